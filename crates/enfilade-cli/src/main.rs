@@ -1,0 +1,2 @@
+//! The enfilade command.
+fn main() {}

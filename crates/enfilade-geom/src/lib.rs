@@ -1,0 +1,24 @@
+//! Geometry that every other crate of enfilade stands on: boxes, planes, windings (convex planar
+//! polygons), the scene as it was read, and the bounding volume hierarchy.
+//!
+//! Conventions, everywhere: right-handed, +Y up, meters; front faces are counter-clockwise;
+//! building computes in `f64`, files hold `f32`.
+
+mod aabb;
+mod plane;
+pub mod scene;
+mod winding;
+
+pub use aabb::Aabb;
+pub use glam::{DMat3, DMat4, DVec2, DVec3};
+pub use plane::Plane;
+pub use winding::Winding;
+
+/// A triangle in world space. [Units: wu]
+pub type Triangle = [DVec3; 3];
+
+/// Normal of a triangle scaled by twice its area.
+#[must_use]
+pub fn triangle_area_normal(t: &Triangle) -> DVec3 {
+    (t[1] - t[0]).cross(t[2] - t[0])
+}
