@@ -5,13 +5,17 @@
 //! building computes in `f64`, files hold `f32`.
 
 mod aabb;
+mod bvh;
 mod plane;
+pub mod ray;
 pub mod scene;
 mod winding;
 
 pub use aabb::Aabb;
+pub use bvh::{Bvh, Nearest};
 pub use glam::{DMat3, DMat4, DVec2, DVec3};
 pub use plane::Plane;
+pub use ray::{Hit, Ray};
 pub use winding::Winding;
 
 /// A triangle in world space. [Units: wu]

@@ -1,0 +1,529 @@
+//! The bounding volume hierarchy: which triangles a ray, a box or a point meets.
+//!
+//! Built top-down by binned surface-area heuristic (Wald, "On fast Construction of SAH-based
+//! Bounding Volume Hierarchies", RT 2007), four children a node. Boxes are `f32`, rounded
+//! outwards, and every box test errs to "may meet"; triangles are `f64` and decide. What a
+//! triangle test alone would answer, the tree answers too: it never loses a hit.
+//!
+//! Same triangles in the same order give the same tree and the same answers.
+
+use std::ops::ControlFlow;
+
+use glam::{Vec3, Vec4};
+
+use crate::ray::{
+    Hit, Ray, ShearedRay, closest_point_on_triangle, segment_to_triangle_distance,
+    triangle_touches_box,
+};
+use crate::{Aabb, DVec3, Triangle};
+
+/// Triangles a leaf may hold; four `f64` triangles cost about as much as one more node.
+const LEAF_SIZE: usize = 4;
+/// Candidate planes an axis is divided by.
+const N_BINS: usize = 16;
+/// Below this depth nodes are split by count, so that hostile input cannot make the tree deep.
+const MAX_SAH_DEPTH: usize = 40;
+/// Enough for [`MAX_SAH_DEPTH`] levels and 16 more that quarter 2³² triangles, three pushes each.
+const STACK_SIZE: usize = 192;
+/// Larger coordinates overflow `f32` products on the way; such triangles are never met.
+const MAX_COORDINATE: f64 = 1e15;
+
+/// Four children: their boxes as `[min, max][axis]`, and what they are.
+#[derive(Clone, Debug)]
+#[repr(align(128))]
+struct Node {
+    bounds: [[Vec4; 3]; 2],
+    /// A node, or the first triangle of a leaf.
+    children: [u32; 4],
+    /// Triangles of a leaf; 0 for a node. Unused children have an empty box.
+    counts: [u32; 4],
+}
+
+const UNUSED: Node = Node {
+    bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]],
+    children: [0; 4],
+    counts: [0; 4],
+};
+
+/// A tree over triangles that answers in about the logarithm of their number.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    /// In leaf order.
+    triangles: Vec<[[f64; 3]; 3]>,
+    /// Index of each in the caller's list.
+    ids: Vec<u32>,
+    bounds: Aabb,
+}
+
+/// What [`Bvh::nearest`] found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// How far. [Units: wu]
+    pub distance: f64,
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Its nearest point.
+    pub point: DVec3,
+}
+
+/// What the builder knows of a triangle.
+struct Entry {
+    bounds: Aabb,
+    center: DVec3,
+    id: u32,
+}
+
+impl Bvh {
+    /// Builds the tree. O(n log n); 128 bytes a node and 76 a triangle.
+    ///
+    /// Triangles with a corner that is not finite or beyond 10¹⁵ are left out: nothing meets them.
+    #[must_use]
+    pub fn build(triangles: &[Triangle]) -> Self {
+        let mut entries: Vec<Entry> = triangles
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| {
+                t.iter().all(|p| p.abs().max_element() <= MAX_COORDINATE && p.is_finite())
+            })
+            .map(|(i, t)| {
+                let bounds = Aabb::of_points(t);
+                Entry { bounds, center: bounds.center(), id: i as u32 }
+            })
+            .collect();
+        let bounds = entries.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
+        let mut nodes = Vec::with_capacity(entries.len() / 2 + 1);
+        build_node(&mut nodes, &mut entries, 0, 0);
+        let ids: Vec<u32> = entries.iter().map(|e| e.id).collect();
+        let triangles = ids.iter().map(|&i| triangles[i as usize].map(|p| p.to_array())).collect();
+        Self { nodes, triangles, ids, bounds }
+    }
+
+    /// The box around all triangles.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Number of triangles that can be met.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Whether there is no triangle to meet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+
+    /// Whether the closed segment from `a` to `b` meets a triangle for which `excluded` is false.
+    #[must_use]
+    pub fn any_hit(&self, a: DVec3, b: DVec3, mut excluded: impl FnMut(u32) -> bool) -> bool {
+        let ray = Ray::segment(a, b);
+        let sheared = ShearedRay::new(&ray);
+        let met = self.walk(&ray, 0.0, |i, t_max| {
+            if sheared.hit(&self.triangles[i], *t_max).is_some() && !excluded(self.ids[i]) {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+        met.is_break()
+    }
+
+    /// The first triangle along the ray for which `excluded` is false.
+    ///
+    /// Of several at the very same `t`, the one with the least index.
+    #[must_use]
+    pub fn closest_hit(&self, ray: &Ray, mut excluded: impl FnMut(u32) -> bool) -> Option<Hit> {
+        let sheared = ShearedRay::new(ray);
+        let mut best: Option<Hit> = None;
+        let _ = self.walk::<()>(ray, 0.0, |i, t_max| {
+            if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
+                let id = self.ids[i];
+                let is_nearer = best.is_none_or(|b| t < b.t || (t == b.t && id < b.triangle));
+                if is_nearer && !excluded(id) {
+                    best = Some(Hit { t, triangle: id, front });
+                    *t_max = t;
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        best
+    }
+
+    /// Calls `visit` with every triangle that the ray meets, in no order that means anything.
+    pub fn for_each_hit(&self, ray: &Ray, mut visit: impl FnMut(Hit)) {
+        let sheared = ShearedRay::new(ray);
+        let _ = self.walk::<()>(ray, 0.0, |i, t_max| {
+            if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
+                visit(Hit { t, triangle: self.ids[i], front });
+            }
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// Calls `visit` with every triangle nearer than `radius` to the closed segment from `a` to `b`
+    /// and its distance, until `visit` breaks; returns whether it did.
+    pub fn for_each_near_segment(
+        &self,
+        a: DVec3,
+        b: DVec3,
+        radius: f64,
+        mut visit: impl FnMut(u32, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        self.for_each_around_segment(a, b, radius, |id, triangle| {
+            // Both ends on one side, farther than the radius: spares most triangles the rest.
+            let n = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+            let (da, db) = (n.dot(a - triangle[0]), n.dot(b - triangle[0]));
+            let nearer = da.abs().min(db.abs());
+            if da * db > 0.0 && nearer > 1.001 * radius * n.length() {
+                return ControlFlow::Continue(());
+            }
+            let distance = segment_to_triangle_distance(a, b, triangle);
+            if distance < radius { visit(id, distance) } else { ControlFlow::Continue(()) }
+        })
+    }
+
+    /// Calls `visit` with every triangle in a leaf whose box, grown by `radius`, the closed segment
+    /// meets: all that are within `radius` (finite), and some that are not. Breaks as `visit` does.
+    pub fn for_each_around_segment(
+        &self,
+        a: DVec3,
+        b: DVec3,
+        radius: f64,
+        mut visit: impl FnMut(u32, &Triangle) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        // Without a length there is no direction; any other will do for a point-like segment.
+        let mut ray = Ray::segment(a, b);
+        if ray.direction == DVec3::ZERO {
+            ray = Ray { origin: a, direction: DVec3::X, t_max: 0.0 };
+        }
+        self.walk(&ray, radius, |i, _| visit(self.ids[i], &self.triangle(i)))
+    }
+
+    /// Calls `visit` with every triangle that touches the closed box, and perhaps with some that
+    /// miss it by rounding.
+    pub fn for_each_in_box(&self, query: &Aabb, mut visit: impl FnMut(u32)) {
+        if self.nodes.is_empty() || query.is_empty() {
+            return;
+        }
+        let (min, max) = (round_down(query.min), round_up(query.max));
+        let mut stack = Stack::new();
+        stack.push(Pending { child: 0, count: 0, near: 0.0 });
+        while let Some(at) = stack.pop() {
+            if at.count > 0 {
+                let first = at.child as usize;
+                for i in first..first + at.count as usize {
+                    if triangle_touches_box(&self.triangle(i), query) {
+                        visit(self.ids[i]);
+                    }
+                }
+                continue;
+            }
+            let node = &self.nodes[at.child as usize];
+            let [low, high] = &node.bounds;
+            let meets = low[0].cmple(Vec4::splat(max.x))
+                & low[1].cmple(Vec4::splat(max.y))
+                & low[2].cmple(Vec4::splat(max.z))
+                & high[0].cmpge(Vec4::splat(min.x))
+                & high[1].cmpge(Vec4::splat(min.y))
+                & high[2].cmpge(Vec4::splat(min.z));
+            let mask = meets.bitmask();
+            for k in (0..4).rev().filter(|k| mask >> k & 1 == 1) {
+                stack.push(Pending { child: node.children[k], count: node.counts[k], near: 0.0 });
+            }
+        }
+    }
+
+    /// The triangle nearest to `p`, if one is within `max_distance` (infinity allowed).
+    ///
+    /// Of several at the very same distance, the one with the least index.
+    #[must_use]
+    pub fn nearest(&self, p: DVec3, max_distance: f64) -> Option<Nearest> {
+        if self.nodes.is_empty() || !p.is_finite() {
+            return None;
+        }
+        let margin = box_margin(&self.bounds, p);
+        let (low_p, high_p) = ((p + margin).as_vec3(), (p - margin).as_vec3());
+        let mut best: Option<Nearest> = None;
+        let mut limit = max_distance * max_distance;
+        let mut stack = Stack::new();
+        stack.push(Pending { child: 0, count: 0, near: 0.0 });
+        while let Some(at) = stack.pop() {
+            if f64::from(at.near) > limit {
+                continue;
+            }
+            if at.count > 0 {
+                let first = at.child as usize;
+                for i in first..first + at.count as usize {
+                    let point = closest_point_on_triangle(p, &self.triangle(i));
+                    let d2 = point.distance_squared(p);
+                    let id = self.ids[i];
+                    if d2 < limit || (d2 == limit && best.is_none_or(|b| id < b.triangle)) {
+                        limit = d2;
+                        best = Some(Nearest { distance: d2.sqrt(), triangle: id, point });
+                    }
+                }
+                continue;
+            }
+            let node = &self.nodes[at.child as usize];
+            let [low, high] = &node.bounds;
+            let mut d2 = Vec4::ZERO;
+            for axis in 0..3 {
+                let below = low[axis] - Vec4::splat(low_p[axis]);
+                let above = Vec4::splat(high_p[axis]) - high[axis];
+                let d = below.max(above).max(Vec4::ZERO);
+                d2 += d * d;
+            }
+            // Five roundings of 2⁻²⁴ at most; 2⁻²⁰ covers them.
+            let near = d2 * (1.0 - 1.0 / 1_048_576.0);
+            let is_used = low[0].cmple(high[0]);
+            stack.push_sorted(node, near, is_used.bitmask());
+        }
+        best
+    }
+
+    fn triangle(&self, i: usize) -> Triangle {
+        self.triangles[i].map(DVec3::from_array)
+    }
+
+    /// Visits the triangles (by place in leaf order) of every leaf whose box, grown by `radius`,
+    /// the ray meets before `t_max`, which `visit` may lower; roughly from near to far.
+    #[inline]
+    fn walk<B>(
+        &self,
+        ray: &Ray,
+        radius: f64,
+        mut visit: impl FnMut(usize, &mut f64) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        let longest = ray.direction.abs().max_element();
+        if self.nodes.is_empty() || !(longest > 0.0 && longest.is_finite()) {
+            return ControlFlow::Continue(());
+        }
+        // Scaled so that the longest component is 1: no `f32` overflows. A component under 1e-12
+        // of it is raised to that, and moves by less than the margin within reach of the boxes.
+        let direction = ray.direction / longest;
+        let direction = direction.abs().max(DVec3::splat(1e-12)).copysign(direction).as_vec3();
+        let inverse = direction.recip();
+        // The factor covers the rounding of a radius that dwarfs the scene.
+        let margin = (box_margin(&self.bounds, ray.origin) + radius) * (1.0 + 1e-6);
+        let from = [(ray.origin + margin).as_vec3(), (ray.origin - margin).as_vec3()];
+        let is_back = [direction.x < 0.0, direction.y < 0.0, direction.z < 0.0].map(usize::from);
+        let inverse4 = [Vec4::splat(inverse.x), Vec4::splat(inverse.y), Vec4::splat(inverse.z)];
+        let near_from = [0, 1, 2].map(|axis| Vec4::splat(from[is_back[axis]][axis]));
+        let far_from = [0, 1, 2].map(|axis| Vec4::splat(from[1 - is_back[axis]][axis]));
+        // Four roundings of 2⁻²⁴ on either side of each comparison; 2⁻²⁰ covers them.
+        const GROW: f32 = 1.0 + 1.0 / 1_048_576.0;
+
+        let mut t_max = ray.t_max;
+        let mut limit = (t_max * longest) as f32 * GROW;
+        let mut stack = Stack::new();
+        stack.push(Pending { child: 0, count: 0, near: 0.0 });
+        while let Some(at) = stack.pop() {
+            if at.near > limit {
+                continue;
+            }
+            if at.count > 0 {
+                let first = at.child as usize;
+                for i in first..first + at.count as usize {
+                    visit(i, &mut t_max)?;
+                }
+                limit = (t_max * longest) as f32 * GROW;
+                continue;
+            }
+            let node = &self.nodes[at.child as usize];
+            let plane = |far: usize, axis: usize| node.bounds[is_back[axis] ^ far][axis];
+            let near = ((plane(0, 0) - near_from[0]) * inverse4[0])
+                .max((plane(0, 1) - near_from[1]) * inverse4[1])
+                .max((plane(0, 2) - near_from[2]) * inverse4[2])
+                .max(Vec4::ZERO);
+            let far = ((plane(1, 0) - far_from[0]) * inverse4[0])
+                .min((plane(1, 1) - far_from[1]) * inverse4[1])
+                .min((plane(1, 2) - far_from[2]) * inverse4[2]);
+            let meets = near.cmple((far * GROW).min(Vec4::splat(limit)));
+            stack.push_sorted(node, near, meets.bitmask());
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// How far the rounding of `p` and of differences with it can move a box plane. [Units: wu]
+fn box_margin(bounds: &Aabb, p: DVec3) -> f64 {
+    let reach = bounds.min.abs().max(bounds.max.abs()).max(p.abs()).max_element();
+    // Two roundings of 2⁻²⁴ of up to twice the reach, doubled.
+    (reach * (1.0 / 2_097_152.0)).max(1e-30)
+}
+
+/// A child still to be visited.
+#[derive(Clone, Copy)]
+struct Pending {
+    child: u32,
+    count: u32,
+    near: f32,
+}
+
+struct Stack {
+    entries: [Pending; STACK_SIZE],
+    len: usize,
+}
+
+impl Stack {
+    fn new() -> Self {
+        Self { entries: [Pending { child: 0, count: 0, near: 0.0 }; STACK_SIZE], len: 0 }
+    }
+
+    #[inline]
+    fn push(&mut self, entry: Pending) {
+        self.entries[self.len] = entry;
+        self.len += 1;
+    }
+
+    #[inline]
+    fn pop(&mut self) -> Option<Pending> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.entries[self.len])
+    }
+
+    /// Pushes the children in `mask`, the nearest last.
+    #[inline]
+    fn push_sorted(&mut self, node: &Node, near: Vec4, mut mask: u32) {
+        let near = near.to_array();
+        let base = self.len;
+        while mask != 0 {
+            let k = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            let entry = Pending { child: node.children[k], count: node.counts[k], near: near[k] };
+            let mut at = self.len;
+            self.len += 1;
+            while at > base && self.entries[at - 1].near < entry.near {
+                self.entries[at] = self.entries[at - 1];
+                at -= 1;
+            }
+            self.entries[at] = entry;
+        }
+    }
+}
+
+fn round_down(p: DVec3) -> Vec3 {
+    Vec3::from_array(p.to_array().map(|x| {
+        let rounded = x as f32;
+        if f64::from(rounded) > x { rounded.next_down() } else { rounded }
+    }))
+}
+
+fn round_up(p: DVec3) -> Vec3 {
+    -round_down(-p)
+}
+
+/// A part of the entries that becomes one child.
+struct Part {
+    first: usize,
+    count: usize,
+    bounds: Aabb,
+}
+
+/// Appends the node over `entries`, which start at `offset` in leaf order, and all below it.
+fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth: usize) {
+    if entries.is_empty() {
+        return;
+    }
+    let by_count = depth >= MAX_SAH_DEPTH;
+    let whole = entries.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
+    let mut parts = vec![Part { first: 0, count: entries.len(), bounds: whole }];
+    while parts.len() < 4 {
+        // The part whose children a ray is likeliest to meet; by count, the largest.
+        let weight = |p: &Part| if by_count { p.count as f64 } else { p.bounds.surface_area() };
+        let Some(widest) = (0..parts.len())
+            .filter(|&i| parts[i].count > LEAF_SIZE)
+            .max_by(|&a, &b| weight(&parts[a]).total_cmp(&weight(&parts[b])).then(b.cmp(&a)))
+        else {
+            break;
+        };
+        let part = &parts[widest];
+        let slice = &mut entries[part.first..part.first + part.count];
+        let left = if by_count { slice.len() / 2 } else { split(slice) };
+        let bounds_of = |s: &[Entry]| s.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
+        let halves = [
+            Part { first: part.first, count: left, bounds: bounds_of(&slice[..left]) },
+            Part {
+                first: part.first + left,
+                count: part.count - left,
+                bounds: bounds_of(&slice[left..]),
+            },
+        ];
+        parts.splice(widest..=widest, halves);
+    }
+    let this = nodes.len();
+    nodes.push(UNUSED);
+    for (k, part) in parts.iter().enumerate() {
+        let (min, max) = (round_down(part.bounds.min), round_up(part.bounds.max));
+        for axis in 0..3 {
+            nodes[this].bounds[0][axis][k] = min[axis];
+            nodes[this].bounds[1][axis][k] = max[axis];
+        }
+        if part.count <= LEAF_SIZE {
+            nodes[this].children[k] = (offset + part.first) as u32;
+            nodes[this].counts[k] = part.count as u32;
+        } else {
+            nodes[this].children[k] = nodes.len() as u32;
+            let slice = &mut entries[part.first..part.first + part.count];
+            build_node(nodes, slice, offset + part.first, depth + 1);
+        }
+    }
+}
+
+/// Reorders `entries` into two parts, neither empty, and returns the size of the first.
+fn split(entries: &mut [Entry]) -> usize {
+    let centers = entries.iter().fold(Aabb::EMPTY, |b, e| b.including(e.center));
+    let size = centers.size();
+    let mut best: Option<(f64, usize, usize)> = None;
+    for axis in 0..3 {
+        if size[axis] <= 0.0 {
+            continue;
+        }
+        let mut bins = [(Aabb::EMPTY, 0_usize); N_BINS];
+        for e in entries.iter() {
+            let bin = &mut bins[bin_of(e.center[axis], centers.min[axis], size[axis])];
+            bin.0 = bin.0.union(e.bounds);
+            bin.1 += 1;
+        }
+        let mut right_cost = [0.0; N_BINS];
+        let mut right = (Aabb::EMPTY, 0);
+        for k in (1..N_BINS).rev() {
+            right = (right.0.union(bins[k].0), right.1 + bins[k].1);
+            right_cost[k] = right.0.surface_area() * right.1 as f64;
+        }
+        let mut left = (Aabb::EMPTY, 0);
+        for k in 1..N_BINS {
+            left = (left.0.union(bins[k - 1].0), left.1 + bins[k - 1].1);
+            if left.1 == 0 || left.1 == entries.len() {
+                continue;
+            }
+            let cost = left.0.surface_area() * left.1 as f64 + right_cost[k];
+            if best.is_none_or(|b| cost < b.0) {
+                best = Some((cost, axis, k));
+            }
+        }
+    }
+    let Some((_, axis, bin)) = best else {
+        // All centers in one place: any halves are as good.
+        return entries.len() / 2;
+    };
+    let mut left = 0;
+    for i in 0..entries.len() {
+        if bin_of(entries[i].center[axis], centers.min[axis], size[axis]) < bin {
+            entries.swap(left, i);
+            left += 1;
+        }
+    }
+    left
+}
+
+fn bin_of(center: f64, min: f64, size: f64) -> usize {
+    // A tiny size can make the quotient infinite or not a number; the cast and `min` tame both.
+    (((center - min) / size * N_BINS as f64) as usize).min(N_BINS - 1)
+}
+
+#[cfg(test)]
+mod tests;

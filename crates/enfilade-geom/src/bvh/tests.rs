@@ -1,0 +1,226 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::ray::hit_triangle;
+
+fn coordinate() -> impl Strategy<Value = f64> {
+    // Whole numbers make shared corners, coplanar triangles and axis-parallel rays common.
+    prop_oneof![(-8..8).prop_map(f64::from), -8.0..8.0]
+}
+
+fn point() -> impl Strategy<Value = DVec3> {
+    [coordinate(), coordinate(), coordinate()].prop_map(DVec3::from_array)
+}
+
+fn soup() -> impl Strategy<Value = Vec<Triangle>> {
+    proptest::collection::vec([point(), point(), point()], 0..60)
+}
+
+/// Exact sign of the volume of `a b c d`, 0 within rounding of the test under way: determinants of
+/// coordinates up to 16 apart are rounded by about 1e-12, and 1e-9 leaves room.
+fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
+    let at = |p: DVec3| robust::Coord3D { x: p.x, y: p.y, z: p.z };
+    let volume = robust::orient3d(at(a), at(b), at(c), at(d));
+    if volume.abs() < 1e-9 { 0 } else { volume.signum() as i32 }
+}
+
+/// Whether the segment meets the triangle, by exact predicates; `None` when too close to say.
+fn oracle(a: DVec3, b: DVec3, t: &Triangle) -> Option<bool> {
+    let ends = [side(t[0], t[1], t[2], a), side(t[0], t[1], t[2], b)];
+    let edges = [side(a, b, t[0], t[1]), side(a, b, t[1], t[2]), side(a, b, t[2], t[0])];
+    if ends[0] * ends[1] > 0 || (edges.contains(&1) && edges.contains(&-1)) {
+        return Some(false);
+    }
+    if ends.contains(&0) || edges.contains(&0) { None } else { Some(true) }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
+
+    #[test]
+    fn hits_are_those_of_exact_predicates(t in [point(), point(), point()], a in point(), b in point()) {
+        let found = hit_triangle(&Ray::segment(a, b), &t);
+        if let Some(expected) = oracle(a, b, &t) {
+            prop_assert_eq!(found.is_some(), expected);
+        }
+        if let Some(hit) = found {
+            // Front is where the volume of triangle and start is negative (robust's orient3d).
+            let start = side(t[0], t[1], t[2], a);
+            prop_assert!(start == 0 || hit.front == (start < 0));
+        }
+    }
+
+    #[test]
+    fn rays_find_what_testing_every_triangle_finds(soup in soup(), a in point(), b in point(), skip in 0..4u32) {
+        prop_assume!(a != b);
+        let bvh = Bvh::build(&soup);
+        for t_max in [1.0, f64::INFINITY] {
+            let ray = Ray { origin: a, direction: b - a, t_max };
+            let mut all: Vec<Hit> = soup.iter().enumerate()
+                .filter_map(|(i, t)| hit_triangle(&ray, t).map(|h| Hit { triangle: i as u32, ..h }))
+                .collect();
+            let mut found = Vec::new();
+            bvh.for_each_hit(&ray, |h| found.push(h));
+            found.sort_by_key(|h| h.triangle);
+            prop_assert_eq!(&found, &all);
+            all.retain(|h| h.triangle % 4 != skip);
+            let first = all.iter().copied()
+                .min_by(|x, y| x.t.total_cmp(&y.t).then(x.triangle.cmp(&y.triangle)));
+            prop_assert_eq!(bvh.closest_hit(&ray, |i| i % 4 == skip), first);
+            if t_max == 1.0 {
+                prop_assert_eq!(bvh.any_hit(a, b, |i| i % 4 == skip), !all.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn far_origins_and_tiny_directions_lose_no_hit(soup in soup(), target in point(), away in 1.0..1e6f64, scale in 1e-30..1e-3f64) {
+        let bvh = Bvh::build(&soup);
+        let direction = DVec3::new(0.3, 1.0, -1e-14);
+        let ray = Ray { origin: target - direction * away, direction: direction * scale, t_max: f64::INFINITY };
+        let expected = soup.iter().filter(|t| hit_triangle(&ray, t).is_some()).count();
+        let mut found = 0;
+        bvh.for_each_hit(&ray, |_| found += 1);
+        prop_assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn the_nearest_triangle_is_nearest_by_fine_sampling(soup in soup(), p in point(), limit in 0.0..6.0f64) {
+        let bvh = Bvh::build(&soup);
+        let all: Vec<f64> = soup.iter().map(|t| closest_point_on_triangle(p, t).distance(p)).collect();
+        let least = all.iter().copied().fold(f64::INFINITY, f64::min);
+        let found = bvh.nearest(p, f64::INFINITY);
+        prop_assert_eq!(found.map_or(f64::INFINITY, |n| n.distance), least);
+        prop_assert_eq!(bvh.nearest(p, limit).is_some(), least <= limit);
+        // Nothing on any triangle is nearer; the answer's point is on its triangle.
+        if let Some(found) = found {
+            for t in &soup {
+                for (i, j) in (0..=8).flat_map(|i| (0..=8 - i).map(move |j| (i, j))) {
+                    let q = t[0] + (t[1] - t[0]) * (f64::from(i) / 8.0) + (t[2] - t[0]) * (f64::from(j) / 8.0);
+                    prop_assert!(q.distance(p) >= found.distance - 1e-12);
+                }
+            }
+            let on = closest_point_on_triangle(found.point, &soup[found.triangle as usize]);
+            prop_assert!(on.distance(found.point) < 1e-7, "slivers lose half the digits");
+        }
+    }
+
+    #[test]
+    fn boxes_find_every_triangle_that_has_a_sample_inside(soup in soup(), a in point(), b in point()) {
+        let query = Aabb::new(a.min(b), a.max(b));
+        let mut found = Vec::new();
+        Bvh::build(&soup).for_each_in_box(&query, |i| found.push(i));
+        found.sort_unstable();
+        for (i, t) in soup.iter().enumerate() {
+            let samples = (0..=12).flat_map(|i| (0..=12 - i).map(move |j| (f64::from(i) / 12.0, f64::from(j) / 12.0)));
+            let has_sample = samples.into_iter().any(|(u, v)| query.contains(t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v));
+            let is_found = found.contains(&(i as u32));
+            prop_assert!(is_found || !has_sample);
+            // And nothing whose clipping by the box leaves it empty by a clear margin.
+            if is_found {
+                let mut w = Some(crate::Winding::new(t.to_vec()));
+                let grown = query.expanded(1e-6);
+                for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                    w = w.filter(|w| w.points.iter().any(|p| (*p - grown.min).dot(axis) >= 0.0));
+                    w = w.and_then(|w| w.clipped(&crate::Plane::through(grown.min, axis), 0.0));
+                    w = w.and_then(|w| w.clipped(&crate::Plane::through(grown.max, -axis), 0.0));
+                }
+                prop_assert!(w.is_some());
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_near_a_segment_are_those_within_the_radius(soup in soup(), a in point(), b in point(), radius in 0.0..2.0f64) {
+        let bvh = Bvh::build(&soup);
+        let mut found = Vec::new();
+        let _ = bvh.for_each_near_segment(a, b, radius, |i, d| {
+            found.push((i, d));
+            ControlFlow::Continue(())
+        });
+        found.sort_by_key(|f| f.0);
+        for (i, t) in soup.iter().enumerate() {
+            // Upper bound by sampling the segment; the distance to a convex body is convex along
+            // a line, so a golden-section search finds its least to about 1e-8.
+            let at = |s: f64| { let p = a.lerp(b, s); closest_point_on_triangle(p, t).distance(p) };
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..60 {
+                let (m1, m2) = (low + (high - low) * 0.382, low + (high - low) * 0.618);
+                if at(m1) <= at(m2) { high = m2 } else { low = m1 }
+            }
+            let least = at(low).min(at(0.0)).min(at(1.0));
+            let hit = found.iter().find(|f| f.0 == i as u32);
+            if least < radius - 1e-5 { prop_assert!(hit.is_some(), "{i} at {least}") }
+            if let Some((_, d)) = hit { prop_assert!((d - least).abs() < 1e-5, "{d} {least}") }
+        }
+    }
+}
+
+/// A closed bumpy sphere whose rows are turned so that corners fall nowhere special.
+fn bumpy_sphere(n: usize) -> Vec<Triangle> {
+    let at = |i: usize, j: usize| {
+        let (theta, phi) = (
+            std::f64::consts::PI * i as f64 / n as f64,
+            std::f64::consts::TAU * ((j % (2 * n)) as f64 + 0.3) / (2 * n) as f64,
+        );
+        let r = 3.0 + 0.2 * (5.0 * phi).sin() * (4.0 * theta).sin();
+        // Corners are shared exactly, poles included.
+        let ring = if i == 0 || i == n { 0.0 } else { theta.sin() };
+        DVec3::new(r * ring * phi.cos(), 3.0 * theta.cos(), r * ring * phi.sin())
+    };
+    let mut out = Vec::new();
+    for i in 0..n {
+        for j in 0..2 * n {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            out.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    out
+}
+
+#[test]
+fn no_ray_leaves_a_closed_surface_between_its_triangles() {
+    let mesh = bumpy_sphere(24);
+    let bvh = Bvh::build(&mesh);
+    let eye = DVec3::new(0.123, -0.456, 0.0789);
+    for t in &mesh {
+        for k in 0..=16 {
+            // Through corners and along edges, where rounding decides.
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                let through = a.lerp(b, f64::from(k) / 16.0);
+                assert!(bvh.any_hit(eye, eye + (through - eye) * 3.0, |_| false));
+            }
+        }
+    }
+}
+
+#[test]
+fn hostile_triangles_neither_panic_nor_hide_the_others() {
+    let good = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    let mut soup = vec![
+        [DVec3::NAN; 3],
+        [DVec3::INFINITY; 3],
+        [DVec3::splat(1e300); 3],
+        [DVec3::ONE; 3],
+        good,
+    ];
+    soup.extend(std::iter::repeat_n([DVec3::ONE, DVec3::ONE, DVec3::X], 1000));
+    // Centers that shrink towards a corner make the heuristic peel one triangle a level.
+    soup.extend((0..2000).map(|i| {
+        let s = 0.5f64.powi(i / 2) * 1e12;
+        [DVec3::splat(s), DVec3::new(s, -s, s), DVec3::new(-s, s, s)]
+    }));
+    let bvh = Bvh::build(&soup);
+    assert_eq!(bvh.len(), soup.len() - 3);
+    let (a, b) = (DVec3::new(0.2, 0.2, 1e-290), DVec3::new(0.2, 0.2, -1.0));
+    assert_eq!(bvh.closest_hit(&Ray::segment(a, b), |_| false).map(|h| h.triangle), Some(4));
+    assert!(!bvh.any_hit(a, DVec3::NAN, |_| false));
+    assert!(bvh.nearest(DVec3::NAN, 1.0).is_none());
+    assert!(bvh.nearest(DVec3::splat(1e200), f64::INFINITY).is_some());
+    let none = Bvh::build(&[]);
+    assert!(
+        none.is_empty()
+            && none.nearest(a, f64::INFINITY).is_none()
+            && !none.any_hit(a, b, |_| false)
+    );
+}
