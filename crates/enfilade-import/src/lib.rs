@@ -1,1 +1,229 @@
-//! enfilade-import
+//! Reads glTF, GLB, OBJ, PLY and STL into one [`Scene`](enfilade_geom::scene::Scene).
+//!
+//! [`import`] takes any number of files and gives one scene, in meters and +Y up, with a role for
+//! each object and a report of everything skipped or repaired. Input is not trusted: each count,
+//! offset and index is checked before use, memory is bounded by [`Limits`], and bad input ends in
+//! an [`ImportError`] that says where and what to do.
+//!
+//! Each object's transform has a determinant of at least 0: a mirrored placement gets a mirrored
+//! mesh, so front faces are counter-clockwise in world space without further thought.
+//!
+//! Not promised: animation, skins, morph targets, cameras, lights, curves, points and lines; they
+//! are left out with a note.
+
+mod builder;
+mod error;
+mod files;
+mod gltf;
+mod options;
+mod report;
+mod roles;
+
+pub use error::ImportError;
+pub use options::{ImportOptions, Limits, Up};
+pub use report::{Example, FileReport, Finding, ImportReport, Note};
+pub use roles::RoleRules;
+
+use builder::Builder;
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Aabb, DVec3};
+use std::path::{Path, PathBuf};
+
+/// A scene and what was noticed while reading it.
+#[derive(Clone, Debug, Default)]
+pub struct Imported {
+    /// What was read.
+    pub scene: Scene,
+    /// What was noticed.
+    pub report: ImportReport,
+}
+
+/// Reads all files into one scene; those of `detail_paths` are detail as a whole.
+///
+/// The format is told by content, or by the name's ending for OBJ. Time and memory grow linearly
+/// with the input.
+///
+/// # Errors
+///
+/// When a file cannot be read, is malformed or unsupported, when a limit is passed, when there is
+/// no triangle, or when the scene's size speaks of a wrong unit.
+pub fn import(
+    paths: &[PathBuf],
+    detail_paths: &[PathBuf],
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
+    let mut builder = Builder::new(options)?;
+    let all = paths
+        .iter()
+        .map(|p| (p, false))
+        .chain(detail_paths.iter().map(|p| (p, true)));
+    for (path, is_detail) in all {
+        let bytes = files::read_file(path, options.limits.max_file_bytes)?;
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        builder.begin_file(path, Some(&folder), is_detail);
+        read_any(&bytes, path, &mut builder)?;
+    }
+    finish(builder, options)
+}
+
+fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    if gltf::is_gltf(bytes) {
+        gltf::read(bytes, builder)
+    } else {
+        Err(ImportError::UnknownFormat {
+            path: path.to_path_buf(),
+        })
+    }
+}
+
+/// Reads a glTF or GLB file from memory; it may refer to no other file.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_gltf(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.glb", options, gltf::read)
+}
+
+fn decode(
+    bytes: &[u8],
+    name: &str,
+    options: &ImportOptions,
+    read: impl Fn(&[u8], &mut Builder<'_>) -> Result<(), ImportError>,
+) -> Result<Imported, ImportError> {
+    let mut builder = Builder::new(options)?;
+    builder.begin_file(Path::new(name), None, false);
+    read(bytes, &mut builder)?;
+    finish(builder, options)
+}
+
+fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, ImportError> {
+    let (scene, report) = builder.finish();
+    if scene.objects.is_empty() {
+        let paths: Vec<String> = report
+            .files
+            .iter()
+            .map(|f| f.path.display().to_string())
+            .collect();
+        let advice = match report.notes.first() {
+            Some(note) => format!("the first thing noticed: {note}"),
+            None => "export the meshes, too".into(),
+        };
+        return Err(ImportError::NoTriangles {
+            paths: paths.join(", "),
+            advice,
+        });
+    }
+    check_extent(&scene, options)?;
+    Ok(Imported { scene, report })
+}
+
+/// Refuses scenes that are far larger or smaller than any building, or far off.
+fn check_extent(scene: &Scene, options: &ImportOptions) -> Result<(), ImportError> {
+    let limits = &options.limits;
+    let boxes: Vec<Aabb> = (0..scene.objects.len())
+        .map(|i| scene.object_aabb(i))
+        .collect();
+    let has_structure = scene.objects.iter().any(|o| o.role == Role::Structural);
+    // A sky dome or a landscape may be as large as it likes, if it is detail.
+    let counted: Vec<usize> = (0..boxes.len())
+        .filter(|&i| !has_structure || scene.objects[i].role == Role::Structural)
+        .collect();
+    let bounds = counted.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i]));
+    let size = bounds.size();
+    let unit = options.unit.unwrap_or(1.0);
+    let error = |bound: String, offender, advice| {
+        Err(ImportError::Extent {
+            size: size.to_array(),
+            bound,
+            offender,
+            advice,
+        })
+    };
+    let longest = size.max_element();
+    if longest.is_nan() || longest > limits.max_extent {
+        let limit = limits.max_extent;
+        let offender = offender(&boxes, &counted, limit).map(|i| scene.objects[i].name.clone());
+        let advice = if offender.is_some() {
+            "remove that object or name it detail; or, if the unit is wrong, ".to_owned()
+        } else {
+            String::new()
+        };
+        let factor = if longest * 0.01 > limit { 0.001 } else { 0.01 };
+        let factor = if longest * 0.001 > 1.0 { 0.001 } else { factor };
+        let advice = format!(
+            "{advice}give the unit of its numbers, e.g. --unit {}",
+            significant(unit * factor)
+        );
+        return error(format!("larger than {limit} m"), offender, advice);
+    }
+    if longest < limits.min_extent {
+        let factor = if longest * 100.0 >= 2.0 {
+            100.0
+        } else {
+            1000.0
+        };
+        let advice = format!(
+            "give the unit of its numbers, e.g. --unit {}",
+            significant(unit * factor)
+        );
+        return error(
+            format!("smaller than {} m", limits.min_extent),
+            None,
+            advice,
+        );
+    }
+    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
+    if reach > limits.max_coordinate {
+        let center = bounds.center().round();
+        let advice = format!(
+            "move the scene to its origin, e.g. --origin {},{},{}",
+            center.x, center.y, center.z
+        );
+        return error(
+            format!(
+                "and {reach:.0} m off its origin, where 32-bit numbers are too coarse \
+                 (the limit is {} m)",
+                limits.max_coordinate
+            ),
+            None,
+            advice,
+        );
+    }
+    let all = boxes.iter().fold(Aabb::EMPTY, |b, &o| b.union(o));
+    let most = DVec3::splat(f32::MAX.into());
+    if !(all.max.cmple(most).all() && all.min.cmpge(-most).all()) {
+        return error(
+            "and a detail object lies beyond what 32-bit numbers hold".into(),
+            None,
+            "remove it".into(),
+        );
+    }
+    Ok(())
+}
+
+/// Six digits are enough to type, and hide the dust of binary fractions.
+fn significant(x: f64) -> f64 {
+    format!("{x:.6e}").parse().unwrap_or(x)
+}
+
+/// The one object without which the rest would fit, if there is one.
+fn offender(boxes: &[Aabb], counted: &[usize], limit: f64) -> Option<usize> {
+    let n = counted.len();
+    if n < 2 {
+        return None;
+    }
+    let mut after = vec![Aabb::EMPTY; n + 1];
+    for k in (0..n).rev() {
+        after[k] = after[k + 1].union(boxes[counted[k]]);
+    }
+    let mut before = Aabb::EMPTY;
+    for k in 0..n {
+        let rest = before.union(after[k + 1]);
+        if rest.size().max_element() <= limit {
+            return Some(counted[k]);
+        }
+        before = before.union(boxes[counted[k]]);
+    }
+    None
+}

@@ -1,0 +1,436 @@
+//! Fills one [`Scene`] from several files: merging, limits, mirrored placements, roles.
+
+use crate::roles::{Facts, Verdict};
+use crate::{ImportError, ImportOptions, ImportReport, Limits};
+use enfilade_geom::scene::{Image, Material, Mesh, Object, Primitive, Role, Scene, Texture};
+use enfilade_geom::{DMat4, DVec3};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// The scene under construction and the file that is being read.
+pub(crate) struct Builder<'a> {
+    pub(crate) options: &'a ImportOptions,
+    pub(crate) report: ImportReport,
+    /// The file being read.
+    pub(crate) path: PathBuf,
+    /// Where its relative references start; `None` when read from memory.
+    pub(crate) folder: Option<PathBuf>,
+    pub(crate) base: DMat4,
+    scene: Scene,
+    is_detail_file: bool,
+    n_triangles: u64,
+    n_placements: u64,
+    n_vertices: u64,
+    n_image_bytes: u64,
+    /// Meshes made from other meshes: which, mirrored or not, which primitives.
+    variants: HashMap<(u32, bool, Part), u32>,
+}
+
+/// Which primitives of a mesh.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Part {
+    All,
+    Opaque,
+    SeeThrough,
+}
+
+/// A mesh to be placed.
+pub(crate) struct Placement<'n> {
+    pub(crate) mesh: u32,
+    /// Names to judge the role by: the node's own, its mesh's.
+    pub(crate) names: [&'n str; 2],
+    /// Names of the nodes above, nearest first.
+    pub(crate) ancestors: &'n [&'n str],
+    /// One object each.
+    pub(crate) transforms: &'n [DMat4],
+    /// Why it moves, if it does.
+    pub(crate) moves: Option<&'static str>,
+    pub(crate) place: &'n str,
+}
+
+impl<'a> Builder<'a> {
+    pub(crate) fn new(options: &'a ImportOptions) -> Result<Self, ImportError> {
+        Ok(Self {
+            base: options.base_transform()?,
+            options,
+            report: ImportReport::default(),
+            path: PathBuf::new(),
+            folder: None,
+            scene: Scene::default(),
+            is_detail_file: false,
+            n_triangles: 0,
+            n_placements: 0,
+            n_vertices: 0,
+            n_image_bytes: 0,
+            variants: HashMap::new(),
+        })
+    }
+
+    /// Starts a file.
+    pub(crate) fn begin_file(&mut self, path: &Path, folder: Option<&Path>, is_detail: bool) {
+        self.path = path.to_path_buf();
+        self.folder = folder.map(Path::to_path_buf);
+        self.is_detail_file = is_detail;
+        self.report.files.push(crate::FileReport {
+            path: path.to_path_buf(),
+            ..Default::default()
+        });
+    }
+
+    pub(crate) fn set_format(&mut self, format: &'static str) {
+        if let Some(file) = self.report.files.last_mut() {
+            file.format = format;
+        }
+    }
+
+    pub(crate) fn malformed(
+        &self,
+        place: impl Into<String>,
+        problem: impl Into<String>,
+    ) -> ImportError {
+        ImportError::malformed(&self.path, place, problem)
+    }
+
+    pub(crate) fn note(&mut self, place: impl Into<String>, text: impl Into<String>) {
+        let path = std::mem::take(&mut self.path);
+        self.report.note(&path, place, text);
+        self.path = path;
+    }
+
+    pub(crate) fn limits(&self) -> &'a Limits {
+        &self.options.limits
+    }
+
+    fn too_much(&self, place: &str, what: &'static str, n: u64, limit: u64) -> ImportError {
+        ImportError::TooMuch {
+            path: self.path.clone(),
+            place: place.into(),
+            what,
+            n,
+            limit,
+        }
+    }
+
+    /// Counts vertices before they are allocated.
+    pub(crate) fn charge_vertices(&mut self, place: &str, n: u64) -> Result<(), ImportError> {
+        self.n_vertices = self.n_vertices.saturating_add(n);
+        let limit = self.limits().max_vertices;
+        if self.n_vertices > limit {
+            return Err(self.too_much(place, "vertices", self.n_vertices, limit));
+        }
+        Ok(())
+    }
+
+    /// Checks a number of triangles before they are allocated; placing them counts them.
+    pub(crate) fn check_triangles(&self, place: &str, n: u64) -> Result<(), ImportError> {
+        let limit = self.limits().max_triangles;
+        if n > limit {
+            return Err(self.too_much(place, "triangles", n, limit));
+        }
+        Ok(())
+    }
+
+    /// Counts picture bytes before they are kept.
+    pub(crate) fn charge_image(&mut self, place: &str, n: u64) -> Result<(), ImportError> {
+        self.n_image_bytes = self.n_image_bytes.saturating_add(n);
+        let limit = self.limits().max_image_bytes;
+        if self.n_image_bytes > limit {
+            return Err(self.too_much(place, "picture bytes", self.n_image_bytes, limit));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn n_textures(&self) -> u32 {
+        self.scene.textures.len() as u32
+    }
+
+    pub(crate) fn material(&self, index: u32) -> Option<&Material> {
+        self.scene.materials.get(index as usize)
+    }
+
+    pub(crate) fn push_material(&mut self, material: Material) -> u32 {
+        self.scene.materials.push(material);
+        self.scene.materials.len() as u32 - 1
+    }
+
+    pub(crate) fn push_texture(&mut self, texture: Texture) -> u32 {
+        self.scene.textures.push(texture);
+        self.scene.textures.len() as u32 - 1
+    }
+
+    pub(crate) fn push_image(&mut self, image: Image) -> u32 {
+        self.scene.images.push(image);
+        self.scene.images.len() as u32 - 1
+    }
+
+    pub(crate) fn image_mime(&self, index: u32) -> &str {
+        self.scene
+            .images
+            .get(index as usize)
+            .map_or("", |image| &image.mime)
+    }
+
+    pub(crate) fn push_mesh(&mut self, mesh: Mesh) -> u32 {
+        self.scene.meshes.push(mesh);
+        self.scene.meshes.len() as u32 - 1
+    }
+
+    /// Drops triangles at vertices that are no finite numbers, and those vertices.
+    ///
+    /// A NaN would make every box that it enters meaningless.
+    pub(crate) fn drop_nonfinite(&mut self, place: &str, primitive: &mut Primitive) {
+        let is_good = |p: &[f32; 3]| p.iter().all(|c| c.is_finite());
+        if primitive.positions.iter().all(is_good) {
+            return;
+        }
+        let mut remap = vec![u32::MAX; primitive.positions.len()];
+        let mut kept = Vec::new();
+        for (i, p) in primitive.positions.iter().enumerate() {
+            if is_good(p) {
+                remap[i] = kept.len() as u32;
+                kept.push(i);
+            } else {
+                let shown = p.map(|c| if c.is_finite() { c.into() } else { 0.0 });
+                self.report
+                    .nonfinite_vertices
+                    .add(DVec3::from_array(shown), || format!("{place} vertex {i}"));
+            }
+        }
+        let n_before = primitive.indices.len() / 3;
+        primitive.indices = primitive
+            .indices
+            .chunks_exact(3)
+            .map(|t| [0, 1, 2].map(|k| remap[t[k] as usize]))
+            .filter(|t| !t.contains(&u32::MAX))
+            .flatten()
+            .collect();
+        let n_dropped = n_before - primitive.indices.len() / 3;
+        self.report.n_nonfinite_triangles += n_dropped as u64;
+        fn pick<T: Copy>(values: &mut Vec<T>, kept: &[usize]) {
+            if !values.is_empty() {
+                *values = kept.iter().map(|&i| values[i]).collect();
+            }
+        }
+        pick(&mut primitive.positions, &kept);
+        pick(&mut primitive.normals, &kept);
+        pick(&mut primitive.tangents, &kept);
+        pick(&mut primitive.colors, &kept);
+        for set in &mut primitive.uvs {
+            pick(set, &kept);
+        }
+        self.note(
+            place,
+            "coordinates that are no finite numbers; those triangles are dropped",
+        );
+    }
+
+    /// Places a mesh: judges its role, splits it where only a part can be seen through, and
+    /// keeps the placement's determinant positive.
+    ///
+    /// A mirroring placement turns front faces into back faces. So the mesh itself is mirrored
+    /// (`x` negated and the winding turned round, once for all its mirrored placements) and the
+    /// placement mirrored back: each corner stays exactly where it was, and no reader of the
+    /// scene has to think of the determinant's sign.
+    pub(crate) fn place(&mut self, placement: &Placement<'_>) -> Result<(), ImportError> {
+        // Counted first, so that placements that are then left out cost bounded time, too.
+        self.n_placements = self
+            .n_placements
+            .saturating_add(placement.transforms.len() as u64);
+        let limit = self.limits().max_objects;
+        if self.n_placements > limit {
+            return Err(self.too_much(placement.place, "objects", self.n_placements, limit));
+        }
+        let mesh = &self.scene.meshes[placement.mesh as usize];
+        let n_triangles: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
+        if n_triangles == 0 {
+            self.note(placement.place, "an object without triangles; left out");
+            return Ok(());
+        }
+        let is_clear: Vec<bool> = mesh
+            .primitives
+            .iter()
+            .filter(|p| !p.indices.is_empty())
+            .map(|p| self.is_see_through(p))
+            .collect();
+        let is_mixed = is_clear.contains(&true) && is_clear.contains(&false);
+        let all_clear = is_clear.iter().all(|&c| c);
+        let materials: Vec<&str> = mesh
+            .primitives
+            .iter()
+            .filter(|p| !p.indices.is_empty())
+            .map(|p| {
+                p.material
+                    .and_then(|m| self.material(m))
+                    .map_or("", |m| &m.name)
+            })
+            .collect();
+        let verdict = self.options.roles.judge(&Facts {
+            names: placement.names,
+            ancestors: placement.ancestors,
+            materials: &materials,
+            is_see_through: all_clear,
+            moves: placement.moves,
+            is_detail_file: self.is_detail_file,
+        });
+        let (role, reason) = match verdict {
+            Verdict::Ignore(reason) => {
+                self.note(placement.place, format!("left out: {reason}"));
+                return Ok(());
+            }
+            Verdict::Keep(role, reason) => (role, reason),
+        };
+        let limits = self.limits();
+        let n_placed = placement.transforms.len() as u64;
+        let n_placed_triangles = n_placed.saturating_mul(n_triangles as u64);
+        self.n_triangles = self.n_triangles.saturating_add(n_placed_triangles);
+        if self.n_triangles > limits.max_triangles {
+            let (n, limit) = (self.n_triangles, limits.max_triangles);
+            return Err(self.too_much(placement.place, "triangles", n, limit));
+        }
+        let name = placement
+            .names
+            .into_iter()
+            .find(|n| !n.is_empty())
+            .unwrap_or("");
+        let parts: &[(Part, Role, &str)] = if is_mixed && role == Role::Structural {
+            &[
+                (Part::Opaque, role, ""),
+                (Part::SeeThrough, Role::Detail, "see-through part of: "),
+            ]
+        } else {
+            &[(Part::All, role, "")]
+        };
+        for &transform in placement.transforms {
+            if !transform.is_finite() {
+                return Err(self.malformed(
+                    placement.place,
+                    "its transform overflows; look for a huge scale on it or above it",
+                ));
+            }
+            let determinant = transform.determinant();
+            if determinant == 0.0 {
+                self.note(placement.place, "a transform that flattens the object");
+            }
+            let is_mirrored = determinant < 0.0;
+            let transform = if is_mirrored {
+                transform * DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0))
+            } else {
+                transform
+            };
+            for &(part, role, why) in parts {
+                let mesh = self.variant(placement, is_mirrored, part)?;
+                self.scene.objects.push(Object {
+                    name: name.to_owned(),
+                    mesh,
+                    transform,
+                    role,
+                    reason: format!("{why}{reason}"),
+                });
+            }
+        }
+        let n_objects = self.scene.objects.len() as u64;
+        if n_objects > limits.max_objects {
+            return Err(self.too_much(placement.place, "objects", n_objects, limits.max_objects));
+        }
+        if let Some(file) = self.report.files.last_mut() {
+            file.n_objects += n_placed * parts.len() as u64;
+            file.n_triangles += n_placed_triangles;
+        }
+        Ok(())
+    }
+
+    fn is_see_through(&self, primitive: &Primitive) -> bool {
+        primitive
+            .material
+            .and_then(|m| self.material(m))
+            .is_some_and(|m| m.transparent || self.options.roles.is_clear_material(&m.name))
+    }
+
+    /// The mesh, mirrored and reduced to a part as asked; made once.
+    fn variant(
+        &mut self,
+        placement: &Placement<'_>,
+        is_mirrored: bool,
+        part: Part,
+    ) -> Result<u32, ImportError> {
+        let source = placement.mesh;
+        if !is_mirrored && part == Part::All {
+            return Ok(source);
+        }
+        if let Some(&mesh) = self.variants.get(&(source, is_mirrored, part)) {
+            return Ok(mesh);
+        }
+        let original = &self.scene.meshes[source as usize];
+        let is_kept = |p: &&Primitive| match part {
+            Part::All => true,
+            Part::Opaque => !self.is_see_through(p),
+            Part::SeeThrough => self.is_see_through(p),
+        };
+        let n_vertices: u64 = original
+            .primitives
+            .iter()
+            .filter(is_kept)
+            .map(|p| p.positions.len() as u64)
+            .sum();
+        let mut mesh = Mesh {
+            name: original.name.clone(),
+            primitives: original
+                .primitives
+                .iter()
+                .filter(is_kept)
+                .cloned()
+                .collect(),
+        };
+        self.charge_vertices(placement.place, n_vertices)?;
+        if is_mirrored {
+            mesh.primitives.iter_mut().for_each(mirror);
+            self.note(
+                placement.place,
+                "mirrored placement; its mesh is mirrored and its winding turned round",
+            );
+        }
+        if part == Part::SeeThrough {
+            self.note(
+                placement.place,
+                "an object of opaque and see-through parts; split in two",
+            );
+        }
+        let made = self.push_mesh(mesh);
+        self.variants.insert((source, is_mirrored, part), made);
+        Ok(made)
+    }
+
+    /// Ends the import: drops meshes that nothing places.
+    pub(crate) fn finish(mut self) -> (Scene, ImportReport) {
+        let mut remap = vec![u32::MAX; self.scene.meshes.len()];
+        let mut kept = Vec::new();
+        for object in &mut self.scene.objects {
+            let slot = &mut remap[object.mesh as usize];
+            if *slot == u32::MAX {
+                *slot = kept.len() as u32;
+                kept.push(std::mem::take(&mut self.scene.meshes[object.mesh as usize]));
+            }
+            object.mesh = *slot;
+        }
+        self.scene.meshes = kept;
+        (self.scene, self.report)
+    }
+}
+
+/// Mirrors at the plane `x = 0` and turns the winding round. Exact.
+fn mirror(primitive: &mut Primitive) {
+    for p in &mut primitive.positions {
+        p[0] = -p[0];
+    }
+    for n in &mut primitive.normals {
+        n[0] = -n[0];
+    }
+    for t in &mut primitive.tangents {
+        // The bitangent is `cross(normal, tangent) * w`; a mirror turns the cross product round.
+        t[0] = -t[0];
+        t[3] = -t[3];
+    }
+    for t in primitive.indices.chunks_exact_mut(3) {
+        t.swap(1, 2);
+    }
+}

@@ -1,0 +1,109 @@
+//! What can go wrong on the way in, with the place and the way out.
+
+use std::path::{Path, PathBuf};
+
+/// Why an import stopped. Every text says what was found, where, and what to change.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// A file could not be read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is of no format that is read here.
+    #[error(
+        "{path}: not a glTF, GLB, OBJ, PLY or STL file; convert it to GLB (Blender and most modelers export it)",
+        path = path.display()
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file breaks its format.
+    #[error("{path}: {place}: {problem}", path = path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Element, index or line.
+        place: String,
+        /// What is wrong and what to change.
+        problem: String,
+    },
+    /// The file is sound but uses something that is not read here.
+    #[error("{path}: {feature} is not supported; {advice}", path = path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it uses.
+        feature: String,
+        /// What to do instead.
+        advice: String,
+    },
+    /// A limit of [`crate::Limits`] would be passed.
+    #[error(
+        "{path}: {place}: {n} {what}, more than the limit of {limit}; split the input or raise the limit",
+        path = path.display()
+    )]
+    TooMuch {
+        /// The file.
+        path: PathBuf,
+        /// Element, index or line.
+        place: String,
+        /// What there is too much of.
+        what: &'static str,
+        /// How much there is.
+        n: u64,
+        /// How much is allowed.
+        limit: u64,
+    },
+    /// No triangle was found in any file.
+    #[error("no triangles in {paths}; {advice}")]
+    NoTriangles {
+        /// The files, comma separated.
+        paths: String,
+        /// What to look at.
+        advice: String,
+    },
+    /// The scene is far larger or smaller than a building: the unit is probably wrong.
+    #[error(
+        "the scene is {x:.4} x {y:.4} x {z:.4} m, {bound}{offender}; {advice}",
+        x = size[0], y = size[1], z = size[2],
+        offender = offender.as_ref().map(|name| format!(", because object '{name}' sticks out")).unwrap_or_default()
+    )]
+    Extent {
+        /// Edge lengths of the scene's box. [Units: wu]
+        size: [f64; 3],
+        /// The limit that it breaks, as text.
+        bound: String,
+        /// The one object without which the scene would fit.
+        offender: Option<String>,
+        /// What to do.
+        advice: String,
+    },
+    /// An option makes no sense.
+    #[error("{option}: {problem}")]
+    BadOption {
+        /// The option.
+        option: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl ImportError {
+    pub(crate) fn malformed(
+        path: &Path,
+        place: impl Into<String>,
+        problem: impl Into<String>,
+    ) -> Self {
+        Self::Malformed {
+            path: path.to_path_buf(),
+            place: place.into(),
+            problem: problem.into(),
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Materials, textures, samplers and pictures, carried over as they are.
+
+use super::accessor::Document;
+use super::data_error;
+use super::json::TextureDef;
+use crate::builder::Builder;
+use crate::{ImportError, files};
+use enfilade_geom::scene::{Image, Material, Texture};
+use serde_json::Value;
+
+/// Extensions of a texture that name a picture in a newer format.
+const TEXTURE_EXTENSIONS: [&str; 4] = [
+    "EXT_texture_webp",
+    "EXT_texture_avif",
+    "KHR_texture_basisu",
+    "MSFT_texture_dds",
+];
+
+/// Reads materials with their textures; gives scene materials by document material.
+pub(super) fn read_materials(
+    document: &Document<'_>,
+    builder: &mut Builder<'_>,
+) -> Result<Vec<u32>, ImportError> {
+    let root = &document.root;
+    let mut images: Vec<Option<Option<u32>>> = vec![None; root.images.len()];
+    let first_texture = builder.n_textures();
+    let mut is_opaque_picture = Vec::new();
+    for (i, def) in root.textures.iter().enumerate() {
+        let place = format!("texture {i}");
+        let sampler = match def.sampler {
+            None => String::new(),
+            Some(s) => match root.samplers.get(s as usize) {
+                Some(sampler) => sampler.to_string(),
+                None => return Err(builder.malformed(place, format!("no sampler {s}"))),
+            },
+        };
+        let image = match source_of(def) {
+            None => None,
+            Some(source) => match images.get(source as usize) {
+                None => return Err(builder.malformed(place, format!("no image {source}"))),
+                Some(Some(image)) => *image,
+                Some(None) => {
+                    let image = read_image(document, source, builder)?;
+                    images[source as usize] = Some(image);
+                    image
+                }
+            },
+        };
+        // JPEG has no alpha channel.
+        is_opaque_picture.push(image.is_some_and(|i| builder.image_mime(i) == "image/jpeg"));
+        builder.push_texture(Texture { image, sampler });
+    }
+    let mut materials = Vec::new();
+    for (i, value) in root.materials.iter().enumerate() {
+        let mut value = value.clone();
+        let Value::Object(fields) = &mut value else {
+            return Err(builder.malformed(format!("material {i}"), "is no object"));
+        };
+        remap_textures(fields, first_texture, root.textures.len() as u64)
+            .map_err(|problem| builder.malformed(format!("material {i}"), problem))?;
+        let pbr = &value["pbrMetallicRoughness"];
+        let mut base_color = [1.0; 4];
+        if let Some(factor) = pbr["baseColorFactor"].as_array() {
+            for (c, v) in base_color.iter_mut().zip(factor) {
+                *c = v.as_f64().unwrap_or(1.0) as f32;
+            }
+        }
+        let may_have_holes = pbr["baseColorTexture"]["index"].as_u64().is_some_and(|t| {
+            let t = (t as usize).wrapping_sub(first_texture as usize);
+            !is_opaque_picture.get(t).copied().unwrap_or(false)
+        });
+        let cutoff = value["alphaCutoff"].as_f64().unwrap_or(0.5) as f32;
+        let extensions = &value["extensions"];
+        let transmission = [
+            "KHR_materials_transmission",
+            "KHR_materials_diffuse_transmission",
+        ]
+        .iter()
+        .zip(["transmissionFactor", "diffuseTransmissionFactor"])
+        .any(|(name, key)| extensions[*name][key].as_f64().is_some_and(|f| f > 0.0));
+        let transparent = transmission
+            || match value["alphaMode"].as_str() {
+                Some("BLEND") => true,
+                Some("MASK") => may_have_holes || base_color[3] < cutoff,
+                _ => false,
+            };
+        materials.push(builder.push_material(Material {
+            name: value["name"].as_str().unwrap_or("").to_owned(),
+            double_sided: value["doubleSided"].as_bool().unwrap_or(false),
+            transparent,
+            base_color,
+            gltf: value.to_string(),
+        }));
+    }
+    Ok(materials)
+}
+
+/// The picture of a texture; the plain one if it has both.
+fn source_of(def: &TextureDef) -> Option<u32> {
+    let extended = || {
+        let extensions = def.extensions.as_ref()?;
+        let source = TEXTURE_EXTENSIONS
+            .iter()
+            .find_map(|name| extensions.get(*name))?;
+        u32::try_from(source["source"].as_u64()?).ok()
+    };
+    def.source.or_else(extended)
+}
+
+/// Adds `first` to the index of every texture reference: an object under a key that ends in
+/// `Texture`, anywhere in the material but its `extras`.
+fn remap_textures(
+    fields: &mut serde_json::Map<String, Value>,
+    first: u32,
+    n: u64,
+) -> Result<(), String> {
+    for (key, value) in fields {
+        if key == "extras" {
+            continue;
+        }
+        // serde_json bounds the nesting of what it reads, and so this recursion.
+        if let Value::Object(inner) = value {
+            if key.ends_with("Texture")
+                && let Some(index) = inner.get("index").and_then(Value::as_u64)
+            {
+                if index >= n {
+                    return Err(format!("{key}: no texture {index}"));
+                }
+                inner.insert("index".into(), (index + u64::from(first)).into());
+            }
+            remap_textures(inner, first, n)?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads a picture's bytes; `None`, with a note, where a file cannot be had.
+fn read_image(
+    document: &Document<'_>,
+    index: u32,
+    builder: &mut Builder<'_>,
+) -> Result<Option<u32>, ImportError> {
+    let def = &document.root.images[index as usize];
+    let name = def.name.clone().unwrap_or_default();
+    let place = format!("image {index} '{name}'");
+    let mut mime = def.mime_type.clone().unwrap_or_default();
+    let bytes = if let Some(view) = def.buffer_view {
+        let (bytes, _) = document
+            .view(view)
+            .map_err(|problem| data_error(builder, &place, &problem))?;
+        bytes.to_vec()
+    } else if let Some(uri) = &def.uri {
+        match files::decode_data_uri(uri) {
+            Some(Ok((data_mime, bytes))) => {
+                if mime.is_empty() {
+                    mime = data_mime;
+                }
+                bytes
+            }
+            Some(Err(problem)) => return Err(builder.malformed(place, problem)),
+            None => match read_picture_file(uri, builder) {
+                Ok(bytes) => bytes,
+                Err(problem) => {
+                    builder.note(place, format!("{problem}; the texture stays empty"));
+                    return Ok(None);
+                }
+            },
+        }
+    } else {
+        builder.note(place, "a picture without bytes; the texture stays empty");
+        return Ok(None);
+    };
+    builder.charge_image(&place, bytes.len() as u64)?;
+    match files::sniff_image(&bytes) {
+        Some(found) => mime = found.to_owned(),
+        None => builder.note(place, "a picture of no known format; carried over as it is"),
+    }
+    Ok(Some(builder.push_image(Image { name, mime, bytes })))
+}
+
+/// Reads a picture beside the scene, if it is one.
+pub(crate) fn read_picture_file(uri: &str, builder: &Builder<'_>) -> Result<Vec<u8>, String> {
+    let path = files::resolve(builder.folder.as_deref(), uri)?;
+    let limit = builder.limits().max_image_bytes;
+    let bytes = files::read_file(&path, limit).map_err(|e| e.to_string())?;
+    // A scene may not carry any file of the reader's disk into its output, only pictures.
+    match files::sniff_image(&bytes) {
+        Some(_) => Ok(bytes),
+        None => Err(format!(
+            "{} is no picture of a known format",
+            path.display()
+        )),
+    }
+}

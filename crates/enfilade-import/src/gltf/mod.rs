@@ -1,0 +1,497 @@
+//! glTF 2.0 and GLB (Khronos, *glTF 2.0 Specification*, version 2.0.1), read from untrusted bytes.
+//!
+//! Kept: triangles (strips and fans made lists), normals, tangents, texture coordinates, the first
+//! color set, materials with all their extensions, textures, samplers, pictures. Node transforms
+//! are flattened; a mesh placed several times stays one mesh. Everything else is noted.
+
+mod accessor;
+mod json;
+mod look;
+mod primitive;
+
+use crate::builder::{Builder, Placement};
+use crate::{ImportError, files};
+use accessor::{Document, MESHOPT};
+use enfilade_geom::scene::Mesh;
+use enfilade_geom::{DMat4, DVec3};
+use json::{Node, Root};
+use std::borrow::Cow;
+
+/// Required extensions that are read, or that change nothing that is read.
+const KNOWN_EXTENSIONS: [&str; 12] = [
+    "EXT_mesh_gpu_instancing",
+    "EXT_texture_avif",
+    "EXT_texture_webp",
+    "ENFILADE_cell_portal_graph",
+    "KHR_animation_pointer",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
+];
+
+/// Nodes above an object whose names count for its role; also ends the walk up a cycle that lies
+/// above the scene's own roots.
+const MAX_NAMED_ANCESTORS: usize = 32;
+
+const GLB_MAGIC: &[u8] = b"glTF";
+const CHUNK_JSON: u32 = u32::from_le_bytes(*b"JSON");
+const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
+
+/// Whether the bytes look like GLB or a glTF document.
+pub(crate) fn is_gltf(bytes: &[u8]) -> bool {
+    bytes.starts_with(GLB_MAGIC)
+        || bytes
+            .iter()
+            .find(|b| !b.is_ascii_whitespace() && !matches!(b, 0xEF | 0xBB | 0xBF))
+            == Some(&b'{')
+}
+
+/// Reads one file into the builder.
+pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    builder.set_format("glTF");
+    let (json, bin) = split_container(bytes, builder)?;
+    let limit = builder.limits().max_json_bytes;
+    if json.len() as u64 > limit {
+        return Err(ImportError::TooMuch {
+            path: builder.path.clone(),
+            place: "JSON".into(),
+            what: "bytes",
+            n: json.len() as u64,
+            limit,
+        });
+    }
+    let root: Root = serde_json::from_slice(json)
+        .map_err(|e| builder.malformed("JSON", format!("{e}; is the file whole?")))?;
+    check_version(&root, builder)?;
+    let buffers = read_buffers(&root, bin, builder)?;
+    let document = Document { root, buffers };
+    let materials = look::read_materials(&document, builder)?;
+    Reader {
+        meshes: vec![None; document.root.meshes.len()],
+        document: &document,
+        materials,
+        builder,
+    }
+    .read_scene()
+}
+
+/// JSON and binary chunk of a GLB; the whole of a `.gltf`.
+fn split_container<'b>(
+    bytes: &'b [u8],
+    builder: &mut Builder<'_>,
+) -> Result<(&'b [u8], Option<&'b [u8]>), ImportError> {
+    if !bytes.starts_with(GLB_MAGIC) {
+        return Ok((bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), None));
+    }
+    let word = |at: usize| {
+        bytes
+            .get(at..at + 4)
+            .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    };
+    let cut = |place: &str| ImportError::malformed(&builder.path, place, "the file is cut off");
+    let version = word(4).ok_or_else(|| cut("GLB header"))?;
+    if version != 2 {
+        return Err(unsupported_version(builder, &version.to_string()));
+    }
+    let length = word(8).ok_or_else(|| cut("GLB header"))? as usize;
+    if length > bytes.len() {
+        return Err(builder.malformed(
+            "GLB header",
+            format!(
+                "the file is cut off: it should have {length} bytes and has {}",
+                bytes.len()
+            ),
+        ));
+    }
+    if length < bytes.len() {
+        builder.note("GLB header", "bytes after the end of the GLB; left out");
+    }
+    let mut json = None;
+    let mut bin = None;
+    let mut at = 12;
+    while at < length {
+        let place = format!("GLB chunk at byte {at}");
+        let cut = || ImportError::malformed(&builder.path, &place, "the chunk is cut off");
+        let n = word(at).ok_or_else(cut)? as usize;
+        let kind = word(at + 4).ok_or_else(cut)?;
+        let body = bytes[..length].get(at + 8..at + 8 + n).ok_or_else(cut)?;
+        match kind {
+            CHUNK_JSON if json.is_none() => json = Some(body),
+            CHUNK_BIN if bin.is_none() => bin = Some(body),
+            _ => {}
+        }
+        at += 8 + n;
+    }
+    match json {
+        Some(json) => Ok((json, bin)),
+        None => Err(builder.malformed("GLB", "no JSON chunk")),
+    }
+}
+
+fn unsupported_version(builder: &Builder<'_>, version: &str) -> ImportError {
+    ImportError::Unsupported {
+        path: builder.path.clone(),
+        feature: format!("glTF version {version}"),
+        advice: "export it as glTF 2.0 (`npx gltf-pipeline -i IN -o OUT.glb` upgrades)".into(),
+    }
+}
+
+fn unsupported_extension(builder: &Builder<'_>, name: &str) -> ImportError {
+    let advice = if name.contains("draco") || name.contains("meshopt") {
+        "decompress it first: `npx @gltf-transform/cli copy IN.glb OUT.glb`, \
+         or export without compression"
+    } else {
+        "export without it"
+    };
+    ImportError::Unsupported {
+        path: builder.path.clone(),
+        feature: format!("the required extension {name}"),
+        advice: advice.into(),
+    }
+}
+
+fn check_version(root: &Root, builder: &Builder<'_>) -> Result<(), ImportError> {
+    if !root.asset.version.starts_with("2.") {
+        return Err(unsupported_version(builder, &root.asset.version));
+    }
+    for name in root.extensions_required.iter() {
+        let is_known =
+            KNOWN_EXTENSIONS.contains(&name.as_str()) || name.starts_with("KHR_materials_");
+        if !is_known {
+            return Err(unsupported_extension(builder, name));
+        }
+    }
+    Ok(())
+}
+
+fn read_buffers<'b>(
+    root: &Root,
+    bin: Option<&'b [u8]>,
+    builder: &Builder<'_>,
+) -> Result<Vec<Option<Cow<'b, [u8]>>>, ImportError> {
+    let mut buffers = Vec::new();
+    let mut budget = builder.limits().max_file_bytes;
+    for (i, def) in root.buffers.iter().enumerate() {
+        let place = format!("buffer {i}");
+        let bytes = match &def.uri {
+            None if i == 0 => bin.map(Cow::Borrowed),
+            None => None,
+            Some(uri) => Some(Cow::Owned(match files::decode_data_uri(uri) {
+                Some(Ok((_, bytes))) => bytes,
+                Some(Err(problem)) => return Err(builder.malformed(place, problem)),
+                None => {
+                    let path = files::resolve(builder.folder.as_deref(), uri)
+                        .map_err(|problem| builder.malformed(&place, problem))?;
+                    let bytes = files::read_file(&path, budget)?;
+                    budget -= bytes.len() as u64;
+                    bytes
+                }
+            })),
+        };
+        if let Some(bytes) = &bytes
+            && (bytes.len() as u64) < def.byte_length
+        {
+            return Err(builder.malformed(
+                place,
+                format!("has {} bytes of {}", bytes.len(), def.byte_length),
+            ));
+        }
+        buffers.push(bytes);
+    }
+    Ok(buffers)
+}
+
+struct Reader<'r, 'a, 'b> {
+    document: &'r Document<'b>,
+    /// Scene materials by document material.
+    materials: Vec<u32>,
+    /// Scene meshes by document mesh, as far as used.
+    meshes: Vec<Option<u32>>,
+    builder: &'r mut Builder<'a>,
+}
+
+/// A node on the way down.
+struct Visit {
+    node: u32,
+    parent: DMat4,
+    depth: u32,
+    moves: Option<&'static str>,
+}
+
+impl Reader<'_, '_, '_> {
+    fn read_scene(mut self) -> Result<(), ImportError> {
+        let root = &self.document.root;
+        let n = root.nodes.len();
+        let mut parents = vec![u32::MAX; n];
+        for (i, node) in root.nodes.iter().enumerate() {
+            for &child in node.children.iter() {
+                let place = || format!("node {i}");
+                match parents.get_mut(child as usize) {
+                    None => {
+                        return Err(self
+                            .builder
+                            .malformed(place(), format!("no child node {child}")));
+                    }
+                    Some(parent) if *parent != u32::MAX => {
+                        return Err(self.builder.malformed(
+                            place(),
+                            format!("child node {child} has another parent, node {parent}"),
+                        ));
+                    }
+                    Some(parent) => *parent = i as u32,
+                }
+            }
+        }
+        let starts: Vec<usize> = if root.scenes.is_empty() {
+            (0..n).filter(|&i| parents[i] == u32::MAX).collect()
+        } else {
+            let index = root.scene.unwrap_or(0);
+            let Some(scene) = root.scenes.get(index) else {
+                return Err(self.builder.malformed("scene", format!("no scene {index}")));
+            };
+            if root.scenes.len() > 1 {
+                self.builder.note(
+                    format!("scene {index}"),
+                    "several scenes; only the default one is read",
+                );
+            }
+            scene.nodes.to_vec()
+        };
+        let animated = self.animated_nodes();
+        let mut is_visited = vec![false; n];
+        let mut stack: Vec<Visit> = Vec::new();
+        for &start in starts.iter().rev() {
+            if start >= n {
+                return Err(self.builder.malformed("scene", format!("no node {start}")));
+            }
+            stack.push(Visit {
+                node: start as u32,
+                parent: self.builder.base,
+                depth: 1,
+                moves: None,
+            });
+        }
+        while let Some(visit) = stack.pop() {
+            let i = visit.node as usize;
+            let place = || format!("node {i}");
+            // With one parent a node, a second visit means a cycle or a root listed twice.
+            if std::mem::replace(&mut is_visited[i], true) {
+                return Err(self
+                    .builder
+                    .malformed(place(), "is reached twice: the node tree has a cycle"));
+            }
+            if visit.depth > self.builder.limits().max_node_depth {
+                return Err(ImportError::TooMuch {
+                    path: self.builder.path.clone(),
+                    place: place(),
+                    what: "levels of nodes",
+                    n: visit.depth.into(),
+                    limit: self.builder.limits().max_node_depth.into(),
+                });
+            }
+            let node = &root.nodes[i];
+            let name = node.name.as_deref().unwrap_or("");
+            let is_hidden = node
+                .extensions
+                .as_ref()
+                .and_then(|e| e.visibility.as_ref())
+                .is_some_and(|v| v.visible == Some(false));
+            let dropped = if is_hidden {
+                Some("hidden by KHR_node_visibility".to_owned())
+            } else {
+                crate::roles::drops_subtree(name)
+            };
+            if let Some(reason) = dropped {
+                self.builder.note(
+                    format!("node {i} '{name}'"),
+                    format!("left out with all below it: {reason}"),
+                );
+                continue;
+            }
+            let local = local_transform(node)
+                .map_err(|problem| self.builder.malformed(place(), problem))?;
+            let world = visit.parent * local;
+            let moves = visit
+                .moves
+                .or(if animated[i] { Some("animated") } else { None });
+            if let Some(mesh) = node.mesh {
+                self.place_node(i, mesh, world, moves, &parents)?;
+            }
+            for &child in node.children.iter().rev() {
+                stack.push(Visit {
+                    node: child,
+                    parent: world,
+                    depth: visit.depth + 1,
+                    moves,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Which nodes an animation moves.
+    fn animated_nodes(&self) -> Vec<bool> {
+        let mut animated = vec![false; self.document.root.nodes.len()];
+        for channel in self
+            .document
+            .root
+            .animations
+            .iter()
+            .flat_map(|a| a.channels.iter())
+        {
+            let target = &channel.target;
+            let is_move = matches!(target.path.as_str(), "translation" | "rotation" | "scale");
+            if let Some(slot) = target.node.and_then(|n| animated.get_mut(n as usize))
+                && is_move
+            {
+                *slot = true;
+            }
+        }
+        animated
+    }
+
+    fn place_node(
+        &mut self,
+        i: usize,
+        mesh: u32,
+        world: DMat4,
+        moves: Option<&'static str>,
+        parents: &[u32],
+    ) -> Result<(), ImportError> {
+        let document = self.document;
+        let root = &document.root;
+        let node = &root.nodes[i];
+        let name = node.name.as_deref().unwrap_or("");
+        let place = format!("node {i} '{name}'");
+        let Some(slot) = self.meshes.get(mesh as usize) else {
+            return Err(self.builder.malformed(place, format!("no mesh {mesh}")));
+        };
+        let scene_mesh = match *slot {
+            Some(made) => made,
+            None => {
+                let made = self.read_mesh(mesh)?;
+                self.meshes[mesh as usize] = Some(made);
+                made
+            }
+        };
+        let mut ancestors = Vec::new();
+        let mut at = parents[i];
+        while at != u32::MAX && ancestors.len() < MAX_NAMED_ANCESTORS {
+            ancestors.push(root.nodes[at as usize].name.as_deref().unwrap_or(""));
+            at = parents[at as usize];
+        }
+        let moves = if node.skin.is_some() {
+            self.builder.note(
+                place.clone(),
+                "a skinned mesh; taken in its unposed shape, as detail",
+            );
+            Some("skinned")
+        } else {
+            moves
+        };
+        let instancing = node.extensions.as_ref().and_then(|e| e.instancing.as_ref());
+        let instances = match instancing {
+            None => vec![DMat4::IDENTITY],
+            Some(instancing) => {
+                let limit = self.builder.limits().max_objects;
+                primitive::read_instances(document, instancing, limit)
+                    .map_err(|problem| self.builder.malformed(&place, problem))?
+            }
+        };
+        let mesh_name = root.meshes[mesh as usize].name.as_deref().unwrap_or("");
+        let transforms: Vec<DMat4> = instances.into_iter().map(|m| world * m).collect();
+        self.builder.place(&Placement {
+            mesh: scene_mesh,
+            names: [name, mesh_name],
+            ancestors: &ancestors,
+            transforms: &transforms,
+            moves,
+            place: &place,
+        })
+    }
+
+    fn read_mesh(&mut self, index: u32) -> Result<u32, ImportError> {
+        let def = &self.document.root.meshes[index as usize];
+        let mut mesh = Mesh {
+            name: def.name.clone().unwrap_or_default(),
+            primitives: Vec::new(),
+        };
+        for (k, primitive) in def.primitives.iter().enumerate() {
+            let place = format!("mesh {index} '{}' primitive {k}", mesh.name);
+            let read = primitive::read_primitive(
+                self.document,
+                primitive,
+                &self.materials,
+                &place,
+                self.builder,
+            )?;
+            mesh.primitives.extend(read);
+        }
+        Ok(self.builder.push_mesh(mesh))
+    }
+}
+
+/// Turns a text of [`Document`] into the fitting error.
+fn data_error(builder: &Builder<'_>, place: &str, problem: &str) -> ImportError {
+    if problem.ends_with(MESHOPT) {
+        unsupported_extension(builder, "EXT_meshopt_compression")
+    } else {
+        builder.malformed(place, problem)
+    }
+}
+
+fn local_transform(node: &Node) -> Result<DMat4, String> {
+    if let Some(matrix) = &node.matrix {
+        let matrix = DMat4::from_cols_array(matrix);
+        let last_row = matrix.row(3);
+        if last_row.truncate() != DVec3::ZERO || last_row.w != 1.0 {
+            return Err("its matrix is not affine: the last row must be 0 0 0 1".into());
+        }
+        return Ok(matrix);
+    }
+    let translation = node
+        .translation
+        .as_ref()
+        .map_or(DVec3::ZERO, |t| DVec3::from_array(**t));
+    let scale = node
+        .scale
+        .as_ref()
+        .map_or(DVec3::ONE, |s| DVec3::from_array(**s));
+    let rotation = node.rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |r| **r);
+    Ok(compose(translation, rotation, scale))
+}
+
+/// Translation times rotation (quaternion `x y z w`, normalized here) times scale.
+fn compose(translation: DVec3, q: [f64; 4], scale: DVec3) -> DMat4 {
+    let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let [x, y, z, w] = if length > 0.0 {
+        q.map(|c| c / length)
+    } else {
+        [0.0, 0.0, 0.0, 1.0]
+    };
+    let right = DVec3::new(
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y + w * z),
+        2.0 * (x * z - w * y),
+    );
+    let up = DVec3::new(
+        2.0 * (x * y - w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z + w * x),
+    );
+    let back = DVec3::new(
+        2.0 * (x * z + w * y),
+        2.0 * (y * z - w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    );
+    DMat4::from_cols(
+        (right * scale.x).extend(0.0),
+        (up * scale.y).extend(0.0),
+        (back * scale.z).extend(0.0),
+        translation.extend(1.0),
+    )
+}

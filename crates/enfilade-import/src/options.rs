@@ -1,0 +1,127 @@
+//! What the caller can choose.
+
+use crate::ImportError;
+use crate::roles::RoleRules;
+use enfilade_geom::{DMat4, DVec3};
+
+/// The input's up axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Up {
+    /// +Y, as in glTF.
+    Y,
+    /// +Z, as in most CAD and survey data; `(x, y, z)` becomes `(x, z, -y)`.
+    Z,
+}
+
+/// How to read.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOptions {
+    /// Meters per input unit; `None` is 1. [Limit: > 0, finite]
+    pub unit: Option<f64>,
+    /// The input's up axis; `None` is [`Up::Y`] for every format.
+    pub up: Option<Up>,
+    /// Point of the scaled, Y-up scene that becomes the origin. [Units: wu]
+    ///
+    /// Maps and surveys sit millions of meters from their origin, where the `f32` that files hold
+    /// is no longer exact to a millimeter.
+    pub origin: DVec3,
+    /// What to refuse.
+    pub limits: Limits,
+    /// What is structural and what is detail.
+    pub roles: RoleRules,
+}
+
+/// What to refuse, so that hostile input ends in an error in bounded memory and time.
+///
+/// All limits but `max_file_bytes` and `max_json_bytes` count over all files of one import.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest file. [Units: bytes]
+    pub max_file_bytes: u64,
+    /// Largest JSON part of a glTF file. [Units: bytes]
+    pub max_json_bytes: u64,
+    /// Most triangles, counted once per placement.
+    pub max_triangles: u64,
+    /// Most vertices, counted once per mesh.
+    pub max_vertices: u64,
+    /// Most placed meshes.
+    pub max_objects: u64,
+    /// Most bytes of encoded pictures.
+    pub max_image_bytes: u64,
+    /// Deepest node below a scene.
+    pub max_node_depth: u32,
+    /// Largest edge of the structural objects' box. [Units: wu]
+    pub max_extent: f64,
+    /// Smallest allowed longest edge of the scene's box. [Units: wu]
+    pub min_extent: f64,
+    /// Largest coordinate of the structural objects' box. [Units: wu]
+    ///
+    /// At 100 km, `f32` coordinates are 8 mm apart; past that, walls tear.
+    pub max_coordinate: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            max_file_bytes: 4 << 30,
+            max_json_bytes: 256 << 20,
+            max_triangles: 100_000_000,
+            max_vertices: 100_000_000,
+            max_objects: 2_000_000,
+            max_image_bytes: 4 << 30,
+            max_node_depth: 1024,
+            max_extent: 2000.0,
+            min_extent: 0.1,
+            max_coordinate: 100_000.0,
+        }
+    }
+}
+
+impl Limits {
+    /// Limits small enough to fuzz with: nothing above some megabytes is ever held.
+    #[must_use]
+    pub fn tiny() -> Self {
+        Self {
+            max_file_bytes: 1 << 20,
+            max_json_bytes: 1 << 20,
+            max_triangles: 100_000,
+            max_vertices: 100_000,
+            max_objects: 10_000,
+            max_image_bytes: 1 << 20,
+            max_node_depth: 64,
+            ..Self::default()
+        }
+    }
+}
+
+impl ImportOptions {
+    /// Input space to world space.
+    pub(crate) fn base_transform(&self) -> Result<DMat4, ImportError> {
+        let unit = self.unit.unwrap_or(1.0);
+        if !(unit.is_finite() && (1e-9..=1e9).contains(&unit)) {
+            return Err(ImportError::BadOption {
+                option: "unit",
+                problem: format!(
+                    "{unit} is not a length in meters; give e.g. 0.001 for millimeters"
+                ),
+            });
+        }
+        if !self.origin.is_finite() {
+            return Err(ImportError::BadOption {
+                option: "origin",
+                problem: format!("{} is not a point", self.origin),
+            });
+        }
+        let axes = match self.up.unwrap_or(Up::Y) {
+            Up::Y => DMat4::IDENTITY,
+            Up::Z => DMat4::from_cols_array_2d(&[
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 0.0, -1.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 0.0, 1.0],
+            ]),
+        };
+        // A product with an identity would turn 0 into -0 here and there; keep plain input plain.
+        Ok(DMat4::from_translation(-self.origin) * DMat4::from_scale(DVec3::splat(unit)) * axes)
+    }
+}

@@ -1,0 +1,140 @@
+//! What the importer noticed and did. Nothing is changed without a line here.
+
+use enfilade_geom::DVec3;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Distinct notes kept; past it, new ones are only counted.
+const MAX_NOTES: usize = 500;
+
+/// Example positions kept per finding.
+pub(crate) const MAX_EXAMPLES: usize = 5;
+
+/// What the importer noticed and did.
+#[derive(Clone, Debug, Default)]
+pub struct ImportReport {
+    /// One entry a file, in the order given.
+    pub files: Vec<FileReport>,
+    /// What was skipped, assumed or repaired, equal texts of one file merged.
+    pub notes: Vec<Note>,
+    /// Notes left out because there were too many distinct ones.
+    pub n_notes_dropped: u64,
+    /// Vertices with a coordinate that is no finite number; their triangles are dropped.
+    pub nonfinite_vertices: Finding,
+    /// Triangles dropped for the vertices above.
+    pub n_nonfinite_triangles: u64,
+    /// Polygons with more than three corners, one of them more than 1 mm off their plane.
+    pub non_planar_polygons: Finding,
+    /// Polygons split into triangles.
+    pub n_polygons: u64,
+}
+
+/// One input file.
+#[derive(Clone, Debug, Default)]
+pub struct FileReport {
+    /// The file.
+    pub path: PathBuf,
+    /// `glTF`, `OBJ`, `PLY` or `STL`.
+    pub format: &'static str,
+    /// Objects it gave.
+    pub n_objects: u64,
+    /// Triangles of these objects.
+    pub n_triangles: u64,
+}
+
+/// One thing noticed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// The file.
+    pub path: PathBuf,
+    /// Where it was first noticed.
+    pub place: String,
+    /// What was noticed and what was done.
+    pub text: String,
+    /// How often.
+    pub n: u64,
+}
+
+/// A count with a few places to look at.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Finding {
+    /// How many.
+    pub n: u64,
+    /// The first few, at most five.
+    pub examples: Vec<Example>,
+}
+
+/// One place in the scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Example {
+    /// The object or element.
+    pub name: String,
+    /// Where; in world space unless the finding says otherwise. [Units: wu]
+    pub position: DVec3,
+}
+
+impl Finding {
+    pub(crate) fn add(&mut self, position: DVec3, name: impl FnOnce() -> String) {
+        self.n += 1;
+        if self.examples.len() < MAX_EXAMPLES {
+            self.examples.push(Example {
+                name: name(),
+                position,
+            });
+        }
+    }
+}
+
+impl ImportReport {
+    pub(crate) fn note(&mut self, path: &Path, place: impl Into<String>, text: impl Into<String>) {
+        let text = text.into();
+        if let Some(note) = self
+            .notes
+            .iter_mut()
+            .find(|note| note.text == text && note.path == path)
+        {
+            note.n += 1;
+        } else if self.notes.len() < MAX_NOTES {
+            self.notes.push(Note {
+                path: path.to_path_buf(),
+                place: place.into(),
+                text,
+                n: 1,
+            });
+        } else {
+            self.n_notes_dropped += 1;
+        }
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}: {}", self.path.display(), self.place, self.text)?;
+        if self.n > 1 {
+            write!(f, " ({} times)", self.n)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for ImportReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for file in &self.files {
+            writeln!(
+                f,
+                "{}: {}, {} objects, {} triangles",
+                file.path.display(),
+                file.format,
+                file.n_objects,
+                file.n_triangles
+            )?;
+        }
+        for note in &self.notes {
+            writeln!(f, "{note}")?;
+        }
+        if self.n_notes_dropped > 0 {
+            writeln!(f, "... and {} more notes", self.n_notes_dropped)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,513 @@
+//! What is structural and what is detail, by file, name and material.
+//!
+//! A wrong "detail" opens a hole in a wall, a wrong "structural" makes a chair a wall; both cost
+//! quality, neither correctness. Only see-through surfaces *must* be detail: a cell seen through
+//! glass may not be called hidden. The first rule that fits decides; `docs/import.md` lists them.
+
+use enfilade_geom::scene::Role;
+
+/// The user's own rules, before all others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RoleRules {
+    /// Globs (`*`, `?`, case-insensitive) of object, mesh or material names that are structural;
+    /// these win over `detail`. A material counts if all of an object's materials fit.
+    pub structural: Vec<String>,
+    /// Globs of object, mesh or material names that are detail.
+    pub detail: Vec<String>,
+    /// Judge by the user's rules and detail files only; see-through surfaces stay detail.
+    pub is_manual: bool,
+}
+
+/// What is known of an object.
+pub(crate) struct Facts<'n> {
+    /// Node's and mesh's name.
+    pub(crate) names: [&'n str; 2],
+    /// Names above, nearest first.
+    pub(crate) ancestors: &'n [&'n str],
+    /// Name of each primitive's material.
+    pub(crate) materials: &'n [&'n str],
+    /// All of it lets light through.
+    pub(crate) is_see_through: bool,
+    /// Why it moves.
+    pub(crate) moves: Option<&'static str>,
+    pub(crate) is_detail_file: bool,
+}
+
+/// What becomes of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    Keep(Role, String),
+    /// Not to be seen: a helper of some engine.
+    Ignore(String),
+}
+
+/// What a name's ending means, after Godot's "Node type customization using name suffixes".
+enum Suffix {
+    /// Helper geometry that is never drawn.
+    Helper,
+    /// Moves on its own.
+    Moves,
+    /// Blocks sight, says its author.
+    Occluder,
+    /// Says nothing about the role.
+    Neutral,
+}
+
+/// Longer endings first where one is the end of another.
+const SUFFIXES: [(&str, Suffix); 15] = [
+    ("noimp", Suffix::Helper),
+    ("convcolonly", Suffix::Helper),
+    ("colonly", Suffix::Helper),
+    ("navmesh", Suffix::Helper),
+    ("occonly", Suffix::Helper),
+    ("convcol", Suffix::Neutral),
+    ("col", Suffix::Neutral),
+    ("occ", Suffix::Occluder),
+    ("rigidonly", Suffix::Helper),
+    ("rigid", Suffix::Moves),
+    ("vehicle", Suffix::Moves),
+    ("wheel", Suffix::Moves),
+    ("loop", Suffix::Neutral),
+    ("cycle", Suffix::Neutral),
+    ("alpha", Suffix::Neutral),
+];
+
+/// Collision hulls as Unreal Engine's importer names them.
+const HULL_PREFIXES: [&str; 4] = ["UCX_", "UBX_", "USP_", "UCP_"];
+
+/// IFC classes of things that stand in rooms, or that fill openings.
+#[rustfmt::skip]
+const IFC_DETAIL: [&str; 21] = [
+    "IfcAnnotation", "IfcDistribution", "IfcDoor", "IfcElectric",
+    "IfcEnergyConversionDevice", "IfcFlow", "IfcFurnishingElement", "IfcFurniture",
+    "IfcGeographicElement", "IfcGrid", "IfcLamp", "IfcLightFixture", "IfcRailing",
+    "IfcSanitaryTerminal", "IfcShadingDevice", "IfcSite", "IfcSystemFurnitureElement",
+    "IfcTransportElement", "IfcOutlet", "IfcWindow", "IfcSwitchingDevice",
+];
+
+/// IFC classes that are no matter at all.
+const IFC_VOID: [&str; 4] = [
+    "IfcOpeningElement",
+    "IfcOpeningStandardCase",
+    "IfcSpace",
+    "IfcVirtualElement",
+];
+
+/// Words for what bounds rooms.
+#[rustfmt::skip]
+const STRUCTURAL_WORDS: [&str; 18] = [
+    "wall", "floor", "ceiling", "roof", "slab", "column", "pillar", "beam", "foundation",
+    "facade", "partition", "building", "house", "stair", "staircase", "stairs", "ground",
+    "corridor",
+];
+
+/// Words for what fills an opening. Any structural word beside them wins: kits call a wall with
+/// a hole in it `wall_door`.
+const OPENING_WORDS: [&str; 8] = [
+    "door", "window", "gate", "shutter", "glass", "glazing", "pane", "leaf",
+];
+
+/// Words for what stands in rooms.
+#[rustfmt::skip]
+const DETAIL_WORDS: [&str; 106] = [
+    "appliance", "armchair", "banister", "barrel", "basin", "basket", "bathtub", "bed", "bench",
+    "blanket", "blind", "book", "bookcase", "bookshelf", "bookshelves", "bottle", "bowl", "box",
+    "bush", "cabinet", "candle", "carpet", "cart", "chair", "chandelier", "clock", "closet",
+    "clutter", "computer", "cooker", "couch", "crate", "cup", "cupboard", "curtain", "cushion",
+    "decal", "deco", "decoration", "desk", "dishwasher", "drawer", "dresser", "faucet", "flower",
+    "foliage", "fridge", "furnishing", "furniture", "grass", "handrail", "hedge", "instrument",
+    "keyboard", "lamp", "laptop", "light", "locker", "mattress", "microwave", "mirror", "monitor",
+    "mug", "nightstand", "ottoman", "oven", "painting", "person", "picture", "pillow", "plant",
+    "plate", "poster", "pot", "printer", "prop", "radiator", "railing", "refrigerator", "rug",
+    "seat", "shelf", "shelves", "shower", "shrub", "sideboard", "sink", "sofa", "stool", "stove",
+    "table", "tap", "television", "toilet", "towel", "toy", "trash", "tree", "tv", "vase",
+    "vegetation", "wardrobe", "washbasin", "washer", "whiteboard", "wreath",
+];
+
+/// Words of a material's name for what light passes, or what is full of holes.
+const CLEAR_MATERIAL_WORDS: [&str; 8] = [
+    "glass",
+    "glazing",
+    "foliage",
+    "leaves",
+    "curtain",
+    "windowpane",
+    "plexiglass",
+    "grille",
+];
+
+/// Why a node is dropped with all below it, if its name says so.
+pub(crate) fn drops_subtree(name: &str) -> Option<String> {
+    if ifc_class(name).is_some() {
+        return None;
+    }
+    matches!(suffix(name), Some(("noimp", _))).then(|| "name ends in -noimp".to_owned())
+}
+
+impl RoleRules {
+    /// Whether a material of this name lets light through, whatever its settings say.
+    pub(crate) fn is_clear_material(&self, name: &str) -> bool {
+        !self.is_manual
+            && words(name)
+                .iter()
+                .any(|w| has_word(&CLEAR_MATERIAL_WORDS, w))
+    }
+
+    /// The object's role; the first rule that fits decides.
+    pub(crate) fn judge(&self, facts: &Facts<'_>) -> Verdict {
+        let structural = |reason: String| Verdict::Keep(Role::Structural, reason);
+        let detail = |reason: String| Verdict::Keep(Role::Detail, reason);
+        if let Some(glob) = matching(&self.structural, facts) {
+            return structural(format!("rule: structural '{glob}'"));
+        }
+        if let Some(glob) = matching(&self.detail, facts) {
+            return detail(format!("rule: detail '{glob}'"));
+        }
+        if facts.is_detail_file {
+            return detail("from a detail file".into());
+        }
+        if facts.is_see_through {
+            return detail("material: see-through".into());
+        }
+        if self.is_manual {
+            return structural("default".into());
+        }
+        if let Some(verdict) = facts.names.iter().find_map(|name| judge_ifc(name)) {
+            return verdict;
+        }
+        if let Some(verdict) = facts.names.iter().find_map(|name| judge_suffix(name)) {
+            return verdict;
+        }
+        if let Some(why) = facts.moves {
+            return detail(format!("moves: {why}"));
+        }
+        for name in facts.names {
+            match judge_words(name) {
+                Some((Role::Structural, word)) => return structural(format!("name: '{word}'")),
+                Some((Role::Detail, word)) => return detail(format!("name: '{word}'")),
+                None => {}
+            }
+        }
+        for name in facts.ancestors {
+            if let Some(word) = group_word(name) {
+                return detail(format!("below '{name}': '{word}'"));
+            }
+        }
+        structural("default".into())
+    }
+}
+
+fn judge_ifc(name: &str) -> Option<Verdict> {
+    let class = ifc_class(name)?;
+    let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
+    Some(if starts(&IFC_VOID) {
+        Verdict::Ignore(format!("{class} is no matter"))
+    } else if starts(&IFC_DETAIL) {
+        Verdict::Keep(Role::Detail, format!("IFC class {class}"))
+    } else {
+        Verdict::Keep(Role::Structural, format!("IFC class {class}"))
+    })
+}
+
+/// `IfcWall` of `IfcWall/0aBc$`: asked before endings are looked at, as an IFC id may end in
+/// anything.
+fn ifc_class(name: &str) -> Option<&str> {
+    let n = name.bytes().take_while(u8::is_ascii_alphabetic).count();
+    let class = &name[..n];
+    let tail = class.strip_prefix("Ifc")?;
+    tail.starts_with(|c: char| c.is_ascii_uppercase())
+        .then_some(class)
+}
+
+fn judge_suffix(name: &str) -> Option<Verdict> {
+    if let Some(prefix) = HULL_PREFIXES.iter().find(|p| name.starts_with(**p)) {
+        return Some(Verdict::Ignore(format!(
+            "name starts with {prefix}: a collision hull"
+        )));
+    }
+    match suffix(name)? {
+        (ending, Suffix::Helper) => Some(Verdict::Ignore(format!("name ends in -{ending}"))),
+        (ending, Suffix::Moves) => Some(Verdict::Keep(
+            Role::Detail,
+            format!("moves: name ends in -{ending}"),
+        )),
+        (ending, Suffix::Occluder) => Some(Verdict::Keep(
+            Role::Structural,
+            format!("name ends in -{ending}"),
+        )),
+        (_, Suffix::Neutral) => None,
+    }
+}
+
+/// The ending of a name, behind `-`, `$` or `_` and before the `.001` that modelers append.
+fn suffix(name: &str) -> Option<(&'static str, &'static Suffix)> {
+    let name = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.' || c == ' ');
+    let at = name.rfind(['-', '$', '_'])?;
+    let ending = &name[at + 1..];
+    SUFFIXES
+        .iter()
+        .find(|(word, _)| ending.eq_ignore_ascii_case(word))
+        .map(|(word, meaning)| (*word, meaning))
+}
+
+/// Furniture against structure: the last word of either kind is what the thing is (a floor lamp
+/// is a lamp, the plant room's wall a wall).
+fn judge_words(name: &str) -> Option<(Role, String)> {
+    let words = words(name);
+    let mut opening = None;
+    let mut found = None;
+    for word in words {
+        if has_word(&STRUCTURAL_WORDS, &word) {
+            found = Some((Role::Structural, word));
+        } else if has_word(&DETAIL_WORDS, &word) {
+            found = Some((Role::Detail, word));
+        } else if has_word(&OPENING_WORDS, &word) {
+            opening = Some((Role::Detail, word));
+        }
+    }
+    found.or(opening)
+}
+
+/// A group's name counts only if every word of it says detail: `Furniture`, not
+/// `House with furniture`.
+fn group_word(name: &str) -> Option<String> {
+    let words = words(name);
+    let all = words
+        .iter()
+        .all(|w| has_word(&DETAIL_WORDS, w) || has_word(&OPENING_WORDS, w));
+    if all { words.into_iter().next() } else { None }
+}
+
+fn has_word(list: &[&str], word: &str) -> bool {
+    list.contains(&word)
+        || word
+            .strip_suffix('s')
+            .is_some_and(|one| list.contains(&one))
+        || word
+            .strip_suffix("es")
+            .is_some_and(|one| list.contains(&one))
+}
+
+/// Lower-case words: cut at what is no letter, and where a small letter meets a capital.
+fn words(name: &str) -> Vec<String> {
+    let mut words = Vec::new();
+    let mut word = String::new();
+    let mut was_lower = false;
+    for c in name.chars() {
+        let is_cut = !c.is_alphabetic() || (was_lower && c.is_uppercase());
+        if is_cut && !word.is_empty() {
+            words.push(std::mem::take(&mut word));
+        }
+        was_lower = c.is_lowercase();
+        if c.is_alphabetic() {
+            word.extend(c.to_lowercase());
+        }
+    }
+    if !word.is_empty() {
+        words.push(word);
+    }
+    words
+}
+
+/// The first glob that fits the object's names, its groups' names or all of its materials.
+fn matching<'g>(globs: &'g [String], facts: &Facts<'_>) -> Option<&'g str> {
+    globs.iter().map(String::as_str).find(|glob| {
+        facts
+            .names
+            .iter()
+            .chain(facts.ancestors)
+            .any(|n| !n.is_empty() && is_match(glob, n))
+            || !facts.materials.is_empty()
+                && facts
+                    .materials
+                    .iter()
+                    .all(|m| !m.is_empty() && is_match(glob, m))
+    })
+}
+
+/// Whether the glob fits the whole text, letters of either case. Time: product of the lengths.
+pub(crate) fn is_match(glob: &str, text: &str) -> bool {
+    let fold = |s: &str| s.chars().flat_map(char::to_lowercase).collect::<Vec<_>>();
+    let (glob, text) = (fold(glob), fold(text));
+    let (mut g, mut t) = (0, 0);
+    let mut back: Option<(usize, usize)> = None;
+    while t < text.len() {
+        match glob.get(g) {
+            Some('*') => {
+                back = Some((g + 1, t));
+                g += 1;
+            }
+            Some(&c) if c == '?' || c == text[t] => {
+                g += 1;
+                t += 1;
+            }
+            _ => match back {
+                None => return false,
+                Some((after, from)) => {
+                    g = after;
+                    t = from + 1;
+                    back = Some((after, t));
+                }
+            },
+        }
+    }
+    glob[g..].iter().all(|&c| c == '*')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judge(name: &str) -> Verdict {
+        judge_with(&RoleRules::default(), name, |_| {})
+    }
+
+    fn judge_with(rules: &RoleRules, name: &str, change: impl Fn(&mut Facts<'_>)) -> Verdict {
+        let mut facts = Facts {
+            names: [name, ""],
+            ancestors: &[],
+            materials: &["Plaster"],
+            is_see_through: false,
+            moves: None,
+            is_detail_file: false,
+        };
+        change(&mut facts);
+        rules.judge(&facts)
+    }
+
+    fn role(name: &str) -> Option<Role> {
+        match judge(name) {
+            Verdict::Keep(role, _) => Some(role),
+            Verdict::Ignore(_) => None,
+        }
+    }
+
+    #[test]
+    fn names_of_things_that_bound_rooms_are_structural() {
+        for name in [
+            "",
+            "Cube.001",
+            "Wall_03",
+            "wall_door",
+            "WallWindowSmall",
+            "HouseWallB_01#0",
+            "PlantRoom_Wall",
+            "stable",
+            "Floor.002",
+            "IfcWall/1NlPq2Qy5FNPHd4Z_0$col",
+            "IfcWallStandardCase/x-noimp",
+            "IfcSlab/table",
+            "Wall-col",
+            "thing-occ",
+            "doorway",
+        ] {
+            assert_eq!(role(name), Some(Role::Structural), "{name}");
+        }
+    }
+
+    #[test]
+    fn names_of_things_that_stand_in_rooms_are_detail() {
+        for name in [
+            "Table",
+            "DINING_TABLES.003",
+            "KitchenChair12",
+            "floor_lamp",
+            "WallShelf",
+            "Door-Leaf",
+            "window",
+            "IfcDoor/0aB",
+            "IfcFurnishingElement/7",
+            "IfcFlowTerminal/1",
+            "IfcWindowStandardCase/1",
+            "IfcRailing/1",
+            "Crate-rigid",
+            "Car_Vehicle.001",
+            "Bookshelves",
+            "IfcSite/2",
+        ] {
+            assert_eq!(role(name), Some(Role::Detail), "{name}");
+        }
+    }
+
+    #[test]
+    fn helpers_that_are_never_drawn_are_left_out() {
+        for name in [
+            "Wall-colonly",
+            "a$NAVMESH",
+            "b_occonly.001",
+            "c-convcolonly",
+            "UCX_Wall",
+            "IfcSpace/1",
+            "IfcOpeningElement/1",
+            "d-noimp",
+        ] {
+            assert_eq!(role(name), None, "{name}");
+        }
+        assert!(drops_subtree("Group-noimp").is_some());
+        assert!(drops_subtree("IfcWall/0-noimp").is_none());
+        assert!(drops_subtree("Group-colonly").is_none());
+    }
+
+    #[test]
+    fn the_first_rule_that_fits_decides() {
+        let rules = RoleRules {
+            structural: vec!["*keep*".into()],
+            detail: vec!["Wall*".into(), "Plaster".into()],
+            is_manual: false,
+        };
+        let reason = |verdict| match verdict {
+            Verdict::Keep(role, reason) => (role, reason),
+            Verdict::Ignore(reason) => panic!("{reason}"),
+        };
+        let of = |name: &str| reason(judge_with(&rules, name, |_| {})).0;
+        assert_eq!(of("wall KEEP"), Role::Structural);
+        assert_eq!(of("wall 1"), Role::Detail);
+        assert_eq!(of("by its material"), Role::Detail);
+        let file = judge_with(&RoleRules::default(), "Wall", |f| f.is_detail_file = true);
+        assert_eq!(reason(file), (Role::Detail, "from a detail file".into()));
+        let glass = judge_with(&RoleRules::default(), "Wall", |f| f.is_see_through = true);
+        assert_eq!(
+            reason(glass),
+            (Role::Detail, "material: see-through".into())
+        );
+        let moves = judge_with(&RoleRules::default(), "Wall", |f| {
+            f.moves = Some("animated");
+        });
+        assert_eq!(reason(moves), (Role::Detail, "moves: animated".into()));
+        let group = judge_with(&RoleRules::default(), "x", |f| {
+            f.ancestors = &["a", "Chairs"];
+        });
+        assert_eq!(reason(group).0, Role::Detail);
+        let house = judge_with(&RoleRules::default(), "x", |f| {
+            f.ancestors = &["House with chairs"];
+        });
+        assert_eq!(reason(house).0, Role::Structural);
+        let manual = RoleRules {
+            is_manual: true,
+            ..RoleRules::default()
+        };
+        assert_eq!(
+            reason(judge_with(&manual, "Table", |_| {})).0,
+            Role::Structural
+        );
+    }
+
+    #[test]
+    fn globs_match_as_shells_do() {
+        for (glob, text, fits) in [
+            ("*", "", true),
+            ("", "", true),
+            ("", "a", false),
+            ("a*c", "ABBC", true),
+            ("a*c", "abcd", false),
+            ("?b", "ab", true),
+            ("?b", "b", false),
+            ("*a*b*", "xaybz", true),
+            ("**", "x", true),
+            ("\u{c4}*", "\u{e4}b", true),
+            ("*ab", "aab", true),
+        ] {
+            assert_eq!(is_match(glob, text), fits, "{glob} {text}");
+        }
+    }
+}
