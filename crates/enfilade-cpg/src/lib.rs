@@ -2,14 +2,18 @@
 //!
 //! A [`World`] is a [`CellPortalGraph`] together with the geometry of its cells. This crate holds
 //! the types, their invariants ([`CellPortalGraph::validate`]), the [`Locator`] (point to cell) and
-//! the file: a GLB with the `ENFILADE_cell_portal_graph` extension (`wire`). It does not know how a
+//! the file: a GLB with the `ENFILADE_cell_portal_graph` extension ([`wire`]). It does not know how a
 //! graph was made, touches no file system and starts no thread.
 
 mod graph;
 mod locator;
+mod look;
+mod validate;
+pub mod wire;
 
 pub use graph::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Portal, PortalId, PortalKind, Provenance,
     Statistics, World,
 };
 pub use locator::{Locator, LocatorNode};
+pub use validate::{GraphError, MAX_REPORTED};

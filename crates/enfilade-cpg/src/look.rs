@@ -1,0 +1,160 @@
+//! Materials, textures and samplers as the glTF JSON that they are carried through in.
+
+use std::collections::BTreeSet;
+
+use enfilade_geom::scene::{Material, Texture};
+use serde_json::{Map, Value, json};
+
+use crate::World;
+
+/// Checks that materials and samplers are JSON objects and that every reference is in range.
+pub(crate) fn check(world: &World, problem: &mut dyn FnMut(String, String)) {
+    for (i, material) in world.materials.iter().enumerate() {
+        let mut broken = |what| problem(format!("material {i} ({})", material.name), what);
+        match object(&material_text(material)) {
+            Err(why) => broken(why),
+            Ok(value) => {
+                let mut worst = None;
+                each_texture_reference(&Value::Object(value), &mut |index| {
+                    if index.is_none_or(|t| t >= world.textures.len() as u64) {
+                        worst = Some(index);
+                    }
+                });
+                if let Some(index) = worst {
+                    let named = index.map_or_else(|| "no number".into(), |t| t.to_string());
+                    broken(format!("names texture {named} of {}", world.textures.len()));
+                }
+            }
+        }
+    }
+    for (i, texture) in world.textures.iter().enumerate() {
+        let mut broken = |what| problem(format!("texture {i}"), what);
+        if let Some(image) = texture.image.filter(|&m| m as usize >= world.images.len()) {
+            broken(format!("image {image} of {}", world.images.len()));
+        }
+        if let Some(Err(why)) = sampler_text(texture).map(object) {
+            broken(format!("its sampler: {why}"));
+        }
+    }
+}
+
+/// The material's JSON object, made from the other fields where the input had none.
+pub(crate) fn material_text(material: &Material) -> String {
+    let text = material.gltf.trim();
+    if !text.is_empty() {
+        return text.to_owned();
+    }
+    let mut value = json!({
+        "pbrMetallicRoughness": { "baseColorFactor": material.base_color.map(f64::from) },
+    });
+    if !material.name.is_empty() {
+        value["name"] = json!(material.name);
+    }
+    if material.double_sided {
+        value["doubleSided"] = json!(true);
+    }
+    if material.transparent {
+        value["alphaMode"] = json!("BLEND");
+    }
+    value.to_string()
+}
+
+/// The sampler's JSON object; `None` for the default.
+pub(crate) fn sampler_text(texture: &Texture) -> Option<&str> {
+    Some(texture.sampler.trim()).filter(|s| !s.is_empty())
+}
+
+/// The material that a JSON object describes.
+pub(crate) fn material_of_text(text: &str) -> Result<Material, String> {
+    let value = object(text)?;
+    let name = value
+        .get("name")
+        .and_then(Value::as_str)
+        .unwrap_or_default()
+        .to_owned();
+    let double_sided = value
+        .get("doubleSided")
+        .and_then(Value::as_bool)
+        .unwrap_or(false);
+    let blends = value.get("alphaMode").and_then(Value::as_str) == Some("BLEND");
+    let transmits = value
+        .get("extensions")
+        .and_then(|e| e.get("KHR_materials_transmission"))
+        .and_then(|t| t.get("transmissionFactor").and_then(Value::as_f64))
+        .is_some_and(|f| f > 0.0);
+    let mut base_color = [1.0; 4];
+    let factor = value
+        .get("pbrMetallicRoughness")
+        .and_then(|p| p.get("baseColorFactor"));
+    if let Some(Value::Array(factor)) = factor {
+        for (to, from) in base_color.iter_mut().zip(factor) {
+            *to = from.as_f64().unwrap_or(1.0) as f32;
+        }
+    }
+    let transparent = blends || transmits;
+    Ok(Material {
+        name,
+        gltf: text.to_owned(),
+        double_sided,
+        transparent,
+        base_color,
+    })
+}
+
+/// Adds the extensions that a material or sampler uses, wherever in it.
+pub(crate) fn add_extensions(used: &mut BTreeSet<String>, text: &str) {
+    fn visit(used: &mut BTreeSet<String>, value: &Value) {
+        match value {
+            Value::Object(map) => {
+                for (key, inner) in map {
+                    if key == "extensions"
+                        && let Value::Object(extensions) = inner
+                    {
+                        used.extend(extensions.keys().cloned());
+                    }
+                    // Extras are the application's own; what looks like an extension there is none.
+                    if key != "extras" {
+                        visit(used, inner);
+                    }
+                }
+            }
+            Value::Array(items) => items.iter().for_each(|v| visit(used, v)),
+            _ => {}
+        }
+    }
+    if let Ok(value) = object(text) {
+        visit(used, &Value::Object(value));
+    }
+}
+
+/// Parses a JSON object. The parser limits nesting to 128 levels, so that recursion over the
+/// result is safe.
+fn object(text: &str) -> Result<Map<String, Value>, String> {
+    match serde_json::from_str(text) {
+        Ok(Value::Object(map)) => Ok(map),
+        Ok(_) => Err("is no JSON object".into()),
+        Err(why) => Err(format!("is no JSON: {why}")),
+    }
+}
+
+/// Calls `visit` with the index of every texture reference: glTF, its extensions included, keeps
+/// them in objects whose key ends in `Texture`. `None` where the index is no whole number.
+fn each_texture_reference(value: &Value, visit: &mut dyn FnMut(Option<u64>)) {
+    match value {
+        Value::Object(map) => {
+            for (key, inner) in map {
+                if key == "extras" {
+                    continue;
+                }
+                if key.ends_with("Texture")
+                    && let Some(index) = inner.get("index")
+                {
+                    visit(index.as_u64());
+                }
+                each_texture_reference(inner, visit);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|v| each_texture_reference(v, visit)),
+        _ => {}
+    }
+}

@@ -1,0 +1,547 @@
+//! GLB → world, from bytes that nobody vouches for.
+//!
+//! Every count is checked against the bytes that are there before anything is allocated for it,
+//! and a file cannot have the same bytes decoded again and again ([`Reader::spend`]): memory and
+//! time stay within a small factor of the file's size. What comes out passed [`World::validate`].
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::scene::{Image, Mesh, Primitive, Texture};
+use enfilade_geom::{Aabb, DVec3};
+use serde::Deserialize;
+use serde_json::value::RawValue;
+
+use super::json::{self, FLOAT, TEXTURE_EXTENSIONS, U8, U16, U32};
+use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError};
+use crate::look::material_of_text;
+use crate::{
+    Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
+    PortalKind, Provenance, Statistics, World,
+};
+
+/// Decodes a world from one GLB.
+///
+/// Safe on hostile bytes: no panic, no allocation from an unchecked count, nesting of the JSON
+/// limited to 128. The world returned passes [`World::validate`]. Takes time and memory linear in
+/// the bytes.
+///
+/// # Errors
+///
+/// Says what is wrong and what to do: no GLB, a GLB that was not baked, another version, damage.
+pub fn decode_glb(bytes: &[u8]) -> Result<World, WireError> {
+    let (text, bin) = chunks(bytes)?;
+    check_version(text)?;
+    let root: json::Root = serde_json::from_str(text).map_err(json_error)?;
+    let mut reader = Reader {
+        root: &root,
+        bin,
+        budget: 4 * bin.len() as u64,
+    };
+    let world = reader.world()?;
+    world.validate().map_err(WireError::Invalid)?;
+    Ok(world)
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
+fn json_error(error: serde_json::Error) -> WireError {
+    WireError::Json(error.to_string())
+}
+
+/// Splits a GLB into the text of its JSON chunk and the bytes of its binary chunk.
+fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), WireError> {
+    if !bytes.starts_with(&GLB_MAGIC) {
+        return Err(WireError::NotGlb("it does not begin with `glTF`"));
+    }
+    let damaged = |at, problem| WireError::Damaged { at, problem };
+    let word = |at: usize| {
+        let word = bytes.get(at..at + 4).and_then(|w| w.try_into().ok());
+        word.map(u32::from_le_bytes)
+            .ok_or(damaged(bytes.len(), "it ends within a header"))
+    };
+    if word(4)? != GLB_VERSION {
+        return Err(WireError::NotGlb("its container is not version 2"));
+    }
+    if word(8)? as usize != bytes.len() {
+        return Err(damaged(8, "the length in its header is not the file's"));
+    }
+    let chunk = |at: usize, kind: [u8; 4]| {
+        let len = word(at)? as usize;
+        if bytes.get(at + 4..at + 8) != Some(&kind) {
+            return Err(damaged(at + 4, "an unexpected chunk"));
+        }
+        let body = bytes.get(at + 8..).and_then(|rest| rest.get(..len));
+        Ok((
+            body.ok_or(damaged(at, "a chunk is longer than the file"))?,
+            at + 8 + len,
+        ))
+    };
+    let (text, end) = chunk(12, CHUNK_JSON)?;
+    let text = std::str::from_utf8(text).map_err(|e| WireError::Json(e.to_string()))?;
+    if end == bytes.len() {
+        return Ok((text, &[]));
+    }
+    let (bin, end) = chunk(end, CHUNK_BIN)?;
+    if end != bytes.len() {
+        return Err(damaged(end, "something follows the binary chunk"));
+    }
+    Ok((text, bin))
+}
+
+/// Looks for our extension and its version before anything else is asked of the file.
+fn check_version(text: &str) -> Result<(), WireError> {
+    #[derive(Deserialize)]
+    struct Probe<'a> {
+        #[serde(borrow, default)]
+        extensions: BTreeMap<String, &'a RawValue>,
+    }
+    #[derive(Deserialize)]
+    struct Ours {
+        version: u64,
+    }
+    let probe: Probe = serde_json::from_str(text).map_err(json_error)?;
+    let ours = probe
+        .extensions
+        .get(EXTENSION)
+        .ok_or(WireError::NotAWorld)?;
+    let Ours { version } = serde_json::from_str(ours.get()).map_err(json_error)?;
+    if version == VERSION {
+        Ok(())
+    } else {
+        Err(WireError::Version { found: version })
+    }
+}
+
+/// A row of an accessor.
+trait Row: Sized {
+    const KIND: &'static str;
+    const SIZE: usize;
+    fn of_bytes(bytes: &[u8]) -> Self;
+}
+
+macro_rules! float_rows {
+    ($($n:literal $kind:literal),*) => {$(
+        impl Row for [f32; $n] {
+            const KIND: &'static str = $kind;
+            const SIZE: usize = 4 * $n;
+            fn of_bytes(bytes: &[u8]) -> Self {
+                std::array::from_fn(|i| f32::from_le_bytes(four(bytes, 4 * i)))
+            }
+        }
+    )*};
+}
+float_rows!(2 "VEC2", 3 "VEC3", 4 "VEC4");
+
+/// Four bytes from `at` on. Callers hand in slices of checked length.
+fn four(bytes: &[u8], at: usize) -> [u8; 4] {
+    std::array::from_fn(|i| bytes[at + i])
+}
+
+fn eight(bytes: &[u8], at: usize) -> [u8; 8] {
+    std::array::from_fn(|i| bytes[at + i])
+}
+
+struct Reader<'a> {
+    root: &'a json::Root,
+    bin: &'a [u8],
+    /// Bytes that may still be decoded.
+    budget: u64,
+}
+
+impl<'a> Reader<'a> {
+    fn world(&mut self) -> Result<World, WireError> {
+        let graph = &self.root.extensions.graph;
+        if let Some(buffer) = self.root.buffers.first()
+            && buffer.uri.is_some()
+        {
+            return Err(broken(
+                "buffer 0",
+                "lies in another file; a world is one GLB",
+            ));
+        }
+        let batches = graph
+            .batches
+            .iter()
+            .enumerate()
+            .map(|(i, b)| self.batch(i, b));
+        let batches = batches.collect::<Result<_, _>>()?;
+        let detail_meshes = graph.detail_meshes.iter().map(|m| match m {
+            Some(mesh) => self.mesh(*mesh),
+            None => Ok(Mesh::default()),
+        });
+        let detail_meshes = detail_meshes.collect::<Result<_, _>>()?;
+        let details = graph
+            .details
+            .iter()
+            .enumerate()
+            .map(|(i, d)| self.detail(i, d));
+        let details = details.collect::<Result<_, _>>()?;
+        let materials = self.root.materials.iter().enumerate().map(|(i, text)| {
+            material_of_text(text.get()).map_err(|why| broken(format!("material {i}"), why))
+        });
+        let materials = materials.collect::<Result<_, _>>()?;
+        let textures = self
+            .root
+            .textures
+            .iter()
+            .enumerate()
+            .map(|(i, t)| self.texture(i, t));
+        let textures = textures.collect::<Result<_, _>>()?;
+        let images = self.root.images.iter().enumerate().map(|(i, image)| {
+            let bytes = self.view(image.buffer_view, || format!("image {i}"))?;
+            self.spend(bytes.len() as u64)?;
+            let (name, mime) = (image.name.clone(), image.mime_type.clone());
+            Ok(Image {
+                name,
+                mime,
+                bytes: bytes.to_vec(),
+            })
+        });
+        let images = images.collect::<Result<_, _>>()?;
+        let graph = self.graph()?;
+        Ok(World {
+            graph,
+            batches,
+            details,
+            detail_meshes,
+            materials,
+            textures,
+            images,
+        })
+    }
+
+    fn graph(&mut self) -> Result<CellPortalGraph, WireError> {
+        let graph = &self.root.extensions.graph;
+        let n_nodes = self.root.nodes.len();
+        let cells = graph.cells.iter().enumerate().map(|(i, c)| {
+            if c.node as usize >= n_nodes {
+                return Err(broken(
+                    format!("cell {i}"),
+                    format!("node {} of {n_nodes}", c.node),
+                ));
+            }
+            Ok(Cell {
+                name: c.name.clone(),
+                aabb: c.aabb.map(|corner| corner.map(|v| v as f32)),
+                volume: c.volume as f32,
+                n_triangles: c.triangles,
+                n_detail_triangles: c.detail_triangles,
+                portals: c.portals.iter().copied().map(PortalId).collect(),
+                outdoor: c.outdoor,
+            })
+        });
+        let cells = cells.collect::<Result<_, _>>()?;
+        let portals = self.portals()?;
+        let locator = self.locator()?;
+        let p = &graph.provenance;
+        Ok(CellPortalGraph {
+            cells,
+            portals,
+            locator,
+            provenance: Provenance {
+                generator: p.generator.clone(),
+                method: p.method.clone(),
+                settings: p.settings.clone(),
+                input_hash: p.input_hash.clone(),
+            },
+            statistics: Statistics {
+                counts: graph.statistics.clone(),
+            },
+        })
+    }
+
+    fn portals(&mut self) -> Result<Vec<Portal>, WireError> {
+        let graph = &self.root.extensions.graph;
+        let bytes = self.optional_view(graph.portal_corners, "the portals' corners")?;
+        let (mut corners, rest) = bytes.as_chunks::<12>();
+        if !rest.is_empty() {
+            return Err(broken(
+                "the portals' corners",
+                "their buffer view is cut off",
+            ));
+        }
+        self.spend(bytes.len() as u64)?;
+        let mut portals = Vec::with_capacity(graph.portals.len());
+        for (i, p) in graph.portals.iter().enumerate() {
+            let mut take = |n: u32| {
+                let (polygon, rest) = corners.split_at_checked(n as usize).ok_or_else(|| {
+                    broken(
+                        format!("portal {i}"),
+                        "has more corners than the file holds",
+                    )
+                })?;
+                corners = rest;
+                Ok(polygon
+                    .iter()
+                    .map(|c| <[f32; 3]>::of_bytes(c))
+                    .collect::<Vec<_>>())
+            };
+            let outline = take(p.outline)?;
+            let pieces = p
+                .pieces
+                .iter()
+                .map(|&n| take(n))
+                .collect::<Result<_, _>>()?;
+            portals.push(Portal {
+                cells: p.cells.map(CellId),
+                kind: match p.kind {
+                    json::Kind::Open => PortalKind::Open,
+                    json::Kind::Door => PortalKind::Door,
+                    json::Kind::Window => PortalKind::Window,
+                    json::Kind::Crack => PortalKind::Crack,
+                },
+                normal: p.normal.map(|v| v as f32),
+                outline,
+                pieces,
+                area: p.area as f32,
+            });
+        }
+        if !corners.is_empty() {
+            return Err(broken(
+                "the portals' corners",
+                "there are more than the portals use",
+            ));
+        }
+        Ok(portals)
+    }
+
+    fn locator(&mut self) -> Result<Locator, WireError> {
+        let l = &self.root.extensions.graph.locator;
+        let planes = self.optional_view(l.planes, "the locator's planes")?;
+        let nodes = self.optional_view(l.nodes, "the locator's nodes")?;
+        self.spend(planes.len() as u64 + nodes.len() as u64)?;
+        let (planes, planes_rest) = planes.as_chunks::<32>();
+        let (nodes, nodes_rest) = nodes.as_chunks::<12>();
+        if !planes_rest.is_empty() || !nodes_rest.is_empty() {
+            return Err(broken("the locator", "a buffer view is cut off"));
+        }
+        let bounds = l.bounds.map_or(Aabb::EMPTY, |[min, max]| {
+            Aabb::new(DVec3::from_array(min), DVec3::from_array(max))
+        });
+        let plane = |p: &[u8; 32]| std::array::from_fn(|i| f64::from_le_bytes(eight(p, 8 * i)));
+        let node = |n: &[u8; 12]| LocatorNode {
+            plane: u32::from_le_bytes(four(n, 0)),
+            children: [4, 8].map(|at| i32::from_le_bytes(four(n, at))),
+        };
+        Ok(Locator {
+            bounds,
+            outside: l.outside.map(CellId),
+            planes: planes.iter().map(plane).collect(),
+            nodes: nodes.iter().map(node).collect(),
+            root: l.root,
+        })
+    }
+
+    fn batch(&mut self, i: usize, batch: &json::Batch) -> Result<Batch, WireError> {
+        let cells = batch.cells.iter().copied().map(CellId).collect();
+        let primitive = match (batch.mesh, batch.primitive) {
+            (None, None) => Primitive::default(),
+            (Some(mesh), Some(primitive)) => {
+                let found = self
+                    .root
+                    .meshes
+                    .get(mesh as usize)
+                    .and_then(|m| m.primitives.get(primitive as usize));
+                let found = found.ok_or_else(|| {
+                    broken(
+                        format!("batch {i}"),
+                        format!("no primitive {primitive} in mesh {mesh}"),
+                    )
+                })?;
+                self.primitive(found)?
+            }
+            _ => {
+                return Err(broken(
+                    format!("batch {i}"),
+                    "has a mesh or a primitive, not both",
+                ));
+            }
+        };
+        Ok(Batch { cells, primitive })
+    }
+
+    fn mesh(&mut self, mesh: u32) -> Result<Mesh, WireError> {
+        let found = self.root.meshes.get(mesh as usize);
+        let found = found.ok_or_else(|| broken("detailMeshes", format!("no mesh {mesh}")))?;
+        let primitives = found.primitives.iter().map(|p| self.primitive(p));
+        Ok(Mesh {
+            name: found.name.clone(),
+            primitives: primitives.collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn detail(&self, i: usize, detail: &json::Detail) -> Result<DetailObject, WireError> {
+        let at = || format!("detail {i}");
+        let node = self.root.nodes.get(detail.node as usize);
+        let node = node.ok_or_else(|| broken(at(), format!("no node {}", detail.node)))?;
+        let meshes = &self.root.extensions.graph.detail_meshes;
+        if meshes.get(detail.mesh as usize) != Some(&node.mesh) {
+            return Err(broken(at(), "its mesh is not its node's"));
+        }
+        let identity = super::encode::IDENTITY;
+        Ok(DetailObject {
+            name: node.name.clone(),
+            mesh: detail.mesh,
+            transform: node.matrix.map_or(identity, |m| m.map(|v| v as f32)),
+            cells: detail.cells.iter().copied().map(CellId).collect(),
+        })
+    }
+
+    fn texture(&self, i: usize, texture: &json::Texture) -> Result<Texture, WireError> {
+        let sampler = match texture.sampler {
+            None => String::new(),
+            Some(sampler) => {
+                let text = self.root.samplers.get(sampler as usize);
+                let missing = || broken(format!("texture {i}"), format!("no sampler {sampler}"));
+                text.ok_or_else(missing)?.get().to_owned()
+            }
+        };
+        let extended = TEXTURE_EXTENSIONS
+            .iter()
+            .filter_map(|(_, e)| texture.extensions.get(*e));
+        let image = texture
+            .source
+            .or_else(|| extended.filter_map(|e| e.source).next());
+        Ok(Texture { image, sampler })
+    }
+
+    fn primitive(&mut self, p: &json::Primitive) -> Result<Primitive, WireError> {
+        let named = |name: &str| p.attributes.get(name).copied();
+        let position =
+            named("POSITION").ok_or_else(|| broken("a primitive", "has no positions"))?;
+        let mut uvs = Vec::new();
+        while let Some(accessor) = named(&format!("TEXCOORD_{}", uvs.len())) {
+            uvs.push(self.rows(accessor)?);
+        }
+        let indices = p
+            .indices
+            .ok_or_else(|| broken("a primitive", "has no indices"))?;
+        Ok(Primitive {
+            positions: self.rows(position)?,
+            normals: self.optional_rows(named("NORMAL"))?,
+            tangents: self.optional_rows(named("TANGENT"))?,
+            uvs,
+            colors: self.optional_rows(named("COLOR_0"))?,
+            indices: self.indices(indices)?,
+            material: p.material,
+        })
+    }
+
+    fn optional_rows<R: Row>(&mut self, accessor: Option<u32>) -> Result<Vec<R>, WireError> {
+        accessor.map_or(Ok(Vec::new()), |a| self.rows(a))
+    }
+
+    fn rows<R: Row>(&mut self, accessor: u32) -> Result<Vec<R>, WireError> {
+        let (bytes, stride, component_type, kind) = self.accessor(accessor, |_| R::SIZE)?;
+        if component_type != FLOAT || kind != R::KIND {
+            let want = R::KIND;
+            return Err(broken(
+                format!("accessor {accessor}"),
+                format!("is no {want} of floats"),
+            ));
+        }
+        Ok(bytes.chunks(stride).map(|row| R::of_bytes(row)).collect())
+    }
+
+    fn indices(&mut self, accessor: u32) -> Result<Vec<u32>, WireError> {
+        let size = |component_type| match component_type {
+            U8 => 1,
+            U16 => 2,
+            _ => 4,
+        };
+        let (bytes, stride, component_type, kind) = self.accessor(accessor, size)?;
+        if !matches!(component_type, U8 | U16 | U32) || kind != "SCALAR" {
+            return Err(broken(format!("accessor {accessor}"), "holds no indices"));
+        }
+        let rows = bytes.chunks(stride);
+        Ok(match component_type {
+            U8 => rows.map(|b| b[0].into()).collect(),
+            U16 => rows
+                .map(|b| u16::from_le_bytes([b[0], b[1]]).into())
+                .collect(),
+            _ => rows.map(|b| u32::from_le_bytes(four(b, 0))).collect(),
+        })
+    }
+
+    /// Bytes, stride, component type and kind of an accessor whose rows take `size` bytes, by
+    /// component type. The bytes end with the last row, so that chunks of `stride` are its rows.
+    fn accessor(
+        &mut self,
+        accessor: u32,
+        size: impl Fn(u32) -> usize,
+    ) -> Result<(&'a [u8], usize, u32, &'a str), WireError> {
+        let at = || format!("accessor {accessor}");
+        let root = self.root;
+        let a = root
+            .accessors
+            .get(accessor as usize)
+            .ok_or_else(|| broken(at(), "is missing"))?;
+        let view = a
+            .buffer_view
+            .ok_or_else(|| broken(at(), "has no buffer view"))?;
+        let bytes = self.view(view, at)?;
+        let size = size(a.component_type);
+        let stride = match root.buffer_views[view as usize].byte_stride {
+            None => size,
+            Some(stride) if stride >= size as u64 && stride <= 252 => stride as usize,
+            Some(stride) => return Err(broken(at(), format!("its stride is {stride}"))),
+        };
+        let beyond = || broken(at(), "reaches beyond its buffer view");
+        let start = usize::try_from(a.byte_offset).map_err(|_| beyond())?;
+        let bytes = bytes.get(start..).ok_or_else(beyond)?;
+        let end = match a.count.checked_sub(1) {
+            None => Some(0),
+            Some(last) => last
+                .checked_mul(stride as u64)
+                .and_then(|n| n.checked_add(size as u64)),
+        };
+        let end = end
+            .and_then(|end| usize::try_from(end).ok())
+            .ok_or_else(beyond)?;
+        let bytes = bytes.get(..end).ok_or_else(beyond)?;
+        // What decoding allocates: rows of their own size, indices as four bytes.
+        self.spend(a.count * size.max(4) as u64)?;
+        Ok((bytes, stride, a.component_type, &a.kind))
+    }
+
+    fn optional_view(&self, view: Option<u32>, of: &str) -> Result<&'a [u8], WireError> {
+        view.map_or(Ok(&[]), |view| self.view(view, || of.to_owned()))
+    }
+
+    fn view(&self, view: u32, of: impl Fn() -> String) -> Result<&'a [u8], WireError> {
+        let missing = || broken(of(), format!("no buffer view {view}"));
+        let v = self
+            .root
+            .buffer_views
+            .get(view as usize)
+            .ok_or_else(missing)?;
+        let beyond = || broken(of(), format!("buffer view {view} reaches beyond the file"));
+        if v.buffer != 0 {
+            return Err(broken(
+                of(),
+                "its buffer lies in another file; a world is one GLB",
+            ));
+        }
+        let start = usize::try_from(v.byte_offset).map_err(|_| beyond())?;
+        let len = usize::try_from(v.byte_length).map_err(|_| beyond())?;
+        self.bin
+            .get(start..)
+            .and_then(|rest| rest.get(..len))
+            .ok_or_else(beyond)
+    }
+
+    /// Counts what is decoded. Our files use every byte once (indices may grow from one byte to
+    /// four); a file that has megabytes decoded a thousand times is an attack.
+    fn spend(&mut self, bytes: u64) -> Result<(), WireError> {
+        let left = self.budget.checked_sub(bytes);
+        self.budget =
+            left.ok_or_else(|| broken("the file", "decodes to far more than it holds"))?;
+        Ok(())
+    }
+}
+
+fn broken(at: impl Into<String>, problem: impl Into<String>) -> WireError {
+    WireError::Structure {
+        at: at.into(),
+        problem: problem.into(),
+    }
+}

@@ -1,0 +1,270 @@
+//! The JSON of a world, as written and as read.
+//!
+//! Only what a world needs of glTF is here; other properties are ignored when read. Numbers that
+//! are `f32` in the graph are written as the `f64` of the same value, so that nothing rounds twice.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Root {
+    pub(super) asset: Asset,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) extensions_used: Vec<String>,
+    #[serde(default)]
+    pub(super) scene: u32,
+    #[serde(default)]
+    pub(super) scenes: Vec<Scene>,
+    #[serde(default)]
+    pub(super) nodes: Vec<Node>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) meshes: Vec<Mesh>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) materials: Vec<Box<RawValue>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) textures: Vec<Texture>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) samplers: Vec<Box<RawValue>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) images: Vec<Image>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) accessors: Vec<Accessor>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) buffer_views: Vec<BufferView>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) buffers: Vec<Buffer>,
+    pub(super) extensions: RootExtensions,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Asset {
+    pub(super) version: String,
+    #[serde(default)]
+    pub(super) generator: String,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Scene {
+    #[serde(default)]
+    pub(super) nodes: Vec<u32>,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct Node {
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) children: Vec<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) mesh: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) matrix: Option<[f64; 16]>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Mesh {
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) name: String,
+    pub(super) primitives: Vec<Primitive>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Primitive {
+    pub(super) attributes: BTreeMap<String, u32>,
+    pub(super) indices: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) material: Option<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Texture {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) sampler: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) source: Option<u32>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) extensions: BTreeMap<String, TextureSource>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct TextureSource {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) source: Option<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Image {
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) mime_type: String,
+    pub(super) buffer_view: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub(super) buffer_view: Option<u32>,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) component_type: u32,
+    pub(super) count: u64,
+    #[serde(rename = "type")]
+    pub(super) kind: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) min: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) max: Option<Vec<f64>>,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub(super) buffer: u32,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) byte_stride: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) target: Option<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub(super) byte_length: u64,
+    #[serde(default, skip_serializing)]
+    pub(super) uri: Option<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct RootExtensions {
+    #[serde(rename = "ENFILADE_cell_portal_graph")]
+    pub(super) graph: Graph,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Graph {
+    pub(super) version: u64,
+    pub(super) cells: Vec<Cell>,
+    pub(super) portals: Vec<Portal>,
+    /// Buffer view of all portals' corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) portal_corners: Option<u32>,
+    pub(super) batches: Vec<Batch>,
+    pub(super) details: Vec<Detail>,
+    /// glTF mesh by detail mesh; null for a mesh without triangles.
+    pub(super) detail_meshes: Vec<Option<u32>>,
+    pub(super) locator: Locator,
+    pub(super) provenance: Provenance,
+    pub(super) statistics: BTreeMap<String, f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Cell {
+    pub(super) name: String,
+    pub(super) node: u32,
+    pub(super) aabb: [[f64; 3]; 2],
+    pub(super) volume: f64,
+    pub(super) triangles: u32,
+    pub(super) detail_triangles: u32,
+    pub(super) portals: Vec<u32>,
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub(super) outdoor: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Portal {
+    pub(super) cells: [u32; 2],
+    pub(super) kind: Kind,
+    pub(super) normal: [f64; 3],
+    pub(super) area: f64,
+    /// Corners of the outline.
+    pub(super) outline: u32,
+    /// Corners of each piece.
+    pub(super) pieces: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Kind {
+    Open,
+    Door,
+    Window,
+    Crack,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Batch {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) mesh: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) primitive: Option<u32>,
+    pub(super) cells: Vec<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Detail {
+    pub(super) node: u32,
+    /// Index into `detailMeshes`.
+    pub(super) mesh: u32,
+    pub(super) cells: Vec<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Locator {
+    /// Absent for the locator that covers nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) bounds: Option<[[f64; 3]; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) outside: Option<u32>,
+    pub(super) root: i32,
+    /// Buffer view of planes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) planes: Option<u32>,
+    /// Buffer view of nodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) nodes: Option<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Provenance {
+    pub(super) generator: String,
+    pub(super) method: String,
+    pub(super) settings: BTreeMap<String, String>,
+    pub(super) input_hash: String,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_false(value: &bool) -> bool {
+    !*value
+}
+
+/// `FLOAT` of glTF.
+pub(super) const FLOAT: u32 = 5126;
+/// `UNSIGNED_BYTE`.
+pub(super) const U8: u32 = 5121;
+/// `UNSIGNED_SHORT`.
+pub(super) const U16: u32 = 5123;
+/// `UNSIGNED_INT`.
+pub(super) const U32: u32 = 5125;
+/// `ARRAY_BUFFER`.
+pub(super) const VERTICES: u32 = 34962;
+/// `ELEMENT_ARRAY_BUFFER`.
+pub(super) const TRIANGLES: u32 = 34963;
+
+/// Extension that carries a texture's picture, by MIME type; core glTF knows PNG and JPEG only.
+pub(super) const TEXTURE_EXTENSIONS: [(&str, &str); 4] = [
+    ("image/webp", "EXT_texture_webp"),
+    ("image/avif", "EXT_texture_avif"),
+    ("image/ktx2", "KHR_texture_basisu"),
+    ("image/vnd-ms.dds", "MSFT_texture_dds"),
+];

@@ -1,0 +1,210 @@
+//! Worlds made in code for the tests of this crate.
+#![allow(dead_code, reason = "every test binary uses a part of it")]
+
+use enfilade_cpg::{
+    Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
+    PortalKind, Provenance, Statistics, World,
+};
+use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
+use enfilade_geom::{Aabb, DVec3};
+
+/// Four corners as two triangles, with normals and texture coordinates.
+pub(crate) fn quad(corners: [[f32; 3]; 4], normal: [f32; 3]) -> Primitive {
+    Primitive {
+        positions: corners.to_vec(),
+        normals: vec![normal; 4],
+        tangents: Vec::new(),
+        uvs: vec![vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]],
+        colors: Vec::new(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        material: Some(0),
+    }
+}
+
+/// Floor of the rectangle `x0..x1` × `0..5`.
+pub(crate) fn floor(x0: f32, x1: f32) -> Primitive {
+    quad(
+        [
+            [x0, 0.0, 0.0],
+            [x0, 0.0, 5.0],
+            [x1, 0.0, 5.0],
+            [x1, 0.0, 0.0],
+        ],
+        [0.0, 1.0, 0.0],
+    )
+}
+
+pub(crate) fn cell(name: &str, aabb: [[f32; 3]; 2], portals: &[u32]) -> Cell {
+    let size = [0, 1, 2].map(|k| aabb[1][k] - aabb[0][k]);
+    Cell {
+        name: name.into(),
+        aabb,
+        volume: size[0] * size[1] * size[2],
+        n_triangles: 2,
+        n_detail_triangles: 2,
+        portals: portals.iter().copied().map(PortalId).collect(),
+        outdoor: name == "outdoors",
+    }
+}
+
+/// A rectangle in the plane at `x`, facing +x, from `z0` to `z1` and from the floor to `height`.
+pub(crate) fn doorway(x: f32, z0: f32, z1: f32, height: f32, cells: [u32; 2]) -> Portal {
+    let outline = vec![[x, 0.0, z0], [x, height, z0], [x, height, z1], [x, 0.0, z1]];
+    Portal {
+        cells: cells.map(CellId),
+        kind: PortalKind::Open,
+        normal: [1.0, 0.0, 0.0],
+        pieces: vec![outline.clone()],
+        outline,
+        area: height * (z1 - z0),
+    }
+}
+
+/// Two rooms of 4 × 3 × 5 m side by side along x, a doorway between them, a window to outdoors.
+pub(crate) fn two_rooms() -> World {
+    let mut window = doorway(8.0, 1.0, 3.0, 2.0, [1, 2]);
+    window.kind = PortalKind::Window;
+    // An opening in two pieces, with a mullion of 10 cm between.
+    window.pieces = vec![
+        vec![
+            [8.0, 0.0, 1.0],
+            [8.0, 2.0, 1.0],
+            [8.0, 2.0, 1.9],
+            [8.0, 0.0, 1.9],
+        ],
+        vec![
+            [8.0, 0.0, 2.0],
+            [8.0, 2.0, 2.0],
+            [8.0, 2.0, 3.0],
+            [8.0, 0.0, 3.0],
+        ],
+    ];
+    window.area = 3.8;
+    let locator = Locator {
+        bounds: Aabb::new(DVec3::new(0.0, 0.0, 0.0), DVec3::new(8.0, 3.0, 5.0)),
+        outside: Some(CellId(2)),
+        planes: vec![[1.0, 0.0, 0.0, -4.0], [0.0, 1.0, 0.0, -0.1]],
+        nodes: vec![
+            LocatorNode {
+                plane: 1,
+                children: [1, Locator::leaf(None)],
+            },
+            LocatorNode {
+                plane: 0,
+                children: [
+                    Locator::leaf(Some(CellId(1))),
+                    Locator::leaf(Some(CellId(0))),
+                ],
+            },
+        ],
+        root: 0,
+    };
+    let graph = CellPortalGraph {
+        cells: vec![
+            cell("cell-0", [[0.0, 0.0, 0.0], [4.0, 3.0, 5.0]], &[0]),
+            cell("cell-1", [[4.0, 0.0, 0.0], [8.0, 3.0, 5.0]], &[0, 1]),
+            cell("outdoors", [[-1.0, -1.0, -1.0], [9.0, 4.0, 6.0]], &[1]),
+        ],
+        portals: vec![doorway(4.0, 2.0, 3.0, 2.1, [0, 1]), window],
+        locator,
+        provenance: Provenance {
+            generator: "enfilade 0.1.0".into(),
+            method: "watershed".into(),
+            settings: [("voxel_size".to_owned(), "0.1".to_owned())].into(),
+            input_hash: "00ff".into(),
+        },
+        statistics: Statistics {
+            counts: [("input_triangles".to_owned(), 8.0), ("odd".to_owned(), 0.1)].into(),
+        },
+    };
+    let batch = |cells: &[u32], primitive| Batch {
+        cells: cells.iter().copied().map(CellId).collect(),
+        primitive,
+    };
+    let turned = [
+        0.0, 0.0, -2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 1.0,
+    ];
+    let chair = |name: &str, transform, cells: &[u32]| DetailObject {
+        name: name.into(),
+        mesh: 0,
+        transform,
+        cells: cells.iter().copied().map(CellId).collect(),
+    };
+    let mut identity = [0.0; 16];
+    [0, 5, 10, 15].into_iter().for_each(|i| identity[i] = 1.0);
+    let sampler = r#"{ "magFilter": 9729, "wrapS": 33071 }"#;
+    World {
+        graph,
+        batches: vec![
+            batch(&[1], floor(4.0, 8.0)),
+            batch(&[0], floor(0.0, 4.0)),
+            batch(&[0, 1], floor(3.0, 5.0)),
+            batch(&[], floor(-1.0, 0.0)),
+            batch(
+                &[0],
+                Primitive {
+                    material: Some(1),
+                    ..floor(0.0, 1.0)
+                },
+            ),
+            batch(
+                &[0, 1, 2],
+                Primitive {
+                    uvs: Vec::new(),
+                    material: None,
+                    ..floor(2.0, 3.0)
+                },
+            ),
+        ],
+        details: vec![
+            chair("chair", identity, &[0]),
+            chair("chair", turned, &[0, 1]),
+        ],
+        detail_meshes: vec![Mesh {
+            name: "chair".into(),
+            primitives: vec![Primitive {
+                tangents: vec![[1.0, 0.0, 0.0, 1.0]; 4],
+                colors: vec![[1.0, 0.5, 0.25, 1.0]; 4],
+                ..floor(0.0, 0.5)
+            }],
+        }],
+        materials: vec![
+            Material {
+                name: "brick".into(),
+                gltf: r#"{"name":"brick",  "pbrMetallicRoughness":{"baseColorTexture":{"index":0},
+                    "baseColorFactor":[0.5,0.25,1,1]},"extras":{"extensions":{"no":1}},
+                    "extensions":{"KHR_materials_ior":{"ior":1.4}}}"#
+                    .into(),
+                double_sided: false,
+                transparent: false,
+                base_color: [0.5, 0.25, 1.0, 1.0],
+            },
+            Material {
+                name: "glass".into(),
+                gltf: String::new(),
+                double_sided: true,
+                transparent: true,
+                base_color: [1.0, 1.0, 1.0, 0.5],
+            },
+        ],
+        textures: vec![
+            Texture {
+                image: Some(0),
+                sampler: sampler.into(),
+            },
+            Texture {
+                image: Some(0),
+                sampler: String::new(),
+            },
+            Texture {
+                image: Some(0),
+                sampler: sampler.into(),
+            },
+        ],
+        images: vec![Image {
+            name: "lost".into(),
+            mime: "image/png".into(),
+            bytes: Vec::new(),
+        }],
+    }
+}
