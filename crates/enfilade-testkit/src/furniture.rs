@@ -1,0 +1,245 @@
+//! Furniture, doors and glass: meshes for detail objects.
+//!
+//! Each stands on the origin, its back towards -z and its front towards +z, centered in x and z,
+//! so that a yaw of 0 faces the viewer who looks along -z.
+
+use enfilade_geom::{Aabb, DVec2, DVec3};
+
+use crate::site::Site;
+use crate::solid::{MeshBuilder, aabb};
+
+/// Materials that furniture is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Palette {
+    /// Table tops, wardrobes.
+    pub wood: u32,
+    /// Legs, lamps.
+    pub metal: u32,
+    /// Sofas, beds.
+    pub fabric: u32,
+    /// Pillows, bath tubs, counters.
+    pub white: u32,
+    /// Plants.
+    pub leaf: u32,
+    /// Plant pots.
+    pub clay: u32,
+    /// Panes.
+    pub glass: u32,
+}
+
+impl Palette {
+    /// Adds the materials to `site`.
+    pub fn new(site: &mut Site) -> Self {
+        Self {
+            wood: site.material("wood", [0.42, 0.24, 0.11]),
+            metal: site.material("metal", [0.25, 0.26, 0.28]),
+            fabric: site.material("fabric", [0.10, 0.22, 0.38]),
+            white: site.material("white", [0.85, 0.85, 0.83]),
+            leaf: site.material("leaf", [0.08, 0.32, 0.08]),
+            clay: site.material("clay", [0.45, 0.16, 0.08]),
+            glass: site.glass("glass", [0.70, 0.85, 0.90, 0.25]),
+        }
+    }
+}
+
+/// Meshes of furniture, each added to the scene once.
+#[derive(Clone, Copy, Debug)]
+pub struct Furniture {
+    /// 1.6 × 0.8 m, 0.74 m high; 60 triangles.
+    pub desk: u32,
+    /// 2.0 × 0.9 m, 0.75 m high; 60 triangles.
+    pub table: u32,
+    /// 0.45 × 0.45 m, 0.85 m high; 72 triangles.
+    pub chair: u32,
+    /// 2.0 × 0.9 m; 72 triangles.
+    pub sofa: u32,
+    /// 1.6 × 2.0 m, its head towards -z; 60 triangles.
+    pub bed: u32,
+    /// 1.8 × 0.6 m, 2.0 m high; 36 triangles.
+    pub wardrobe: u32,
+    /// 0.9 × 0.35 m, 1.8 m high; 76 triangles.
+    pub shelf: u32,
+    /// 2.4 × 0.6 m, 0.9 m high; 52 triangles.
+    pub counter: u32,
+    /// 1.7 × 0.75 m, 0.55 m high; 56 triangles.
+    pub tub: u32,
+    /// 0.4 × 0.6 m; 24 triangles.
+    pub toilet: u32,
+    /// 0.5 × 0.5 m, 1.1 m high; 84 triangles.
+    pub plant: u32,
+    /// 0.4 × 0.4 m, 1.5 m high; 88 triangles.
+    pub lamp: u32,
+    /// 2.0 × 1.4 m, 1 cm thick; 12 triangles.
+    pub rug: u32,
+    /// 0.45 × 0.4 m, 0.5 m high; 12 triangles.
+    pub cabinet: u32,
+}
+
+/// A box `w` × `d` around the origin, from `y0` to `y1`.
+fn block(w: f64, d: f64, y0: f64, y1: f64) -> Aabb {
+    at(0.0, 0.0, w, d, y0, y1)
+}
+
+/// A box `w` × `d` around (x, z), from `y0` to `y1`.
+fn at(x: f64, z: f64, w: f64, d: f64, y0: f64, y1: f64) -> Aabb {
+    aabb(
+        [x - w * 0.5, y0, z - d * 0.5],
+        [x + w * 0.5, y1, z + d * 0.5],
+    )
+}
+
+fn legs(b: &mut MeshBuilder, w: f64, d: f64, size: f64, top: f64) {
+    let (x, z) = ((w - size) * 0.5, (d - size) * 0.5);
+    for (x, z) in [(-x, -z), (x, -z), (-x, z), (x, z)] {
+        b.cuboid(at(x, z, size, size, 0.0, top));
+    }
+}
+
+impl Furniture {
+    /// Adds the meshes to `site`.
+    pub fn new(site: &mut Site, p: &Palette) -> Self {
+        let table = |w: f64, d: f64, h: f64| {
+            let mut b = MeshBuilder::new(p.wood);
+            b.cuboid(block(w, d, h - 0.04, h)).paint(p.metal);
+            legs(&mut b, w, d, 0.06, h - 0.04);
+            b
+        };
+        let mut chair = MeshBuilder::new(p.wood);
+        chair.cuboid(block(0.45, 0.45, 0.42, 0.46));
+        chair
+            .cuboid(at(0.0, -0.205, 0.45, 0.04, 0.46, 0.85))
+            .paint(p.metal);
+        legs(&mut chair, 0.45, 0.45, 0.04, 0.42);
+
+        let mut sofa = MeshBuilder::new(p.fabric);
+        sofa.cuboid(block(1.6, 0.9, 0.12, 0.42));
+        sofa.cuboid(at(-0.9, 0.0, 0.2, 0.9, 0.08, 0.62));
+        sofa.cuboid(at(0.9, 0.0, 0.2, 0.9, 0.08, 0.62));
+        sofa.cuboid(at(0.0, -0.35, 1.6, 0.2, 0.42, 0.85))
+            .paint(p.white);
+        sofa.cuboid(at(-0.6, -0.15, 0.4, 0.15, 0.42, 0.75));
+        sofa.cuboid(at(0.6, -0.15, 0.4, 0.15, 0.42, 0.75));
+
+        let mut bed = MeshBuilder::new(p.wood);
+        bed.cuboid(block(1.6, 2.0, 0.08, 0.3));
+        bed.cuboid(at(0.0, -1.0, 1.6, 0.06, 0.0, 0.95))
+            .paint(p.fabric);
+        bed.cuboid(at(0.0, 0.2, 1.56, 1.5, 0.3, 0.52))
+            .paint(p.white);
+        bed.cuboid(at(-0.4, -0.75, 0.65, 0.4, 0.3, 0.6));
+        bed.cuboid(at(0.4, -0.75, 0.65, 0.4, 0.3, 0.6));
+
+        let mut wardrobe = MeshBuilder::new(p.wood);
+        wardrobe.cuboid(block(1.8, 0.56, 0.0, 2.0));
+        wardrobe.cuboid(at(-0.45, 0.29, 0.86, 0.02, 0.06, 1.94));
+        wardrobe.cuboid(at(0.45, 0.29, 0.86, 0.02, 0.06, 1.94));
+
+        let mut shelf = MeshBuilder::new(p.wood);
+        let niches: Vec<Aabb> = (0..4)
+            .map(|i| {
+                let low = 0.05 + 0.44 * f64::from(i);
+                aabb([-0.42, low, -0.15], [0.42, low + 0.39, 0.175])
+            })
+            .collect();
+        shelf.carved(&[block(0.9, 0.35, 0.0, 1.8)], &niches);
+
+        let mut counter = MeshBuilder::new(p.wood);
+        counter.cuboid(block(2.4, 0.56, 0.0, 0.86)).paint(p.white);
+        let sink = at(-0.5, 0.0, 0.6, 0.4, 0.88, 0.9);
+        counter.carved(&[block(2.4, 0.6, 0.86, 0.9)], &[sink]);
+
+        let mut tub = MeshBuilder::new(p.white);
+        tub.carved(
+            &[block(1.7, 0.75, 0.0, 0.55)],
+            &[block(1.54, 0.59, 0.12, 0.55)],
+        );
+
+        let mut toilet = MeshBuilder::new(p.white);
+        toilet.cuboid(at(0.0, 0.05, 0.38, 0.5, 0.0, 0.42));
+        toilet.cuboid(at(0.0, -0.25, 0.4, 0.1, 0.0, 0.8));
+
+        let mut plant = MeshBuilder::new(p.clay);
+        plant.column(DVec2::ZERO, 0.18, 6, 0.0, 0.35).paint(p.leaf);
+        for (x, y, z, r) in [
+            (0.0, 0.62, 0.0, 0.24),
+            (0.1, 0.85, 0.04, 0.18),
+            (-0.08, 0.9, -0.06, 0.16),
+        ] {
+            plant.icosahedron(DVec3::new(x, y, z), DVec3::new(r, r * 1.2, r));
+        }
+
+        let mut lamp = MeshBuilder::new(p.metal);
+        lamp.column(DVec2::ZERO, 0.15, 8, 0.0, 0.03);
+        lamp.column(DVec2::ZERO, 0.015, 8, 0.03, 1.25)
+            .paint(p.white);
+        lamp.column(DVec2::ZERO, 0.2, 10, 1.25, 1.5);
+
+        let mut rug = MeshBuilder::new(p.fabric);
+        rug.cuboid(block(2.0, 1.4, 0.0, 0.01));
+        let mut cabinet = MeshBuilder::new(p.metal);
+        cabinet.cuboid(block(0.45, 0.4, 0.0, 0.5));
+
+        Self {
+            desk: site.mesh("desk", table(1.6, 0.8, 0.74)),
+            table: site.mesh("table", table(2.0, 0.9, 0.75)),
+            chair: site.mesh("chair", chair),
+            sofa: site.mesh("sofa", sofa),
+            bed: site.mesh("bed", bed),
+            wardrobe: site.mesh("wardrobe", wardrobe),
+            shelf: site.mesh("shelf", shelf),
+            counter: site.mesh("counter", counter),
+            tub: site.mesh("bath tub", tub),
+            toilet: site.mesh("toilet", toilet),
+            plant: site.mesh("plant", plant),
+            lamp: site.mesh("lamp", lamp),
+            rug: site.mesh("rug", rug),
+            cabinet: site.mesh("cabinet", cabinet),
+        }
+    }
+}
+
+/// Hangs an open door leaf into `hole`, a hole across `axis` (0 or 2): hinged at its low end,
+/// swung by `degrees` towards the positive side of `axis`.
+pub fn hang_door(site: &mut Site, p: &Palette, hole: &Aabb, axis: usize, degrees: f64) {
+    let along = 2 - axis;
+    let size = hole.size();
+    let mut leaf = MeshBuilder::new(p.wood);
+    leaf.cuboid(aabb(
+        [0.01, 0.005, -0.02],
+        [size[along] - 0.01, size.y - 0.01, 0.02],
+    ));
+    leaf.paint(p.metal);
+    leaf.cuboid(aabb(
+        [size[along] - 0.12, 0.98, -0.07],
+        [size[along] - 0.08, 1.02, 0.07],
+    ));
+    let mesh = site.mesh("door leaf", leaf);
+    let mut hinge = hole.center();
+    hinge.y = hole.min.y;
+    hinge[along] = hole.min[along];
+    // The leaf's +x lies along +x (axis z: turn -degrees to swing to +z) or +z (axis x: turn
+    // from -90, where +x becomes +z, towards 0, where it is +x).
+    let yaw = if axis == 2 { -degrees } else { degrees - 90.0 };
+    site.furnish("door leaf", mesh, hinge, yaw);
+}
+
+/// Sets a frame and a pane into `hole`, a hole across `axis` (0 or 2).
+pub fn glaze(site: &mut Site, p: &Palette, hole: &Aabb, axis: usize) {
+    let along = 2 - axis;
+    let slice = |border: f64, depth: f64| {
+        let mut b = *hole;
+        let middle = hole.center()[axis];
+        (b.min[axis], b.max[axis]) = (middle - depth, middle + depth);
+        for a in [along, 1] {
+            b.min[a] += border;
+            b.max[a] -= border;
+        }
+        b
+    };
+    let mut frame = MeshBuilder::new(p.white);
+    frame.carved(&[slice(0.0, 0.03)], &[slice(0.05, 0.03)]);
+    site.detail("window frame", frame);
+    let mut pane = MeshBuilder::new(p.glass);
+    pane.cuboid(slice(0.05, 0.005));
+    site.detail("window glass", pane);
+}

@@ -1,0 +1,471 @@
+//! The demo: a furnished house of two storeys and an attic.
+
+use enfilade_geom::{Aabb, DVec3};
+
+use crate::furniture::{Furniture, Palette, glaze, hang_door};
+use crate::picture;
+use crate::site::{Generated, Site};
+use crate::solid::{MeshBuilder, Steps, aabb};
+use crate::truth::{Convex, OpeningKind, Room, Side};
+
+/// Thickness of outer and inner walls. [Units: wu]
+const OUTER: f64 = 0.36;
+/// Outer measures of the house on plan, along x and z. [Units: wu]
+const LENGTH: f64 = 11.0;
+const DEPTH: f64 = 8.6;
+/// Floor and ceiling of the two storeys, and the floor of the attic. [Units: wu]
+const GROUND: [f64; 2] = [0.0, 2.6];
+const UPPER: [f64; 2] = [2.9, 5.4];
+const ATTIC: f64 = 5.65;
+/// Underside of the roof at the inner face of the eaves walls, and its rise per run.
+const EAVES: f64 = 6.25;
+const SLOPE: f64 = 0.84;
+
+struct House {
+    site: Site,
+    palette: Palette,
+    plaster: u32,
+    oak: u32,
+}
+
+/// A hole in a wall: along the wall, up, its kind, and the rooms in ascending order across it.
+struct Hole {
+    along: [f64; 2],
+    up: [f64; 2],
+    kind: OpeningKind,
+    rooms: [Side; 2],
+}
+
+fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> Hole {
+    Hole {
+        along,
+        up: [floor, floor + 2.05],
+        kind: OpeningKind::Door,
+        rooms,
+    }
+}
+
+fn window(along: [f64; 2], up: [f64; 2], rooms: [Side; 2]) -> Hole {
+    Hole {
+        along,
+        up,
+        kind: OpeningKind::Window,
+        rooms,
+    }
+}
+
+impl House {
+    /// A wall across `axis` (0: x, 2: z) between `faces`, running over `along` and `up`.
+    fn wall(
+        &mut self,
+        axis: usize,
+        faces: [f64; 2],
+        along: [f64; 2],
+        up: [f64; 2],
+        holes: &[Hole],
+    ) {
+        let span = |a: [f64; 2], u: [f64; 2]| {
+            if axis == 0 {
+                aabb([faces[0], u[0], a[0]], [faces[1], u[1], a[1]])
+            } else {
+                aabb([a[0], u[0], faces[0]], [a[1], u[1], faces[1]])
+            }
+        };
+        let voids: Vec<Aabb> = holes.iter().map(|h| span(h.along, h.up)).collect();
+        let mut wall = MeshBuilder::new(self.plaster);
+        wall.carved(&[span(along, up)], &voids);
+        self.site.structure("wall", wall);
+        for (hole, void) in holes.iter().zip(&voids) {
+            self.site.opening(hole.kind, *void, axis, hole.rooms);
+            match hole.kind {
+                OpeningKind::Door => hang_door(&mut self.site, &self.palette, void, axis, 80.0),
+                OpeningKind::Window => glaze(&mut self.site, &self.palette, void, axis),
+                OpeningKind::Opening | OpeningKind::Virtual => {}
+            }
+        }
+    }
+
+    /// A slab over the whole footprint, wooden on top.
+    fn slab(&mut self, low: f64, high: f64, holes: &[Aabb]) {
+        let mut slab = MeshBuilder::new(self.plaster);
+        slab.paint_top(self.oak);
+        slab.carved(&[aabb([0.0, low, 0.0], [LENGTH, high, DEPTH])], holes);
+        self.site.structure("floor slab", slab);
+    }
+}
+
+/// A furnished house of two storeys and an attic, on a lawn.
+///
+/// Entrance hall with stairs to a landing, living room, kitchen, dining room, toilet; three
+/// bedrooms, study and bath; an attic under a pitched roof, reached through a hatch. 12 rooms,
+/// 9 doors, a passage, 17 windows; colored and textured materials; furniture,
+/// door leaves and glass as detail.
+#[must_use]
+pub fn furnished_house() -> Generated {
+    let mut site = Site::new("furnished-house");
+    let palette = Palette::new(&mut site);
+    let plaster = site.material("plaster", [0.82, 0.79, 0.72]);
+    let oak = site.textured_material("oak floor", picture::oak_planks());
+    let mut house = House {
+        site,
+        palette,
+        plaster,
+        oak,
+    };
+
+    let ground = house.site.storey("ground floor", GROUND[0]);
+    let upper = house.site.storey("upper floor", UPPER[0]);
+    let attic = house.site.storey("attic", ATTIC);
+    let steps = Steps {
+        n: 16,
+        riser: 2.9 / 16.0,
+        going: 0.26,
+        waist: 0.18,
+    };
+    let stair_hole = aabb([6.05, GROUND[1], 3.4], [7.05, UPPER[0], 6.5]);
+    let hatch = aabb([4.6, UPPER[1], 6.3], [5.3, ATTIC, 7.5]);
+
+    // The stairs fill the hall below and, above the slab's underside, the hole.
+    let mut stairs = MeshBuilder::new(oak);
+    stairs.flight(
+        DVec3::new(6.55, 0.0, 3.4 + steps.run()),
+        -DVec3::Z,
+        1.0,
+        &steps,
+    );
+    let flight_box = aabb([6.05, 0.0, 3.4], [7.05, 2.9, 3.4 + steps.run()]);
+    let flight_volume = steps.volume_below(1.0, GROUND[1]);
+
+    let room = |site: &mut Site, name: &str, storey: usize, [x, z]: [[f64; 2]; 2]| {
+        let up = if storey == ground { GROUND } else { UPPER };
+        site.room(name, storey, aabb([x[0], up[0], z[0]], [x[1], up[1], z[1]]))
+    };
+    let (west, mid, east) = ([OUTER, 4.3], [4.45, 7.05], [7.2, LENGTH - OUTER]);
+    let north_end = DEPTH - OUTER;
+    let s = &mut house.site;
+    let living = room(s, "living room", ground, [west, [OUTER, north_end]]);
+    let hall_air = aabb([mid[0], GROUND[0], 2.45], [mid[1], GROUND[1], north_end]);
+    let hall = s.add_room(Room::new(
+        "entrance hall",
+        ground,
+        vec![Convex::of_aabb(&hall_air)],
+        &[(flight_box, flight_volume)],
+    ));
+    let toilet = room(s, "toilet", ground, [mid, [OUTER, 2.3]]);
+    let kitchen = room(s, "kitchen", ground, [east, [4.4, north_end]]);
+    let dining = room(s, "dining room", ground, [east, [OUTER, 4.25]]);
+    let landing_air = aabb([mid[0], UPPER[0], 2.45], [mid[1], UPPER[1], north_end]);
+    let landing = s.add_room(Room::new(
+        "landing",
+        upper,
+        vec![Convex::of_aabb(&landing_air)],
+        &[],
+    ));
+    let bedroom_1 = room(s, "bedroom 1", upper, [west, [4.4, north_end]]);
+    let bedroom_2 = room(s, "bedroom 2", upper, [west, [OUTER, 4.25]]);
+    let bedroom_3 = room(s, "bedroom 3", upper, [east, [OUTER, 4.25]]);
+    let study = room(s, "study", upper, [east, [4.4, north_end]]);
+    let bath = room(s, "bath", upper, [mid, [OUTER, 2.3]]);
+    let section = [
+        [ATTIC, OUTER],
+        [ATTIC, DEPTH - OUTER],
+        [EAVES, DEPTH - OUTER],
+        [EAVES + SLOPE * (DEPTH * 0.5 - OUTER), DEPTH * 0.5],
+        [EAVES, OUTER],
+    ];
+    let section = section.map(|[y, z]| DVec3::new(OUTER, y, z));
+    let loft_air = Convex::prism(&section, DVec3::X * (LENGTH - 2.0 * OUTER));
+    let loft = s.add_room(Room::new("attic", attic, vec![loft_air], &[]));
+
+    house.site.structure("stairs", stairs);
+    let out = Side::Outside;
+    house.slab(-0.3, 0.0, &[]);
+    house.slab(GROUND[1], UPPER[0], &[stair_hole]);
+    house.slab(UPPER[1], ATTIC, &[hatch]);
+    house
+        .site
+        .opening(OpeningKind::Opening, stair_hole, 1, [hall, landing]);
+    house
+        .site
+        .opening(OpeningKind::Opening, hatch, 1, [landing, loft]);
+
+    let (north, south) = ([0.0, OUTER], [DEPTH - OUTER, DEPTH]);
+    let (inner, all) = ([OUTER, DEPTH - OUTER], [0.0, LENGTH]);
+    let sill = [0.9, 2.2];
+    house.wall(
+        2,
+        north,
+        all,
+        GROUND,
+        &[
+            window([1.4, 3.2], sill, [out, living]),
+            window([5.5, 6.1], [1.4, 2.1], [out, toilet]),
+            window([8.2, 9.8], sill, [out, dining]),
+        ],
+    );
+    house.wall(
+        2,
+        south,
+        all,
+        GROUND,
+        &[
+            window([1.0, 3.6], [0.3, 2.2], [living, out]),
+            door([4.75, 5.75], 0.0, [hall, out]),
+            window([8.2, 9.8], sill, [kitchen, out]),
+        ],
+    );
+    house.wall(
+        0,
+        [0.0, OUTER],
+        inner,
+        GROUND,
+        &[
+            window([1.5, 3.0], sill, [out, living]),
+            window([5.2, 6.7], sill, [out, living]),
+        ],
+    );
+    house.wall(
+        0,
+        [LENGTH - OUTER, LENGTH],
+        inner,
+        GROUND,
+        &[
+            window([1.6, 3.0], sill, [dining, out]),
+            window([5.6, 7.0], sill, [kitchen, out]),
+        ],
+    );
+    house.wall(
+        0,
+        [4.3, 4.45],
+        inner,
+        GROUND,
+        &[door([3.2, 4.8], 0.0, [living, hall])],
+    );
+    let passage = Hole {
+        along: [8.2, 9.6],
+        up: [0.0, 2.1],
+        kind: OpeningKind::Opening,
+        rooms: [dining, kitchen],
+    };
+    house.wall(
+        0,
+        [7.05, 7.2],
+        inner,
+        GROUND,
+        &[door([7.38, 8.18], 0.0, [hall, kitchen])],
+    );
+    house.wall(
+        2,
+        [2.3, 2.45],
+        mid,
+        GROUND,
+        &[door([4.75, 5.55], 0.0, [toilet, hall])],
+    );
+    house.wall(2, [4.25, 4.4], east, GROUND, &[passage]);
+
+    let f = UPPER[0];
+    let sill = [f + 0.9, f + 2.1];
+    house.wall(
+        2,
+        north,
+        all,
+        UPPER,
+        &[
+            window([1.6, 3.0], sill, [out, bedroom_2]),
+            window([5.3, 6.2], [f + 1.2, f + 2.1], [out, bath]),
+            window([8.2, 9.6], sill, [out, bedroom_3]),
+        ],
+    );
+    house.wall(
+        2,
+        south,
+        all,
+        UPPER,
+        &[
+            window([1.6, 3.0], sill, [bedroom_1, out]),
+            window([4.9, 6.1], sill, [landing, out]),
+            window([8.2, 9.6], sill, [study, out]),
+        ],
+    );
+    house.wall(0, [0.0, OUTER], inner, UPPER, &[]);
+    house.wall(0, [LENGTH - OUTER, LENGTH], inner, UPPER, &[]);
+    house.wall(
+        0,
+        [4.3, 4.45],
+        inner,
+        UPPER,
+        &[
+            door([2.8, 3.65], f, [bedroom_2, landing]),
+            door([6.3, 7.15], f, [bedroom_1, landing]),
+        ],
+    );
+    house.wall(
+        0,
+        [7.05, 7.2],
+        inner,
+        UPPER,
+        &[
+            door([2.55, 3.35], f, [landing, bedroom_3]),
+            door([6.7, 7.5], f, [landing, study]),
+        ],
+    );
+    house.wall(2, [4.25, 4.4], west, UPPER, &[]);
+    house.wall(2, [4.25, 4.4], east, UPPER, &[]);
+    house.wall(
+        2,
+        [2.3, 2.45],
+        mid,
+        UPPER,
+        &[door([4.8, 5.6], f, [bath, landing])],
+    );
+
+    roof(&mut house, loft);
+    furnish(&mut house);
+    house.site.finish()
+}
+
+/// Height of the roof's underside at `z`.
+fn underside(z: f64) -> f64 {
+    EAVES + SLOPE * ((DEPTH * 0.5 - OUTER) - (z - DEPTH * 0.5).abs())
+}
+
+fn roof(house: &mut House, loft: Side) {
+    let tiles = house.site.material("roof tiles", [0.42, 0.13, 0.08]);
+    let brick = house.site.material("brick", [0.45, 0.20, 0.14]);
+    let grass = house.site.material("grass", [0.13, 0.30, 0.09]);
+    let mid = DEPTH * 0.5;
+    let eave = 0.5;
+    let at = |x: f64, lift: f64| move |z: f64| DVec3::new(x, underside(z) + lift, z);
+    let (low, high) = (at(-0.4, 0.0), at(-0.4, 0.3));
+    let profile = [-eave, mid, DEPTH + eave].map(low);
+    let cover = [DEPTH + eave, mid, -eave].map(high);
+    let mut roof = MeshBuilder::new(tiles);
+    roof.prism(&[profile, cover].concat(), DVec3::X * (LENGTH + 0.8));
+    house.site.structure("roof", roof);
+    let mut chimney = MeshBuilder::new(brick);
+    chimney.cuboid(aabb([8.0, 9.2, 3.2], [8.6, 10.9, 3.8]));
+    house.site.structure("chimney", chimney);
+
+    // Walls end 2 cm inside the roof, so that no gap is left where they meet.
+    let bury = 0.02;
+    for z in [[0.0, OUTER], [DEPTH - OUTER, DEPTH]] {
+        let x = OUTER;
+        let point = |y: f64, z: f64| DVec3::new(x, y, z);
+        let profile = [
+            point(ATTIC, z[0]),
+            point(ATTIC, z[1]),
+            point(underside(z[1]) + bury, z[1]),
+            point(underside(z[0]) + bury, z[0]),
+        ];
+        let mut wall = MeshBuilder::new(house.plaster);
+        wall.prism(&profile, DVec3::X * (LENGTH - 2.0 * OUTER));
+        house.site.structure("wall", wall);
+    }
+    for (x, sides) in [
+        (0.0, [Side::Outside, loft]),
+        (LENGTH - OUTER, [loft, Side::Outside]),
+    ] {
+        let hole = aabb([x, 6.6, mid - 0.5], [x + OUTER, 7.7, mid + 0.5]);
+        let top = |z: f64| DVec3::new(x, underside(z) + bury, z);
+        let point = |y: f64, z: f64| DVec3::new(x, y, z);
+        let (left, right, along) = (hole.min.z, hole.max.z, DVec3::X * OUTER);
+        let mut gable = MeshBuilder::new(house.plaster);
+        gable.prism(
+            &[point(ATTIC, 0.0), point(ATTIC, left), top(left), top(0.0)],
+            along,
+        );
+        gable.prism(
+            &[
+                point(ATTIC, right),
+                point(ATTIC, DEPTH),
+                top(DEPTH),
+                top(right),
+            ],
+            along,
+        );
+        gable.cuboid(aabb([x, ATTIC, left], [x + OUTER, hole.min.y, right]));
+        let above = [
+            point(hole.max.y, left),
+            point(hole.max.y, right),
+            top(right),
+            top(mid),
+            top(left),
+        ];
+        gable.prism(&above, along);
+        house.site.structure("wall", gable);
+        house.site.opening(OpeningKind::Window, hole, 0, sides);
+        glaze(&mut house.site, &house.palette, &hole, 0);
+    }
+    let mut lawn = MeshBuilder::new(grass);
+    lawn.cuboid(aabb(
+        [-12.0, -0.5, -12.0],
+        [LENGTH + 12.0, -0.15, DEPTH + 12.0],
+    ));
+    house.site.structure("ground", lawn);
+}
+
+fn furnish(house: &mut House) {
+    let site = &mut house.site;
+    let f = Furniture::new(site, &house.palette);
+    let up = UPPER[0];
+    let mut put = |name: &str, mesh: u32, x: f64, y: f64, z: f64, yaw: f64| {
+        site.furnish(name, mesh, DVec3::new(x, y, z), yaw);
+    };
+    put("rug", f.rug, 2.2, 0.0, 5.8, 0.0);
+    put("sofa", f.sofa, 2.2, 0.0, 7.2, 180.0);
+    put("table", f.table, 2.2, 0.01, 5.6, 0.0);
+    put("shelf", f.shelf, 2.2, 0.0, 0.56, 0.0);
+    put("plant", f.plant, 0.8, 0.0, 7.8, 0.0);
+    put("lamp", f.lamp, 3.9, 0.0, 7.8, 0.0);
+    put("plant", f.plant, 4.85, 0.0, 2.9, 0.0);
+    put("cabinet", f.cabinet, 4.75, 0.0, 6.0, 90.0);
+    put("toilet", f.toilet, 6.6, 0.0, 0.72, 0.0);
+    put("counter", f.counter, 10.3, 0.0, 6.0, -90.0);
+    put("counter", f.counter, 9.0, 0.0, 7.9, 180.0);
+    put("table", f.table, 8.9, 0.0, 2.2, 90.0);
+    for (x, z, yaw) in [
+        (8.2, 1.7, 90.0),
+        (8.2, 2.7, 90.0),
+        (9.6, 1.7, -90.0),
+        (9.6, 2.7, -90.0),
+    ] {
+        put("chair", f.chair, x, 0.0, z, yaw);
+    }
+    put("plant", f.plant, 10.2, 0.0, 0.8, 0.0);
+    put("bed", f.bed, 1.45, up, 6.3, 90.0);
+    put("wardrobe", f.wardrobe, 2.6, up, 4.75, 0.0);
+    put("lamp", f.lamp, 0.7, up, 7.8, 0.0);
+    put("bed", f.bed, 1.45, up, 1.6, 90.0);
+    put("wardrobe", f.wardrobe, 2.0, up, 3.9, 180.0);
+    put("bed", f.bed, 9.6, up, 1.6, -90.0);
+    put("wardrobe", f.wardrobe, 9.0, up, 3.9, 180.0);
+    put("desk", f.desk, 10.1, up, 6.3, -90.0);
+    put("chair", f.chair, 9.4, up, 6.3, 90.0);
+    put("shelf", f.shelf, 8.2, up, 4.6, 0.0);
+    put("plant", f.plant, 10.2, up, 7.8, 0.0);
+    put("bath tub", f.tub, 6.6, up, 1.3, 90.0);
+    put("toilet", f.toilet, 4.9, up, 0.72, 0.0);
+    put("lamp", f.lamp, 4.8, up, 5.2, 0.0);
+    put("cabinet", f.cabinet, 2.5, ATTIC, 3.0, 10.0);
+    put("cabinet", f.cabinet, 3.2, ATTIC, 3.2, 40.0);
+    put("shelf", f.shelf, 8.5, ATTIC, 1.0, 0.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::scene::Role;
+
+    #[test]
+    fn the_house_is_as_large_as_promised() {
+        let house = furnished_house();
+        assert_eq!(house.truth.rooms.len(), 12);
+        let count = |k| house.truth.openings.iter().filter(|o| o.kind == k).count();
+        assert_eq!(count(OpeningKind::Window), 17);
+        assert_eq!(count(OpeningKind::Door), 9);
+        assert_eq!(count(OpeningKind::Opening), 3);
+        let n = house.n_triangles(Role::Structural) + house.n_triangles(Role::Detail);
+        assert!((3_000..6_000).contains(&n), "{n} triangles");
+        assert_eq!(house.scene.images.len(), 1);
+    }
+}

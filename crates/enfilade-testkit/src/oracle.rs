@@ -1,0 +1,242 @@
+//! Slow, plain checks that share no code with the kernels they judge.
+
+use std::collections::HashMap;
+
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Aabb, DVec3, Triangle, triangle_area_normal};
+
+/// World triangles of all structural objects.
+#[must_use]
+pub fn structural_triangles(scene: &Scene) -> Vec<Triangle> {
+    scene
+        .triangle_sources(Role::Structural)
+        .map(|s| scene.world_triangle(s))
+        .collect()
+}
+
+/// World triangles of one object.
+#[must_use]
+pub fn object_triangles(scene: &Scene, object: usize) -> Vec<Triangle> {
+    [Role::Structural, Role::Detail]
+        .into_iter()
+        .flat_map(|role| scene.triangle_sources(role))
+        .filter(|s| s.object as usize == object)
+        .map(|s| scene.world_triangle(s))
+        .collect()
+}
+
+/// Number of directed edges that no opposite edge answers; 0 for closed, well-oriented surfaces.
+///
+/// Corners are the same when all bits are.
+#[must_use]
+pub fn n_open_edges(triangles: &[Triangle]) -> usize {
+    balance(triangles)
+        .values()
+        .map(|n| n.unsigned_abs() as usize)
+        .sum()
+}
+
+fn bits(p: DVec3) -> [u64; 3] {
+    // Adding zero makes -0.0 and 0.0 one corner.
+    p.to_array().map(|x| (x + 0.0).to_bits())
+}
+
+fn balance(triangles: &[Triangle]) -> HashMap<[[u64; 3]; 2], i64> {
+    let mut edges: HashMap<[[u64; 3]; 2], i64> = HashMap::new();
+    for t in triangles {
+        for i in 0..3 {
+            let (a, b) = (bits(t[i]), bits(t[(i + 1) % 3]));
+            let (key, one) = if a < b { ([a, b], 1) } else { ([b, a], -1) };
+            *edges.entry(key).or_default() += one;
+        }
+    }
+    edges
+}
+
+/// Numbers of distinct corners and distinct undirected edges.
+#[must_use]
+pub fn n_corners_and_edges(triangles: &[Triangle]) -> (usize, usize) {
+    let corners: std::collections::HashSet<_> =
+        triangles.iter().flatten().map(|&p| bits(p)).collect();
+    (corners.len(), balance(triangles).len())
+}
+
+/// Volume enclosed by a closed surface with outward faces; negative if they face inwards.
+#[must_use]
+pub fn signed_volume(triangles: &[Triangle]) -> f64 {
+    triangles
+        .iter()
+        .map(|t| t[0].dot(t[1].cross(t[2])))
+        .sum::<f64>()
+        / 6.0
+}
+
+/// Whether the closed segment meets any triangle, edges included. O(triangles).
+#[must_use]
+pub fn segment_is_blocked(triangles: &[Triangle], from: DVec3, to: DVec3) -> bool {
+    first_hit(triangles, from, to).is_some()
+}
+
+/// Share of the segment passed at its first hit, with the index of the triangle. O(triangles).
+///
+/// Möller and Trumbore 1997, in `f64`, widened by 1e-9 so that a seam between two triangles is
+/// never slipped through.
+#[must_use]
+pub fn first_hit(triangles: &[Triangle], from: DVec3, to: DVec3) -> Option<(f64, usize)> {
+    let along = to - from;
+    let mut best: Option<(f64, usize)> = None;
+    for (i, t) in triangles.iter().enumerate() {
+        let (e1, e2) = (t[1] - t[0], t[2] - t[0]);
+        let p = along.cross(e2);
+        let det = e1.dot(p);
+        if det == 0.0 {
+            continue;
+        }
+        let s = from - t[0];
+        let q = s.cross(e1);
+        let (u, v, w) = (s.dot(p) / det, along.dot(q) / det, e2.dot(q) / det);
+        let slack = -1e-9;
+        let inside = u >= slack && v >= slack && u + v <= 1.0 - slack;
+        if inside && (0.0..=1.0).contains(&w) && best.is_none_or(|(b, _)| w < b) {
+            best = Some((w, i));
+        }
+    }
+    best
+}
+
+/// How often outward-facing surfaces enclose `p`: positive in a solid, 0 in the open air, -1 in
+/// a cave that is modelled by its inner surface alone. O(triangles).
+///
+/// Signed crossings along one ray, in a direction that no wall is built along.
+#[must_use]
+pub fn winding_number(triangles: &[Triangle], p: DVec3) -> i32 {
+    let along = DVec3::new(0.301_511_3, 0.904_534_1, 0.301_931_7);
+    let mut winding = 0;
+    for t in triangles {
+        // Seen along the ray, does the triangle's projection hold the origin, and which way round?
+        let [a, b, c] = t.map(|q| q - p);
+        let [u, v, w] = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n.dot(along));
+        let front = u > 0.0 && v > 0.0 && w > 0.0;
+        let back = u < 0.0 && v < 0.0 && w < 0.0;
+        let ahead = a.dot(triangle_area_normal(t)) * (u + v + w) > 0.0;
+        if ahead && (front || back) {
+            winding += if front { 1 } else { -1 };
+        }
+    }
+    winding
+}
+
+/// Air regions of a coarse voxel grid: voxels that no triangle touches, joined through faces.
+///
+/// Rasterisation is conservative, so a region never leaks through a crack narrower than a voxel.
+#[derive(Clone, Debug)]
+pub struct FloodGrid {
+    origin: DVec3,
+    voxel: f64,
+    n: [usize; 3],
+    labels: Vec<u32>,
+}
+
+const SOLID: u32 = u32::MAX;
+const UNSEEN: u32 = u32::MAX - 1;
+
+impl FloodGrid {
+    /// Floods the box `bounds` in voxels of side `voxel`.
+    #[must_use]
+    pub fn new(triangles: &[Triangle], bounds: Aabb, voxel: f64) -> Self {
+        let n = (bounds.size() / voxel)
+            .ceil()
+            .to_array()
+            .map(|x| (x as usize).max(1));
+        let mut grid = Self {
+            origin: bounds.min,
+            voxel,
+            n,
+            labels: vec![UNSEEN; n[0] * n[1] * n[2]],
+        };
+        for t in triangles {
+            grid.mark(t);
+        }
+        let mut next = 0;
+        for start in 0..grid.labels.len() {
+            if grid.labels[start] == UNSEEN {
+                grid.flood(start, next);
+                next += 1;
+            }
+        }
+        grid
+    }
+
+    fn mark(&mut self, t: &Triangle) {
+        let bounds = Aabb::of_points(t);
+        let low = ((bounds.min - self.origin) / self.voxel - 1e-6).floor();
+        let high = ((bounds.max - self.origin) / self.voxel + 1e-6).floor();
+        let span = [0, 1, 2].map(|a: usize| {
+            low[a].max(0.0) as usize..((high[a] + 1.0).max(0.0) as usize).min(self.n[a])
+        });
+        for z in span[2].clone() {
+            for y in span[1].clone() {
+                for x in span[0].clone() {
+                    let center =
+                        self.origin + (DVec3::new(x as f64, y as f64, z as f64) + 0.5) * self.voxel;
+                    if touches_cube(t, center, self.voxel * 0.5 + 1e-7) {
+                        self.labels[(z * self.n[1] + y) * self.n[0] + x] = SOLID;
+                    }
+                }
+            }
+        }
+    }
+
+    fn flood(&mut self, start: usize, label: u32) {
+        let [nx, ny, nz] = self.n;
+        let mut stack = vec![start];
+        self.labels[start] = label;
+        while let Some(i) = stack.pop() {
+            let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
+            let neighbors = [
+                (x > 0).then(|| i - 1),
+                (x + 1 < nx).then_some(i + 1),
+                (y > 0).then(|| i - nx),
+                (y + 1 < ny).then_some(i + nx),
+                (z > 0).then(|| i - nx * ny),
+                (z + 1 < nz).then_some(i + nx * ny),
+            ];
+            for j in neighbors.into_iter().flatten() {
+                if self.labels[j] == UNSEEN {
+                    self.labels[j] = label;
+                    stack.push(j);
+                }
+            }
+        }
+    }
+
+    /// Region of the voxel that holds `p`; `None` where a triangle touches it, or off the grid.
+    #[must_use]
+    pub fn region_at(&self, p: DVec3) -> Option<u32> {
+        let c = ((p - self.origin) / self.voxel).floor();
+        if (0..3).any(|a| c[a] < 0.0 || c[a] >= self.n[a] as f64) {
+            return None;
+        }
+        let [x, y, z] = c.to_array().map(|x| x as usize);
+        let label = self.labels[(z * self.n[1] + y) * self.n[0] + x];
+        (label != SOLID).then_some(label)
+    }
+}
+
+/// Whether a triangle meets a cube: no separating axis among the 13 candidates.
+fn touches_cube(t: &Triangle, center: DVec3, half: f64) -> bool {
+    let c = t.map(|p| p - center);
+    let separates = |axis: DVec3| {
+        let d = c.map(|p| p.dot(axis));
+        let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
+        d.iter().all(|&x| x > reach) || d.iter().all(|&x| x < -reach)
+    };
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    if axes.into_iter().any(separates) || separates(triangle_area_normal(&c)) {
+        return false;
+    }
+    let edges = [c[1] - c[0], c[2] - c[1], c[0] - c[2]];
+    !edges
+        .into_iter()
+        .any(|e| axes.into_iter().any(|a| separates(a.cross(e))))
+}

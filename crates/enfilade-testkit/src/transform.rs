@@ -1,0 +1,54 @@
+//! The same scene another way: turned, scaled, its triangles in another order.
+
+use enfilade_geom::{DMat4, DVec3};
+
+use crate::rng::Rng;
+use crate::site::Generated;
+
+/// The scene moved by a rotation, uniform scaling and translation. Meshes stay as they are.
+#[must_use]
+pub fn transformed(mut generated: Generated, by: &DMat4) -> Generated {
+    for o in &mut generated.scene.objects {
+        o.transform = *by * o.transform;
+    }
+    generated.truth.transform(by);
+    generated
+}
+
+/// The scene turned about +Y.
+#[must_use]
+pub fn rotated(generated: Generated, degrees: f64) -> Generated {
+    transformed(generated, &DMat4::from_rotation_y(degrees.to_radians()))
+}
+
+/// The scene scaled about the origin.
+#[must_use]
+pub fn scaled(generated: Generated, factor: f64) -> Generated {
+    transformed(generated, &DMat4::from_scale(DVec3::splat(factor)))
+}
+
+/// The scene with its objects, and the triangles within each part, in another order; triangles
+/// also start at another of their corners. The truth stays.
+#[must_use]
+pub fn shuffled(mut generated: Generated, seed: u64) -> Generated {
+    let mut rng = Rng::new(seed);
+    rng.shuffle(&mut generated.scene.objects);
+    for p in generated
+        .scene
+        .meshes
+        .iter_mut()
+        .flat_map(|m| &mut m.primitives)
+    {
+        let mut triangles: Vec<[u32; 3]> = p
+            .indices
+            .chunks_exact(3)
+            .map(|t| [t[0], t[1], t[2]])
+            .collect();
+        rng.shuffle(&mut triangles);
+        for t in &mut triangles {
+            t.rotate_left(rng.below(3));
+        }
+        p.indices = triangles.concat();
+    }
+    generated
+}
