@@ -15,9 +15,15 @@ mod builder;
 mod error;
 mod files;
 mod gltf;
+mod mtl;
+mod obj;
 mod options;
+mod ply;
+mod polygon;
 mod report;
 mod roles;
+mod soup;
+mod stl;
 
 pub use error::ImportError;
 pub use options::{ImportOptions, Limits, Up};
@@ -67,8 +73,26 @@ pub fn import(
 }
 
 fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    if gltf::is_gltf(bytes) {
+    let ending = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
+    // Content first, where it leaves no doubt; then the name; then a guess.
+    if bytes.starts_with(b"glTF") {
         gltf::read(bytes, builder)
+    } else if ply::is_ply(bytes) {
+        ply::read(bytes, builder)
+    } else if ending == "obj" {
+        obj::read(bytes, builder)
+    } else if ending == "stl" {
+        stl::read(bytes, builder)
+    } else if gltf::is_gltf(bytes) {
+        gltf::read(bytes, builder)
+    } else if stl::is_stl(bytes) {
+        stl::read(bytes, builder)
+    } else if obj::is_obj(bytes) {
+        obj::read(bytes, builder)
     } else {
         Err(ImportError::UnknownFormat {
             path: path.to_path_buf(),
@@ -83,6 +107,33 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
 /// As [`import`].
 pub fn decode_gltf(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.glb", options, gltf::read)
+}
+
+/// Reads an OBJ file from memory, without its material libraries.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_obj(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.obj", options, obj::read)
+}
+
+/// Reads a PLY file from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_ply(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.ply", options, ply::read)
+}
+
+/// Reads an STL file from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_stl(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.stl", options, stl::read)
 }
 
 fn decode(

@@ -15,6 +15,7 @@ use accessor::{Document, MESHOPT};
 use enfilade_geom::scene::Mesh;
 use enfilade_geom::{DMat4, DVec3};
 use json::{Node, Root};
+pub(crate) use look::read_picture_file;
 use std::borrow::Cow;
 
 /// Required extensions that are read, or that change nothing that is read.

@@ -1,0 +1,235 @@
+//! Polygons with more than three corners: planarity, and ear clipping in their own plane.
+//!
+//! Ears are clipped by the `earcut` crate. It keeps corners that lie in the middle of a straight
+//! edge, as long as the outline does not cross itself; dropping one would tear the surface from
+//! its neighbor.
+
+use crate::ImportError;
+use crate::builder::Builder;
+use earcut::Earcut;
+use enfilade_geom::DVec3;
+
+/// Most corners of one polygon. Ear clipping can take time in the square of it.
+pub(crate) const MAX_CORNERS: usize = 4096;
+
+/// Corners may be this far from their polygon's plane. [Units: wu]
+const PLANAR: f64 = 1e-3;
+
+/// Splits polygons; keeps its buffers.
+pub(crate) struct Splitter {
+    earcut: Earcut<f64>,
+    flat: Vec<[f64; 2]>,
+    triangles: Vec<u32>,
+}
+
+impl Splitter {
+    pub(crate) fn new() -> Self {
+        Self {
+            earcut: Earcut::new(),
+            flat: Vec::new(),
+            triangles: Vec::new(),
+        }
+    }
+
+    /// Triangles of a polygon as triples of corner numbers, wound as the polygon is.
+    ///
+    /// `unit` is meters per unit of the corners.
+    pub(crate) fn split(
+        &mut self,
+        corners: &[DVec3],
+        unit: f64,
+        builder: &mut Builder<'_>,
+        place: impl Fn() -> String,
+    ) -> Result<&[u32], ImportError> {
+        self.triangles.clear();
+        let n = corners.len();
+        if n > MAX_CORNERS {
+            return Err(ImportError::TooMuch {
+                path: builder.path.clone(),
+                place: place(),
+                what: "corners of one polygon",
+                n: n as u64,
+                limit: MAX_CORNERS as u64,
+            });
+        }
+        if n == 3 {
+            self.triangles.extend([0, 1, 2]);
+        }
+        if n <= 3 {
+            return Ok(&self.triangles);
+        }
+        builder.report.n_polygons += 1;
+        let center = corners.iter().sum::<DVec3>() / n as f64;
+        let normal = newell_normal(corners, center).normalize_or_zero();
+        if normal == DVec3::ZERO || !center.is_finite() {
+            // No plane: any triangles do, and the cleaning report shows them as degenerate.
+            self.fan(n);
+            return Ok(&self.triangles);
+        }
+        let off = corners
+            .iter()
+            .map(|&c| (c - center).dot(normal).abs())
+            .fold(0.0, f64::max);
+        if off * unit > PLANAR {
+            let position = builder.base.transform_point3(center);
+            builder.report.non_planar_polygons.add(position, &place);
+        }
+        let (u, v) = normal.any_orthonormal_pair();
+        self.flat.clear();
+        self.flat.extend(
+            corners
+                .iter()
+                .map(|&c| [(c - center).dot(u), (c - center).dot(v)]),
+        );
+        // `u, v, normal` is right-handed, so the outline runs counter-clockwise.
+        if n == 4 && (0..4).all(|i| self.area([i, (i + 1) % 4, (i + 2) % 4]) > 0.0) {
+            self.triangles.extend([0, 1, 2, 0, 2, 3]);
+            return Ok(&self.triangles);
+        }
+        self.earcut.earcut(
+            self.flat.iter().copied(),
+            &[] as &[u32],
+            &mut self.triangles,
+        );
+        let mut triangles = std::mem::take(&mut self.triangles);
+        for t in triangles.chunks_exact_mut(3) {
+            if self.area([t[0], t[1], t[2]].map(|i| i as usize)) < 0.0 {
+                t.swap(1, 2);
+            }
+        }
+        self.triangles = triangles;
+        if self.triangles.len() != 3 * (n - 2) {
+            builder.note(
+                place(),
+                "a polygon that crosses or touches itself; look at the result",
+            );
+        }
+        if self.triangles.is_empty() {
+            self.fan(n);
+        }
+        Ok(&self.triangles)
+    }
+
+    fn fan(&mut self, n: usize) {
+        self.triangles
+            .extend((1..n as u32 - 1).flat_map(|i| [0, i, i + 1]));
+    }
+
+    /// Twice the signed area.
+    fn area(&self, t: [usize; 3]) -> f64 {
+        let [a, b, c] = t.map(|i| self.flat[i]);
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    }
+}
+
+/// Twice the area vector (Newell's method), about `center` to keep digits.
+fn newell_normal(corners: &[DVec3], center: DVec3) -> DVec3 {
+    let n = corners.len();
+    (0..n)
+        .map(|i| (corners[i] - center).cross(corners[(i + 1) % n] - center))
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ImportOptions;
+    use proptest::prelude::*;
+
+    fn split(corners: &[DVec3]) -> (Vec<u32>, u64, usize) {
+        let options = ImportOptions::default();
+        let mut builder = Builder::new(&options).unwrap();
+        let mut splitter = Splitter::new();
+        let triangles = splitter
+            .split(corners, 1.0, &mut builder, || "here".into())
+            .unwrap()
+            .to_vec();
+        let report = &builder.report;
+        (triangles, report.non_planar_polygons.n, report.notes.len())
+    }
+
+    /// Area vector of the triangles and the sum of their areas, both doubled.
+    fn areas(corners: &[DVec3], triangles: &[u32]) -> (DVec3, f64) {
+        triangles
+            .chunks_exact(3)
+            .fold((DVec3::ZERO, 0.0), |(vector, sum), t| {
+                let [a, b, c] = [t[0], t[1], t[2]].map(|i| corners[i as usize]);
+                let normal = (b - a).cross(c - a);
+                (vector + normal, sum + normal.length())
+            })
+    }
+
+    fn on_plane(outline: &[[f64; 2]]) -> Vec<DVec3> {
+        outline
+            .iter()
+            .map(|p| DVec3::new(p[0], 2.0, -p[1]))
+            .collect()
+    }
+
+    #[test]
+    fn a_concave_polygon_with_a_corner_mid_edge_is_covered_exactly_once() {
+        // An L of area 3 with one corner in the middle of its longest edge.
+        let outline = [
+            [0., 0.],
+            [1., 0.],
+            [2., 0.],
+            [2., 1.],
+            [1., 1.],
+            [1., 2.],
+            [0., 2.],
+        ];
+        let corners = on_plane(&outline);
+        let (triangles, n_bent, n_notes) = split(&corners);
+        let (vector, sum) = areas(&corners, &triangles);
+        assert_eq!((triangles.len(), n_bent, n_notes), (15, 0, 0));
+        assert_eq!(vector, DVec3::new(0.0, 6.0, 0.0));
+        assert_eq!(sum, 6.0);
+    }
+
+    #[test]
+    fn a_bent_quad_is_reported_and_a_flat_one_is_not() {
+        let flat = on_plane(&[[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
+        assert_eq!(split(&flat).1, 0);
+        let mut bent = flat;
+        bent[2].y += 0.01;
+        assert_eq!(split(&bent).1, 1);
+    }
+
+    #[test]
+    fn polygons_without_a_plane_still_give_triangles() {
+        assert_eq!(split(&[DVec3::ONE; 5]).0.len(), 9);
+        let line: Vec<DVec3> = (0..4).map(|i| DVec3::X * f64::from(i)).collect();
+        assert_eq!(split(&line).0.len(), 6);
+        // A bow tie crosses itself.
+        let bow = on_plane(&[[0., 0.], [2., 2.], [2., 0.], [0., 3.]]);
+        assert!(!split(&bow).0.is_empty());
+    }
+
+    proptest! {
+        /// Star-shaped outlines are simple; the triangles then cover them once, all turned alike.
+        #[test]
+        fn star_outlines_are_covered_once(
+            radii in prop::collection::vec(0.1f64..10.0, 4..40),
+            turn in prop::array::uniform3(-1.0f64..1.0),
+        ) {
+            let n = radii.len() as f64;
+            let axis = DVec3::from_array(turn).try_normalize().unwrap_or(DVec3::Z);
+            let (u, v) = axis.any_orthonormal_pair();
+            let corners: Vec<DVec3> = radii.iter().enumerate().map(|(i, r)| {
+                let angle = i as f64 / n * std::f64::consts::TAU;
+                (u * angle.cos() + v * angle.sin()) * *r
+            }).collect();
+            let (triangles, n_bent, _) = split(&corners);
+            let (vector, sum) = areas(&corners, &triangles);
+            // The outline's own area, by sectors.
+            let m = radii.len();
+            let sector = (std::f64::consts::TAU / n).sin();
+            let area: f64 = (0..m).map(|i| radii[i] * radii[(i + 1) % m] * sector).sum();
+            // 1e-9: forty additions of numbers up to 100 in f64.
+            prop_assert!((sum - area).abs() < 1e-9 * area.max(1.0));
+            prop_assert!((vector - axis * area).length() < 1e-9 * area.max(1.0));
+            prop_assert_eq!(n_bent, 0);
+            prop_assert_eq!(triangles.len(), 3 * (m - 2));
+        }
+    }
+}
