@@ -1,2 +1,57 @@
-//! The enfilade command.
-fn main() {}
+//! The `enfilade` command: arguments → library calls → report.
+//!
+//! Results go to standard output, progress and messages to standard error. Exit code 0: done;
+//! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
+
+mod inspect;
+mod locate;
+#[allow(dead_code, reason = "for the commands that write files")]
+mod output;
+#[allow(dead_code, reason = "for the commands that take long")]
+mod progress;
+mod world;
+
+use std::io;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Finds the rooms and doorways of a 3D scene; answers what can be seen from where.
+#[derive(Parser)]
+#[command(version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Inspect(inspect::Inspect),
+    Locate(locate::Locate),
+}
+
+fn run(cli: Cli) -> anyhow::Result<()> {
+    match cli.command {
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Locate(args) => locate::run(&args),
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of our output has seen enough, as in `enfilade inspect X.glb | head`.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("enfilade: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<io::Error>())
+        .any(|e| e.kind() == io::ErrorKind::BrokenPipe)
+}

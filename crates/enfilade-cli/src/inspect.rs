@@ -1,0 +1,287 @@
+//! `enfilade inspect`: what a world holds.
+
+use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+
+use anyhow::Context;
+use enfilade::cpg::{Cell, Portal, PortalKind, World};
+use enfilade::geom::DVec3;
+use serde::Serialize;
+
+use crate::world::read_world;
+
+/// Shows the cells, portals and statistics of a world.
+#[derive(clap::Args)]
+pub(crate) struct Inspect {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
+    let world = read_world(&args.world)?;
+    let mut out = BufWriter::new(io::stdout().lock());
+    if args.json {
+        serde_json::to_writer(&mut out, &report(&world)).map_err(io::Error::from)?;
+        writeln!(out)?;
+    } else {
+        write_tables(&mut out, &world)?;
+    }
+    out.flush().context("cannot write to standard output")
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    cells: Vec<CellReport<'a>>,
+    portals: Vec<PortalReport<'a>>,
+    stats: Stats<'a>,
+}
+
+#[derive(Serialize)]
+struct CellReport<'a> {
+    id: usize,
+    name: &'a str,
+    aabb: [[f32; 3]; 2],
+    volume: f32,
+    triangles: u32,
+    detail_triangles: u32,
+    portals: Vec<u32>,
+    outdoor: bool,
+}
+
+#[derive(Serialize)]
+struct PortalReport<'a> {
+    id: usize,
+    cells: [u32; 2],
+    kind: &'static str,
+    area: f32,
+    width: f32,
+    height: f32,
+    pieces: usize,
+    normal: [f32; 3],
+    outline: &'a [[f32; 3]],
+}
+
+/// Times and peaks differ from run to run and are not in the file, which is the same every time.
+#[derive(Serialize)]
+struct Stats<'a> {
+    input_triangles: u64,
+    seconds: BTreeMap<String, f64>,
+    peak_bytes: u64,
+    generator: &'a str,
+    method: &'a str,
+    input_hash: &'a str,
+    settings: &'a BTreeMap<String, String>,
+    counts: &'a BTreeMap<String, f64>,
+}
+
+fn report(world: &World) -> Report<'_> {
+    let graph = &world.graph;
+    let cells = graph.cells.iter().enumerate().map(|(id, c)| CellReport {
+        id,
+        name: &c.name,
+        aabb: c.aabb,
+        volume: c.volume,
+        triangles: c.n_triangles,
+        detail_triangles: c.n_detail_triangles,
+        portals: c.portals.iter().map(|p| p.0).collect(),
+        outdoor: c.outdoor,
+    });
+    let portals = graph.portals.iter().enumerate().map(|(id, p)| {
+        let [width, height] = size(p);
+        PortalReport {
+            id,
+            cells: p.cells.map(|c| c.0),
+            kind: kind_name(p.kind),
+            area: p.area,
+            width,
+            height,
+            pieces: p.pieces.len(),
+            normal: p.normal,
+            outline: &p.outline,
+        }
+    });
+    Report {
+        cells: cells.collect(),
+        portals: portals.collect(),
+        stats: Stats {
+            input_triangles: input_triangles(world),
+            seconds: BTreeMap::new(),
+            peak_bytes: 0,
+            generator: &graph.provenance.generator,
+            method: &graph.provenance.method,
+            input_hash: &graph.provenance.input_hash,
+            settings: &graph.provenance.settings,
+            counts: &graph.statistics.counts,
+        },
+    }
+}
+
+fn input_triangles(world: &World) -> u64 {
+    world
+        .graph
+        .statistics
+        .counts
+        .get("input_triangles")
+        .map_or(0, |&n| n as u64)
+}
+
+fn kind_name(kind: PortalKind) -> &'static str {
+    match kind {
+        PortalKind::Open => "open",
+        PortalKind::Door => "door",
+        PortalKind::Window => "window",
+        PortalKind::Crack => "crack",
+    }
+}
+
+/// Width and height of a portal's outline: across and up as one who stands before it would say;
+/// for a hole in a floor, along x and z. [Units: wu]
+fn size(portal: &Portal) -> [f32; 2] {
+    let normal = DVec3::from(portal.normal.map(f64::from));
+    // Steeper than 45° reads as a floor.
+    let up_hint = if normal.y.abs() < 0.7 {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    let across = up_hint.cross(normal).normalize_or_zero();
+    let up = normal.cross(across);
+    [across, up].map(|axis| {
+        let along = |c: &[f32; 3]| axis.dot(DVec3::from(c.map(f64::from)));
+        let least = portal
+            .outline
+            .iter()
+            .map(along)
+            .fold(f64::INFINITY, f64::min);
+        let most = portal
+            .outline
+            .iter()
+            .map(along)
+            .fold(f64::NEG_INFINITY, f64::max);
+        (most - least) as f32
+    })
+}
+
+fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
+    let graph = &world.graph;
+    let mut by_volume: Vec<(usize, &Cell)> = graph.cells.iter().enumerate().collect();
+    // Ids break ties, so that the table is the same every time.
+    by_volume.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
+    writeln!(
+        out,
+        "{:>6}  {:<16} {:>12} {:>10} {:>10} {:>8}  size in m (x × y × z)",
+        "cell", "name", "volume m³", "triangles", "detail", "portals"
+    )?;
+    for (id, c) in by_volume {
+        let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
+        writeln!(
+            out,
+            "{id:>6}  {:<16} {:>12.2} {:>10} {:>10} {:>8}  {x:.2} × {y:.2} × {z:.2}",
+            c.name,
+            c.volume,
+            c.n_triangles,
+            c.n_detail_triangles,
+            c.portals.len()
+        )?;
+    }
+    writeln!(
+        out,
+        "\n{:>6}  {:<8} {:>15} {:>9} {:>9} {:>10} {:>7}  middle in m",
+        "portal", "kind", "cells", "width m", "height m", "area m²", "pieces"
+    )?;
+    for (id, p) in graph.portals.iter().enumerate() {
+        let [width, height] = size(p);
+        let sum = p
+            .outline
+            .iter()
+            .fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
+        let [x, y, z] = sum.map(|s| s / p.outline.len() as f32);
+        let cells = format!("{} – {}", p.cells[0].0, p.cells[1].0);
+        writeln!(
+            out,
+            "{id:>6}  {:<8} {cells:>15} {width:>9.2} {height:>9.2} {:>10.3} {:>7}  {x:.2} {y:.2} {z:.2}",
+            kind_name(p.kind),
+            p.area,
+            p.pieces.len()
+        )?;
+    }
+    write_totals(out, world)
+}
+
+fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
+    let graph = &world.graph;
+    let mut row = |name: &str, value: String| writeln!(out, "{name:<22} {value}");
+    let indoor = graph.cells.iter().filter(|c| !c.outdoor).count();
+    let outdoors = if indoor < graph.cells.len() {
+        " and outdoors"
+    } else {
+        ""
+    };
+    row("\ncells", format!("{indoor}{outdoors}"))?;
+    let mut kinds = BTreeMap::new();
+    for p in &graph.portals {
+        *kinds.entry(p.kind).or_insert(0_usize) += 1;
+    }
+    let kinds: Vec<String> = kinds
+        .iter()
+        .map(|(k, n)| format!("{n} {}", kind_name(*k)))
+        .collect();
+    let kinds = if kinds.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", kinds.join(", "))
+    };
+    row("portals", format!("{}{kinds}", graph.portals.len()))?;
+    let most = graph
+        .cells
+        .iter()
+        .map(|c| c.portals.len())
+        .max()
+        .unwrap_or(0);
+    let n_cells = graph.cells.len().max(1) as f64;
+    let mean = |n: u64| format!("{:.1}", n as f64 / n_cells);
+    let ends = graph.portals.len() as u64 * 2;
+    row(
+        "portals a cell",
+        format!("{} on average, {most} at most", mean(ends)),
+    )?;
+    let stored: u64 = world
+        .batches
+        .iter()
+        .map(|b| b.primitive.indices.len() as u64 / 3)
+        .sum();
+    let seen: u64 = graph.cells.iter().map(|c| u64::from(c.n_triangles)).sum();
+    row("input triangles", input_triangles(world).to_string())?;
+    row(
+        "stored triangles",
+        format!("{stored}, {} a cell on average", mean(seen)),
+    )?;
+    row("detail objects", world.details.len().to_string())?;
+    let locator = &graph.locator;
+    row(
+        "locator",
+        format!(
+            "{} nodes, {} planes",
+            locator.nodes.len(),
+            locator.planes.len()
+        ),
+    )?;
+    row(
+        "made by",
+        format!(
+            "{} ({})",
+            graph.provenance.generator, graph.provenance.method
+        ),
+    )?;
+    row("input hash", graph.provenance.input_hash.clone())?;
+    for (name, value) in &graph.statistics.counts {
+        if name != "input_triangles" {
+            row(&name.replace('_', " "), value.to_string())?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,88 @@
+//! `enfilade locate`: points in, cells out.
+
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use enfilade::cpg::Locator;
+use enfilade::geom::DVec3;
+
+use crate::world::read_world;
+
+/// Reads `x y z` lines (meters, +Y up) and prints the id of each point's cell, `-` where there is
+/// none.
+#[derive(clap::Args)]
+pub(crate) struct Locate {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+}
+
+/// Longest line that is read; three numbers never take as much, and a file without line ends must
+/// not fill the memory.
+const MAX_LINE: u64 = 4096;
+
+pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
+    let world = read_world(&args.world)?;
+    let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
+    let output = BufWriter::with_capacity(1 << 16, io::stdout().lock());
+    locate_lines(&world.graph.locator, input, output)
+}
+
+fn locate_lines<R: Read>(
+    locator: &Locator,
+    mut input: BufReader<R>,
+    mut output: impl Write,
+) -> anyhow::Result<()> {
+    let mut line = Vec::new();
+    for number in 1_u64.. {
+        line.clear();
+        let read = (&mut input).take(MAX_LINE).read_until(b'\n', &mut line);
+        if read.context("cannot read standard input")? == 0 {
+            break;
+        }
+        let Some(p) = parse_point(&line) else {
+            output.flush()?;
+            bail!("standard input, line {number}: expected three numbers `x y z`");
+        };
+        match locator.locate(p) {
+            Some(cell) => writeln!(output, "{}", cell.0)?,
+            None => output.write_all(b"-\n")?,
+        }
+        // Someone who asks one point at a time is waiting for the answer.
+        if input.buffer().is_empty() {
+            output.flush()?;
+        }
+    }
+    output.flush()?;
+    Ok(())
+}
+
+fn parse_point(line: &[u8]) -> Option<DVec3> {
+    let mut words = std::str::from_utf8(line).ok()?.split_ascii_whitespace();
+    let mut number = || words.next()?.parse::<f64>().ok();
+    let p = DVec3::new(number()?, number()?, number()?);
+    words.next().is_none().then_some(p)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_is_three_numbers_and_nothing_else() {
+        assert_eq!(
+            parse_point(b"1 -2.5\t3e2\r\n"),
+            Some(DVec3::new(1.0, -2.5, 300.0))
+        );
+        for line in ["", "1 2", "1 2 3 4", "1 2 x", "1,2,3", "\u{fc} 1 2"] {
+            assert_eq!(parse_point(line.as_bytes()), None, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_refused() {
+        let endless = BufReader::new(io::repeat(b'1'));
+        let error = locate_lines(&Locator::default(), endless, Vec::new()).unwrap_err();
+        assert!(error.to_string().contains("line 1"), "{error}");
+    }
+}
