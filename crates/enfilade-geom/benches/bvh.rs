@@ -69,7 +69,11 @@ fn main() {
     let triangles = building([12, 4, 10], &mut rng);
     let started = Instant::now();
     let bvh = Bvh::build(&triangles);
-    println!("triangles,{},build_ms,{:.1}", triangles.len(), started.elapsed().as_secs_f64() * 1e3);
+    println!(
+        "triangles,{},build_ms,{:.1}",
+        triangles.len(),
+        started.elapsed().as_secs_f64() * 1e3
+    );
     let size = bvh.bounds().size();
     let n = 1_000_000;
     let pairs: Vec<(DVec3, DVec3)> = (0..n).map(|_| (rng.point(size), rng.point(size))).collect();
@@ -81,15 +85,25 @@ fn main() {
     let hits = pairs
         .iter()
         .filter(|(a, b)| {
-            let ray = Ray { origin: *a, direction: *b - *a, t_max: f64::INFINITY };
+            let ray = Ray {
+                origin: *a,
+                direction: *b - *a,
+                t_max: f64::INFINITY,
+            };
             bvh.closest_hit(&ray, |_| false).is_some()
         })
         .count();
     report("closest_hit", hits, started);
     let started = Instant::now();
-    let hits = pairs.iter().filter(|(a, b)| bvh.any_hit(*a, *b, |_| false)).count();
+    let hits = pairs
+        .iter()
+        .filter(|(a, b)| bvh.any_hit(*a, *b, |_| false))
+        .count();
     report("any_hit", hits, started);
     let started = Instant::now();
-    let hits = pairs.iter().filter(|(a, _)| bvh.nearest(*a, 0.1).is_some()).count();
+    let hits = pairs
+        .iter()
+        .filter(|(a, _)| bvh.nearest(*a, 0.1).is_some())
+        .count();
     report("nearest_within_0.1", hits, started);
 }

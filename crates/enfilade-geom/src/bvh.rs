@@ -84,19 +84,32 @@ impl Bvh {
             .iter()
             .enumerate()
             .filter(|(_, t)| {
-                t.iter().all(|p| p.abs().max_element() <= MAX_COORDINATE && p.is_finite())
+                t.iter()
+                    .all(|p| p.abs().max_element() <= MAX_COORDINATE && p.is_finite())
             })
             .map(|(i, t)| {
                 let bounds = Aabb::of_points(t);
-                Entry { bounds, center: bounds.center(), id: i as u32 }
+                Entry {
+                    bounds,
+                    center: bounds.center(),
+                    id: i as u32,
+                }
             })
             .collect();
         let bounds = entries.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
         let mut nodes = Vec::with_capacity(entries.len() / 2 + 1);
         build_node(&mut nodes, &mut entries, 0, 0);
         let ids: Vec<u32> = entries.iter().map(|e| e.id).collect();
-        let triangles = ids.iter().map(|&i| triangles[i as usize].map(|p| p.to_array())).collect();
-        Self { nodes, triangles, ids, bounds }
+        let triangles = ids
+            .iter()
+            .map(|&i| triangles[i as usize].map(|p| p.to_array()))
+            .collect();
+        Self {
+            nodes,
+            triangles,
+            ids,
+            bounds,
+        }
     }
 
     /// The box around all triangles.
@@ -143,7 +156,11 @@ impl Bvh {
                 let id = self.ids[i];
                 let is_nearer = best.is_none_or(|b| t < b.t || (t == b.t && id < b.triangle));
                 if is_nearer && !excluded(id) {
-                    best = Some(Hit { t, triangle: id, front });
+                    best = Some(Hit {
+                        t,
+                        triangle: id,
+                        front,
+                    });
                     *t_max = t;
                 }
             }
@@ -157,7 +174,11 @@ impl Bvh {
         let sheared = ShearedRay::new(ray);
         let _ = self.walk::<()>(ray, 0.0, |i, t_max| {
             if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
-                visit(Hit { t, triangle: self.ids[i], front });
+                visit(Hit {
+                    t,
+                    triangle: self.ids[i],
+                    front,
+                });
             }
             ControlFlow::Continue(())
         });
@@ -181,7 +202,11 @@ impl Bvh {
                 return ControlFlow::Continue(());
             }
             let distance = segment_to_triangle_distance(a, b, triangle);
-            if distance < radius { visit(id, distance) } else { ControlFlow::Continue(()) }
+            if distance < radius {
+                visit(id, distance)
+            } else {
+                ControlFlow::Continue(())
+            }
         })
     }
 
@@ -197,7 +222,11 @@ impl Bvh {
         // Without a length there is no direction; any other will do for a point-like segment.
         let mut ray = Ray::segment(a, b);
         if ray.direction == DVec3::ZERO {
-            ray = Ray { origin: a, direction: DVec3::X, t_max: 0.0 };
+            ray = Ray {
+                origin: a,
+                direction: DVec3::X,
+                t_max: 0.0,
+            };
         }
         self.walk(&ray, radius, |i, _| visit(self.ids[i], &self.triangle(i)))
     }
@@ -210,7 +239,11 @@ impl Bvh {
         }
         let (min, max) = (round_down(query.min), round_up(query.max));
         let mut stack = Stack::new();
-        stack.push(Pending { child: 0, count: 0, near: 0.0 });
+        stack.push(Pending {
+            child: 0,
+            count: 0,
+            near: 0.0,
+        });
         while let Some(at) = stack.pop() {
             if at.count > 0 {
                 let first = at.child as usize;
@@ -231,7 +264,11 @@ impl Bvh {
                 & high[2].cmpge(Vec4::splat(min.z));
             let mask = meets.bitmask();
             for k in (0..4).rev().filter(|k| mask >> k & 1 == 1) {
-                stack.push(Pending { child: node.children[k], count: node.counts[k], near: 0.0 });
+                stack.push(Pending {
+                    child: node.children[k],
+                    count: node.counts[k],
+                    near: 0.0,
+                });
             }
         }
     }
@@ -249,7 +286,11 @@ impl Bvh {
         let mut best: Option<Nearest> = None;
         let mut limit = max_distance * max_distance;
         let mut stack = Stack::new();
-        stack.push(Pending { child: 0, count: 0, near: 0.0 });
+        stack.push(Pending {
+            child: 0,
+            count: 0,
+            near: 0.0,
+        });
         while let Some(at) = stack.pop() {
             if f64::from(at.near) > limit {
                 continue;
@@ -262,7 +303,11 @@ impl Bvh {
                     let id = self.ids[i];
                     if d2 < limit || (d2 == limit && best.is_none_or(|b| id < b.triangle)) {
                         limit = d2;
-                        best = Some(Nearest { distance: d2.sqrt(), triangle: id, point });
+                        best = Some(Nearest {
+                            distance: d2.sqrt(),
+                            triangle: id,
+                            point,
+                        });
                     }
                 }
                 continue;
@@ -304,13 +349,24 @@ impl Bvh {
         // Scaled so that the longest component is 1: no `f32` overflows. A component under 1e-12
         // of it is raised to that, and moves by less than the margin within reach of the boxes.
         let direction = ray.direction / longest;
-        let direction = direction.abs().max(DVec3::splat(1e-12)).copysign(direction).as_vec3();
+        let direction = direction
+            .abs()
+            .max(DVec3::splat(1e-12))
+            .copysign(direction)
+            .as_vec3();
         let inverse = direction.recip();
         // The factor covers the rounding of a radius that dwarfs the scene.
         let margin = (box_margin(&self.bounds, ray.origin) + radius) * (1.0 + 1e-6);
-        let from = [(ray.origin + margin).as_vec3(), (ray.origin - margin).as_vec3()];
+        let from = [
+            (ray.origin + margin).as_vec3(),
+            (ray.origin - margin).as_vec3(),
+        ];
         let is_back = [direction.x < 0.0, direction.y < 0.0, direction.z < 0.0].map(usize::from);
-        let inverse4 = [Vec4::splat(inverse.x), Vec4::splat(inverse.y), Vec4::splat(inverse.z)];
+        let inverse4 = [
+            Vec4::splat(inverse.x),
+            Vec4::splat(inverse.y),
+            Vec4::splat(inverse.z),
+        ];
         let near_from = [0, 1, 2].map(|axis| Vec4::splat(from[is_back[axis]][axis]));
         let far_from = [0, 1, 2].map(|axis| Vec4::splat(from[1 - is_back[axis]][axis]));
         // Four roundings of 2⁻²⁴ on either side of each comparison; 2⁻²⁰ covers them.
@@ -319,7 +375,11 @@ impl Bvh {
         let mut t_max = ray.t_max;
         let mut limit = (t_max * longest) as f32 * GROW;
         let mut stack = Stack::new();
-        stack.push(Pending { child: 0, count: 0, near: 0.0 });
+        stack.push(Pending {
+            child: 0,
+            count: 0,
+            near: 0.0,
+        });
         while let Some(at) = stack.pop() {
             if at.near > limit {
                 continue;
@@ -350,7 +410,12 @@ impl Bvh {
 
 /// How far the rounding of `p` and of differences with it can move a box plane. [Units: wu]
 fn box_margin(bounds: &Aabb, p: DVec3) -> f64 {
-    let reach = bounds.min.abs().max(bounds.max.abs()).max(p.abs()).max_element();
+    let reach = bounds
+        .min
+        .abs()
+        .max(bounds.max.abs())
+        .max(p.abs())
+        .max_element();
     // Two roundings of 2⁻²⁴ of up to twice the reach, doubled.
     (reach * (1.0 / 2_097_152.0)).max(1e-30)
 }
@@ -370,7 +435,14 @@ struct Stack {
 
 impl Stack {
     fn new() -> Self {
-        Self { entries: [Pending { child: 0, count: 0, near: 0.0 }; STACK_SIZE], len: 0 }
+        Self {
+            entries: [Pending {
+                child: 0,
+                count: 0,
+                near: 0.0,
+            }; STACK_SIZE],
+            len: 0,
+        }
     }
 
     #[inline]
@@ -393,7 +465,11 @@ impl Stack {
         while mask != 0 {
             let k = mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            let entry = Pending { child: node.children[k], count: node.counts[k], near: near[k] };
+            let entry = Pending {
+                child: node.children[k],
+                count: node.counts[k],
+                near: near[k],
+            };
             let mut at = self.len;
             self.len += 1;
             while at > base && self.entries[at - 1].near < entry.near {
@@ -408,7 +484,11 @@ impl Stack {
 fn round_down(p: DVec3) -> Vec3 {
     Vec3::from_array(p.to_array().map(|x| {
         let rounded = x as f32;
-        if f64::from(rounded) > x { rounded.next_down() } else { rounded }
+        if f64::from(rounded) > x {
+            rounded.next_down()
+        } else {
+            rounded
+        }
     }))
 }
 
@@ -430,22 +510,44 @@ fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth
     }
     let by_count = depth >= MAX_SAH_DEPTH;
     let whole = entries.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
-    let mut parts = vec![Part { first: 0, count: entries.len(), bounds: whole }];
+    let mut parts = vec![Part {
+        first: 0,
+        count: entries.len(),
+        bounds: whole,
+    }];
     while parts.len() < 4 {
         // The part whose children a ray is likeliest to meet; by count, the largest.
-        let weight = |p: &Part| if by_count { p.count as f64 } else { p.bounds.surface_area() };
+        let weight = |p: &Part| {
+            if by_count {
+                p.count as f64
+            } else {
+                p.bounds.surface_area()
+            }
+        };
         let Some(widest) = (0..parts.len())
             .filter(|&i| parts[i].count > LEAF_SIZE)
-            .max_by(|&a, &b| weight(&parts[a]).total_cmp(&weight(&parts[b])).then(b.cmp(&a)))
+            .max_by(|&a, &b| {
+                weight(&parts[a])
+                    .total_cmp(&weight(&parts[b]))
+                    .then(b.cmp(&a))
+            })
         else {
             break;
         };
         let part = &parts[widest];
         let slice = &mut entries[part.first..part.first + part.count];
-        let left = if by_count { slice.len() / 2 } else { split(slice) };
+        let left = if by_count {
+            slice.len() / 2
+        } else {
+            split(slice)
+        };
         let bounds_of = |s: &[Entry]| s.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
         let halves = [
-            Part { first: part.first, count: left, bounds: bounds_of(&slice[..left]) },
+            Part {
+                first: part.first,
+                count: left,
+                bounds: bounds_of(&slice[..left]),
+            },
             Part {
                 first: part.first + left,
                 count: part.count - left,
@@ -475,7 +577,9 @@ fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth
 
 /// Reorders `entries` into two parts, neither empty, and returns the size of the first.
 fn split(entries: &mut [Entry]) -> usize {
-    let centers = entries.iter().fold(Aabb::EMPTY, |b, e| b.including(e.center));
+    let centers = entries
+        .iter()
+        .fold(Aabb::EMPTY, |b, e| b.including(e.center));
     let size = centers.size();
     let mut best: Option<(f64, usize, usize)> = None;
     for axis in 0..3 {

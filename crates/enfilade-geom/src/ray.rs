@@ -23,7 +23,11 @@ impl Ray {
     /// The closed segment from `a` (`t = 0`) to `b` (`t = 1`).
     #[must_use]
     pub fn segment(a: DVec3, b: DVec3) -> Self {
-        Self { origin: a, direction: b - a, t_max: 1.0 }
+        Self {
+            origin: a,
+            direction: b - a,
+            t_max: 1.0,
+        }
     }
 
     /// The point at `t`.
@@ -106,7 +110,11 @@ impl ShearedRay {
 #[must_use]
 pub fn hit_triangle(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
     let (t, front) = ShearedRay::new(ray).hit(&triangle.map(|p| p.to_array()), ray.t_max)?;
-    Some(Hit { t, triangle: 0, front })
+    Some(Hit {
+        t,
+        triangle: 0,
+        front,
+    })
 }
 
 /// The point of the closed segment `a b` nearest to `p`.
@@ -224,7 +232,11 @@ pub fn triangle_touches_box(t: &Triangle, bounds: &crate::Aabb) -> bool {
 mod tests {
     use super::*;
 
-    const T: Triangle = [DVec3::ZERO, DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.0, 1.0, 0.0)];
+    const T: Triangle = [
+        DVec3::ZERO,
+        DVec3::new(1.0, 0.0, 0.0),
+        DVec3::new(0.0, 1.0, 0.0),
+    ];
 
     #[test]
     fn the_front_is_the_side_seen_counter_clockwise() {
@@ -262,9 +274,15 @@ mod tests {
     #[test]
     fn distances_of_known_figures() {
         let p = DVec3::new(0.25, 0.25, 3.0);
-        assert_eq!(closest_point_on_triangle(p, &T), DVec3::new(0.25, 0.25, 0.0));
+        assert_eq!(
+            closest_point_on_triangle(p, &T),
+            DVec3::new(0.25, 0.25, 0.0)
+        );
         let far = DVec3::new(2.0, 2.0, 0.0);
-        assert_eq!(closest_point_on_triangle(far, &T), DVec3::new(0.5, 0.5, 0.0));
+        assert_eq!(
+            closest_point_on_triangle(far, &T),
+            DVec3::new(0.5, 0.5, 0.0)
+        );
         let d = segment_to_triangle_distance(
             DVec3::new(-1.0, 2.0, 0.0),
             DVec3::new(2.0, -1.0, 0.5),

@@ -19,19 +19,35 @@ fn soup() -> impl Strategy<Value = Vec<Triangle>> {
 /// Exact sign of the volume of `a b c d`, 0 within rounding of the test under way: determinants of
 /// coordinates up to 16 apart are rounded by about 1e-12, and 1e-9 leaves room.
 fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
-    let at = |p: DVec3| robust::Coord3D { x: p.x, y: p.y, z: p.z };
+    let at = |p: DVec3| robust::Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    };
     let volume = robust::orient3d(at(a), at(b), at(c), at(d));
-    if volume.abs() < 1e-9 { 0 } else { volume.signum() as i32 }
+    if volume.abs() < 1e-9 {
+        0
+    } else {
+        volume.signum() as i32
+    }
 }
 
 /// Whether the segment meets the triangle, by exact predicates; `None` when too close to say.
 fn oracle(a: DVec3, b: DVec3, t: &Triangle) -> Option<bool> {
     let ends = [side(t[0], t[1], t[2], a), side(t[0], t[1], t[2], b)];
-    let edges = [side(a, b, t[0], t[1]), side(a, b, t[1], t[2]), side(a, b, t[2], t[0])];
+    let edges = [
+        side(a, b, t[0], t[1]),
+        side(a, b, t[1], t[2]),
+        side(a, b, t[2], t[0]),
+    ];
     if ends[0] * ends[1] > 0 || (edges.contains(&1) && edges.contains(&-1)) {
         return Some(false);
     }
-    if ends.contains(&0) || edges.contains(&0) { None } else { Some(true) }
+    if ends.contains(&0) || edges.contains(&0) {
+        None
+    } else {
+        Some(true)
+    }
 }
 
 proptest! {
@@ -166,7 +182,11 @@ fn bumpy_sphere(n: usize) -> Vec<Triangle> {
         let r = 3.0 + 0.2 * (5.0 * phi).sin() * (4.0 * theta).sin();
         // Corners are shared exactly, poles included.
         let ring = if i == 0 || i == n { 0.0 } else { theta.sin() };
-        DVec3::new(r * ring * phi.cos(), 3.0 * theta.cos(), r * ring * phi.sin())
+        DVec3::new(
+            r * ring * phi.cos(),
+            3.0 * theta.cos(),
+            r * ring * phi.sin(),
+        )
     };
     let mut out = Vec::new();
     for i in 0..n {
@@ -204,7 +224,10 @@ fn hostile_triangles_neither_panic_nor_hide_the_others() {
         [DVec3::ONE; 3],
         good,
     ];
-    soup.extend(std::iter::repeat_n([DVec3::ONE, DVec3::ONE, DVec3::X], 1000));
+    soup.extend(std::iter::repeat_n(
+        [DVec3::ONE, DVec3::ONE, DVec3::X],
+        1000,
+    ));
     // Centers that shrink towards a corner make the heuristic peel one triangle a level.
     soup.extend((0..2000).map(|i| {
         let s = 0.5f64.powi(i / 2) * 1e12;
@@ -213,7 +236,11 @@ fn hostile_triangles_neither_panic_nor_hide_the_others() {
     let bvh = Bvh::build(&soup);
     assert_eq!(bvh.len(), soup.len() - 3);
     let (a, b) = (DVec3::new(0.2, 0.2, 1e-290), DVec3::new(0.2, 0.2, -1.0));
-    assert_eq!(bvh.closest_hit(&Ray::segment(a, b), |_| false).map(|h| h.triangle), Some(4));
+    assert_eq!(
+        bvh.closest_hit(&Ray::segment(a, b), |_| false)
+            .map(|h| h.triangle),
+        Some(4)
+    );
     assert!(!bvh.any_hit(a, DVec3::NAN, |_| false));
     assert!(bvh.nearest(DVec3::NAN, 1.0).is_none());
     assert!(bvh.nearest(DVec3::splat(1e200), f64::INFINITY).is_some());

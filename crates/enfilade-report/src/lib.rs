@@ -1,0 +1,1 @@
+//! Reports on enfilade worlds for people: floor plans as SVG.

@@ -1,0 +1,108 @@
+//! *Complete*: a triangle is listed in every cell from which it can be seen without passing a
+//! portal.
+
+use enfilade_geom::{DVec3, Ray};
+
+use crate::report::{Failure, FailureKind, Tally};
+use crate::rng::Rng;
+use crate::sealed::{Break, follow};
+use crate::subject::Subject;
+
+/// Casts ray number `i` from a random point of a random cell and judges what it meets.
+///
+/// A ray that crosses portals on its way judges the cell in which it arrives: from the last portal
+/// on it is a sight line of that cell.
+pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) {
+    let counts = &mut tally.complete;
+    counts.drawn += 1;
+    if subject.sampled.is_empty() {
+        counts.on_surface += 1;
+        return;
+    }
+    let start = subject.sampled[rng.below(subject.sampled.len())];
+    let a = subject.point_in_cell(rng, start);
+    if subject.is_close_to_surface(a) {
+        counts.on_surface += 1;
+        return;
+    }
+    let ray = Ray {
+        origin: a,
+        direction: rng.direction(),
+        t_max: f64::INFINITY,
+    };
+    let Some(hit) = subject.blockers.closest_hit(&ray, |_| false) else {
+        counts.escaped += 1;
+        return;
+    };
+    let at = ray.at(hit.t);
+    // A little past the triangle, so that its own edges are among those that are passed.
+    let b = ray.at(hit.t + 2.0 * subject.eps);
+    if subject.is_grazing(a, b) || subject.nearest_portal(at).is_some() {
+        counts.grazing += 1;
+        return;
+    }
+    // The end of the segment is on a boundary, so it is followed to a point short of the triangle
+    // by more than the triangle may be misplaced.
+    let slack = 2.0 * subject.eps / surface_slope(subject, hit.triangle, ray.direction).max(1e-3);
+    let end = ray.at(hit.t - slack);
+    let mut crossings = Vec::new();
+    subject.crossings(a, at, &mut crossings);
+    let n_crossings = crossings.len();
+    subject.crossings(a, end, &mut crossings);
+    if hit.t <= slack || crossings.len() != n_crossings {
+        counts.grazing += 1;
+        return;
+    }
+    let Ok(cell) = follow(subject, rng, a, end, start, &mut crossings) else {
+        // The way there is not sealed; the other promise reports that.
+        counts.unresolved += 1;
+        return;
+    };
+    let (mut is_listed, mut is_present) = (false, false);
+    let window = Ray {
+        t_max: hit.t + 2.0 * slack,
+        ..ray
+    };
+    subject.for_each_own_at(&window, at, |batch| {
+        is_present = true;
+        let cells = &subject.world.batches[batch as usize].cells;
+        is_listed |= cells.binary_search(&cell).is_ok();
+    });
+    if !is_listed && subject.is_grazing_own(a, b) {
+        counts.grazing += 1;
+        return;
+    }
+    counts.judged += 1;
+    if is_listed {
+        return;
+    }
+    let kind = if is_present {
+        FailureKind::Unlisted
+    } else {
+        FailureKind::MissingTriangle
+    };
+    let portal = crossings.last().map(|c| c.portal);
+    let wrong = Break {
+        kind,
+        expected: Some(cell),
+        found: None,
+        portal,
+        at,
+    };
+    let triangle = subject.triangles[hit.triangle as usize].map(|p| p.to_array());
+    let failure = Failure::of_break(&wrong, i, [a, at], &crossings);
+    tally.add_failure(
+        subject,
+        Failure {
+            triangle: Some(triangle),
+            ..failure
+        },
+    );
+}
+
+/// How steeply the ray meets the triangle: 1 head-on, 0 along it.
+fn surface_slope(subject: &Subject, triangle: u32, direction: DVec3) -> f64 {
+    let t = &subject.triangles[triangle as usize];
+    let n = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();
+    n.dot(direction).abs()
+}

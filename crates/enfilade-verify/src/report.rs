@@ -1,0 +1,445 @@
+//! What was tried, what was judged, and what broke.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_geom::DVec3;
+use serde::Serialize;
+
+use crate::VerifyOptions;
+use crate::sealed::Break;
+use crate::subject::{Crossing, Subject};
+
+/// Failures of one kind in one chunk whose clearance is measured; it costs many times a ray.
+const MEASURED: u64 = 4;
+/// Clearances beyond this are reported as this. [Units: wu]
+const FAR: f64 = 0.25;
+
+/// What became of the segments tried for *sealed*. All but `crossings` and `drawn` add up to `drawn`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct SealedCounts {
+    /// Segments drawn.
+    pub drawn: u64,
+    /// Blocked by no triangle, and followed from end to end.
+    pub judged: u64,
+    /// Blocked by a triangle: says nothing.
+    pub blocked: u64,
+    /// Passed an edge within twice the tolerance: not judged.
+    pub grazing: u64,
+    /// Both ends in solid matter.
+    pub solid: u64,
+    /// One end in a cell, the other in what the locator calls solid, and nothing in between: not
+    /// against the promise, but a hole in the model or in the locator.
+    pub cell_to_solid: u64,
+    /// An end lay on a surface in every draw.
+    pub on_surface: u64,
+    /// Portals crossed by judged segments.
+    pub crossings: u64,
+}
+
+/// What became of the rays tried for *complete*. All but `drawn` add up to `drawn`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct CompleteCounts {
+    /// Rays drawn.
+    pub drawn: u64,
+    /// Met a triangle, whose batch was looked up.
+    pub judged: u64,
+    /// Met no triangle.
+    pub escaped: u64,
+    /// Passed or met an edge within twice the tolerance: not judged.
+    pub grazing: u64,
+    /// Started on a surface.
+    pub on_surface: u64,
+    /// The portals on the way did not lead to a cell; *sealed* judges that.
+    pub unresolved: u64,
+}
+
+/// How a promise broke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FailureKind {
+    /// *Sealed*: the cell changed along the way, but no portal was crossed there.
+    MissedPortal,
+    /// *Sealed*: a portal was crossed that does not belong to the cell left.
+    WrongSide,
+    /// *Sealed*: a portal was crossed that joins the right cells, against its normal.
+    WrongWay,
+    /// *Sealed*: at a portal, the locator's cell changes to another than the portal leads to.
+    EndMismatch,
+    /// *Sealed*: between two points of air, the locator says solid.
+    InSolid,
+    /// *Complete*: the batch of a triangle does not list a cell that sees it.
+    Unlisted,
+    /// *Complete*: no batch holds the triangle of the source that was met.
+    MissingTriangle,
+}
+
+impl FailureKind {
+    /// The promise that it breaks.
+    #[must_use]
+    pub fn promise(self) -> &'static str {
+        match self {
+            Self::Unlisted | Self::MissingTriangle => "complete",
+            _ => "sealed",
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::MissedPortal => "the cell changes where no portal is",
+            Self::WrongSide => "a portal of other cells is crossed",
+            Self::WrongWay => "a portal faces the wrong way",
+            Self::EndMismatch => "the portals lead to another cell",
+            Self::InSolid => "the locator says solid in open air",
+            Self::Unlisted => "a triangle's batch lacks a cell that sees it",
+            Self::MissingTriangle => "a triangle of the source is in no batch",
+        }
+    }
+}
+
+/// All failures alike in kind, cells and portal, with the surest example.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Failure {
+    /// How it broke.
+    pub kind: FailureKind,
+    /// Rays that failed alike.
+    pub count: u64,
+    /// The cell that the ray should be in there.
+    pub expected: Option<u32>,
+    /// The cell that is there; none for solid, or for triangles.
+    pub found: Option<u32>,
+    /// The portal crossed there, or last.
+    pub portal: Option<u32>,
+    /// Where it broke. [Units: wu]
+    pub at: [f64; 3],
+    /// Start of the example. [Units: wu]
+    pub start: [f64; 3],
+    /// End of the example. [Units: wu]
+    pub end: [f64; 3],
+    /// Portals that the example crosses, in order.
+    pub crossed: Vec<u32>,
+    /// How far the example stays from every edge, at most 0.25; more is surer. [Units: wu]
+    pub clearance: f64,
+    /// The triangle met.
+    pub triangle: Option<[[f64; 3]; 3]>,
+    /// Number of the example's ray.
+    pub ray: u64,
+}
+
+impl Failure {
+    pub(crate) fn of_break(
+        wrong: &Break,
+        ray: u64,
+        [start, end]: [DVec3; 2],
+        crossings: &[Crossing],
+    ) -> Self {
+        Self {
+            kind: wrong.kind,
+            count: 1,
+            expected: wrong.expected.map(|c: CellId| c.0),
+            found: wrong.found.map(|c| c.0),
+            portal: wrong.portal.map(|p: PortalId| p.0),
+            at: wrong.at.to_array(),
+            start: start.to_array(),
+            end: end.to_array(),
+            crossed: crossings.iter().map(|c| c.portal.0).collect(),
+            clearance: 0.0,
+            triangle: None,
+            ray,
+        }
+    }
+
+    fn key(&self) -> FailureKey {
+        (self.kind, self.expected, self.found, self.portal)
+    }
+
+    /// Joins two alike: counts add up, the surer example stays.
+    fn joined(self, other: Self) -> Self {
+        let count = self.count + other.count;
+        let is_first_surer = other
+            .clearance
+            .total_cmp(&self.clearance)
+            .then(self.ray.cmp(&other.ray))
+            .is_le();
+        Self {
+            count,
+            ..if is_first_surer { self } else { other }
+        }
+    }
+}
+
+type FailureKey = (FailureKind, Option<u32>, Option<u32>, Option<u32>);
+
+/// Counts and failures of some rays; tallies add up in any order to the same.
+#[derive(Default)]
+pub(crate) struct Tally {
+    pub(crate) sealed: SealedCounts,
+    pub(crate) complete: CompleteCounts,
+    failures: BTreeMap<FailureKey, Failure>,
+}
+
+impl Tally {
+    pub(crate) fn add_failure(&mut self, subject: &Subject, mut failure: Failure) {
+        let seen = self.failures.get(&failure.key()).map_or(0, |f| f.count);
+        if seen < MEASURED {
+            let (a, b) = (failure.start.into(), failure.end.into());
+            failure.clearance = subject.edge_clearance(a, b, FAR).min(FAR);
+        }
+        self.join(failure);
+    }
+
+    fn join(&mut self, failure: Failure) {
+        let key = failure.key();
+        let joined = match self.failures.remove(&key) {
+            Some(known) => known.joined(failure),
+            None => failure,
+        };
+        self.failures.insert(key, joined);
+    }
+
+    pub(crate) fn merged(mut self, other: Self) -> Self {
+        let (s, o) = (&mut self.sealed, other.sealed);
+        s.drawn += o.drawn;
+        s.judged += o.judged;
+        s.blocked += o.blocked;
+        s.grazing += o.grazing;
+        s.solid += o.solid;
+        s.cell_to_solid += o.cell_to_solid;
+        s.on_surface += o.on_surface;
+        s.crossings += o.crossings;
+        let (c, o) = (&mut self.complete, other.complete);
+        c.drawn += o.drawn;
+        c.judged += o.judged;
+        c.escaped += o.escaped;
+        c.grazing += o.grazing;
+        c.on_surface += o.on_surface;
+        c.unresolved += o.unresolved;
+        for failure in other.failures.into_values() {
+            self.join(failure);
+        }
+        self
+    }
+}
+
+/// The outcome of [`verify_world`](crate::verify_world).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VerifyReport {
+    /// Cells of the world.
+    pub cells: usize,
+    /// Portals of the world.
+    pub portals: usize,
+    /// Structural triangles in its batches.
+    pub triangles: usize,
+    /// Triangles that blocked: the world's own, or those of the source.
+    pub blockers: usize,
+    /// Whether a source was given.
+    pub has_source: bool,
+    /// Distance below which nothing is judged, halved: `eps`. [Units: wu]
+    pub tolerance: f64,
+    /// Start of the random sequences.
+    pub seed: u64,
+    /// Broken invariants of graph and outlines, a line each.
+    pub problems: Vec<String>,
+    /// Segments for *sealed*.
+    pub sealed: SealedCounts,
+    /// Rays for *complete*.
+    pub complete: CompleteCounts,
+    /// Cells in which no point was found, so that nothing is known about them.
+    pub unsampled_cells: Vec<u32>,
+    /// Segments that break *sealed*.
+    pub unsealed: u64,
+    /// Rays that break *complete*.
+    pub incomplete: u64,
+    /// Failures by likeness, the most frequent first; a list of limited length.
+    pub failures: Vec<Failure>,
+    /// How many kinds of failure there are in all.
+    pub failure_groups: usize,
+}
+
+impl VerifyReport {
+    /// Whether no promise was seen broken. Says nothing where nothing was judged.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.problems.is_empty() && self.unsealed == 0 && self.incomplete == 0
+    }
+
+    pub(crate) fn unshot(world: &World, options: &VerifyOptions, problems: Vec<String>) -> Self {
+        Self {
+            cells: world.graph.cells.len(),
+            portals: world.graph.portals.len(),
+            triangles: world
+                .batches
+                .iter()
+                .map(|b| b.primitive.indices.len() / 3)
+                .sum(),
+            blockers: 0,
+            has_source: false,
+            tolerance: 0.0,
+            seed: options.seed,
+            problems,
+            sealed: SealedCounts::default(),
+            complete: CompleteCounts::default(),
+            unsampled_cells: Vec::new(),
+            unsealed: 0,
+            incomplete: 0,
+            failures: Vec::new(),
+            failure_groups: 0,
+        }
+    }
+
+    pub(crate) fn new(
+        subject: &Subject,
+        options: &VerifyOptions,
+        problems: Vec<String>,
+        tally: Tally,
+    ) -> Self {
+        let mut failures: Vec<Failure> = tally.failures.into_values().collect();
+        let total = |promise: &str| {
+            failures
+                .iter()
+                .filter(|f| f.kind.promise() == promise)
+                .map(|f| f.count)
+                .sum()
+        };
+        let (unsealed, incomplete) = (total("sealed"), total("complete"));
+        // Stable: ties stay in the order of the keys.
+        failures.sort_by_key(|f| std::cmp::Reverse(f.count));
+        let failure_groups = failures.len();
+        failures.truncate(options.max_listed);
+        let is_sampled = |c: &u32| subject.sampled.binary_search(&CellId(*c)).is_ok();
+        Self {
+            blockers: subject.triangles.len(),
+            has_source: subject.has_source,
+            tolerance: subject.eps,
+            sealed: tally.sealed,
+            complete: tally.complete,
+            unsampled_cells: (0..subject.cells.len() as u32)
+                .filter(|c| !is_sampled(c))
+                .collect(),
+            unsealed,
+            incomplete,
+            failures,
+            failure_groups,
+            ..Self::unshot(subject.world, options, problems)
+        }
+    }
+}
+
+impl fmt::Display for VerifyReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (s, c) = (&self.sealed, &self.complete);
+        writeln!(
+            f,
+            "{} cells, {} portals, {} triangles; {} triangles {}block; tolerance {:.1e} m, seed {}",
+            self.cells,
+            self.portals,
+            self.triangles,
+            self.blockers,
+            if self.has_source {
+                "of the source "
+            } else {
+                ""
+            },
+            self.tolerance,
+            self.seed
+        )?;
+        writeln!(
+            f,
+            "sealed    {:>10} judged ({} portals crossed), {} broken\n          \
+             {:>10} blocked, {} grazing, {} on a surface, {} in solid, {} from a cell into solid",
+            s.judged,
+            s.crossings,
+            self.unsealed,
+            s.blocked,
+            s.grazing,
+            s.on_surface,
+            s.solid,
+            s.cell_to_solid
+        )?;
+        writeln!(
+            f,
+            "complete  {:>10} judged, {} broken\n          \
+             {:>10} met nothing, {} grazing, {} on a surface, {} unresolved",
+            c.judged, self.incomplete, c.escaped, c.grazing, c.on_surface, c.unresolved
+        )?;
+        writeln!(f, "outlines  {:>10} problems", self.problems.len())?;
+        for problem in &self.problems {
+            writeln!(f, "  {problem}")?;
+        }
+        if !self.unsampled_cells.is_empty() {
+            let shown: Vec<String> = self
+                .unsampled_cells
+                .iter()
+                .take(20)
+                .map(ToString::to_string)
+                .collect();
+            writeln!(
+                f,
+                "no point found in {} cells: {}",
+                self.unsampled_cells.len(),
+                shown.join(" ")
+            )?;
+        }
+        for failure in &self.failures {
+            write!(f, "{failure}")?;
+        }
+        if self.failure_groups > self.failures.len() {
+            writeln!(
+                f,
+                "… and {} more kinds",
+                self.failure_groups - self.failures.len()
+            )?;
+        }
+        match (self.holds(), s.judged + c.judged) {
+            (true, 0) => writeln!(f, "nothing was judged"),
+            (true, _) => writeln!(f, "no promise was seen broken"),
+            (false, _) => writeln!(f, "BROKEN"),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let cell = |c: Option<u32>| c.map_or("solid".to_owned(), |c| format!("cell {c}"));
+        let point = |p: [f64; 3]| format!("({:.6} {:.6} {:.6})", p[0], p[1], p[2]);
+        write!(
+            f,
+            "{} × {}: {}",
+            self.count,
+            self.kind.promise(),
+            self.kind.words()
+        )?;
+        match self.kind {
+            FailureKind::Unlisted | FailureKind::MissingTriangle => {
+                write!(f, "; seen from {}", cell(self.expected))?;
+            }
+            _ => write!(
+                f,
+                "; in {}, found {}",
+                cell(self.expected),
+                cell(self.found)
+            )?,
+        }
+        if let Some(portal) = self.portal {
+            write!(f, ", portal {portal}")?;
+        }
+        writeln!(
+            f,
+            "\n  at {}, {:.2e} m from any edge",
+            point(self.at),
+            self.clearance
+        )?;
+        writeln!(
+            f,
+            "  from {} to {}, crossing {:?}",
+            point(self.start),
+            point(self.end),
+            self.crossed
+        )?;
+        if let Some([a, b, c]) = self.triangle {
+            writeln!(f, "  triangle {} {} {}", point(a), point(b), point(c))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,167 @@
+//! *Sealed*: the portals that an unblocked segment crosses lead from its first cell to its last.
+
+use enfilade_cpg::{CellId, PortalId};
+use enfilade_geom::DVec3;
+
+use crate::report::{Failure, FailureKind, Tally};
+use crate::rng::Rng;
+use crate::sample::draw_segment;
+use crate::subject::{Crossing, Subject};
+
+/// Draws before a segment is given up because its ends lie on surfaces.
+const DRAWS: usize = 4;
+
+/// Where following a segment went wrong.
+pub(crate) struct Break {
+    pub(crate) kind: FailureKind,
+    pub(crate) expected: Option<CellId>,
+    pub(crate) found: Option<CellId>,
+    pub(crate) portal: Option<PortalId>,
+    pub(crate) at: DVec3,
+}
+
+/// Draws segment number `i` and judges it.
+pub(crate) fn try_segment(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) {
+    let counts = &mut tally.sealed;
+    counts.drawn += 1;
+    let drawn = (0..DRAWS).find_map(|_| {
+        let (a, b) = draw_segment(subject, rng, i);
+        let is_usable =
+            a != b && !subject.is_close_to_surface(a) && !subject.is_close_to_surface(b);
+        is_usable.then_some((a, b))
+    });
+    let Some((a, b)) = drawn else {
+        counts.on_surface += 1;
+        return;
+    };
+    let ends = [subject.locator.locate(a), subject.locator.locate(b)];
+    if subject.blockers.any_hit(a, b, |_| false) {
+        counts.blocked += 1;
+        return;
+    }
+    let [Some(start), Some(_)] = ends else {
+        if ends == [None, None] {
+            counts.solid += 1;
+        } else {
+            counts.cell_to_solid += 1;
+        }
+        return;
+    };
+    if subject.is_grazing(a, b) {
+        counts.grazing += 1;
+        return;
+    }
+    counts.judged += 1;
+    let mut crossings = Vec::new();
+    subject.crossings(a, b, &mut crossings);
+    counts.crossings += crossings.len() as u64;
+    if let Err(wrong) = follow(subject, rng, a, b, start, &mut crossings) {
+        tally.add_failure(subject, Failure::of_break(&wrong, i, [a, b], &crossings));
+    }
+}
+
+/// Follows the segment through `crossings`; ends in the cell of `b`, or says where it does not.
+///
+/// The order of crossings that may be swapped within the tolerance is settled on the way.
+pub(crate) fn follow(
+    subject: &Subject,
+    rng: &mut Rng,
+    a: DVec3,
+    b: DVec3,
+    start: CellId,
+    crossings: &mut [Crossing],
+) -> Result<CellId, Break> {
+    let mut cell = start;
+    let mut t = 0.0;
+    for k in 0..crossings.len() {
+        subject.settle_order(cell, &mut crossings[k..]);
+        let crossing = crossings[k];
+        check_between(subject, rng, a, b, [t, crossing.t], cell)?;
+        let view = &subject.portals[crossing.portal.0 as usize];
+        let wrong = |kind, expected, found| Break {
+            kind,
+            expected: Some(expected),
+            found: Some(found),
+            portal: Some(crossing.portal),
+            at: a.lerp(b, crossing.t),
+        };
+        let [from, to] = if crossing.is_forward {
+            view.cells
+        } else {
+            [view.cells[1], view.cells[0]]
+        };
+        if cell == to && cell != from {
+            return Err(wrong(FailureKind::WrongWay, cell, from));
+        }
+        if cell != from {
+            return Err(wrong(FailureKind::WrongSide, cell, from));
+        }
+        cell = to;
+        t = crossing.t;
+    }
+    check_between(subject, rng, a, b, [t, 1.0], cell)?;
+    let end = subject.locator.locate(b);
+    if end == Some(cell) {
+        return Ok(cell);
+    }
+    Err(locate_change(subject, a, b, [t, 1.0], cell, end))
+}
+
+/// Between two crossings the locator must answer the same cell everywhere.
+fn check_between(
+    subject: &Subject,
+    rng: &mut Rng,
+    a: DVec3,
+    b: DVec3,
+    [from, to]: [f64; 2],
+    cell: CellId,
+) -> Result<(), Break> {
+    let length = a.distance(b);
+    if (to - from) * length < 8.0 * subject.eps {
+        return Ok(());
+    }
+    for s in [0.5, rng.unit()] {
+        let t = from + (to - from) * s;
+        let p = a.lerp(b, t);
+        let found = subject.locator.locate(p);
+        if found != Some(cell) && subject.nearest_portal(p).is_none() {
+            return Err(locate_change(subject, a, b, [from, t], cell, found));
+        }
+    }
+    Ok(())
+}
+
+/// Narrows down where the locator's answer leaves `cell` on the way from `from` to `to`.
+fn locate_change(
+    subject: &Subject,
+    a: DVec3,
+    b: DVec3,
+    [mut from, mut to]: [f64; 2],
+    cell: CellId,
+    mut found: Option<CellId>,
+) -> Break {
+    for _ in 0..48 {
+        let t = 0.5 * (from + to);
+        let here = subject.locator.locate(a.lerp(b, t));
+        if here == Some(cell) {
+            from = t;
+        } else {
+            (to, found) = (t, here);
+        }
+    }
+    let at = a.lerp(b, to);
+    // At a portal, the locator and that portal disagree about what lies behind it.
+    let portal = subject.nearest_portal(at);
+    let kind = match (portal, found) {
+        (Some(_), _) => FailureKind::EndMismatch,
+        (None, None) => FailureKind::InSolid,
+        (None, Some(_)) => FailureKind::MissedPortal,
+    };
+    Break {
+        kind,
+        expected: Some(cell),
+        found,
+        portal,
+        at,
+    }
+}
