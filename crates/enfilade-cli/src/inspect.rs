@@ -214,6 +214,7 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
 
 fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
+    writeln!(out)?;
     let mut row = |name: &str, value: String| writeln!(out, "{name:<22} {value}");
     let indoor = graph.cells.iter().filter(|c| !c.outdoor).count();
     let outdoors = if indoor < graph.cells.len() {
@@ -221,7 +222,7 @@ fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
     } else {
         ""
     };
-    row("\ncells", format!("{indoor}{outdoors}"))?;
+    row("cells", format!("{indoor}{outdoors}"))?;
     let mut kinds = BTreeMap::new();
     for p in &graph.portals {
         *kinds.entry(p.kind).or_insert(0_usize) += 1;

@@ -127,6 +127,46 @@ pub(crate) fn add_extensions(used: &mut BTreeSet<String>, text: &str) {
     }
 }
 
+/// How many texture coordinate sets a material reads; 0 where it has no texture.
+///
+/// Sets beyond the eighth are not counted: no renderer has as many, and a damaged number must not
+/// have gigabytes of them written.
+pub(crate) fn n_texcoord_sets(text: &str) -> usize {
+    fn visit(most: &mut u64, value: &Value) {
+        match value {
+            Value::Object(map) => {
+                for (key, inner) in map {
+                    if key == "extras" {
+                        continue;
+                    }
+                    if key.ends_with("Texture") && inner.get("index").is_some() {
+                        let transformed = inner
+                            .get("extensions")
+                            .and_then(|e| e.get("KHR_texture_transform"))
+                            .and_then(|t| t.get("texCoord"));
+                        let sets = [inner.get("texCoord"), transformed];
+                        for set in sets.map(|s| s.and_then(Value::as_u64).unwrap_or(0)) {
+                            if set < MAX_TEXCOORD_SETS {
+                                *most = (*most).max(set + 1);
+                            }
+                        }
+                    }
+                    visit(most, inner);
+                }
+            }
+            Value::Array(items) => items.iter().for_each(|v| visit(most, v)),
+            _ => {}
+        }
+    }
+    let mut most = 0;
+    if let Ok(value) = object(text) {
+        visit(&mut most, &Value::Object(value));
+    }
+    most as usize
+}
+
+const MAX_TEXCOORD_SETS: u64 = 8;
+
 /// Parses a JSON object. The parser limits nesting to 128 levels, so that recursion over the
 /// result is safe.
 fn object(text: &str) -> Result<Map<String, Value>, String> {

@@ -2,10 +2,12 @@
 
 mod common;
 
-use common::{floor, two_rooms};
+use common::{floor, nasty_rooms, two_rooms};
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
-use enfilade_cpg::{CellId, World};
-use enfilade_geom::DVec3;
+use enfilade_cpg::{Batch, CellId, World};
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{DMat4, DVec3};
+use proptest::prelude::*;
 
 /// Everything but materials and images, whose form changes on the first way through.
 fn geometry(world: &World) -> String {
@@ -20,7 +22,7 @@ fn a_world_comes_back_as_it_was() {
     let world = two_rooms();
     let bytes = encode_glb(&world).unwrap();
     let back = decode_glb(&bytes).unwrap();
-    assert_eq!(geometry(&back), geometry(&world));
+    assert!(geometry(&back) == geometry(&world), "{}", geometry(&back));
     assert_eq!(encode_glb(&back).unwrap(), bytes);
     assert_eq!(
         back.graph.locator.locate(DVec3::new(5.0, 1.0, 1.0)),
@@ -66,8 +68,177 @@ fn a_batch_with_more_corners_than_u16_comes_back() {
     p.positions = (0..many).map(|i| [i as f32, 0.0, (i % 7) as f32]).collect();
     p.normals = vec![[0.0, 1.0, 0.0]; many];
     p.uvs.clear();
+    p.material = None;
     p.indices = vec![0, 1, 65_535];
     world.batches[0].primitive = p;
     let back = decode_glb(&encode_glb(&world).unwrap()).unwrap();
-    assert_eq!(geometry(&back), geometry(&world));
+    assert!(geometry(&back) == geometry(&world));
+}
+
+/// World-space triangles of a detail object, with their normals.
+fn drawn(world: &World, detail: usize) -> Vec<([DVec3; 3], Option<DVec3>)> {
+    let detail = &world.details[detail];
+    let m = DMat4::from_cols_array(&detail.transform.map(f64::from));
+    let vec = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let mut all = Vec::new();
+    for p in &world.detail_meshes[detail.mesh as usize].primitives {
+        for t in p.indices.chunks_exact(3) {
+            let corners = [0, 1, 2].map(|k| m.transform_point3(vec(p.positions[t[k] as usize])));
+            // By the book: the inverse transpose.
+            let normal = p.normals.get(t[0] as usize).map(|&n| {
+                m.inverse()
+                    .transpose()
+                    .transform_vector3(vec(n))
+                    .normalize()
+            });
+            all.push((corners, normal));
+        }
+    }
+    all
+}
+
+#[test]
+fn what_gltf_forbids_is_mended_once() {
+    let world = nasty_rooms();
+    let bytes = encode_glb(&world).unwrap();
+    let back = decode_glb(&bytes).unwrap();
+    assert_eq!(encode_glb(&back).unwrap(), bytes);
+
+    let (before, after) = (&world.batches[0].primitive, &back.batches[0].primitive);
+    assert_eq!(after.positions, before.positions);
+    assert!(
+        after.normals.is_empty(),
+        "a zero normal takes the others with it"
+    );
+    assert_eq!(after.uvs[0][1], [0.0, 0.0]);
+    assert_eq!(after.uvs[0][2], before.uvs[0][2]);
+    assert_eq!(after.colors, vec![[1.0, 0.0, 0.0, 0.5]; 4]);
+    assert_eq!(back.batches[1].primitive.uvs, vec![vec![[0.0, 0.0]; 4]]);
+    assert_eq!(back.batches[2].primitive.indices, [65_534, 65_533, 0]);
+    assert_eq!(back.batches.last().unwrap().cells, [CellId(1)]);
+    let chair = &back.detail_meshes[0].primitives;
+    assert!(chair.len() == 1 && chair[0].tangents.is_empty() && !chair[0].normals.is_empty());
+    let counts = &back.graph.statistics.counts;
+    // The vanished and the flat chair lose their normals, too, and every copy its tangents.
+    assert_eq!(counts["flattened_details"], 5.0);
+    assert!(
+        counts["dropped_normals"] >= 1.0 && counts["dropped_tangents"] >= 1.0,
+        "{counts:?}"
+    );
+}
+
+#[test]
+fn a_detail_that_gltf_cannot_place_is_drawn_where_it_was() {
+    let world = nasty_rooms();
+    let back = decode_glb(&encode_glb(&world).unwrap()).unwrap();
+    for (i, detail) in world.details.iter().enumerate() {
+        let (before, after) = (drawn(&world, i), drawn(&back, i));
+        assert_eq!(before.len(), after.len(), "{}", detail.name);
+        let m = DMat4::from_cols_array(&detail.transform.map(f64::from));
+        for ((a, n), (b, m_n)) in before.iter().zip(&after) {
+            let (mut a, b) = (*a, *b);
+            if a[1].distance(b[1]) > 1e-3 {
+                // A mirror turns the triangle around, so that its front stays its front.
+                assert!(m.determinant() < 0.0, "{}", detail.name);
+                a.swap(1, 2);
+            }
+            for k in 0..3 {
+                // Rounded to f32 once, at up to 50 km.
+                assert!(
+                    a[k].distance(b[k]) <= 1e-7 * (1.0 + a[k].length()),
+                    "{}",
+                    detail.name
+                );
+            }
+            if let (Some(n), Some(m_n)) = (n, m_n)
+                && m.determinant() != 0.0
+            {
+                assert!(n.distance(*m_n) < 1e-6, "{}: {n} became {m_n}", detail.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn pictures_keep_their_bytes_and_get_their_true_type() {
+    let world = nasty_rooms();
+    let back = decode_glb(&encode_glb(&world).unwrap()).unwrap();
+    assert_eq!(back.images[1].bytes, world.images[1].bytes);
+    assert_eq!(back.images[1].mime, "image/webp");
+    assert_eq!(back.textures[3].image, Some(1));
+    assert_eq!(back.textures[4].image, None);
+    assert!(back.images[0].bytes.starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn equal_worlds_give_equal_bytes() {
+    assert_eq!(
+        encode_glb(&nasty_rooms()).unwrap(),
+        encode_glb(&nasty_rooms()).unwrap()
+    );
+}
+
+fn primitive() -> impl Strategy<Value = Primitive> {
+    let finite = -1e6_f32..1e6;
+    prop::collection::vec((prop::array::uniform3(finite), any::<[f32; 2]>()), 1..12)
+        .prop_flat_map(|rows| {
+            let n = rows.len();
+            let triangles = prop::collection::vec(prop::array::uniform3(0..n as u32), 0..6);
+            let normals = prop_oneof![
+                Just(Vec::new()),
+                Just(vec![[0.0, 0.0, -1.0]; n]),
+                prop::collection::vec(any::<[f32; 3]>(), n),
+            ];
+            let material = prop::option::of(0..2_u32);
+            (Just(rows), triangles, normals, material, any::<bool>())
+        })
+        .prop_map(|(rows, triangles, normals, material, has_uvs)| Primitive {
+            positions: rows.iter().map(|r| r.0).collect(),
+            normals,
+            uvs: if has_uvs {
+                vec![rows.iter().map(|r| r.1).collect()]
+            } else {
+                Vec::new()
+            },
+            indices: triangles.into_flattened(),
+            material,
+            ..Primitive::default()
+        })
+}
+
+proptest! {
+    /// Whatever the geometry: the file reads back, what is drawn is the same triangle by triangle,
+    /// and writing it again changes nothing.
+    #[test]
+    fn any_geometry_comes_back(
+        batches in prop::collection::vec(
+            (prop::collection::btree_set(0_u32..3, 0..=3), primitive()), 0..6),
+        mesh in prop::collection::vec(primitive(), 0..3),
+        transform in prop::array::uniform12(-10.0_f32..10.0),
+    ) {
+        let mut world = two_rooms();
+        world.batches = batches
+            .into_iter()
+            .map(|(cells, primitive)| {
+                Batch { cells: cells.into_iter().map(CellId).collect(), primitive }
+            })
+            .collect();
+        world.detail_meshes[0].primitives = mesh;
+        let [a, b, c, d, e, f, g, h, i, x, y, z] = transform;
+        world.details[1].transform =
+            [a, b, c, 0.0, d, e, f, 0.0, g, h, i, 0.0, x, y, z, 1.0];
+        let bytes = encode_glb(&world).unwrap();
+        let back = decode_glb(&bytes).unwrap();
+        prop_assert_eq!(back.batches.len(), world.batches.len());
+        for (after, before) in back.batches.iter().zip(&world.batches) {
+            prop_assert_eq!(&after.cells, &before.cells);
+            prop_assert_eq!(&after.primitive.indices, &before.primitive.indices);
+            if !before.primitive.indices.is_empty() {
+                prop_assert_eq!(&after.primitive.positions, &before.primitive.positions);
+                prop_assert_eq!(after.primitive.material, before.primitive.material);
+            }
+        }
+        prop_assert_eq!(drawn(&back, 0).len(), drawn(&world, 0).len());
+        prop_assert!(encode_glb(&back).unwrap() == bytes);
+    }
 }

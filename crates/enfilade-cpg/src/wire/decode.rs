@@ -377,7 +377,7 @@ impl<'a> Reader<'a> {
         if meshes.get(detail.mesh as usize) != Some(&node.mesh) {
             return Err(broken(at(), "its mesh is not its node's"));
         }
-        let identity = super::encode::IDENTITY;
+        let identity = super::transform::IDENTITY;
         Ok(DetailObject {
             name: node.name.clone(),
             mesh: detail.mesh,

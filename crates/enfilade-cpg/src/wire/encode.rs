@@ -6,13 +6,14 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::scene::{Image, Mesh, Primitive};
-use enfilade_geom::{DMat3, DMat4, DVec3};
+use enfilade_geom::scene::{Image, Mesh};
 use serde_json::value::RawValue;
 
-use super::json::{self, FLOAT, TEXTURE_EXTENSIONS, TRIANGLES, U16, U32, VERTICES};
+use super::buffer::{Layout, image_bytes, mime};
+use super::json::{self, TEXTURE_EXTENSIONS};
+use super::transform::{IDENTITY, is_trs, transformed};
 use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError};
-use crate::look::{add_extensions, material_text, sampler_text};
+use crate::look::{add_extensions, material_text, n_texcoord_sets, sampler_text};
 use crate::{CellId, PortalKind, World};
 
 /// Encodes a world as one GLB.
@@ -26,7 +27,12 @@ use crate::{CellId, PortalKind, World};
 /// 4 GiB.
 pub fn encode_glb(world: &World) -> Result<Vec<u8>, WireError> {
     world.validate().map_err(WireError::Invalid)?;
-    let mut layout = Layout::default();
+    let n_uvs = world
+        .materials
+        .iter()
+        .map(|m| n_texcoord_sets(&material_text(m)))
+        .collect();
+    let mut layout = Layout::new(n_uvs);
     let root = lay_out(&mut layout, world);
     let mut text = serde_json::to_vec(&root).map_err(|e| WireError::Json(e.to_string()))?;
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -49,294 +55,6 @@ pub fn encode_glb(world: &World) -> Result<Vec<u8>, WireError> {
     }
     debug_assert_eq!(out.len() as u64, n_all);
     Ok(out)
-}
-
-/// A stretch of the buffer that holds one kind of vertex data or indices for all primitives.
-#[derive(Clone, Copy, PartialEq)]
-enum Section {
-    Positions,
-    Normals,
-    Tangents,
-    Uvs,
-    Colors,
-    Indices16,
-    Indices32,
-}
-
-impl Section {
-    const ALL: [Self; 7] = [
-        Self::Positions,
-        Self::Normals,
-        Self::Tangents,
-        Self::Uvs,
-        Self::Colors,
-        Self::Indices16,
-        Self::Indices32,
-    ];
-
-    const fn element_size(self) -> u64 {
-        match self {
-            Self::Positions | Self::Normals => 12,
-            Self::Tangents | Self::Colors => 16,
-            Self::Uvs => 8,
-            Self::Indices16 => 2,
-            Self::Indices32 => 4,
-        }
-    }
-
-    const fn is_indices(self) -> bool {
-        matches!(self, Self::Indices16 | Self::Indices32)
-    }
-
-    const fn component_type(self) -> u32 {
-        match self {
-            Self::Indices16 => U16,
-            Self::Indices32 => U32,
-            _ => FLOAT,
-        }
-    }
-
-    const fn kind(self) -> &'static str {
-        match self {
-            Self::Positions | Self::Normals => "VEC3",
-            Self::Tangents | Self::Colors => "VEC4",
-            Self::Uvs => "VEC2",
-            Self::Indices16 | Self::Indices32 => "SCALAR",
-        }
-    }
-}
-
-/// A primitive and which of its attributes are fit to be written.
-struct Prepared<'a> {
-    primitive: Cow<'a, Primitive>,
-    has_normals: bool,
-    has_tangents: bool,
-    indices: Section,
-}
-
-/// Where everything goes in the buffer.
-#[derive(Default)]
-struct Layout<'a> {
-    prepared: Vec<Prepared<'a>>,
-    /// With the section's position in [`Section::ALL`] in place of the buffer view.
-    accessors: Vec<json::Accessor>,
-    section_len: [u64; Section::ALL.len()],
-    views: Vec<json::BufferView>,
-    len: u64,
-    n_dropped_normals: u32,
-    n_dropped_tangents: u32,
-    n_flattened: u32,
-}
-
-impl<'a> Layout<'a> {
-    fn push_mesh(
-        &mut self,
-        name: &str,
-        parts: impl Iterator<Item = Cow<'a, Primitive>>,
-    ) -> json::Mesh {
-        json::Mesh {
-            name: name.to_owned(),
-            primitives: parts.map(|p| self.push(p)).collect(),
-        }
-    }
-
-    fn push(&mut self, primitive: Cow<'a, Primitive>) -> json::Primitive {
-        let p = &*primitive;
-        let has_normals = !p.normals.is_empty() && p.normals.iter().all(|&n| is_unit(n));
-        let are_tangents_fit = p
-            .tangents
-            .iter()
-            .all(|&[x, y, z, w]| is_unit([x, y, z]) && w.abs() == 1.0);
-        let has_tangents = has_normals && !p.tangents.is_empty() && are_tangents_fit;
-        self.n_dropped_normals += u32::from(!has_normals && !p.normals.is_empty());
-        self.n_dropped_tangents += u32::from(!has_tangents && !p.tangents.is_empty());
-        let n = p.positions.len();
-        // 65,535 restarts a strip, so that it can be no index.
-        let indices = if n <= 65_535 {
-            Section::Indices16
-        } else {
-            Section::Indices32
-        };
-
-        let mut attributes = BTreeMap::new();
-        let position = self.accessor(Section::Positions, n);
-        let (min, max) = extent(&p.positions);
-        self.accessors[position as usize].min = Some(min.to_vec());
-        self.accessors[position as usize].max = Some(max.to_vec());
-        attributes.insert("POSITION".to_owned(), position);
-        if has_normals {
-            attributes.insert("NORMAL".to_owned(), self.accessor(Section::Normals, n));
-        }
-        if has_tangents {
-            attributes.insert("TANGENT".to_owned(), self.accessor(Section::Tangents, n));
-        }
-        for set in 0..p.uvs.len() {
-            attributes.insert(format!("TEXCOORD_{set}"), self.accessor(Section::Uvs, n));
-        }
-        if !p.colors.is_empty() {
-            attributes.insert("COLOR_0".to_owned(), self.accessor(Section::Colors, n));
-        }
-        let (n_indices, material) = (p.indices.len(), p.material);
-        let index_accessor = Some(self.accessor(indices, n_indices));
-        self.prepared.push(Prepared {
-            primitive,
-            has_normals,
-            has_tangents,
-            indices,
-        });
-        json::Primitive {
-            attributes,
-            indices: index_accessor,
-            material,
-        }
-    }
-
-    fn accessor(&mut self, section: Section, count: usize) -> u32 {
-        let slot = section as usize;
-        self.accessors.push(json::Accessor {
-            buffer_view: Some(slot as u32),
-            byte_offset: self.section_len[slot],
-            component_type: section.component_type(),
-            count: count as u64,
-            kind: section.kind().to_owned(),
-            min: None,
-            max: None,
-        });
-        self.section_len[slot] += count as u64 * section.element_size();
-        self.accessors.len() as u32 - 1
-    }
-
-    /// Gives every section in use its buffer view, once all primitives are known.
-    fn close_sections(&mut self) {
-        let mut view_of = [None; Section::ALL.len()];
-        for section in Section::ALL {
-            let slot = section as usize;
-            view_of[slot] = self.view(self.section_len[slot]);
-            if let Some(view) = view_of[slot] {
-                let view = &mut self.views[view as usize];
-                view.target = Some(if section.is_indices() {
-                    TRIANGLES
-                } else {
-                    VERTICES
-                });
-                view.byte_stride = (!section.is_indices()).then_some(section.element_size());
-            }
-        }
-        for accessor in &mut self.accessors {
-            accessor.buffer_view = accessor.buffer_view.and_then(|slot| view_of[slot as usize]);
-        }
-    }
-
-    /// Reserves `byte_length` bytes; `None` for none, because glTF knows no empty buffer view.
-    fn view(&mut self, byte_length: u64) -> Option<u32> {
-        if byte_length == 0 {
-            return None;
-        }
-        let byte_offset = self.len.next_multiple_of(ALIGNMENT);
-        self.len = byte_offset + byte_length;
-        self.views.push(json::BufferView {
-            buffer: 0,
-            byte_offset,
-            byte_length,
-            byte_stride: None,
-            target: None,
-        });
-        Some(self.views.len() as u32 - 1)
-    }
-
-    /// Appends everything in the order in which the views were reserved.
-    fn write(&self, world: &World, out: &mut Vec<u8>) {
-        let start = out.len();
-        let mut bulk = Bulk { start, out };
-        for section in Section::ALL {
-            if self.section_len[section as usize] > 0 {
-                bulk.align(ALIGNMENT);
-                self.prepared.iter().for_each(|p| bulk.section(section, p));
-            }
-        }
-        for image in &world.images {
-            bulk.align(ALIGNMENT);
-            bulk.out.extend_from_slice(&image_bytes(image));
-        }
-        if !world.graph.portals.is_empty() {
-            bulk.align(ALIGNMENT);
-            for portal in &world.graph.portals {
-                bulk.floats(&portal.outline);
-                portal.pieces.iter().for_each(|piece| bulk.floats(piece));
-            }
-        }
-        let locator = &world.graph.locator;
-        if !locator.planes.is_empty() {
-            bulk.align(ALIGNMENT);
-            for v in locator.planes.as_flattened() {
-                bulk.out.extend_from_slice(&v.to_le_bytes());
-            }
-        }
-        if !locator.nodes.is_empty() {
-            bulk.align(ALIGNMENT);
-            for node in &locator.nodes {
-                bulk.out.extend_from_slice(&node.plane.to_le_bytes());
-                bulk.out.extend_from_slice(&node.children[0].to_le_bytes());
-                bulk.out.extend_from_slice(&node.children[1].to_le_bytes());
-            }
-        }
-        bulk.align(4);
-    }
-}
-
-/// Buffer views start at multiples of this, which suits `f64` planes as well as vertices.
-const ALIGNMENT: u64 = 8;
-
-/// The buffer while it is written.
-struct Bulk<'o> {
-    start: usize,
-    out: &'o mut Vec<u8>,
-}
-
-impl Bulk<'_> {
-    fn align(&mut self, to: u64) {
-        let len = (self.out.len() - self.start).next_multiple_of(to as usize);
-        self.out.resize(self.start + len, 0);
-    }
-
-    fn floats<const N: usize>(&mut self, rows: &[[f32; N]]) {
-        self.mapped(rows, |v| v);
-    }
-
-    fn mapped<const N: usize>(&mut self, rows: &[[f32; N]], f: impl Fn(f32) -> f32) {
-        for &v in rows.as_flattened() {
-            self.out.extend_from_slice(&f(v).to_le_bytes());
-        }
-    }
-
-    fn section(&mut self, section: Section, prepared: &Prepared) {
-        let p = &*prepared.primitive;
-        match section {
-            Section::Positions => self.floats(&p.positions),
-            Section::Normals if prepared.has_normals => self.floats(&p.normals),
-            Section::Tangents if prepared.has_tangents => self.floats(&p.tangents),
-            Section::Uvs => {
-                for set in &p.uvs {
-                    self.mapped(set, |v| if v.is_finite() { v } else { 0.0 });
-                }
-            }
-            // Compared, so that NaN becomes 0 and no minus zero is left to chance.
-            Section::Colors => {
-                self.mapped(&p.colors, |v| if v > 0.0 { v.min(1.0) } else { 0.0 });
-            }
-            Section::Indices16 if prepared.indices == section => {
-                for &i in &p.indices {
-                    self.out.extend_from_slice(&(i as u16).to_le_bytes());
-                }
-            }
-            Section::Indices32 if prepared.indices == section => {
-                for &i in &p.indices {
-                    self.out.extend_from_slice(&i.to_le_bytes());
-                }
-            }
-            _ => {}
-        }
-    }
 }
 
 /// Builds the whole JSON and reserves the buffer.
@@ -546,71 +264,6 @@ fn lay_out_details<'a>(
     (details, detail_meshes)
 }
 
-pub(super) const IDENTITY: [f32; 16] = [
-    1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
-];
-
-/// Whether a transform is translation, rotation and scale, as glTF demands of a node's matrix.
-///
-/// The limit is a fifth of what the Khronos validator allows (columns' sums of absolute values
-/// within 5·10⁻⁵, whatever the scale), so that its decomposition in `f32` has room to round.
-fn is_trs(transform: &[f32; 16]) -> bool {
-    let m = linear(transform);
-    let columns = [m.x_axis, m.y_axis, m.z_axis];
-    let lengths = columns.map(DVec3::length);
-    // A validator that works in f32 sees a smaller determinant as none.
-    if m.determinant().abs() < 1e-30 || lengths.iter().any(|&l| l < 1e-9) {
-        return transform == &IDENTITY;
-    }
-    let largest = lengths.into_iter().fold(0.0, f64::max);
-    [(0, 1), (0, 2), (1, 2)].into_iter().all(|(a, b)| {
-        let cosine = columns[a].dot(columns[b]) / (lengths[a] * lengths[b]);
-        cosine.abs() * largest <= 1e-5
-    })
-}
-
-fn linear(t: &[f32; 16]) -> DMat3 {
-    DMat3::from_mat4(DMat4::from_cols_array(&t.map(f64::from)))
-}
-
-/// The primitive with `transform` applied to its vertices.
-fn transformed(p: &Primitive, transform: &[f32; 16]) -> Primitive {
-    let whole = DMat4::from_cols_array(&transform.map(f64::from));
-    let linear = linear(transform);
-    // The adjugate's transpose carries normals through singular matrices, too, and keeps the side.
-    let normal_matrix = DMat3::from_cols(
-        linear.y_axis.cross(linear.z_axis),
-        linear.z_axis.cross(linear.x_axis),
-        linear.x_axis.cross(linear.y_axis),
-    );
-    let mirror = if linear.determinant() < 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
-    let vec = |v: [f32; 3]| DVec3::from(v.map(f64::from));
-    let mut moved = p.clone();
-    for position in &mut moved.positions {
-        *position = whole.transform_point3(vec(*position)).as_vec3().to_array();
-    }
-    for normal in &mut moved.normals {
-        let n = (normal_matrix * vec(*normal) * mirror).normalize_or_zero();
-        *normal = n.as_vec3().to_array();
-    }
-    for tangent in &mut moved.tangents {
-        let [x, y, z, w] = *tangent;
-        let t = (linear * vec([x, y, z])).normalize_or_zero().as_vec3();
-        *tangent = [t.x, t.y, t.z, w * mirror as f32];
-    }
-    if mirror < 0.0 {
-        // Front faces stay front faces.
-        for triangle in moved.indices.chunks_exact_mut(3) {
-            triangle.swap(1, 2);
-        }
-    }
-    moved
-}
-
 fn lay_out_textures(
     world: &World,
     used: &mut BTreeSet<String>,
@@ -719,38 +372,6 @@ fn statistics(layout: &Layout, world: &World) -> BTreeMap<String, f64> {
     counts
 }
 
-/// One white pixel, as PNG.
-const WHITE_PIXEL: [u8; 67] = [
-    0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 0x0d, b'I', b'H', b'D', b'R', 0, 0, 0,
-    1, 0, 0, 0, 1, 8, 0, 0, 0, 0, 0x3a, 0x7e, 0x9b, 0x55, 0, 0, 0, 0x0a, b'I', b'D', b'A', b'T',
-    0x78, 0xda, 0x63, 0xf8, 0x0f, 0, 1, 1, 1, 0, 0x1b, 0xb6, 0xee, 0x56, 0, 0, 0, 0, b'I', b'E',
-    b'N', b'D', 0xae, 0x42, 0x60, 0x82,
-];
-
-fn image_bytes(image: &Image) -> Cow<'_, [u8]> {
-    if image.bytes.is_empty() {
-        Cow::Owned(WHITE_PIXEL.to_vec())
-    } else {
-        Cow::Borrowed(&image.bytes)
-    }
-}
-
-/// The picture's MIME type: by its first bytes where they tell, else as the input said.
-fn mime(image: &Image) -> &str {
-    let bytes = image_bytes(image);
-    if bytes.starts_with(&WHITE_PIXEL[..8]) {
-        "image/png"
-    } else if bytes.starts_with(&[0xff, 0xd8, 0xff]) {
-        "image/jpeg"
-    } else if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
-        "image/webp"
-    } else if bytes.starts_with(&[0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb]) {
-        "image/ktx2"
-    } else {
-        &image.mime
-    }
-}
-
 fn ids(cells: &[CellId]) -> Vec<u32> {
     cells.iter().map(|c| c.0).collect()
 }
@@ -758,25 +379,4 @@ fn ids(cells: &[CellId]) -> Vec<u32> {
 /// Embeds JSON text as it is. The world was validated, so that it parses.
 fn raw(text: String) -> Box<RawValue> {
     RawValue::from_string(text).unwrap_or_else(|_| RawValue::NULL.to_owned())
-}
-
-/// Whether a stored direction counts as of unit length; the Khronos validator allows 0.00674.
-fn is_unit(v: [f32; 3]) -> bool {
-    (DVec3::from(v.map(f64::from)).length() - 1.0).abs() <= 0.006
-}
-
-fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
-    let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for p in positions {
-        for k in 0..3 {
-            // Compared, because `f32::min` may pick either of plus and minus zero.
-            if p[k] < min[k] {
-                min[k] = p[k];
-            }
-            if p[k] > max[k] {
-                max[k] = p[k];
-            }
-        }
-    }
-    (min.map(f64::from), max.map(f64::from))
 }

@@ -22,14 +22,17 @@
 //!   counted as `dropped_normals`; tangents alone likewise, `dropped_tangents`. Viewers then shade
 //!   flat. They are not renormalized, because a zero normal has no direction to restore.
 //! - texture coordinates that are not finite become 0; vertex colors are clamped to 0 … 1.
+//! - texture coordinate sets that a material reads and a primitive lacks are written as zeros.
 //! - primitives without triangles are left out.
 //! - a detail object whose transform shears or flattens, which glTF nodes cannot express, gets a
 //!   transformed copy of its mesh, counted as `flattened_details`.
 //! - an image without bytes (its file was missing) becomes one white pixel.
 
+mod buffer;
 mod decode;
 mod encode;
 mod json;
+mod transform;
 
 pub use decode::decode_glb;
 pub use encode::encode_glb;

@@ -208,3 +208,78 @@ pub(crate) fn two_rooms() -> World {
         }],
     }
 }
+
+/// The two rooms with everything in them that inputs hold and glTF forbids.
+pub(crate) fn nasty_rooms() -> World {
+    let mut world = two_rooms();
+    let p = &mut world.batches[0].primitive;
+    p.normals[2] = [0.0; 3];
+    p.uvs[0][1] = [f32::NAN, f32::INFINITY];
+    p.colors = vec![[2.0, -1.0, f32::NAN, 0.5]; 4];
+    let tilted = &mut world.detail_meshes[0].primitives[0];
+    tilted.tangents[3] = [1.0, 0.0, 0.0, 0.5];
+    // Material 0 reads a texture coordinate set that this one lacks.
+    world.batches[1].primitive.uvs.clear();
+    // Every index is the largest that 16 bits may hold, or one less.
+    let many = &mut world.batches[2].primitive;
+    many.positions = (0..65_535)
+        .map(|i| [i as f32 * 1e-4, -0.0, (i % 7) as f32])
+        .collect();
+    many.normals = vec![[0.0, 1.0, 0.0]; 65_535];
+    many.uvs.clear();
+    many.indices = vec![65_534, 65_533, 0];
+    many.material = None;
+    world.batches.push(Batch {
+        cells: vec![CellId(1)],
+        primitive: Primitive::default(),
+    });
+    world.detail_meshes.push(Mesh {
+        name: "nothing".into(),
+        primitives: Vec::new(),
+    });
+    world.detail_meshes[0].primitives.push(Primitive::default());
+    let detail = |name: &str, mesh, transform| DetailObject {
+        name: name.into(),
+        mesh,
+        transform,
+        cells: vec![CellId(0)],
+    };
+    let mut identity = [0.0; 16];
+    [0, 5, 10, 15].into_iter().for_each(|i| identity[i] = 1.0);
+    let changed = |changes: &[(usize, f32)]| {
+        let mut t = identity;
+        changes.iter().for_each(|&(i, v)| t[i] = v);
+        t
+    };
+    world.details.extend([
+        detail("nothing", 1, changed(&[(12, 3.0)])),
+        detail("sheared", 0, changed(&[(4, 0.5), (13, 2.0)])),
+        detail("mirrored and sheared", 0, changed(&[(0, -1.0), (6, 0.25)])),
+        detail("flat", 0, changed(&[(5, 0.0)])),
+        detail("vanished", 0, changed(&[(0, 0.0), (5, 0.0), (10, 0.0)])),
+        detail("mirrored", 0, changed(&[(0, -1.0)])),
+        detail(
+            "huge",
+            0,
+            changed(&[(0, 0.0), (2, 9e3), (8, -9e3), (10, 1e-3), (5, 7.0)]),
+        ),
+    ]);
+    let picture = |mime: &str, bytes: &[u8]| Image {
+        name: String::new(),
+        mime: mime.into(),
+        bytes: bytes.to_vec(),
+    };
+    world.images.extend([
+        // The smallest WebP: one pixel, lossless. Its type is wrong in the input.
+        picture(
+            "image/png",
+            b"RIFF\x1a\0\0\0WEBPVP8L\x0d\0\0\0/\0\0\0\x10\x07\x10\x11\x11\x88\x88\xfe\x07\0",
+        ),
+    ]);
+    world.textures.push(Texture {
+        image: Some(1),
+        sampler: String::new(),
+    });
+    world.textures.push(Texture::default());
+    world
+}

@@ -1,0 +1,70 @@
+//! Transforms of placed objects, within what glTF nodes can express.
+
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{DMat3, DMat4, DVec3};
+
+/// Stays where it is.
+pub(super) const IDENTITY: [f32; 16] = [
+    1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
+];
+
+/// Whether a transform is translation, rotation and scale, as glTF demands of a node's matrix.
+///
+/// The limit is a fifth of what the Khronos validator allows (columns' sums of absolute values
+/// within 5·10⁻⁵, whatever the scale), so that its decomposition in `f32` has room to round.
+pub(super) fn is_trs(transform: &[f32; 16]) -> bool {
+    let m = linear(transform);
+    let columns = [m.x_axis, m.y_axis, m.z_axis];
+    let lengths = columns.map(DVec3::length);
+    // A validator that works in f32 sees a smaller determinant as none.
+    if m.determinant().abs() < 1e-30 || lengths.iter().any(|&l| l < 1e-9) {
+        return transform == &IDENTITY;
+    }
+    let largest = lengths.into_iter().fold(0.0, f64::max);
+    [(0, 1), (0, 2), (1, 2)].into_iter().all(|(a, b)| {
+        let cosine = columns[a].dot(columns[b]) / (lengths[a] * lengths[b]);
+        cosine.abs() * largest <= 1e-5
+    })
+}
+
+fn linear(t: &[f32; 16]) -> DMat3 {
+    DMat3::from_mat4(DMat4::from_cols_array(&t.map(f64::from)))
+}
+
+/// The primitive with `transform` applied to its vertices.
+pub(super) fn transformed(p: &Primitive, transform: &[f32; 16]) -> Primitive {
+    let whole = DMat4::from_cols_array(&transform.map(f64::from));
+    let linear = linear(transform);
+    // The adjugate's transpose carries normals through singular matrices, too, and keeps the side.
+    let normal_matrix = DMat3::from_cols(
+        linear.y_axis.cross(linear.z_axis),
+        linear.z_axis.cross(linear.x_axis),
+        linear.x_axis.cross(linear.y_axis),
+    );
+    let mirror = if linear.determinant() < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
+    let vec = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let mut moved = p.clone();
+    for position in &mut moved.positions {
+        *position = whole.transform_point3(vec(*position)).as_vec3().to_array();
+    }
+    for normal in &mut moved.normals {
+        let n = (normal_matrix * vec(*normal) * mirror).normalize_or_zero();
+        *normal = n.as_vec3().to_array();
+    }
+    for tangent in &mut moved.tangents {
+        let [x, y, z, w] = *tangent;
+        let t = (linear * vec([x, y, z])).normalize_or_zero().as_vec3();
+        *tangent = [t.x, t.y, t.z, w * mirror as f32];
+    }
+    if mirror < 0.0 {
+        // Front faces stay front faces.
+        for triangle in moved.indices.chunks_exact_mut(3) {
+            triangle.swap(1, 2);
+        }
+    }
+    moved
+}

@@ -1,0 +1,208 @@
+//! Bytes that nobody vouches for: every prefix errors, every bit flip errors or gives a world that
+//! holds its invariants, and nothing takes more memory than the file justifies.
+
+mod common;
+
+use common::two_rooms;
+use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+use proptest::prelude::*;
+
+/// A GLB of these chunks.
+fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut out = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
+    out.extend((json.len() as u32).to_le_bytes());
+    out.extend(b"JSON");
+    out.extend(json);
+    if !bin.is_empty() {
+        out.extend((bin.len() as u32).to_le_bytes());
+        out.extend(b"BIN\0");
+        out.extend(bin);
+    }
+    let len = out.len() as u32;
+    out[8..12].copy_from_slice(&len.to_le_bytes());
+    out
+}
+
+/// The two rooms' JSON and binary chunk.
+fn parts() -> (String, Vec<u8>) {
+    let bytes = encode_glb(&two_rooms()).unwrap();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let end = 20 + word(12);
+    (
+        String::from_utf8(bytes[20..end].to_vec()).unwrap(),
+        bytes[end + 8..].to_vec(),
+    )
+}
+
+/// The two rooms with one piece of the JSON replaced.
+fn with(from: &str, to: &str) -> Result<enfilade_cpg::World, WireError> {
+    let (json, bin) = parts();
+    assert!(json.contains(from), "{from} is not in {json}");
+    decode_glb(&glb(&json.replacen(from, to, 1), &bin))
+}
+
+fn check(bytes: &[u8]) {
+    if let Ok(world) = decode_glb(bytes) {
+        world.validate().unwrap();
+        // What was accepted can be written, and reads back as the same bytes from then on.
+        let written = encode_glb(&world).unwrap();
+        assert_eq!(encode_glb(&decode_glb(&written).unwrap()).unwrap(), written);
+    }
+}
+
+#[test]
+fn taking_a_file_apart_and_together_changes_nothing() {
+    let (json, bin) = parts();
+    assert_eq!(glb(&json, &bin), encode_glb(&two_rooms()).unwrap());
+}
+
+#[test]
+fn every_prefix_is_an_error() {
+    let bytes = encode_glb(&two_rooms()).unwrap();
+    for n in 0..bytes.len() {
+        assert!(decode_glb(&bytes[..n]).is_err(), "{n} bytes decoded");
+        // With the header made to fit, too.
+        if n >= 12 {
+            let mut cut = bytes[..n].to_vec();
+            cut[8..12].copy_from_slice(&(n as u32).to_le_bytes());
+            check(&cut);
+        }
+    }
+    let mut longer = bytes;
+    longer.push(0);
+    assert!(decode_glb(&longer).is_err());
+}
+
+#[test]
+fn every_bit_flip_is_an_error_or_a_valid_world() {
+    let bytes = encode_glb(&two_rooms()).unwrap();
+    for i in 0..bytes.len() * 8 {
+        let mut flipped = bytes.clone();
+        flipped[i / 8] ^= 1 << (i % 8);
+        check(&flipped);
+    }
+}
+
+#[test]
+fn a_plain_glb_is_no_world_and_the_message_says_what_to_do() {
+    let plain = decode_glb(&glb(
+        r#"{"asset":{"version":"2.0"},"extensions":{"X_y":{}}}"#,
+        &[],
+    ));
+    let error = plain.unwrap_err();
+    assert_eq!(error, WireError::NotAWorld);
+    assert!(error.to_string().contains("enfilade bake"), "{error}");
+}
+
+#[test]
+fn text_is_no_glb() {
+    assert!(matches!(
+        decode_glb(b"{\"asset\":{}}"),
+        Err(WireError::NotGlb(_))
+    ));
+    assert!(matches!(decode_glb(b""), Err(WireError::NotGlb(_))));
+    assert!(matches!(
+        decode_glb(b"glTF\x01\0\0\0\x14\0\0\0"),
+        Err(WireError::NotGlb(_))
+    ));
+}
+
+#[test]
+fn another_version_is_named() {
+    let error = with("\"version\":1,", "\"version\":2,\"cells\":7,").unwrap_err();
+    assert_eq!(error, WireError::Version { found: 2 });
+    assert!(error.to_string().contains("version 2"), "{error}");
+}
+
+#[test]
+fn a_count_beyond_the_file_is_an_error_before_anything_is_allocated() {
+    for (from, to) in [
+        ("\"count\":4", "\"count\":18446744073709551615"),
+        ("\"count\":4", "\"count\":4000000000"),
+        ("\"outline\":4", "\"outline\":4294967295"),
+        ("\"byteOffset\":0", "\"byteOffset\":18446744073709551615"),
+        ("\"byteStride\":12", "\"byteStride\":0"),
+        ("\"byteStride\":12", "\"byteStride\":11"),
+    ] {
+        let result = with(from, to);
+        assert!(
+            matches!(result, Err(WireError::Structure { .. })),
+            "{from} → {to}: {result:?}"
+        );
+    }
+}
+
+#[test]
+fn the_same_bytes_cannot_be_decoded_a_thousand_times() {
+    let (json, mut bin) = parts();
+    // A detail mesh of a megabyte, named ten thousand times: 10 GB if it were decoded.
+    let from = bin.len();
+    bin.resize(from + (1 << 20), 0);
+    let n = json.matches("\"bufferView\":").count();
+    assert!(n > 0);
+    let listed = format!("\"detailMeshes\":[5{}]", ",5".repeat(10_000));
+    let json = json.replacen("\"detailMeshes\":[5]", &listed, 1);
+    let view = json.find("\"byteLength\":").unwrap();
+    let end = view + json[view..].find(',').unwrap();
+    let json = format!(
+        "{}\"byteLength\":{}{}",
+        &json[..view],
+        bin.len(),
+        &json[end..]
+    );
+    let json = json.replace(
+        "\"count\":4,",
+        &format!("\"count\":{},", bin.len() / 12 - 100),
+    );
+    assert!(matches!(
+        decode_glb(&glb(&json, &bin)),
+        Err(WireError::Structure { .. })
+    ));
+}
+
+#[test]
+fn deep_nesting_is_an_error() {
+    let deep = "[".repeat(1_000_000);
+    assert!(decode_glb(&glb(&format!("{{\"extras\":{deep}"), &[])).is_err());
+    let balanced = format!("{}{}", deep, "]".repeat(1_000_000));
+    let (json, bin) = parts();
+    // Ignored where it is none of ours, refused where it has to be understood.
+    let ignored = json.replacen('{', &format!("{{\"extras\":{balanced},"), 1);
+    check(&glb(&ignored, &bin));
+    let material = json.replacen("\"ior\":1.4", &format!("\"ior\":{balanced}"), 1);
+    assert!(matches!(
+        decode_glb(&glb(&material, &bin)),
+        Err(WireError::Structure { .. })
+    ));
+}
+
+#[test]
+fn a_detail_whose_mesh_is_not_its_nodes_is_an_error() {
+    assert!(matches!(
+        with("\"detailMeshes\":[5]", "\"detailMeshes\":[4]"),
+        Err(WireError::Structure { .. })
+    ));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn no_damage_panics(
+        cut in any::<prop::sample::Index>(),
+        paste in prop::collection::vec(any::<u8>(), 0..16),
+        remove in 0usize..16,
+    ) {
+        let mut bytes = encode_glb(&two_rooms()).unwrap();
+        let at = cut.index(bytes.len());
+        let end = (at + remove).min(bytes.len());
+        bytes.splice(at..end, paste);
+        if bytes.len() >= 12 {
+            let len = bytes.len() as u32;
+            bytes[8..12].copy_from_slice(&len.to_le_bytes());
+        }
+        check(&bytes);
+    }
+}
