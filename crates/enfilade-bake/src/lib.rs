@@ -1,1 +1,3 @@
 //! enfilade-bake
+
+pub mod voxel;
