@@ -1,3 +1,3 @@
 //! enfilade-bake
 
-pub mod voxel;
+pub mod complex;

@@ -1,0 +1,331 @@
+//! From votes to cells: which leaves make up which cell.
+//!
+//! 1. Leaves open to each other other than through screens form components.
+//! 2. A component in which one label rules belongs to it. One with several strong labels has a
+//!    leak: it is grown together along its openings, widest first, unless that would join two
+//!    labels (Kruskal's forest), so that cells meet at the narrowest places.
+//! 3. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
+//!    most, through a screen if need be. What opens nowhere and nobody votes for is solid.
+//!
+//! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use rayon::prelude::*;
+
+use super::graph::{LeafGraph, NO_SCREEN};
+use super::{LabelSettings, Vote};
+
+/// The label of leaves in no cell.
+pub(super) const SOLID: u32 = u32::MAX;
+
+/// Leaves by cell.
+pub(super) struct LeafCells {
+    /// Cell of each leaf, or [`SOLID`].
+    pub(super) cell_of_leaf: Vec<u32>,
+    /// The vote label of each cell.
+    pub(super) label_of_cell: Vec<u32>,
+    /// Volume of each cell.
+    pub(super) volumes: Vec<f64>,
+    /// The cell with most leaves at the border of the box by volume, if any touches it.
+    pub(super) outside: Option<u32>,
+}
+
+/// Disjoint sets; the root of a set is its least member.
+struct Sets(Vec<u32>);
+
+impl Sets {
+    fn new(n: usize) -> Self {
+        Self((0..n as u32).collect())
+    }
+
+    fn find(&mut self, mut x: u32) -> u32 {
+        while self.0[x as usize] != x {
+            self.0[x as usize] = self.0[self.0[x as usize] as usize];
+            x = self.0[x as usize];
+        }
+        x
+    }
+
+    fn join(&mut self, a: u32, b: u32) -> u32 {
+        let (a, b) = (self.find(a), self.find(b));
+        let (low, high) = (a.min(b), a.max(b));
+        self.0[high as usize] = low;
+        low
+    }
+}
+
+/// Votes of one leaf or component for one label.
+type Tally = BTreeMap<(u32, u32), f64>;
+
+fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
+    let mut out = Tally::new();
+    for (&(leaf, label), &w) in tally {
+        *out.entry((key(leaf), label)).or_default() += w;
+    }
+    out
+}
+
+/// A maximal set of leaves that is to be one cell, or part of one.
+struct Group {
+    label: Option<u32>,
+    /// It is a cell whatever happens around it.
+    keeps: bool,
+    volume: f64,
+    /// Open area to other groups.
+    neighbors: BTreeMap<u32, f64>,
+}
+
+/// Divides the leaves among cells. `leaf_of` locates votes.
+pub(super) fn label_leaves(
+    graph: &LeafGraph,
+    votes: &[Vote],
+    settings: &LabelSettings,
+    leaf_of: impl Fn(&Vote) -> Option<u32> + Sync + Send,
+) -> LeafCells {
+    let n_leaves = graph.volumes.len();
+    let mut tally = Tally::new();
+    // Located in parallel, counted in order, so that sums round alike on any number of threads.
+    let leaves: Vec<Option<u32>> = votes.par_iter().with_min_len(1024).map(leaf_of).collect();
+    for (vote, leaf) in votes.iter().zip(leaves) {
+        if let Some(leaf) = leaf
+            && vote.label != SOLID
+        {
+            *tally.entry((leaf, vote.label)).or_default() += f64::from(vote.weight);
+        }
+    }
+    let mut components = Sets::new(n_leaves);
+    for f in &graph.facets {
+        if f.screen == NO_SCREEN {
+            components.join(f.leaves[0], f.leaves[1]);
+        }
+    }
+    let component_of: Vec<u32> = (0..n_leaves as u32).map(|l| components.find(l)).collect();
+    drop(components);
+    let strong = strong_labels(graph, &tally, &component_of, settings);
+
+    // Leaves of components with several strong labels are grown together; all others at once.
+    let mut sets = Sets::new(n_leaves);
+    let mut label_of_set: Vec<u32> = vec![SOLID; n_leaves];
+    let leaked = |leaf: u32| {
+        strong
+            .get(&component_of[leaf as usize])
+            .is_some_and(|s| s.len() > 1)
+    };
+    for leaf in 0..n_leaves as u32 {
+        if !leaked(leaf) {
+            sets.join(component_of[leaf as usize], leaf);
+        }
+    }
+    for (&component, labels) in &strong {
+        if let [label] = labels[..] {
+            label_of_set[component as usize] = label;
+        }
+    }
+    let mut best_of_leaf: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    for (&(leaf, label), &w) in &tally {
+        let labels = strong
+            .get(&component_of[leaf as usize])
+            .map_or(&[][..], Vec::as_slice);
+        if labels.len() > 1 && labels.contains(&label) {
+            let best = best_of_leaf.entry(leaf).or_insert((w, label));
+            if w > best.0 {
+                *best = (w, label);
+            }
+        }
+    }
+    for (&leaf, &(_, label)) in &best_of_leaf {
+        label_of_set[leaf as usize] = label;
+    }
+    grow_together(graph, &mut sets, &mut label_of_set, leaked);
+
+    let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
+    number_cells(graph, &mut sets, &groups)
+}
+
+/// The labels that stand for a region in each component; components without any are left out.
+fn strong_labels(
+    graph: &LeafGraph,
+    tally: &Tally,
+    component_of: &[u32],
+    settings: &LabelSettings,
+) -> BTreeMap<u32, Vec<u32>> {
+    let mut volume: BTreeMap<u32, f64> = BTreeMap::new();
+    for (leaf, &c) in component_of.iter().enumerate() {
+        *volume.entry(c).or_default() += graph.volumes[leaf];
+    }
+    let by_component = tally_by(tally, |leaf| component_of[leaf as usize]);
+    let (mut of_label, mut of_component) =
+        (BTreeMap::<u32, f64>::new(), BTreeMap::<u32, f64>::new());
+    for (&(c, label), &w) in &by_component {
+        *of_label.entry(label).or_default() += w;
+        *of_component.entry(c).or_default() += w;
+    }
+    let mut strong: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (&(c, label), &w) in &by_component {
+        // A share of the label, not of the component: a toilet that leaks into a hall is a small
+        // part of both together, yet all of the toilet.
+        let main = w >= settings.strong_share * of_label[&label];
+        let rules = w >= (1.0 - settings.dominance) * of_component[&c]
+            && of_component[&c] >= 0.25 * volume[&c];
+        if main || rules {
+            strong.entry(c).or_default().push(label);
+        }
+    }
+    strong
+}
+
+/// Kruskal's forest over the openings of leaked components, two labels never in one tree.
+fn grow_together(
+    graph: &LeafGraph,
+    sets: &mut Sets,
+    label_of_set: &mut [u32],
+    leaked: impl Fn(u32) -> bool,
+) {
+    let mut order: Vec<u32> = (0..graph.facets.len() as u32)
+        .filter(|&i| {
+            let f = &graph.facets[i as usize];
+            f.screen == NO_SCREEN && leaked(f.leaves[0])
+        })
+        .collect();
+    order.sort_by(|&a, &b| {
+        graph.facets[b as usize]
+            .width
+            .total_cmp(&graph.facets[a as usize].width)
+            .then(a.cmp(&b))
+    });
+    for i in order {
+        let [a, b] = graph.facets[i as usize].leaves.map(|l| sets.find(l));
+        let (la, lb) = (label_of_set[a as usize], label_of_set[b as usize]);
+        if a != b && (la == lb || la == SOLID || lb == SOLID) {
+            label_of_set[sets.join(a, b) as usize] = la.min(lb);
+        }
+    }
+}
+
+/// Lets groups without a label, and small doubles of a label, join their neighbors.
+fn merge_groups(
+    graph: &LeafGraph,
+    sets: &mut Sets,
+    label_of_set: &[u32],
+    settings: &LabelSettings,
+) -> BTreeMap<u32, Group> {
+    let mut groups: BTreeMap<u32, Group> = BTreeMap::new();
+    for leaf in 0..graph.volumes.len() as u32 {
+        let set = sets.find(leaf);
+        let label = label_of_set[set as usize];
+        let group = groups.entry(set).or_insert(Group {
+            label: (label != SOLID).then_some(label),
+            keeps: false,
+            volume: 0.0,
+            neighbors: BTreeMap::new(),
+        });
+        group.volume += graph.volumes[leaf as usize];
+    }
+    for f in &graph.facets {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        if a != b {
+            for (from, to) in [(a, b), (b, a)] {
+                if let Some(group) = groups.get_mut(&from) {
+                    *group.neighbors.entry(to).or_default() += f64::from(f.area);
+                }
+            }
+        }
+    }
+    // The largest group of each label keeps it whatever its size.
+    let mut main: BTreeMap<u32, (f64, Reverse<u32>)> = BTreeMap::new();
+    for (&id, group) in &groups {
+        if let Some(label) = group.label {
+            let key = (group.volume, Reverse(id));
+            let best = main.entry(label).or_insert(key);
+            if key > *best {
+                *best = key;
+            }
+        }
+    }
+    for (&id, group) in &mut groups {
+        group.keeps = group
+            .label
+            .is_some_and(|l| main[&l].1.0 == id || group.volume >= settings.min_volume);
+    }
+    // Smallest first; volumes are not negative, so their bits compare like the numbers.
+    let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), id));
+    let mut queue: BinaryHeap<Reverse<(u64, u32)>> = groups
+        .iter()
+        .filter(|(_, group)| !group.keeps && !group.neighbors.is_empty())
+        .map(|(&id, group)| entry(id, group))
+        .collect();
+    while let Some(Reverse((bits, id))) = queue.pop() {
+        let is_current = |g: &&Group| !g.keeps && g.volume.to_bits() == bits;
+        let to = groups.get(&id).filter(is_current).and_then(|group| {
+            group
+                .neighbors
+                .iter()
+                .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))
+        });
+        let Some(to) = to.map(|(&to, _)| to) else {
+            continue;
+        };
+        let (Some(merged), Some(mut host)) = (groups.remove(&id), groups.remove(&to)) else {
+            continue;
+        };
+        let root = sets.join(id, to);
+        host.volume += merged.volume;
+        host.label = host.label.or(merged.label);
+        for (other, area) in merged.neighbors {
+            *host.neighbors.entry(other).or_default() += area;
+        }
+        host.neighbors.remove(&id);
+        host.neighbors.remove(&to);
+        for other in host.neighbors.keys() {
+            if let Some(n) = groups.get_mut(other) {
+                let area =
+                    n.neighbors.remove(&id).unwrap_or(0.0) + n.neighbors.remove(&to).unwrap_or(0.0);
+                n.neighbors.insert(root, area);
+            }
+        }
+        if !host.keeps {
+            queue.push(entry(root, &host));
+        }
+        groups.insert(root, host);
+    }
+    groups
+}
+
+/// Numbers the groups that are cells by label, then by falling volume; the rest is solid.
+fn number_cells(graph: &LeafGraph, sets: &mut Sets, groups: &BTreeMap<u32, Group>) -> LeafCells {
+    let mut cells: Vec<(&u32, &Group)> = groups.iter().filter(|(_, g)| g.keeps).collect();
+    cells.sort_by(|a, b| {
+        a.1.label
+            .cmp(&b.1.label)
+            .then(b.1.volume.total_cmp(&a.1.volume))
+            .then(a.0.cmp(b.0))
+    });
+    let cell_of_set: BTreeMap<u32, u32> = cells
+        .iter()
+        .enumerate()
+        .map(|(i, (id, _))| (**id, i as u32))
+        .collect();
+    let cell_of_leaf: Vec<u32> = (0..graph.volumes.len() as u32)
+        .map(|leaf| cell_of_set.get(&sets.find(leaf)).copied().unwrap_or(SOLID))
+        .collect();
+    let mut border = vec![0.0; cells.len()];
+    for (leaf, &cell) in cell_of_leaf.iter().enumerate() {
+        if cell != SOLID && graph.at_border[leaf] {
+            border[cell as usize] += graph.volumes[leaf];
+        }
+    }
+    let outside = (0..cells.len())
+        .filter(|&c| border[c] > 0.0)
+        .max_by(|&a, &b| border[a].total_cmp(&border[b]).then(b.cmp(&a)));
+    LeafCells {
+        cell_of_leaf,
+        label_of_cell: cells
+            .iter()
+            .map(|(_, g)| g.label.unwrap_or(SOLID))
+            .collect(),
+        volumes: cells.iter().map(|(_, g)| g.volume).collect(),
+        outside: outside.map(|c| c as u32),
+    }
+}

@@ -1,0 +1,322 @@
+//! The second visit: cells, portals and locator from labelled leaves.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use enfilade_cpg::{CellId, Locator, LocatorNode, PortalKind};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding};
+
+use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
+use super::graph::{box_faces, sides_of_border};
+use super::label::{LeafCells, SOLID};
+use super::pieces::{self, Opening, Piece};
+use super::tree::{Tree, leaf_index};
+use super::{Complex, seen};
+
+pub use super::seen::TriangleCells;
+
+/// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
+const CRACK_WIDTH: f64 = 0.05;
+
+/// Cells and portals, exactly.
+#[derive(Clone, Debug)]
+pub struct Partition {
+    /// The vote label that each cell goes by; several cells may share one.
+    pub label_of_cell: Vec<u32>,
+    /// Volume of each cell. [Units: wu³]
+    pub volumes: Vec<f64>,
+    /// Box of each cell.
+    pub aabbs: Vec<Aabb>,
+    /// The cell that reaches the border of the box (the largest, if several do).
+    pub outside: Option<u32>,
+    /// All openings between different cells.
+    pub portals: Vec<PartitionPortal>,
+    /// The portals that lie on no screen: where cells leak into each other.
+    pub leaks: Vec<Leak>,
+    /// The cells that see each triangle.
+    pub triangle_cells: TriangleCells,
+    /// Point to cell.
+    pub locator: Locator,
+}
+
+/// An opening between two cells, in one plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartitionPortal {
+    /// The two cells, ascending; the plane's normal points from the first to the second.
+    pub cells: [u32; 2],
+    /// Its plane.
+    pub plane: Plane,
+    /// Convex hull of the pieces, counter-clockwise seen from the second cell.
+    pub outline: Winding,
+    /// The opening itself, as disjoint convex polygons turning as the outline does.
+    pub pieces: Vec<Winding>,
+    /// The screen that it, or its largest part on any, lies on.
+    pub screen: Option<u32>,
+    /// Total area of the pieces. [Units: wu²]
+    pub area: f64,
+    /// Width of the widest piece. [Units: wu]
+    pub width: f64,
+    /// [`PortalKind::Open`], or [`PortalKind::Crack`] where narrow and on no screen.
+    pub kind: PortalKind,
+    /// It lies on no screen.
+    pub is_leak: bool,
+}
+
+/// A place where two cells meet though no screen is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leak {
+    /// Index into [`Partition::portals`].
+    pub portal: u32,
+    /// The two cells.
+    pub cells: [u32; 2],
+    /// Middle of the largest piece. [Units: wu]
+    pub position: DVec3,
+    /// Width of the widest piece. [Units: wu]
+    pub width: f64,
+    /// Area of the opening. [Units: wu²]
+    pub area: f64,
+}
+
+/// The tag of a subtree whose leaves are not all in one cell.
+pub(super) const MIXED: u32 = u32::MAX - 1;
+
+/// The tree with the cell of each subtree that has but one.
+pub(super) struct TaggedTree<'a> {
+    pub(super) tree: &'a Tree,
+    cell_of_leaf: &'a [u32],
+    tags: Vec<u32>,
+}
+
+impl<'a> TaggedTree<'a> {
+    fn new(tree: &'a Tree, cell_of_leaf: &'a [u32]) -> Self {
+        let mut tagged = Self {
+            tree,
+            cell_of_leaf,
+            tags: vec![MIXED; tree.nodes.len()],
+        };
+        // Children come after their parents.
+        for i in (0..tree.nodes.len()).rev() {
+            let [f, b] = tree.nodes[i].children.map(|c| tagged.tag(c));
+            tagged.tags[i] = if f == b { f } else { MIXED };
+        }
+        tagged
+    }
+
+    /// The cell of everything below, [`SOLID`], or [`MIXED`].
+    pub(super) fn tag(&self, child: i32) -> u32 {
+        if child >= 0 {
+            self.tags[child as usize]
+        } else {
+            self.cell_of_leaf[leaf_index(child) as usize]
+        }
+    }
+
+    fn locator(&self, outside: Option<u32>) -> Locator {
+        let mut locator = Locator {
+            bounds: self.tree.bounds,
+            outside: outside.map(CellId),
+            ..Locator::default()
+        };
+        let mut plane_ids = BTreeMap::new();
+        locator.root = self.add_to_locator(self.tree.root, &mut locator, &mut plane_ids);
+        locator
+    }
+
+    fn add_to_locator(
+        &self,
+        child: i32,
+        locator: &mut Locator,
+        plane_ids: &mut BTreeMap<u32, u32>,
+    ) -> i32 {
+        match self.tag(child) {
+            MIXED => {}
+            SOLID => return Locator::leaf(None),
+            cell => return Locator::leaf(Some(CellId(cell))),
+        }
+        let node = self.tree.nodes[child as usize];
+        let plane = *plane_ids.entry(node.plane).or_insert_with(|| {
+            let p = self.tree.planes[node.plane as usize];
+            locator
+                .planes
+                .push([p.normal.x, p.normal.y, p.normal.z, p.d]);
+            locator.planes.len() as u32 - 1
+        });
+        let at = locator.nodes.len();
+        locator.nodes.push(LocatorNode {
+            plane,
+            children: [0; 2],
+        });
+        let children = node
+            .children
+            .map(|c| self.add_to_locator(c, locator, plane_ids));
+        locator.nodes[at].children = children;
+        at as i32
+    }
+}
+
+struct Sink<'a> {
+    tagged: &'a TaggedTree<'a>,
+    visitor: &'a Visitor<'a>,
+    pieces: Vec<Piece>,
+    boxes: BTreeMap<u32, Aabb>,
+}
+
+impl Sink<'_> {
+    fn grow_box(&mut self, cell: u32, points: &[DVec3]) {
+        if cell != SOLID {
+            let b = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
+            *b = points.iter().fold(*b, |b, &p| b.including(p));
+        }
+    }
+}
+
+impl FacetSink for Sink<'_> {
+    fn wants_subtree(&self, child: i32) -> bool {
+        self.tagged.tag(child) == MIXED
+    }
+
+    fn wants_pair(&self, front: i32, back: i32) -> bool {
+        let tag = self.tagged.tag(front);
+        tag == MIXED || tag != self.tagged.tag(back)
+    }
+
+    fn take(&mut self, facet: &RawFacet<'_>) {
+        let cells = facet.leaves.map(|l| self.tagged.cell_of_leaf[l as usize]);
+        if cells[0] == cells[1] {
+            return;
+        }
+        // Where a cell reaches farthest, it borders on something else.
+        for cell in cells {
+            self.grow_box(cell, facet.points);
+        }
+        if cells.contains(&SOLID) {
+            return;
+        }
+        let normal = self.visitor.tree.planes[facet.plane as usize].normal;
+        let is_flipped = cells[0] < cells[1];
+        let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
+        for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+            self.pieces.push(Piece {
+                cells,
+                plane: facet.plane,
+                is_flipped,
+                screen,
+                points,
+            });
+        }
+    }
+
+    fn fork(&self, _: Range<u32>) -> Self {
+        Self {
+            tagged: self.tagged,
+            visitor: self.visitor,
+            pieces: Vec::new(),
+            boxes: BTreeMap::new(),
+        }
+    }
+
+    fn join(&mut self, front: Self, back: Self) {
+        for part in [front, back] {
+            self.pieces.extend(part.pieces);
+            for (cell, b) in part.boxes {
+                let sum = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
+                *sum = sum.union(b);
+            }
+        }
+    }
+}
+
+/// Makes the partition that a labelling stands for.
+pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
+    let tree = &complex.tree;
+    let tagged = TaggedTree::new(tree, &cells.cell_of_leaf);
+    let visitor = Visitor {
+        tree,
+        surfaces: &complex.set.surfaces,
+        tolerance: complex.tolerance,
+    };
+    let mut sink = Sink {
+        tagged: &tagged,
+        visitor: &visitor,
+        pieces: Vec::new(),
+        boxes: BTreeMap::new(),
+    };
+    visitor.visit(&mut sink);
+    for (face, _) in box_faces(&tree.bounds) {
+        sides_of_border(
+            tree,
+            tree.root,
+            &face,
+            complex.tolerance.cut,
+            &mut |leaf, piece| {
+                sink.grow_box(cells.cell_of_leaf[leaf as usize], piece);
+            },
+        );
+    }
+    let Sink { pieces, boxes, .. } = sink;
+    let portals: Vec<PartitionPortal> = pieces::group(pieces, &tree.planes)
+        .into_iter()
+        .map(
+            |Opening {
+                 cells,
+                 plane,
+                 outline,
+                 pieces,
+                 screen,
+                 area,
+                 width,
+             }| {
+                let is_leak = screen.is_none();
+                let kind = if is_leak && width < CRACK_WIDTH {
+                    PortalKind::Crack
+                } else {
+                    PortalKind::Open
+                };
+                PartitionPortal {
+                    cells,
+                    plane,
+                    outline,
+                    pieces,
+                    screen,
+                    area,
+                    width,
+                    kind,
+                    is_leak,
+                }
+            },
+        )
+        .collect();
+    let leaks = portals
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| p.is_leak)
+        .map(|(i, p)| Leak {
+            portal: i as u32,
+            cells: p.cells,
+            // Pieces come largest first.
+            position: p.pieces.first().map_or(DVec3::ZERO, Winding::centroid),
+            width: p.width,
+            area: p.area,
+        })
+        .collect();
+    let aabbs = (0..cells.volumes.len() as u32)
+        .map(|c| boxes.get(&c).copied().unwrap_or(Aabb::EMPTY))
+        .collect();
+    let locator = tagged.locator(cells.outside);
+    let triangle_cells = seen::cells_of_triangles(
+        &tagged,
+        &complex.set,
+        &complex.tolerance,
+        complex.n_triangles,
+    );
+    Partition {
+        label_of_cell: cells.label_of_cell,
+        volumes: cells.volumes,
+        aabbs,
+        outside: cells.outside,
+        portals,
+        leaks,
+        triangle_cells,
+        locator,
+    }
+}
