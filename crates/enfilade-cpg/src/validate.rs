@@ -721,7 +721,7 @@ fn check_primitive(
         found.push(GraphError::Primitive {
             owner: owner(),
             problem,
-        })
+        });
     };
     let n = p.positions.len();
     if let Some(i) = p

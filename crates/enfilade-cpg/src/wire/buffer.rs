@@ -315,12 +315,10 @@ impl Bulk<'_> {
 }
 
 /// One white pixel, as PNG.
-const WHITE_PIXEL: [u8; 67] = [
-    0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 0x0d, b'I', b'H', b'D', b'R', 0, 0, 0,
-    1, 0, 0, 0, 1, 8, 0, 0, 0, 0, 0x3a, 0x7e, 0x9b, 0x55, 0, 0, 0, 0x0a, b'I', b'D', b'A', b'T',
-    0x78, 0xda, 0x63, 0xf8, 0x0f, 0, 1, 1, 1, 0, 0x1b, 0xb6, 0xee, 0x56, 0, 0, 0, 0, b'I', b'E',
-    b'N', b'D', 0xae, 0x42, 0x60, 0x82,
-];
+const WHITE_PIXEL: [u8; 67] =
+    *b"\x89PNG\x0d\x0a\x1a\x0a\x00\x00\x00\x0dIHDR\x00\x00\x00\x01\x00\x00\x00\x01\x08\x00\
+    \x00\x00\x00:~\x9bU\x00\x00\x00\x0aIDATx\xdac\xf8\x0f\x00\x01\x01\x01\x00\x1c\xb0\
+    \x8c\x99\x00\x00\x00\x00IEND\xaeB`\x82";
 
 pub(super) fn image_bytes(image: &Image) -> Cow<'_, [u8]> {
     if image.bytes.is_empty() {
@@ -365,4 +363,32 @@ fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
         }
     }
     (min.map(f64::from), max.map(f64::from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// CRC-32 as PNG defines it, bit by bit.
+    fn crc(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0_u32, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |c, _| {
+                (c >> 1) ^ (0xedb8_8320 * (c & 1))
+            })
+        })
+    }
+
+    #[test]
+    fn the_white_pixel_is_a_sound_png() {
+        let mut rest = &WHITE_PIXEL[8..];
+        let mut kinds = Vec::new();
+        while !rest.is_empty() {
+            let n = u32::from_be_bytes(rest[..4].try_into().unwrap()) as usize;
+            let stored = u32::from_be_bytes(rest[8 + n..12 + n].try_into().unwrap());
+            assert_eq!(crc(&rest[4..8 + n]), stored);
+            kinds.push(&rest[4..8]);
+            rest = &rest[12 + n..];
+        }
+        assert_eq!(kinds, [b"IHDR", b"IDAT", b"IEND"]);
+    }
 }

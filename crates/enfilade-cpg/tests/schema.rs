@@ -1,0 +1,187 @@
+//! Encoded worlds follow the published JSON schema.
+//!
+//! The interpreter below knows the keywords that our schema uses and panics on any other. A full
+//! schema crate would bring some forty more crates into the build for this one test.
+
+mod common;
+
+use common::{nasty_rooms, two_rooms};
+use enfilade_cpg::World;
+use enfilade_cpg::wire::{EXTENSION, encode_glb};
+use serde_json::{Value, json};
+
+const SCHEMA: &str = include_str!("../../../docs/schema/ENFILADE_cell_portal_graph.schema.json");
+
+/// Checks `value` against `schema`, a part of `root`; says where they differ first.
+fn check(root: &Value, schema: &Value, value: &Value, at: &str) -> Result<(), String> {
+    let fail = |why: &str| Err(format!("{at}: {value} {why}"));
+    let number = |v: &Value| v.as_f64().expect("a number in the schema");
+    let count = |v: &Value| v.as_u64().expect("a count in the schema") as usize;
+    for (keyword, rule) in schema.as_object().expect("a schema is an object") {
+        match keyword.as_str() {
+            "$schema" | "$id" | "$defs" | "title" | "description" => {}
+            "$ref" => {
+                let pointer = rule
+                    .as_str()
+                    .and_then(|r| r.strip_prefix('#'))
+                    .expect("a local $ref");
+                check(
+                    root,
+                    root.pointer(pointer).expect("$ref leads somewhere"),
+                    value,
+                    at,
+                )?;
+            }
+            "type" => {
+                let is = match rule.as_str().expect("one type") {
+                    "object" => value.is_object(),
+                    "array" => value.is_array(),
+                    "string" => value.is_string(),
+                    "number" => value.is_number(),
+                    "integer" => value.is_i64() || value.is_u64(),
+                    "boolean" => value.is_boolean(),
+                    "null" => value.is_null(),
+                    other => panic!("type {other}"),
+                };
+                if !is {
+                    return fail(&format!("is no {rule}"));
+                }
+            }
+            "const" if value != rule => return fail(&format!("is not {rule}")),
+            "enum" if !rule.as_array().unwrap().contains(value) => {
+                return fail(&format!("is none of {rule}"));
+            }
+            "const" | "enum" => {}
+            "anyOf" => {
+                let mut any = rule.as_array().unwrap().iter();
+                if !any.any(|s| check(root, s, value, at).is_ok()) {
+                    return fail("fits none");
+                }
+            }
+            "minimum" if value.as_f64().is_some_and(|v| v < number(rule)) => {
+                return fail("is too small");
+            }
+            "maximum" if value.as_f64().is_some_and(|v| v > number(rule)) => {
+                return fail("is too large");
+            }
+            "minItems" if value.as_array().is_some_and(|v| v.len() < count(rule)) => {
+                return fail("is too short");
+            }
+            "maxItems" if value.as_array().is_some_and(|v| v.len() > count(rule)) => {
+                return fail("is too long");
+            }
+            "minimum" | "maximum" | "minItems" | "maxItems" => {}
+            "uniqueItems" => {
+                let items = value.as_array().map_or(&[][..], |v| v);
+                if (0..items.len()).any(|i| items[..i].contains(&items[i])) {
+                    return fail("repeats an item");
+                }
+            }
+            "items" => {
+                for (i, item) in value.as_array().into_iter().flatten().enumerate() {
+                    check(root, rule, item, &format!("{at}/{i}"))?;
+                }
+            }
+            "properties" => {
+                for (key, inner) in value.as_object().into_iter().flatten() {
+                    if let Some(rule) = rule.get(key) {
+                        check(root, rule, inner, &format!("{at}/{key}"))?;
+                    }
+                }
+            }
+            "additionalProperties" => {
+                let known = schema.get("properties");
+                for (key, inner) in value.as_object().into_iter().flatten() {
+                    if known.is_some_and(|k| k.get(key).is_some()) {
+                        continue;
+                    }
+                    match rule {
+                        Value::Bool(false) => return fail(&format!("has an unknown {key:?}")),
+                        rule => check(root, rule, inner, &format!("{at}/{key}"))?,
+                    }
+                }
+            }
+            "required" => {
+                for key in rule.as_array().unwrap() {
+                    if value
+                        .as_object()
+                        .is_some_and(|v| !v.contains_key(key.as_str().unwrap()))
+                    {
+                        return fail(&format!("lacks {key}"));
+                    }
+                }
+            }
+            "dependentRequired" => {
+                for (key, needs) in rule.as_object().unwrap() {
+                    let lacks = |n: &Value| value.get(n.as_str().unwrap()).is_none();
+                    if value.get(key).is_some() && needs.as_array().unwrap().iter().any(lacks) {
+                        return fail(&format!("has {key:?} without {needs}"));
+                    }
+                }
+            }
+            other => panic!("the schema uses {other}, which this test does not know"),
+        }
+    }
+    Ok(())
+}
+
+/// The extension object of an encoded world.
+fn extension(world: &World) -> Value {
+    let bytes = encode_glb(world).unwrap();
+    let len = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let mut root: Value = serde_json::from_slice(&bytes[20..20 + len]).unwrap();
+    assert!(
+        root["extensionsUsed"]
+            .as_array()
+            .unwrap()
+            .contains(&json!(EXTENSION))
+    );
+    assert_eq!(root.get("extensionsRequired"), None);
+    root["extensions"][EXTENSION].take()
+}
+
+#[test]
+fn encoded_worlds_follow_the_schema() {
+    let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+    for world in [two_rooms(), nasty_rooms(), World::default()] {
+        assert_eq!(check(&schema, &schema, &extension(&world), ""), Ok(()));
+    }
+}
+
+#[test]
+fn the_schema_names_every_field_that_is_written() {
+    // Taking any field away, or adding one, is noticed unless the schema calls it optional.
+    let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+    let good = extension(&two_rooms());
+    for (pointer, optional) in [
+        ("", &["portalCorners"][..]),
+        ("/cells/2", &["outdoor"]),
+        ("/portals/1", &[]),
+        ("/batches/0", &[]),
+        ("/details/0", &[]),
+        ("/locator", &["bounds", "outside", "planes", "nodes"]),
+        ("/provenance", &[]),
+    ] {
+        let keys: Vec<String> = good
+            .pointer(pointer)
+            .unwrap()
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect();
+        for key in keys {
+            let mut bad = good.clone();
+            bad.pointer_mut(pointer)
+                .unwrap()
+                .as_object_mut()
+                .unwrap()
+                .remove(&key);
+            let fits = check(&schema, &schema, &bad, "").is_ok();
+            assert_eq!(fits, optional.contains(&key.as_str()), "{pointer}/{key}");
+        }
+        let mut bad = good.clone();
+        bad.pointer_mut(pointer).unwrap()["typo"] = json!(1);
+        assert!(check(&schema, &schema, &bad, "").is_err(), "{pointer}");
+    }
+}
