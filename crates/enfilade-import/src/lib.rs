@@ -12,7 +12,9 @@
 //! are left out with a note.
 
 mod builder;
+mod clean;
 mod error;
+mod export;
 mod files;
 mod gltf;
 mod mtl;
@@ -24,8 +26,11 @@ mod report;
 mod roles;
 mod soup;
 mod stl;
+mod tjunction;
 
+pub use clean::{CleaningOptions, CleaningReport, cleaning_report};
 pub use error::ImportError;
+pub use export::export_glb;
 pub use options::{ImportOptions, Limits, Up};
 pub use report::{Example, FileReport, Finding, ImportReport, Note};
 pub use roles::RoleRules;
@@ -209,6 +214,13 @@ fn check_extent(scene: &Scene, options: &ImportOptions) -> Result<(), ImportErro
         return error(format!("larger than {limit} m"), offender, advice);
     }
     if longest < limits.min_extent {
+        if longest == 0.0 {
+            return error(
+                format!("smaller than {} m", limits.min_extent),
+                None,
+                "all its corners lie in one point; export it again".into(),
+            );
+        }
         let factor = if longest * 100.0 >= 2.0 {
             100.0
         } else {

@@ -361,7 +361,12 @@ impl Reader<'_, '_> {
         let faces = std::mem::take(&mut self.parts[part].faces);
         let n_triangles: usize = faces.iter().map(|f| f.n - 2).sum();
         self.builder.check_triangles(place, n_triangles as u64)?;
-        let has_uvs = corners.iter().any(|c| c.1.is_some());
+        // A picture without coordinates would be no valid glTF; it then shows its corner's color.
+        let material = self.parts[part]
+            .material
+            .and_then(|m| self.builder.material(m));
+        let has_picture = material.is_some_and(|m| m.gltf.contains("Texture\""));
+        let has_uvs = has_picture || corners.iter().any(|c| c.1.is_some());
         let has_normals = corners.iter().all(|c| c.2.is_some());
         if !has_normals && corners.iter().any(|c| c.2.is_some()) {
             self.builder

@@ -15,6 +15,8 @@ pub(crate) const MAX_CORNERS: usize = 4096;
 /// Corners may be this far from their polygon's plane. [Units: wu]
 const PLANAR: f64 = 1e-3;
 
+const CROSSES: &str = "a polygon that crosses or touches itself; look at the result";
+
 /// Splits polygons; keeps its buffers.
 pub(crate) struct Splitter {
     earcut: Earcut<f64>,
@@ -82,8 +84,10 @@ impl Splitter {
                 .map(|&c| [(c - center).dot(u), (c - center).dot(v)]),
         );
         // `u, v, normal` is right-handed, so the outline runs counter-clockwise.
-        if n == 4 && (0..4).all(|i| self.area([i, (i + 1) % 4, (i + 2) % 4]) > 0.0) {
-            self.triangles.extend([0, 1, 2, 0, 2, 3]);
+        if n == 4 {
+            if !self.split_quad() {
+                builder.note(place(), CROSSES);
+            }
             return Ok(&self.triangles);
         }
         self.earcut.earcut(
@@ -99,15 +103,32 @@ impl Splitter {
         }
         self.triangles = triangles;
         if self.triangles.len() != 3 * (n - 2) {
-            builder.note(
-                place(),
-                "a polygon that crosses or touches itself; look at the result",
-            );
+            builder.note(place(), CROSSES);
         }
         if self.triangles.is_empty() {
             self.fan(n);
         }
         Ok(&self.triangles)
+    }
+
+    /// Cuts a quad along the diagonal that leaves both halves turned as the quad is, the one from
+    /// corner 0 if both do; `false` if neither does.
+    ///
+    /// A bent quad, seen along its mean normal, may touch itself. Two triangles are right even
+    /// then, and `earcut` gives one.
+    fn split_quad(&mut self) -> bool {
+        let cuts = [[0, 1, 2, 0, 2, 3], [1, 2, 3, 1, 3, 0]];
+        let [first, second] = cuts.map(|c| {
+            let one = self.area([c[0], c[1], c[2]]);
+            one.min(self.area([c[3], c[4], c[5]]))
+        });
+        let cut = if first > 0.0 || first >= second {
+            cuts[0]
+        } else {
+            cuts[1]
+        };
+        self.triangles.extend(cut.map(|i| i as u32));
+        first.max(second) > 0.0
     }
 
     fn fan(&mut self, n: usize) {
@@ -193,6 +214,21 @@ mod tests {
         let mut bent = flat;
         bent[2].y += 0.01;
         assert_eq!(split(&bent).1, 1);
+    }
+
+    #[test]
+    fn quads_give_two_triangles_whatever_their_shape() {
+        // Concave at corner 1: only the cut from there stays inside.
+        let arrow = on_plane(&[[0., 0.], [1., 0.5], [2., 0.], [1., 3.]]);
+        let (triangles, _, n_notes) = split(&arrow);
+        let (vector, sum) = areas(&arrow, &triangles);
+        assert_eq!((vector.length(), sum, n_notes), (5.0, 5.0, 0));
+        // Found by `obj_and_ply_agree`: bent so far that it touches itself, seen from above.
+        for height in 0..9 {
+            let bent = [(0, 0, 0), (0, height, 1), (1, 0, 1), (1, 4, 0)];
+            let bent = bent.map(|(x, y, z)| DVec3::new(x.into(), y.into(), z.into()));
+            assert_eq!(split(&bent).0.len(), 6, "{height}");
+        }
     }
 
     #[test]

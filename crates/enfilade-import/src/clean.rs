@@ -1,0 +1,498 @@
+//! What is odd about a scene's surface, found and counted, never changed.
+//!
+//! Corners closer than the welding distance count as one. Edges are sorted, not hashed, and the
+//! only search in space is bounded by a budget, so that a million triangles take seconds.
+
+use crate::report::Finding;
+use crate::tjunction;
+use crate::{ImportError, ImportReport};
+use enfilade_geom::scene::{Object, Primitive, Role, Scene, TriangleSource};
+use enfilade_geom::{DVec3, triangle_area_normal};
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+
+/// What counts as odd.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CleaningOptions {
+    /// Corners at most this far apart count as one. [Units: wu] [Limit: 1e-9 to 1]
+    pub weld: f64,
+    /// A corner this near to the inside of an open edge makes a T-junction. [Units: wu]
+    /// [Limit: at least `weld`, at most 1]
+    pub t_junction: f64,
+    /// Look at detail objects, too.
+    pub has_detail: bool,
+}
+
+impl Default for CleaningOptions {
+    fn default() -> Self {
+        Self {
+            weld: 1e-5,
+            t_junction: 1e-4,
+            has_detail: false,
+        }
+    }
+}
+
+/// What is odd about a scene's surface. Counts with a few places each, in world space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CleaningReport {
+    /// Triangles looked at.
+    pub n_triangles: u64,
+    /// Vertices equal to an earlier one of their primitive in every attribute.
+    pub duplicate_vertices: Finding,
+    /// Triangles with the same three corners as an earlier one, in any order and object.
+    pub duplicate_triangles: Finding,
+    /// Triangles lower than the welding distance: a point or a line.
+    pub degenerate_triangles: Finding,
+    /// Ends of open edges that lie inside another open edge.
+    pub t_junctions: Finding,
+    /// Whether the search for T-junctions went through to its end.
+    pub is_complete: bool,
+    /// Edges used by one triangle only, over all objects.
+    pub open_edges: Finding,
+    /// Edges used by more than two triangles of one object.
+    pub non_manifold_edges: Finding,
+    /// Triangles turned against most of those that they hang together with.
+    pub flipped_triangles: Finding,
+    /// Closed shells whose front faces look inwards: turned inside out, or rooms modeled from
+    /// within.
+    pub inverted_shells: Finding,
+    /// From the import: polygons with a corner more than 1 mm off their plane.
+    pub non_planar_polygons: Finding,
+    /// From the import: vertices that are no finite numbers, dropped with their triangles.
+    pub nonfinite_vertices: Finding,
+}
+
+impl CleaningReport {
+    /// The findings with what to call them, in the order shown.
+    #[must_use]
+    pub fn findings(&self) -> [(&'static str, &Finding); 10] {
+        [
+            ("duplicate vertices", &self.duplicate_vertices),
+            ("duplicate triangles", &self.duplicate_triangles),
+            ("degenerate triangles", &self.degenerate_triangles),
+            ("T-junctions", &self.t_junctions),
+            ("open edges", &self.open_edges),
+            ("non-manifold edges", &self.non_manifold_edges),
+            ("flipped triangles", &self.flipped_triangles),
+            ("inverted shells", &self.inverted_shells),
+            ("non-planar polygons", &self.non_planar_polygons),
+            ("non-finite vertices", &self.nonfinite_vertices),
+        ]
+    }
+}
+
+impl fmt::Display for CleaningReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:<22} {:>9}  example", "finding", "count")?;
+        for (name, finding) in self.findings() {
+            write!(f, "{name:<22} {:>9}", finding.n)?;
+            if let Some(e) = finding.examples.first() {
+                let p = e.position;
+                write!(f, "  {:.3} {:.3} {:.3}", p.x, p.y, p.z)?;
+                if !e.name.is_empty() {
+                    write!(f, " in '{}'", e.name)?;
+                }
+            }
+            writeln!(f)?;
+        }
+        if !self.is_complete {
+            writeln!(f, "T-junctions: at least; the search was stopped")?;
+        }
+        write!(f, "{:<22} {:>9}", "of triangles", self.n_triangles)
+    }
+}
+
+/// Looks for what is odd in a scene; `import` adds what was found while reading it.
+///
+/// Time: `n log n` for `n` triangles; memory: about 150 bytes a triangle.
+///
+/// # Errors
+///
+/// When an option is out of range.
+///
+/// # Panics
+///
+/// When the scene breaks its own promises (an index out of range).
+pub fn cleaning_report(
+    scene: &Scene,
+    import: Option<&ImportReport>,
+    options: &CleaningOptions,
+) -> Result<CleaningReport, ImportError> {
+    let is_length = |x: f64, least: f64| x.is_finite() && (least..=1.0).contains(&x);
+    for (option, x, least) in [
+        ("weld", options.weld, 1e-9),
+        ("t_junction", options.t_junction, options.weld),
+    ] {
+        if !is_length(x, least) {
+            let problem = format!("{x} m is not between {least} and 1");
+            return Err(ImportError::BadOption { option, problem });
+        }
+    }
+    let mut report = CleaningReport::default();
+    if let Some(import) = import {
+        report.non_planar_polygons = import.non_planar_polygons.clone();
+        report.nonfinite_vertices = import.nonfinite_vertices.clone();
+    }
+    let chosen: Vec<usize> = (0..scene.objects.len())
+        .filter(|&i| options.has_detail || scene.objects[i].role == Role::Structural)
+        .collect();
+    find_duplicate_vertices(&mut report, scene, &chosen);
+    let soup = Soup::weld(scene, &chosen, options.weld);
+    report.n_triangles = soup.triangles.len() as u64;
+    find_odd_triangles(&mut report, scene, &soup, options.weld);
+    find_odd_edges(&mut report, scene, &soup, options);
+    Ok(report)
+}
+
+/// Triangles over welded points.
+struct Soup {
+    points: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    sources: Vec<TriangleSource>,
+}
+
+impl Soup {
+    fn weld(scene: &Scene, chosen: &[usize], distance: f64) -> Self {
+        let mut welder = Welder::new(distance);
+        let mut soup = Self {
+            points: Vec::new(),
+            triangles: Vec::new(),
+            sources: Vec::new(),
+        };
+        for &o in chosen {
+            let object = &scene.objects[o];
+            for (p, primitive) in scene.meshes[object.mesh as usize]
+                .primitives
+                .iter()
+                .enumerate()
+            {
+                let points = world_points(object, primitive);
+                let welded: Vec<u32> = points.iter().map(|&x| welder.weld(x)).collect();
+                for (t, corners) in primitive.indices.chunks_exact(3).enumerate() {
+                    let corners = [corners[0], corners[1], corners[2]];
+                    // Points that are no numbers cannot be welded to anything.
+                    if corners.iter().any(|&i| !points[i as usize].is_finite()) {
+                        continue;
+                    }
+                    soup.triangles.push(corners.map(|i| welded[i as usize]));
+                    soup.sources.push(TriangleSource {
+                        object: o as u32,
+                        primitive: p as u32,
+                        triangle: t as u32,
+                    });
+                }
+            }
+        }
+        soup.points = welder.points;
+        soup
+    }
+
+    fn corners(&self, t: usize) -> [DVec3; 3] {
+        self.triangles[t].map(|i| self.points[i as usize])
+    }
+
+    fn center(&self, t: usize) -> DVec3 {
+        self.corners(t).iter().sum::<DVec3>() / 3.0
+    }
+
+    fn name(&self, scene: &Scene, t: usize) -> String {
+        scene.objects[self.sources[t].object as usize].name.clone()
+    }
+}
+
+/// World positions, rounded as [`Scene::world_triangle`] rounds them.
+fn world_points(object: &Object, primitive: &Primitive) -> Vec<DVec3> {
+    primitive
+        .positions
+        .iter()
+        .map(|p| {
+            let local = DVec3::from_array(p.map(f64::from));
+            object
+                .transform
+                .transform_point3(local)
+                .as_vec3()
+                .as_dvec3()
+        })
+        .collect()
+}
+
+/// Gives points that lie within the distance of an earlier one that one's number.
+struct Welder {
+    distance: f64,
+    points: Vec<DVec3>,
+    grid: HashMap<[i64; 3], u32>,
+    /// Next point in the same grid cell.
+    next: Vec<u32>,
+}
+
+impl Welder {
+    fn new(distance: f64) -> Self {
+        Self {
+            distance,
+            points: Vec::new(),
+            grid: HashMap::new(),
+            next: Vec::new(),
+        }
+    }
+
+    fn weld(&mut self, p: DVec3) -> u32 {
+        // Cells four distances wide: most points lie well inside and need one look.
+        let width = 4.0 * self.distance;
+        let cell = |q: DVec3| (q / width).floor().to_array().map(|c| c as i64);
+        let reach = DVec3::splat(self.distance);
+        let (low, high) = (cell(p - reach), cell(p + reach));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let mut at = self.grid.get(&[x, y, z]).copied().unwrap_or(u32::MAX);
+                    while let Some(q) = self.points.get(at as usize) {
+                        if q.distance_squared(p) <= self.distance * self.distance {
+                            return at;
+                        }
+                        at = self.next[at as usize];
+                    }
+                }
+            }
+        }
+        let number = self.points.len() as u32;
+        let head = self.grid.insert(cell(p), number);
+        self.points.push(p);
+        self.next.push(head.unwrap_or(u32::MAX));
+        number
+    }
+}
+
+fn find_duplicate_vertices(report: &mut CleaningReport, scene: &Scene, chosen: &[usize]) {
+    let mut is_done = vec![false; scene.meshes.len()];
+    for &o in chosen {
+        let object = &scene.objects[o];
+        if std::mem::replace(&mut is_done[object.mesh as usize], true) {
+            continue;
+        }
+        for p in &scene.meshes[object.mesh as usize].primitives {
+            let mut seen: HashSet<Box<[u32]>> = HashSet::with_capacity(p.positions.len());
+            let mut key: Vec<u32> = Vec::new();
+            for (i, position) in p.positions.iter().enumerate() {
+                key.clear();
+                // Adding zero turns -0 into 0.
+                let bits = |c: &f32| (c + 0.0).to_bits();
+                key.extend(position.iter().map(bits));
+                key.extend(p.normals.get(i).into_iter().flatten().map(bits));
+                key.extend(p.tangents.get(i).into_iter().flatten().map(bits));
+                key.extend(p.colors.get(i).into_iter().flatten().map(bits));
+                key.extend(p.uvs.iter().filter_map(|s| s.get(i)).flatten().map(bits));
+                if !seen.insert(key.as_slice().into()) {
+                    let local = DVec3::from_array(position.map(f64::from));
+                    let world = object.transform.transform_point3(local);
+                    report.duplicate_vertices.add(world, || object.name.clone());
+                }
+            }
+        }
+    }
+}
+
+fn find_odd_triangles(report: &mut CleaningReport, scene: &Scene, soup: &Soup, weld: f64) {
+    let mut order: Vec<([u32; 3], u32)> = Vec::with_capacity(soup.triangles.len());
+    for (t, corners) in soup.triangles.iter().enumerate() {
+        let [a, b, c] = soup.corners(t);
+        let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+        let area = triangle_area_normal(&[a, b, c]).length();
+        if is_collapsed(corners) || area <= weld * longest {
+            report
+                .degenerate_triangles
+                .add(soup.center(t), || soup.name(scene, t));
+        }
+        let mut sorted = *corners;
+        sorted.sort_unstable();
+        order.push((sorted, t as u32));
+    }
+    order.sort_unstable();
+    for pair in order.windows(2) {
+        if pair[0].0 == pair[1].0 && !is_collapsed(&pair[0].0) {
+            let t = pair[1].1 as usize;
+            report
+                .duplicate_triangles
+                .add(soup.center(t), || soup.name(scene, t));
+        }
+    }
+}
+
+fn is_collapsed(t: &[u32; 3]) -> bool {
+    t[0] == t[1] || t[1] == t[2] || t[2] == t[0]
+}
+
+/// One triangle's use of an edge.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Use {
+    ends: [u32; 2],
+    object: u32,
+    triangle: u32,
+    /// Walked from the greater end to the smaller.
+    is_reverse: bool,
+}
+
+fn find_odd_edges(
+    report: &mut CleaningReport,
+    scene: &Scene,
+    soup: &Soup,
+    options: &CleaningOptions,
+) {
+    let mut uses: Vec<Use> = Vec::with_capacity(soup.triangles.len() * 3);
+    for (t, corners) in soup.triangles.iter().enumerate() {
+        if is_collapsed(corners) {
+            continue;
+        }
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            uses.push(Use {
+                ends: [a.min(b), a.max(b)],
+                object: soup.sources[t].object,
+                triangle: t as u32,
+                is_reverse: a > b,
+            });
+        }
+    }
+    uses.sort_unstable();
+    let mut shells = Shells::new(soup.triangles.len());
+    let mut open: Vec<[u32; 2]> = Vec::new();
+    for edge in uses.chunk_by(|a, b| a.ends == b.ends) {
+        let middle = || {
+            let [a, b] = edge[0].ends.map(|i| soup.points[i as usize]);
+            (a + b) * 0.5
+        };
+        let name = |u: &Use| scene.objects[u.object as usize].name.clone();
+        if edge.len() == 1 {
+            open.push(edge[0].ends);
+            report.open_edges.add(middle(), || name(&edge[0]));
+        }
+        for of_object in edge.chunk_by(|a, b| a.object == b.object) {
+            match of_object {
+                [one, other] => {
+                    let is_same = one.is_reverse == other.is_reverse;
+                    shells.join(one.triangle, other.triangle, is_same);
+                }
+                [one] => shells.mark_unclosed(one.triangle),
+                many => {
+                    report.non_manifold_edges.add(middle(), || name(&many[0]));
+                    many.iter().for_each(|u| shells.mark_unclosed(u.triangle));
+                }
+            }
+        }
+    }
+    find_odd_shells(report, scene, soup, &mut shells);
+    let found = tjunction::find(&soup.points, &open, options.t_junction);
+    report.is_complete = found.is_complete;
+    report.t_junctions.n = found.n;
+    for point in found.examples {
+        let p = soup.points[point as usize];
+        let owner = soup.triangles.iter().position(|t| t.contains(&point));
+        let name = owner.map_or_else(String::new, |t| soup.name(scene, t));
+        report
+            .t_junctions
+            .examples
+            .push(crate::Example { name, position: p });
+    }
+}
+
+/// Triangles that hang together over edges with exactly two of them, by union-find; each knows
+/// whether it is turned against its parent.
+struct Shells {
+    parent: Vec<u32>,
+    is_turned: Vec<bool>,
+    is_unclosed: Vec<bool>,
+}
+
+impl Shells {
+    fn new(n: usize) -> Self {
+        Self {
+            parent: (0..n as u32).collect(),
+            is_turned: vec![false; n],
+            is_unclosed: vec![false; n],
+        }
+    }
+
+    /// Root of `t`, and whether `t` is turned against it.
+    fn root(&mut self, t: u32) -> (u32, bool) {
+        let mut at = t;
+        let mut turned = false;
+        while self.parent[at as usize] != at {
+            let up = self.parent[at as usize];
+            let above = self.parent[up as usize];
+            // Path halving: link to the grandparent, with the turns of both steps.
+            let turn = self.is_turned[at as usize] ^ (up != above && self.is_turned[up as usize]);
+            self.parent[at as usize] = above;
+            self.is_turned[at as usize] = turn;
+            turned ^= turn;
+            at = above;
+        }
+        (at, turned)
+    }
+
+    /// Joins two triangles that walk their edge the same way (then one is turned) or not.
+    fn join(&mut self, a: u32, b: u32, is_turned: bool) {
+        let ((ra, ta), (rb, tb)) = (self.root(a), self.root(b));
+        if ra != rb {
+            let (low, high) = (ra.min(rb), ra.max(rb));
+            self.parent[high as usize] = low;
+            self.is_turned[high as usize] = ta ^ tb ^ is_turned;
+        } else if ta ^ tb != is_turned {
+            // A surface with one side only, such as a Moebius strip.
+            self.is_unclosed[a as usize] = true;
+        }
+    }
+
+    fn mark_unclosed(&mut self, t: u32) {
+        self.is_unclosed[t as usize] = true;
+    }
+}
+
+#[derive(Clone, Copy, Default)]
+struct ShellSum {
+    n: [u64; 2],
+    is_unclosed: bool,
+    /// Six times the volume, front faces outwards, were all turned as the root is.
+    volume: f64,
+}
+
+fn find_odd_shells(report: &mut CleaningReport, scene: &Scene, soup: &Soup, shells: &mut Shells) {
+    let n = soup.triangles.len();
+    let mut sums = vec![ShellSum::default(); n];
+    let mut roots = vec![(0, false); n];
+    for (t, slot) in roots.iter_mut().enumerate() {
+        if is_collapsed(&soup.triangles[t]) {
+            continue;
+        }
+        let (root, is_turned) = shells.root(t as u32);
+        *slot = (root, is_turned);
+        // About a point of the shell, so that its digits are not lost to its place.
+        let origin = soup.corners(root as usize)[0];
+        let [a, b, c] = soup.corners(t).map(|p| p - origin);
+        let sum = &mut sums[root as usize];
+        sum.n[usize::from(is_turned)] += 1;
+        sum.is_unclosed |= shells.is_unclosed[t];
+        sum.volume += a.dot(b.cross(c)) * if is_turned { -1.0 } else { 1.0 };
+    }
+    for (t, &(root, is_turned)) in roots.iter().enumerate() {
+        let sum = sums[root as usize];
+        if is_collapsed(&soup.triangles[t]) {
+            continue;
+        }
+        let is_root_minor = sum.n[0] < sum.n[1];
+        if is_turned != is_root_minor && sum.n[0] > 0 && sum.n[1] > 0 {
+            report
+                .flipped_triangles
+                .add(soup.center(t), || soup.name(scene, t));
+        }
+        let volume = if is_root_minor {
+            -sum.volume
+        } else {
+            sum.volume
+        };
+        if root as usize == t && !sum.is_unclosed && volume < 0.0 {
+            report
+                .inverted_shells
+                .add(soup.center(t), || soup.name(scene, t));
+        }
+    }
+}
