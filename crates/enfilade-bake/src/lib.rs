@@ -1,3 +1,5 @@
 //! enfilade-bake
 
 pub mod complex;
+pub mod voxel;
+pub mod watershed;

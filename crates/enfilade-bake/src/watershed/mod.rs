@@ -1,0 +1,19 @@
+//! The watershed builder: rooms and openings found in a voxel volume.
+//!
+//! Haumont, Debeir & Sillion, "Volumetric Cell-and-Portal Generation" (2003), with three
+//! departures: distances are exact instead of chamfered, over-segmentation is cured by merging
+//! (`regions`), and what comes out are not portals but *screens* (`fit`): candidates in the real
+//! opening, which the cell complex then realizes exactly.
+
+mod closures;
+mod fit;
+mod regions;
+mod slabs;
+
+pub use closures::{bounds_of, closure_triangles, flood_closures};
+pub use fit::{Screen, fit_screen};
+pub use regions::{
+    Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
+    group_faces, merge_basins,
+};
+pub use slabs::{cut_at_slabs, slab_heights};

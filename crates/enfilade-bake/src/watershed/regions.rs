@@ -1,0 +1,740 @@
+//! From basins to rooms: over-segmentation cured by merging across openings that are no pinch.
+//!
+//! The flood (Haumont et al. 2003, §4.2) cuts a scene into far more basins than it has rooms (§6).
+//! Two basins belong to one room when the opening between them is hardly narrower than what lies on
+//! either side of it. That is measured as the smaller of two ratios, neither of which has a scale:
+//!
+//! * *section ratio*: area of the opening ÷ the smaller of the two cells' largest cross-sections
+//!   parallel to it, looked for close to the opening (a room that is large elsewhere must not make
+//!   its own alcove look like another room, nor swallow its neighbors one by one);
+//! * *radius ratio*: saddle radius ÷ the smaller of the two peak radii.
+//!
+//! Pairs are merged least pinched first, and weighed again as cells grow. An opening that a door
+//! leaf or a pane fills is never merged across, whatever its shape: that is what tells a closet as
+//! deep as its door is wide from an alcove.
+//!
+//! The opening's area is the length of the *vector area* of the faces between the two cells. It
+//! depends on the rim alone, not on how the flood's front bulges or on how the building is turned
+//! in the grid.
+//!
+//! Cost: one evaluation looks at a few ten thousand lattice points around an opening; their number
+//! grows with the basins, that is with the building. Errs towards too many cells.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+
+use enfilade_geom::{DVec3, Plane};
+use rayon::prelude::*;
+
+use crate::voxel::{BitVolume, Grid, Labels};
+
+/// Label of the space around the building in a flooded volume.
+pub const OUTDOORS: u32 = 1;
+
+/// How merging decides. All lengths in world units, all else without one.
+#[derive(Clone, Debug)]
+pub struct MergeSettings {
+    /// Two cells are one room when the opening between them reaches this share of what lies beside
+    /// it. [Limit: 0 to 1] Doors come out at 0.15–0.6, open plan at 0.9 and more.
+    pub threshold: f64,
+    /// The same where the opening lies in a wall: where, next to its rim, one cell is on one side and
+    /// the other on the other with something thin in between.
+    pub wall_threshold: f64,
+    /// Share of the rim that must be wall for that.
+    pub wall_rim: f64,
+    /// Weight of the radius ratio: radii are coarser than areas, so they get the benefit.
+    pub radius_gain: f64,
+    /// How far from the opening's plane cross-sections are looked for. [Units: wu]
+    pub reach: f64,
+    /// How far around the opening's rim cross-sections are counted. [Units: wu]
+    pub surround: f64,
+    /// What an opening to the outdoors counts, compared with one between rooms.
+    pub outdoor_gain: f64,
+    /// Share of an opening that a door leaf or pane must fill to close it.
+    pub closed_share: f64,
+    /// Radius of the largest ball that fits into a room at least. [Units: wu] What is narrower
+    /// everywhere is a crevice, and belongs to the room it opens to most.
+    pub min_radius: f64,
+}
+
+impl Default for MergeSettings {
+    fn default() -> Self {
+        Self {
+            threshold: 0.7,
+            wall_threshold: 0.9,
+            wall_rim: 0.3,
+            radius_gain: 1.15,
+            reach: 0.6,
+            surround: 1.5,
+            outdoor_gain: 0.8,
+            closed_share: 0.6,
+            min_radius: 0.3,
+        }
+    }
+}
+
+/// The faces through which two cells touch: voxel index × 4 + axis, the face being the one between
+/// the voxel and its next neighbor along the axis.
+type Faces = Vec<u64>;
+
+/// Rooms as unions of basins.
+#[derive(Clone, Debug)]
+pub struct Regions {
+    /// Room label of each basin label (index 0: solid). [`OUTDOORS`] stays itself.
+    pub region_of_basin: Vec<u32>,
+    /// Every merge in order: the two cells, and the ratio that joined them. The hierarchy of rooms.
+    pub merges: Vec<(u32, u32, f32)>,
+    /// Faces between each pair of regions (lesser label first).
+    pub contacts: BTreeMap<(u32, u32), Faces>,
+    /// The ratio of each pair that was left apart.
+    pub ratios: BTreeMap<(u32, u32), f32>,
+}
+
+/// A flooded volume, as merging sees it.
+#[derive(Clone, Copy)]
+pub struct Flooded<'a> {
+    /// Place and size of the voxels.
+    pub grid: &'a Grid,
+    /// Basin of each voxel, 0 where solid.
+    pub labels: &'a Labels,
+    /// Greatest distance in each basin. [Units: vx]
+    pub peaks: &'a [f32],
+    /// Voxels that a door leaf or a pane fills.
+    pub closures: Option<&'a BitVolume>,
+    /// Heights at which basins were cut at slabs, ascending. [Units: wu]
+    pub slabs: &'a [f64],
+}
+
+/// A connected or coplanar group of faces between two cells.
+#[derive(Clone, Debug)]
+pub struct Opening {
+    /// Mean plane; the normal points from the lesser to the greater label.
+    pub plane: Plane,
+    /// Mean of the face centers. [Units: wu]
+    pub center: DVec3,
+    /// Length of the vector area, or the silhouette where the faces wrap around. [Units: wu²]
+    pub area: f64,
+    /// Share of the faces that lie in a closure.
+    pub closed: f64,
+    /// The faces.
+    pub faces: Faces,
+}
+
+/// Merges the basins of `flooded` into rooms. `saddles` holds the saddle distance of each pair of
+/// touching basins, lesser label first. [Units: vx]
+#[must_use]
+pub fn merge_basins(
+    flooded: Flooded<'_>,
+    saddles: &BTreeMap<(u32, u32), f32>,
+    settings: &MergeSettings,
+) -> Regions {
+    let n = flooded.peaks.len();
+    let mut merger = Merger {
+        flooded,
+        settings,
+        parent: (0..n as u32).collect(),
+        peak: flooded.peaks.to_vec(),
+        version: vec![0; n],
+        neighbors: vec![BTreeSet::new(); n],
+        contacts: contact_faces(flooded.grid.dims, flooded.labels),
+        saddles: saddles.clone(),
+        queue: BinaryHeap::new(),
+        storeys_apart: true,
+    };
+    merger.peak[OUTDOORS as usize] = f32::INFINITY;
+    for &(a, b) in merger.contacts.keys() {
+        merger.neighbors[a as usize].insert(b);
+        merger.neighbors[b as usize].insert(a);
+    }
+    // What lies under a wide hole in a slab is a room only together with what surrounds it: each
+    // storey is put together first, and only then are openings between storeys weighed.
+    let mut merges = Vec::new();
+    for storeys_apart in [true, false] {
+        merger.storeys_apart = storeys_apart;
+        merger.weigh_all();
+        merger.run(&mut merges);
+    }
+    merger.absorb_crevices(&mut merges);
+    merger.finish(merges)
+}
+
+/// Collects the faces between differently labelled voxels, by pair, in order of the voxels.
+fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
+    let [nx, ny, nz] = dims;
+    let layer = nx * ny;
+    let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..nz)
+        .into_par_iter()
+        .map(|z| {
+            let mut found: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
+            for y in 0..ny {
+                let row = z * layer + y * nx;
+                for x in 0..nx {
+                    let i = row + x;
+                    let a = labels.get(i);
+                    if a == 0 {
+                        continue;
+                    }
+                    let mut face = |inside: bool, step: usize, axis: u64| {
+                        if inside {
+                            let b = labels.get(i + step);
+                            if b != 0 && b != a {
+                                found
+                                    .entry((a.min(b), a.max(b)))
+                                    .or_default()
+                                    .push(i as u64 * 4 + axis);
+                            }
+                        }
+                    };
+                    face(x + 1 < nx, 1, 0);
+                    face(y + 1 < ny, nx, 1);
+                    face(z + 1 < nz, layer, 2);
+                }
+            }
+            found
+        })
+        .collect();
+    let mut all: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
+    for slab in per_slab {
+        for (pair, faces) in slab {
+            all.entry(pair).or_default().extend(faces);
+        }
+    }
+    all
+}
+
+/// A pair waiting to be merged; the least pinched comes first, ties by label.
+struct Candidate {
+    ratio: f64,
+    pair: (u32, u32),
+    versions: (u32, u32),
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Candidate {}
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.ratio
+            .total_cmp(&other.ratio)
+            .then_with(|| other.pair.cmp(&self.pair))
+    }
+}
+
+struct Merger<'a> {
+    flooded: Flooded<'a>,
+    settings: &'a MergeSettings,
+    parent: Vec<u32>,
+    peak: Vec<f32>,
+    /// Grows when a cell does, so that a stale candidate is known by its age.
+    version: Vec<u32>,
+    neighbors: Vec<BTreeSet<u32>>,
+    contacts: BTreeMap<(u32, u32), Faces>,
+    saddles: BTreeMap<(u32, u32), f32>,
+    queue: BinaryHeap<Candidate>,
+    /// Whether openings that lie in a slab count as shut for now.
+    storeys_apart: bool,
+}
+
+impl Merger<'_> {
+    fn find(&self, mut a: u32) -> u32 {
+        while self.parent[a as usize] != a {
+            a = self.parent[a as usize];
+        }
+        a
+    }
+
+    fn push(&mut self, a: u32, b: u32, ratio: f64) {
+        if ratio >= 1.0 {
+            let versions = (self.version[a as usize], self.version[b as usize]);
+            self.queue.push(Candidate {
+                ratio,
+                pair: (a, b),
+                versions,
+            });
+        }
+    }
+
+    fn weigh_all(&mut self) {
+        let pairs: Vec<(u32, u32)> = self.contacts.keys().copied().collect();
+        let ratios: Vec<f64> = pairs.par_iter().map(|&(a, b)| self.ratio(a, b)).collect();
+        for (&(a, b), ratio) in pairs.iter().zip(ratios) {
+            self.push(a, b, ratio);
+        }
+    }
+
+    fn lies_in_slab(&self, opening: &Opening) -> bool {
+        opening.plane.normal.y.abs() > 0.9
+            && self
+                .flooded
+                .slabs
+                .iter()
+                .any(|h| (h - opening.center.y).abs() < 0.2)
+    }
+
+    fn run(&mut self, merges: &mut Vec<(u32, u32, f32)>) {
+        while let Some(top) = self.queue.pop() {
+            let (a, b) = top.pair;
+            if !self.contacts.contains_key(&(a, b)) {
+                continue; // one of them was merged away; the survivor's pair has its own entry
+            }
+            if top.versions != (self.version[a as usize], self.version[b as usize]) {
+                let ratio = self.ratio(a, b);
+                self.push(a, b, ratio);
+                continue;
+            }
+            merges.push((a, b, top.ratio as f32));
+            self.merge(a, b);
+        }
+    }
+
+    /// Joins cells too narrow to be a room to the neighbor they share the largest open front with.
+    fn absorb_crevices(&mut self, merges: &mut Vec<(u32, u32, f32)>) {
+        // A voxel center next to a wall is already one voxel away from it.
+        let limit = self.settings.min_radius / self.flooded.grid.voxel + 0.5;
+        let mut narrow: Vec<u32> = (OUTDOORS + 1..self.parent.len() as u32)
+            .filter(|&c| self.parent[c as usize] == c && f64::from(self.peak[c as usize]) < limit)
+            .collect();
+        narrow.sort_by(|&p, &q| {
+            self.peak[p as usize]
+                .total_cmp(&self.peak[q as usize])
+                .then(p.cmp(&q))
+        });
+        for c in narrow {
+            if self.parent[c as usize] != c {
+                continue;
+            }
+            let open_faces = |n: u32| {
+                let faces = &self.contacts[&(c.min(n), c.max(n))];
+                match self.flooded.closures {
+                    Some(bits) => faces
+                        .iter()
+                        .filter(|&&f| !bits.get_index((f / 4) as usize))
+                        .count(),
+                    None => faces.len(),
+                }
+            };
+            let home = self.neighbors[c as usize]
+                .iter()
+                .map(|&n| (open_faces(n), std::cmp::Reverse(n)))
+                .max()
+                .filter(|&(faces, _)| faces > 0);
+            if let Some((_, std::cmp::Reverse(n))) = home {
+                merges.push((c.min(n), c.max(n), 1.0));
+                self.merge(c.min(n), c.max(n));
+            }
+        }
+        self.queue.clear();
+    }
+
+    /// Joins `b` into `a` (`a < b`, so outdoors always survives).
+    fn merge(&mut self, a: u32, b: u32) {
+        self.parent[b as usize] = a;
+        self.peak[a as usize] = self.peak[a as usize].max(self.peak[b as usize]);
+        self.version[a as usize] += 1;
+        self.contacts.remove(&(a, b));
+        self.saddles.remove(&(a, b));
+        self.neighbors[a as usize].remove(&b);
+        for c in std::mem::take(&mut self.neighbors[b as usize]) {
+            if c == a {
+                continue;
+            }
+            let (old, new) = ((b.min(c), b.max(c)), (a.min(c), a.max(c)));
+            let faces = self.contacts.remove(&old).unwrap_or_default();
+            let saddle = self.saddles.remove(&old).unwrap_or(f32::INFINITY);
+            let entry = self.contacts.entry(new).or_default();
+            if entry.len() < faces.len() {
+                let small = std::mem::replace(entry, faces);
+                entry.extend(small);
+            } else {
+                entry.extend(faces);
+            }
+            let s = self.saddles.entry(new).or_insert(0.0);
+            *s = s.max(saddle);
+            self.neighbors[c as usize].remove(&b);
+            self.neighbors[c as usize].insert(a);
+            self.neighbors[a as usize].insert(c);
+        }
+        // What the grown cell touches is weighed again: now, in parallel, and in order of labels.
+        let around: Vec<(u32, u32)> = self.neighbors[a as usize]
+            .iter()
+            .map(|&c| (a.min(c), a.max(c)))
+            .collect();
+        let ratios: Vec<f64> = around.par_iter().map(|&(p, q)| self.ratio(p, q)).collect();
+        for (&(p, q), ratio) in around.iter().zip(ratios) {
+            self.push(p, q, ratio);
+        }
+    }
+
+    fn finish(self, merges: Vec<(u32, u32, f32)>) -> Regions {
+        let region_of_basin: Vec<u32> = (0..self.parent.len() as u32)
+            .map(|a| if a == 0 { 0 } else { self.find(a) })
+            .collect();
+        let pairs: Vec<(u32, u32)> = self.contacts.keys().copied().collect();
+        let ratios = pairs
+            .par_iter()
+            .map(|&(a, b)| ((a, b), self.ratio(a, b) as f32))
+            .collect();
+        let mut contacts = self.contacts;
+        for faces in contacts.values_mut() {
+            faces.sort_unstable();
+        }
+        Regions {
+            region_of_basin,
+            merges,
+            contacts,
+            ratios,
+        }
+    }
+
+    /// How much of what lies beside the opening between `a` and `b` it leaves open.
+    fn ratio(&self, a: u32, b: u32) -> f64 {
+        let Some(faces) = self.contacts.get(&(a, b)) else {
+            return 0.0;
+        };
+        let smaller_peak = self.peak[a as usize].min(self.peak[b as usize]);
+        // Pairs made by a cut have no saddle: their radii say nothing, the sections decide.
+        let saddle = self.saddles.get(&(a, b)).copied().unwrap_or(f32::INFINITY);
+        let radius = self.settings.radius_gain * f64::from(saddle / smaller_peak.max(1e-6));
+        let low = radius
+            * if a == OUTDOORS {
+                self.settings.outdoor_gain
+            } else {
+                1.0
+            }
+            / self.settings.threshold;
+        if low < 1.0 {
+            return low;
+        }
+        let side = |i: usize| self.find(self.flooded.labels.get(i)) == a;
+        let openings = group_faces(self.flooded.grid, faces, &side, self.flooded.closures);
+        // The two largest are enough: a third opening between the same two is smaller still.
+        openings
+            .iter()
+            .take(2)
+            .map(|o| {
+                let apart = self.storeys_apart && self.lies_in_slab(o);
+                if apart || o.closed >= self.settings.closed_share {
+                    return 0.0;
+                }
+                let (mut ratio, wall) = self.section_ratio(o, a, b);
+                if a == OUTDOORS {
+                    ratio *= self.settings.outdoor_gain;
+                }
+                let wall = (wall / self.settings.wall_rim).min(1.0);
+                let bar = self.settings.threshold
+                    + (self.settings.wall_threshold - self.settings.threshold) * wall;
+                (ratio / bar).min(low)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Area of `opening` ÷ the smaller of the largest cross-sections of `a` and `b` beside it.
+    fn section_ratio(&self, opening: &Opening, a: u32, b: u32) -> (f64, f64) {
+        let grid = self.flooded.grid;
+        let (u, v) = opening.plane.basis();
+        let n = opening.plane.normal;
+        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for &f in &opening.faces {
+            let p = face_center(grid, f) - opening.center;
+            for (k, t) in [u.dot(p), v.dot(p)].into_iter().enumerate() {
+                lo[k] = lo[k].min(t);
+                hi[k] = hi[k].max(t);
+            }
+        }
+        let step = grid.voxel.max(0.1);
+        let start = [
+            lo[0] - self.settings.surround,
+            lo[1] - self.settings.surround,
+        ];
+        let side = [0, 1].map(|k| {
+            (((hi[k] - lo[k] + 2.0 * self.settings.surround) / step).ceil() as usize).max(1) + 1
+        });
+        let slices = (self.settings.reach / step).round() as i64;
+        let mut seeds = vec![false; side[0] * side[1]];
+        for &f in &opening.faces {
+            let p = face_center(grid, f) - opening.center;
+            let at =
+                [u.dot(p) - start[0], v.dot(p) - start[1]].map(|t| (t / step).round() as usize);
+            seeds[at[0].min(side[0] - 1) + at[1].min(side[1] - 1) * side[0]] = true;
+        }
+        let (mut best_a, mut best_b) = (0_usize, 0_usize);
+        let (mut in_a, mut in_b) = (vec![false; seeds.len()], vec![false; seeds.len()]);
+        let (mut beside_a, mut beside_b) = (in_a.clone(), in_b.clone());
+        let mut stack = Vec::new();
+        for s in -slices..=slices {
+            let base = opening.center + n * (s as f64 * step) + u * start[0] + v * start[1];
+            for j in 0..side[1] {
+                for i in 0..side[0] {
+                    let p = base + v * (j as f64 * step) + u * (i as f64 * step);
+                    let label = grid
+                        .voxel_at(p)
+                        .map_or(0, |[i, j, k]| self.flooded.labels.get(grid.index(i, j, k)));
+                    let cell = if label == 0 { 0 } else { self.find(label) };
+                    in_a[j * side[0] + i] = cell == a;
+                    in_b[j * side[0] + i] = cell == b;
+                }
+            }
+            let mut section = |inside: &mut [bool], beside: &mut [bool], this_side: bool| {
+                connected_count(inside, side, &seeds, &mut stack, |k| beside[k] |= this_side)
+            };
+            best_a = best_a.max(section(&mut in_a, &mut beside_a, s <= 0));
+            best_b = best_b.max(section(&mut in_b, &mut beside_b, s >= 0));
+        }
+        let wall = rim_share(&seeds, side, |k| beside_a[k] && beside_b[k]);
+        let smaller = if a == OUTDOORS {
+            best_b
+        } else {
+            best_a.min(best_b)
+        };
+        let ratio = if smaller == 0 {
+            1.0
+        } else {
+            opening.area / (smaller as f64 * step * step)
+        };
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "DBG {a} {b} area {:.2} n {:.2} c {:.2} sec {:.2} {:.2} ratio {ratio:.2} wall {wall:.2}",
+                opening.area,
+                n,
+                opening.center,
+                best_a as f64 * step * step,
+                best_b as f64 * step * step
+            );
+        }
+        (ratio, wall)
+    }
+}
+
+/// Share of the rim of `mask` (what lies within two steps of it) where `is_wall` holds.
+fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
+    let (mut rim, mut wall) = (0_usize, 0_usize);
+    for j in 0..side[1] {
+        for i in 0..side[0] {
+            let k = j * side[0] + i;
+            let near = |k: usize, n: usize| k.saturating_sub(2)..(k + 3).min(n);
+            if mask[k] || !near(j, side[1]).any(|y| near(i, side[0]).any(|x| mask[y * side[0] + x]))
+            {
+                continue;
+            }
+            rim += 1;
+            wall += usize::from(is_wall(k));
+        }
+    }
+    wall as f64 / rim.max(1) as f64
+}
+
+/// Points of `inside` (a lattice `side` wide and high) that hang together with a seed. Uses up
+/// `inside`. What lies behind a wall beside the opening is no part of the section at the opening.
+fn connected_count(
+    inside: &mut [bool],
+    side: [usize; 2],
+    seeds: &[bool],
+    stack: &mut Vec<usize>,
+    mut visit_point: impl FnMut(usize),
+) -> usize {
+    let mut count = 0;
+    for start in 0..inside.len() {
+        if !(seeds[start] && inside[start]) {
+            continue;
+        }
+        inside[start] = false;
+        stack.push(start);
+        while let Some(k) = stack.pop() {
+            count += 1;
+            visit_point(k);
+            let (i, j) = (k % side[0], k / side[0]);
+            let mut visit = |exists: bool, next: usize| {
+                if exists && inside[next] {
+                    inside[next] = false;
+                    stack.push(next);
+                }
+            };
+            visit(i > 0, k.wrapping_sub(1));
+            visit(i + 1 < side[0], k + 1);
+            visit(j > 0, k.wrapping_sub(side[0]));
+            visit(j + 1 < side[1], k + side[0]);
+        }
+    }
+    count
+}
+
+/// Center of a face. [Units: wu]
+#[must_use]
+pub fn face_center(grid: &Grid, face: u64) -> DVec3 {
+    let axis = (face % 4) as usize;
+    let [i, j, k] = grid.coords((face / 4) as usize);
+    let mut p = grid.center(i, j, k);
+    p[axis] += grid.voxel * 0.5;
+    p
+}
+
+/// Splits the faces between two cells into openings, largest first.
+///
+/// Faces that touch (or nearly: within two voxels) belong together; groups that share a plane are
+/// one opening too, because a column in the middle of a wide opening does not make two doors of it.
+/// `is_lesser` tells whether a voxel index lies in the cell with the lesser label.
+#[must_use]
+pub fn group_faces(
+    grid: &Grid,
+    faces: &[u64],
+    is_lesser: &dyn Fn(usize) -> bool,
+    closures: Option<&BitVolume>,
+) -> Vec<Opening> {
+    let mut patches = connected_patches(grid, faces)
+        .into_iter()
+        .map(|faces| opening_of(grid, faces, is_lesser, closures))
+        .collect::<Vec<_>>();
+    patches.sort_by(|p, q| q.area.total_cmp(&p.area).then(p.faces[0].cmp(&q.faces[0])));
+    let mut groups: Vec<Vec<Opening>> = Vec::new();
+    for patch in patches {
+        let home = groups.iter_mut().find(|g| {
+            let lead = &g[0];
+            lead.plane.normal.dot(patch.plane.normal) > 0.9
+                && lead.plane.signed_distance(patch.center).abs() < 0.5
+        });
+        match home {
+            Some(group) => group.push(patch),
+            None => groups.push(vec![patch]),
+        }
+    }
+    let mut openings: Vec<Opening> = groups
+        .into_iter()
+        .map(|mut g| {
+            if g.len() == 1 {
+                return g.swap_remove(0);
+            }
+            let faces = g.into_iter().flat_map(|o| o.faces).collect();
+            opening_of(grid, faces, is_lesser, closures)
+        })
+        .collect();
+    openings.sort_by(|p, q| q.area.total_cmp(&p.area).then(p.faces[0].cmp(&q.faces[0])));
+    openings
+}
+
+/// Faces grouped by nearness: two faces are linked when their voxels are at most one step apart
+/// along each axis. Each group ascending, groups by their first face.
+#[must_use]
+pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
+    let [nx, ny, _] = grid.dims;
+    let mut sorted = faces.to_vec();
+    sorted.sort_unstable();
+    // Voxels that carry a face, each once; groups are found over voxels.
+    let mut voxels: Vec<u64> = sorted.iter().map(|f| f / 4).collect();
+    voxels.dedup();
+    let mut parent: Vec<u32> = (0..voxels.len() as u32).collect();
+    fn root(parent: &mut [u32], mut a: u32) -> u32 {
+        while parent[a as usize] != a {
+            parent[a as usize] = parent[parent[a as usize] as usize];
+            a = parent[a as usize];
+        }
+        a
+    }
+    let (nx64, layer) = (nx as i64, (nx * ny) as i64);
+    for (at, &voxel) in voxels.iter().enumerate() {
+        // Half of the 26 neighbors: the other half looks back at us.
+        for dz in 0..=1_i64 {
+            for dy in -1..=1_i64 {
+                for dx in -1..=1_i64 {
+                    let step = dz * layer + dy * nx64 + dx;
+                    if step <= 0 {
+                        continue;
+                    }
+                    let Some(other) = voxel.checked_add_signed(step) else {
+                        continue;
+                    };
+                    if let Ok(found) = voxels.binary_search(&other) {
+                        let (p, q) = (
+                            root(&mut parent, at as u32),
+                            root(&mut parent, found as u32),
+                        );
+                        parent[p.max(q) as usize] = p.min(q);
+                    }
+                }
+            }
+        }
+    }
+    let mut patches: BTreeMap<u32, Faces> = BTreeMap::new();
+    let mut at = 0;
+    for &face in &sorted {
+        while voxels[at] != face / 4 {
+            at += 1;
+        }
+        patches
+            .entry(root(&mut parent, at as u32))
+            .or_default()
+            .push(face);
+    }
+    patches.into_values().collect()
+}
+
+fn opening_of(
+    grid: &Grid,
+    faces: Faces,
+    is_lesser: &dyn Fn(usize) -> bool,
+    closures: Option<&BitVolume>,
+) -> Opening {
+    let [nx, ny, _] = grid.dims;
+    let strides = [1, nx, nx * ny];
+    let unit = grid.voxel * grid.voxel;
+    let (mut vector, mut center, mut closed) = (DVec3::ZERO, DVec3::ZERO, 0_usize);
+    let mut per_axis = [0_usize; 3];
+    for &face in &faces {
+        let (index, axis) = ((face / 4) as usize, (face % 4) as usize);
+        vector[axis] += if is_lesser(index) { 1.0 } else { -1.0 };
+        per_axis[axis] += 1;
+        center += face_center(grid, face);
+        if let Some(bits) = closures {
+            closed += usize::from(bits.get_index(index) || bits.get_index(index + strides[axis]));
+        }
+    }
+    center /= faces.len() as f64;
+    // A flat front seen along the worst diagonal has √3 times its area in voxel faces; when the
+    // vector area falls short of that by far, the front wraps around something and its silhouette
+    // along the axis of most faces says more.
+    let total = faces.len() as f64;
+    let wraps = vector.length() < 0.4 * total;
+    let (normal, area) = if wraps {
+        let axis = (0..3).max_by_key(|&k| (per_axis[k], 2 - k)).unwrap_or(0);
+        let mut columns: Vec<usize> = faces
+            .iter()
+            .filter(|&&f| (f % 4) as usize == axis)
+            .map(|&f| {
+                let i = (f / 4) as usize;
+                let at = [i % nx, i / nx % ny, i / (nx * ny)];
+                match axis {
+                    0 => at[1] + at[2] * ny,
+                    1 => at[0] + at[2] * nx,
+                    _ => at[0] + at[1] * nx,
+                }
+            })
+            .collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let mut n = DVec3::ZERO;
+        n[axis] = 1.0;
+        (
+            vector
+                .try_normalize()
+                .filter(|v| v.dot(n).abs() > 0.5)
+                .unwrap_or(n),
+            columns.len() as f64,
+        )
+    } else {
+        (vector.normalize(), vector.length())
+    };
+    Opening {
+        plane: Plane::through(center, normal),
+        center,
+        area: area * unit,
+        closed: closed as f64 / total,
+        faces,
+    }
+}

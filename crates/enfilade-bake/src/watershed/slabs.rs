@@ -1,0 +1,162 @@
+//! Cuts at slabs: where a storey ends although the distance field shows no pinch.
+//!
+//! A stair hole, and more so the open side of a gallery, is as wide as the rooms are high: one basin
+//! forms across the slab, and no merging can undo that. But an opening lies *in a wall* (or a slab):
+//! Lefebvre & Hornus 2003 find their separators by extending the model's own planes. So basins are
+//! cut, before merging, along the planes of large level surfaces. Merging is the judge: where a cut
+//! goes through the middle of a tall room, the opening is as large as the room, and both halves
+//! become one again.
+//!
+//! Cost: linear in triangles and voxels.
+
+use enfilade_geom::{Triangle, triangle_area_normal};
+use rayon::prelude::*;
+
+use crate::voxel::{Grid, Labels};
+
+use super::regions::OUTDOORS;
+
+/// A level counts when its surfaces cover this share of the scene's plan.
+const MIN_SHARE: f64 = 0.02;
+/// The two faces of one slab lie no further apart than this. [Units: wu]
+const MAX_SLAB: f64 = 0.5;
+/// A part of a basin smaller than this is not worth a cut. [Units: wu³]
+const MIN_VOLUME: f64 = 0.3;
+
+/// Heights (+Y) of the middles of slabs, ascending. [Units: wu]
+#[must_use]
+pub fn slab_heights(triangles: &[Triangle]) -> Vec<f64> {
+    let mut levels: Vec<(f64, f64)> = Vec::new(); // height, area
+    let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
+    for t in triangles {
+        for p in t {
+            for (k, v) in [p.x, p.z].into_iter().enumerate() {
+                lo[k] = lo[k].min(v);
+                hi[k] = hi[k].max(v);
+            }
+        }
+        let n = triangle_area_normal(t);
+        if n.y.abs() > 0.98 * n.length() && n.y != 0.0 {
+            levels.push(((t[0].y + t[1].y + t[2].y) / 3.0, n.y.abs() * 0.5));
+        }
+    }
+    let plan = (hi[0] - lo[0]).max(0.0) * (hi[1] - lo[1]).max(0.0);
+    levels.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    // Surfaces within 3 cm are one level.
+    let mut merged: Vec<(f64, f64)> = Vec::new();
+    for (y, area) in levels {
+        match merged.last_mut() {
+            Some(last) if y - last.0 < 0.03 => last.1 += area,
+            _ => merged.push((y, area)),
+        }
+    }
+    merged.retain(|l| l.1 >= MIN_SHARE * plan);
+    // The largest level first: it and the largest other one close by are the two faces of a slab;
+    // sills, lintels, treads and finishes next to them are not slabs of their own.
+    merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
+    let mut heights = Vec::new();
+    while let Some(&(y, _)) = merged.first() {
+        let other = merged[1..].iter().find(|l| (l.0 - y).abs() < MAX_SLAB);
+        let (lo, hi) = other.map_or((y, y), |l| (y.min(l.0), y.max(l.0)));
+        heights.push((lo + hi) * 0.5);
+        merged.retain(|l| l.0 < lo - MAX_SLAB || l.0 > hi + MAX_SLAB);
+    }
+    heights.sort_by(f64::total_cmp);
+    heights
+}
+
+/// Gives the parts of each basin above and below the `heights` labels of their own. Returns the
+/// basin that each new label was cut from; new labels follow the `n_labels` that there are.
+pub fn cut_at_slabs(
+    grid: &Grid,
+    labels: &mut Labels,
+    n_labels: usize,
+    heights: &[f64],
+) -> Vec<u32> {
+    let storey_of_row = |y: usize| {
+        let center = grid.origin.y + (y as f64 + 0.5) * grid.voxel;
+        heights.partition_point(|&h| h < center)
+    };
+    let storeys: Vec<usize> = (0..grid.dims[1]).map(storey_of_row).collect();
+    let n_storeys = heights.len() + 1;
+    let count = match labels {
+        Labels::U16(v) => count_by_storey(grid.dims, v, n_labels, &storeys, n_storeys),
+        Labels::U32(v) => count_by_storey(grid.dims, v, n_labels, &storeys, n_storeys),
+    };
+    let enough = (MIN_VOLUME / grid.voxel.powi(3)).ceil() as u32;
+    let mut parents = Vec::new();
+    let mut new_label = vec![0_u32; n_labels * n_storeys];
+    for l in 0..n_labels {
+        let mut current = l as u32;
+        let mut any = false;
+        for s in 0..n_storeys {
+            let slot = l * n_storeys + s;
+            if count.get(slot).is_some_and(|&c| c >= enough) {
+                if any {
+                    current = (n_labels + parents.len()) as u32;
+                    parents.push(l as u32);
+                }
+                any = true;
+            }
+            new_label[slot] = current;
+        }
+    }
+    if parents.is_empty() {
+        return parents;
+    }
+    if n_labels + parents.len() > usize::from(u16::MAX)
+        && let Labels::U16(v) = labels
+    {
+        *labels = Labels::U32(v.iter().map(|&l| l.into()).collect());
+    }
+    match labels {
+        Labels::U16(v) => relabel(grid.dims, v, |l, y| {
+            new_label[usize::from(l) * n_storeys + storeys[y]] as u16
+        }),
+        Labels::U32(v) => {
+            relabel(grid.dims, v, |l, y| {
+                new_label[l as usize * n_storeys + storeys[y]]
+            });
+        }
+    }
+    parents
+}
+
+/// Voxels of each basin in each storey, `[basin][storey]`; outdoors is left out.
+fn count_by_storey<T: Copy + Into<u32> + Sync>(
+    dims: [usize; 3],
+    labels: &[T],
+    n_labels: usize,
+    storeys: &[usize],
+    n_storeys: usize,
+) -> Vec<u32> {
+    let mut count = vec![0_u32; n_labels * n_storeys];
+    for slice in labels.chunks(dims[0] * dims[1]) {
+        for (y, row) in slice.chunks(dims[0]).enumerate() {
+            for &l in row {
+                let l: u32 = l.into();
+                if l > OUTDOORS {
+                    count[l as usize * n_storeys + storeys[y]] += 1;
+                }
+            }
+        }
+    }
+    count
+}
+
+/// Replaces every label but solid and outdoors, given the label and the row (y).
+fn relabel<T: Copy + Into<u32> + Send>(
+    dims: [usize; 3],
+    labels: &mut [T],
+    new: impl Fn(T, usize) -> T + Sync,
+) {
+    labels.par_chunks_mut(dims[0] * dims[1]).for_each(|slice| {
+        for (y, row) in slice.chunks_mut(dims[0]).enumerate() {
+            for l in row {
+                if (*l).into() > OUTDOORS {
+                    *l = new(*l, y);
+                }
+            }
+        }
+    });
+}
