@@ -198,29 +198,45 @@ impl Furniture {
     }
 }
 
-/// Hangs an open door leaf into `hole`, a hole across `axis` (0 or 2): hinged at its low end,
-/// swung by `degrees` towards the positive side of `axis`.
+/// Width from which a door has two leaves. [Units: wu]
+const DOUBLE: f64 = 1.3;
+
+/// Hangs open door leaves into `hole`, a hole across `axis` (0 or 2), swung by `degrees` towards
+/// the positive side of `axis`: one hinged at its low end, in wide doors one at either end.
 pub fn hang_door(site: &mut Site, p: &Palette, hole: &Aabb, axis: usize, degrees: f64) {
     let along = 2 - axis;
     let size = hole.size();
+    let n = if size[along] > DOUBLE { 2 } else { 1 };
+    let width = size[along] / f64::from(n);
     let mut leaf = MeshBuilder::new(p.wood);
     leaf.cuboid(aabb(
         [0.01, 0.005, -0.02],
-        [size[along] - 0.01, size.y - 0.01, 0.02],
+        [width - 0.01, size.y - 0.01, 0.02],
     ));
     leaf.paint(p.metal);
     leaf.cuboid(aabb(
-        [size[along] - 0.12, 0.98, -0.07],
-        [size[along] - 0.08, 1.02, 0.07],
+        [width - 0.12, 0.98, -0.07],
+        [width - 0.08, 1.02, 0.07],
     ));
     let mesh = site.mesh("door leaf", leaf);
-    let mut hinge = hole.center();
-    hinge.y = hole.min.y;
-    hinge[along] = hole.min[along];
-    // The leaf's +x lies along +x (axis z: turn -degrees to swing to +z) or +z (axis x: turn
-    // from -90, where +x becomes +z, towards 0, where it is +x).
-    let yaw = if axis == 2 { -degrees } else { degrees - 90.0 };
-    site.furnish("door leaf", mesh, hinge, yaw);
+    for i in 0..n {
+        let mut hinge = hole.center();
+        hinge.y = hole.min.y;
+        hinge[along] = if i == 0 {
+            hole.min[along]
+        } else {
+            hole.max[along]
+        };
+        // The leaf points along +x. Across z it closes along +x and swings from there to +z;
+        // across x it closes along +z (yaw -90) and swings to +x. The second leaf mirrors that.
+        let yaw = match (axis, i) {
+            (2, 0) => -degrees,
+            (2, _) => 180.0 + degrees,
+            (_, 0) => degrees - 90.0,
+            _ => 90.0 - degrees,
+        };
+        site.furnish("door leaf", mesh, hinge, yaw);
+    }
 }
 
 /// Sets a frame and a pane into `hole`, a hole across `axis` (0 or 2).

@@ -4,6 +4,7 @@ use enfilade_geom::{Aabb, DVec3};
 
 use crate::furniture::{Furniture, Palette, glaze, hang_door};
 use crate::picture;
+use crate::roof::GableRoof;
 use crate::site::{Generated, Site};
 use crate::solid::{MeshBuilder, Steps, aabb};
 use crate::truth::{Convex, OpeningKind, Room, Side};
@@ -17,9 +18,15 @@ const DEPTH: f64 = 8.6;
 const GROUND: [f64; 2] = [0.0, 2.6];
 const UPPER: [f64; 2] = [2.9, 5.4];
 const ATTIC: f64 = 5.65;
-/// Underside of the roof at the inner face of the eaves walls, and its rise per run.
-const EAVES: f64 = 6.25;
-const SLOPE: f64 = 0.84;
+const ROOF: GableRoof = GableRoof {
+    length: LENGTH,
+    depth: DEPTH,
+    wall: OUTER,
+    floor: ATTIC,
+    eaves: 6.25,
+    slope: 0.84,
+    window: Some([6.6, 7.7]),
+};
 
 struct House {
     site: Site,
@@ -78,7 +85,14 @@ impl House {
         for (hole, void) in holes.iter().zip(&voids) {
             self.site.opening(hole.kind, *void, axis, hole.rooms);
             match hole.kind {
-                OpeningKind::Door => hang_door(&mut self.site, &self.palette, void, axis, 80.0),
+                OpeningKind::Door => {
+                    let swing = if hole.rooms[1] == Side::Outside {
+                        -80.0
+                    } else {
+                        80.0
+                    };
+                    hang_door(&mut self.site, &self.palette, void, axis, swing);
+                }
                 OpeningKind::Window => glaze(&mut self.site, &self.palette, void, axis),
                 OpeningKind::Opening | OpeningKind::Virtual => {}
             }
@@ -166,15 +180,7 @@ pub fn furnished_house() -> Generated {
     let bedroom_3 = room(s, "bedroom 3", upper, [east, [OUTER, 4.25]]);
     let study = room(s, "study", upper, [east, [4.4, north_end]]);
     let bath = room(s, "bath", upper, [mid, [OUTER, 2.3]]);
-    let section = [
-        [ATTIC, OUTER],
-        [ATTIC, DEPTH - OUTER],
-        [EAVES, DEPTH - OUTER],
-        [EAVES + SLOPE * (DEPTH * 0.5 - OUTER), DEPTH * 0.5],
-        [EAVES, OUTER],
-    ];
-    let section = section.map(|[y, z]| DVec3::new(OUTER, y, z));
-    let loft_air = Convex::prism(&section, DVec3::X * (LENGTH - 2.0 * OUTER));
+    let loft_air = ROOF.loft();
     let loft = s.add_room(Room::new("attic", attic, vec![loft_air], &[]));
 
     house.site.structure("stairs", stairs);
@@ -324,78 +330,22 @@ pub fn furnished_house() -> Generated {
     house.site.finish()
 }
 
-/// Height of the roof's underside at `z`.
-fn underside(z: f64) -> f64 {
-    EAVES + SLOPE * ((DEPTH * 0.5 - OUTER) - (z - DEPTH * 0.5).abs())
-}
-
 fn roof(house: &mut House, loft: Side) {
     let tiles = house.site.material("roof tiles", [0.42, 0.13, 0.08]);
     let brick = house.site.material("brick", [0.45, 0.20, 0.14]);
     let grass = house.site.material("grass", [0.13, 0.30, 0.09]);
-    let mid = DEPTH * 0.5;
-    let eave = 0.5;
-    let at = |x: f64, lift: f64| move |z: f64| DVec3::new(x, underside(z) + lift, z);
-    let (low, high) = (at(-0.4, 0.0), at(-0.4, 0.3));
-    let profile = [-eave, mid, DEPTH + eave].map(low);
-    let cover = [DEPTH + eave, mid, -eave].map(high);
-    let mut roof = MeshBuilder::new(tiles);
-    roof.prism(&[profile, cover].concat(), DVec3::X * (LENGTH + 0.8));
-    house.site.structure("roof", roof);
-    let mut chimney = MeshBuilder::new(brick);
-    chimney.cuboid(aabb([8.0, 9.2, 3.2], [8.6, 10.9, 3.8]));
-    house.site.structure("chimney", chimney);
-
-    // Walls end 2 cm inside the roof, so that no gap is left where they meet.
-    let bury = 0.02;
-    for z in [[0.0, OUTER], [DEPTH - OUTER, DEPTH]] {
-        let x = OUTER;
-        let point = |y: f64, z: f64| DVec3::new(x, y, z);
-        let profile = [
-            point(ATTIC, z[0]),
-            point(ATTIC, z[1]),
-            point(underside(z[1]) + bury, z[1]),
-            point(underside(z[0]) + bury, z[0]),
-        ];
-        let mut wall = MeshBuilder::new(house.plaster);
-        wall.prism(&profile, DVec3::X * (LENGTH - 2.0 * OUTER));
-        house.site.structure("wall", wall);
-    }
-    for (x, sides) in [
-        (0.0, [Side::Outside, loft]),
-        (LENGTH - OUTER, [loft, Side::Outside]),
-    ] {
-        let hole = aabb([x, 6.6, mid - 0.5], [x + OUTER, 7.7, mid + 0.5]);
-        let top = |z: f64| DVec3::new(x, underside(z) + bury, z);
-        let point = |y: f64, z: f64| DVec3::new(x, y, z);
-        let (left, right, along) = (hole.min.z, hole.max.z, DVec3::X * OUTER);
-        let mut gable = MeshBuilder::new(house.plaster);
-        gable.prism(
-            &[point(ATTIC, 0.0), point(ATTIC, left), top(left), top(0.0)],
-            along,
-        );
-        gable.prism(
-            &[
-                point(ATTIC, right),
-                point(ATTIC, DEPTH),
-                top(DEPTH),
-                top(right),
-            ],
-            along,
-        );
-        gable.cuboid(aabb([x, ATTIC, left], [x + OUTER, hole.min.y, right]));
-        let above = [
-            point(hole.max.y, left),
-            point(hole.max.y, right),
-            top(right),
-            top(mid),
-            top(left),
-        ];
-        gable.prism(&above, along);
-        house.site.structure("wall", gable);
+    ROOF.add_to(&mut house.site, tiles, house.plaster);
+    for (i, sides) in [[Side::Outside, loft], [loft, Side::Outside]]
+        .into_iter()
+        .enumerate()
+    {
+        let hole = ROOF.gable_windows()[i];
         house.site.opening(OpeningKind::Window, hole, 0, sides);
         glaze(&mut house.site, &house.palette, &hole, 0);
     }
+    let mut chimney = MeshBuilder::new(brick);
+    chimney.cuboid(aabb([8.0, 9.2, 3.2], [8.6, 10.9, 3.8]));
+    house.site.structure("chimney", chimney);
     let mut lawn = MeshBuilder::new(grass);
     lawn.cuboid(aabb(
         [-12.0, -0.5, -12.0],

@@ -14,11 +14,17 @@
 //! assert!(turned.truth_json().contains("\"door\""));
 //! ```
 
+mod cave;
 pub mod furniture;
+mod gjorup;
 mod house;
+mod interior;
+mod maze;
+pub mod mixed;
 pub mod oracle;
 mod picture;
 mod rng;
+mod roof;
 mod site;
 pub mod solid;
 mod tower;
@@ -26,7 +32,10 @@ mod transform;
 mod truth;
 mod truth_json;
 
+pub use cave::cave;
+pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use house::furnished_house;
+pub use maze::dirkse_maze;
 pub use rng::Rng;
 pub use site::{Generated, Site};
 pub use tower::{TowerParams, office_tower};

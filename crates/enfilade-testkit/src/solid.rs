@@ -181,6 +181,46 @@ impl MeshBuilder {
         self
     }
 
+    /// Adds a rectangle without thickness, `face` being flat across `axis`, less `holes`, which
+    /// are cut like [`MeshBuilder::carved`] cuts. It looks along the axis, or against it.
+    pub fn sheet(&mut self, face: Aabb, axis: usize, along: bool, holes: &[Aabb]) -> &mut Self {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let cuts = [u, v].map(|a: usize| {
+            let mut cuts: Vec<f64> = std::iter::once(&face)
+                .chain(holes)
+                .flat_map(|b| [b.min[a], b.max[a]])
+                .map(|x| snapped(x.clamp(face.min[a], face.max[a])))
+                .collect();
+            cuts.sort_by(f64::total_cmp);
+            cuts.dedup();
+            cuts
+        });
+        for q in cuts[1].windows(2) {
+            for p in cuts[0].windows(2) {
+                let mut corners =
+                    [(p[0], q[0]), (p[1], q[0]), (p[1], q[1]), (p[0], q[1])].map(|(a, b)| {
+                        let mut c = face.min;
+                        (c[u], c[v]) = (a, b);
+                        c
+                    });
+                let middle = (corners[0] + corners[2]) * 0.5;
+                let open = |h: &Aabb| {
+                    [u, v]
+                        .iter()
+                        .all(|&a| h.min[a] < middle[a] && middle[a] < h.max[a])
+                };
+                if holes.iter().any(open) {
+                    continue;
+                }
+                if !along {
+                    corners.reverse();
+                }
+                self.convex(&corners);
+            }
+        }
+        self
+    }
+
     /// Adds the prism over the planar simple polygon `profile`, swept by `along`.
     pub fn prism(&mut self, profile: &[DVec3], along: DVec3) -> &mut Self {
         let mut base = profile.to_vec();

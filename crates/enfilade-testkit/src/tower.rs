@@ -116,7 +116,8 @@ struct Tower<'a> {
 /// joined by a cross corridor where there are several wings. Walls are closed solids (facade
 /// 30 cm, corridors 15 cm, partitions 12 cm), floors are slabs of 25 cm with holes for the
 /// flights of the stairwells. The first room of each wing's north row is its stairwell.
-/// About 110 structural triangles a room. O(rooms) time and memory, a second for 10,000 rooms.
+/// 85 to 150 structural triangles a room, the fewer the more rooms lie inside. O(rooms) time and
+/// memory.
 #[must_use]
 pub fn office_tower(params: &TowerParams) -> Generated {
     let mut site = Site::new("office-tower");
@@ -252,7 +253,7 @@ impl Tower<'_> {
                     has_stairs,
                     cross,
                 };
-                let done = self.wing(&wing, &solids, size.z);
+                let done = self.wing(&wing, &solids);
                 stairwells.extend(done.stairwell);
                 back.push(done);
             }
@@ -283,7 +284,7 @@ impl Tower<'_> {
     }
 
     /// Rooms, corridor, corridor walls and partitions of one wing on one storey.
-    fn wing(&mut self, wing: &Wing, solids: &[(Aabb, f64)], _depth: f64) -> BuiltWing {
+    fn wing(&mut self, wing: &Wing, solids: &[(Aabb, f64)]) -> BuiltWing {
         let Wing {
             s,
             storey,

@@ -132,6 +132,40 @@ impl Convex {
         }
     }
 
+    /// A polyhedron with its corners on an ellipsoid: 16 meridians, 7 parallels and the poles.
+    #[must_use]
+    pub fn ellipsoid(center: DVec3, radii: DVec3) -> Self {
+        const MERIDIANS: u32 = 16;
+        const PARALLELS: u32 = 7;
+        let mut corners = vec![center - DVec3::Y * radii.y, center + DVec3::Y * radii.y];
+        for ring in 1..=PARALLELS {
+            let latitude =
+                std::f64::consts::PI * (f64::from(ring) / f64::from(PARALLELS + 1) - 0.5);
+            for m in 0..MERIDIANS {
+                let (sin, cos) =
+                    (std::f64::consts::TAU * f64::from(m) / f64::from(MERIDIANS)).sin_cos();
+                let level = latitude.cos();
+                let direction = DVec3::new(level * cos, latitude.sin(), level * sin);
+                corners.push(center + direction * radii);
+            }
+        }
+        let at = |ring: u32, m: u32| 2 + ring * MERIDIANS + m % MERIDIANS;
+        let mut faces = Vec::new();
+        for m in 0..MERIDIANS {
+            faces.push(vec![0, at(0, m), at(0, m + 1)]);
+            faces.push(vec![1, at(PARALLELS - 1, m + 1), at(PARALLELS - 1, m)]);
+            for ring in 0..PARALLELS - 1 {
+                faces.push(vec![
+                    at(ring, m + 1),
+                    at(ring, m),
+                    at(ring + 1, m),
+                    at(ring + 1, m + 1),
+                ]);
+            }
+        }
+        Self { corners, faces }
+    }
+
     /// Outward unit normal of each face with a point on it.
     fn planes(&self) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
         self.faces.iter().map(|f| {

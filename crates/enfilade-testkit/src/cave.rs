@@ -1,0 +1,310 @@
+//! Organic caves: chambers and tunnels as a noisy distance field, meshed by surface nets.
+
+use std::collections::HashMap;
+
+use enfilade_geom::scene::{Mesh, Primitive, Role};
+use enfilade_geom::{DMat4, DVec3};
+
+use crate::rng::Rng;
+use crate::site::{Generated, Site};
+use crate::solid::newell;
+use crate::truth::{Convex, Opening, OpeningKind, Room, Side};
+
+const N_CHAMBERS: usize = 7;
+/// Region that the chambers' middles lie in. [Units: wu]
+const REGION: DVec3 = DVec3::new(34.0, 8.0, 28.0);
+/// Rock between chambers, and between a tunnel and a chamber it passes, at least. [Units: wu]
+const ROCK: f64 = 2.5;
+/// Largest step of the walls in or out. [Units: wu]
+const ROUGHNESS: f64 = 0.3;
+/// Side of the grid that the surface is taken from. [Units: wu]
+const GRID: f64 = 0.4;
+
+struct Chamber {
+    center: DVec3,
+    radii: DVec3,
+}
+
+struct Tunnel {
+    chambers: [usize; 2],
+    radius: f64,
+}
+
+struct Field {
+    chambers: Vec<Chamber>,
+    tunnels: Vec<Tunnel>,
+    seed: u64,
+}
+
+fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let along = b - a;
+    let t = ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    p.distance(a + along * t)
+}
+
+impl Field {
+    /// Negative in the air, about the distance to the wall near it. [Units: wu]
+    fn at(&self, p: DVec3) -> f64 {
+        let mut d = f64::INFINITY;
+        for c in &self.chambers {
+            let q = (p - c.center) / c.radii;
+            d = d.min((q.length() - 1.0) * c.radii.min_element());
+        }
+        for t in &self.tunnels {
+            let [a, b] = t.chambers.map(|i| self.chambers[i].center);
+            d = d.min(distance_to_segment(p, a, b) - t.radius);
+        }
+        let rough = self.noise(p * 0.55) * 0.7 + self.noise(p * 1.3 + 17.0) * 0.3;
+        d + rough * ROUGHNESS
+    }
+
+    /// Smooth noise in -1..1 with a period of about one unit.
+    fn noise(&self, p: DVec3) -> f64 {
+        let cell = p.floor();
+        let f = p - cell;
+        let s = f * f * (3.0 - 2.0 * f);
+        let mut sum = 0.0;
+        for corner in 0..8 {
+            let offset = DVec3::new(
+                f64::from(corner & 1),
+                f64::from(corner >> 1 & 1),
+                f64::from(corner >> 2),
+            );
+            let lattice = (cell + offset).to_array().map(|x| x as i64 as u64);
+            let key = lattice.iter().fold(self.seed, |h, x| {
+                (h ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+            });
+            let weight = (1.0 - offset - s).abs();
+            sum += weight.x * weight.y * weight.z * Rng::new(key).range(-1.0, 1.0);
+        }
+        sum
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        let h = GRID * 0.5;
+        let d = |axis: DVec3| self.at(p + axis * h) - self.at(p - axis * h);
+        DVec3::new(d(DVec3::X), d(DVec3::Y), d(DVec3::Z))
+    }
+}
+
+/// Chambers and tunnels, or `None` if this try does not connect.
+fn layout(rng: &mut Rng) -> Option<(Vec<Chamber>, Vec<Tunnel>)> {
+    let mut chambers: Vec<Chamber> = Vec::new();
+    for _ in 0..400 {
+        let center = DVec3::new(rng.unit(), rng.unit(), rng.unit()) * REGION;
+        let radii = DVec3::new(
+            rng.range(2.4, 4.4),
+            rng.range(1.9, 2.8),
+            rng.range(2.4, 4.4),
+        );
+        let reach = radii.max_element();
+        let apart = |c: &Chamber| c.center.distance(center) > c.radii.max_element() + reach + ROCK;
+        if chambers.len() < N_CHAMBERS && chambers.iter().all(apart) {
+            chambers.push(Chamber { center, radii });
+        }
+    }
+    let mut pairs: Vec<[usize; 2]> = (0..chambers.len())
+        .flat_map(|a| (a + 1..chambers.len()).map(move |b| [a, b]))
+        .collect();
+    let length = |p: &[usize; 2]| chambers[p[0]].center.distance(chambers[p[1]].center);
+    pairs.sort_by(|a, b| length(a).total_cmp(&length(b)));
+    // A tunnel keeps clear of the chambers and tunnels that it does not join. Shortest first.
+    let mut tunnels: Vec<Tunnel> = Vec::new();
+    let mut group: Vec<usize> = (0..chambers.len()).collect();
+    let mut spare = 2;
+    for [a, b] in pairs {
+        let ends = [chambers[a].center, chambers[b].center];
+        let clear_of_chambers = chambers.iter().enumerate().all(|(i, c)| {
+            i == a
+                || i == b
+                || distance_to_segment(c.center, ends[0], ends[1]) > c.radii.max_element() + ROCK
+        });
+        let clear_of_tunnels = tunnels.iter().all(|t| {
+            let shares = t.chambers.iter().any(|c| [a, b].contains(c));
+            let other = t.chambers.map(|i| chambers[i].center);
+            let near = (0..=40)
+                .map(|i| ends[0].lerp(ends[1], f64::from(i) / 40.0))
+                .map(|p| distance_to_segment(p, other[0], other[1]))
+                .fold(f64::INFINITY, f64::min);
+            // Tunnels from one chamber diverge; the angle between them is what counts.
+            let angle = (ends[1] - ends[0])
+                .normalize()
+                .dot((other[1] - other[0]).normalize());
+            if shares {
+                angle.abs() < 0.85
+            } else {
+                near > 2.5 + ROCK
+            }
+        });
+        let joins = group[a] != group[b];
+        if clear_of_chambers && clear_of_tunnels && (joins || spare > 0) {
+            if joins {
+                let (from, to) = (group[a], group[b]);
+                group
+                    .iter_mut()
+                    .filter(|g| **g == from)
+                    .for_each(|g| *g = to);
+            } else {
+                spare -= 1;
+            }
+            tunnels.push(Tunnel {
+                chambers: [a, b],
+                radius: rng.range(0.85, 1.15),
+            });
+        }
+    }
+    let whole = chambers.len() == N_CHAMBERS && group.iter().all(|&g| g == group[0]);
+    whole.then_some((chambers, tunnels))
+}
+
+/// A cave of seven chambers joined by straight tunnels, all with rough walls: the surface of its
+/// air, closed and facing the air. There is no way out.
+///
+/// Its truth: chambers, given by an ellipsoid well inside each and the volume of the smooth
+/// ellipsoid; tunnels as openings, each a square in its middle with the tunnel's length for
+/// thickness. About 20,000 triangles.
+#[must_use]
+pub fn cave(seed: u64) -> Generated {
+    let mut site = Site::new("cave");
+    let storey = site.storey("cave", 0.0);
+    let mut rng = Rng::stream(seed, 5);
+    let (chambers, tunnels) = loop {
+        if let Some(found) = layout(&mut rng) {
+            break found;
+        }
+    };
+    let field = Field {
+        chambers,
+        tunnels,
+        seed,
+    };
+    for (i, c) in field.chambers.iter().enumerate() {
+        let part = Convex::ellipsoid(c.center, c.radii - ROUGHNESS - GRID);
+        let mut room = Room::new(&format!("chamber {i}"), storey, vec![part], &[]);
+        room.volume = c.radii.element_product() * std::f64::consts::PI * 4.0 / 3.0;
+        site.add_room(room);
+    }
+    for t in &field.tunnels {
+        site.add_opening(tunnel_opening(&field.chambers, t));
+    }
+    let material = site.material("rock", [0.35, 0.31, 0.28]);
+    let mesh = site.add_mesh(surface_net(&field, material));
+    site.place("cave walls", mesh, DMat4::IDENTITY, Role::Structural);
+    site.finish()
+}
+
+fn tunnel_opening(chambers: &[Chamber], t: &Tunnel) -> Opening {
+    let [a, b] = t.chambers.map(|i| &chambers[i]);
+    let normal = (b.center - a.center).normalize();
+    // Where the tunnel's axis leaves the ellipsoids.
+    let exit = |c: &Chamber| 1.0 / (normal / c.radii).length();
+    let (start, end) = (a.center + normal * exit(a), b.center - normal * exit(b));
+    let right = DVec3::Y.cross(normal).normalize();
+    let up = normal.cross(right);
+    // The square as large as the round tunnel.
+    let half = t.radius * std::f64::consts::PI.sqrt() * 0.5;
+    let center = start.midpoint(end);
+    Opening {
+        kind: OpeningKind::Opening,
+        name: format!("tunnel {} to {}", t.chambers[0], t.chambers[1]),
+        center,
+        normal,
+        width: 2.0 * half,
+        height: 2.0 * half,
+        thickness: start.distance(end),
+        corners: [(-half, -half), (half, -half), (half, half), (-half, half)]
+            .map(|(u, v)| center + right * u + up * v),
+        rooms: t.chambers.map(Side::Room),
+    }
+}
+
+/// Naive surface nets (Gibson 1998, "Constrained elastic surface nets"): a corner in each grid
+/// cell that the surface passes, at the mean of its crossings with the cell's edges; a
+/// quadrangle for each grid edge that it crosses.
+fn surface_net(field: &Field, material: u32) -> Mesh {
+    let mut bounds = enfilade_geom::Aabb::EMPTY;
+    for c in &field.chambers {
+        bounds = bounds
+            .including(c.center - c.radii)
+            .including(c.center + c.radii);
+    }
+    let bounds = bounds.expanded(2.0 * ROUGHNESS + 2.0 * GRID);
+    let n = (bounds.size() / GRID)
+        .ceil()
+        .to_array()
+        .map(|x| x as usize + 1);
+    let stride = [1, n[0], n[0] * n[1]];
+    let cell_of = |i: usize| [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
+    let at = |c: [usize; 3]| bounds.min + DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * GRID;
+    let values: Vec<f64> = (0..n[0] * n[1] * n[2])
+        .map(|i| field.at(at(cell_of(i))))
+        .collect();
+    let offset = |corner: usize| (0..3).map(|a| (corner >> a & 1) * stride[a]).sum::<usize>();
+
+    let mut p = Primitive {
+        material: Some(material),
+        ..Primitive::default()
+    };
+    let mut positions: Vec<DVec3> = Vec::new();
+    let mut corner_of: HashMap<usize, u32> = HashMap::new();
+    for i in 0..values.len() {
+        let cell = cell_of(i);
+        if (0..3).any(|a| cell[a] + 1 >= n[a]) {
+            continue;
+        }
+        let (mut sum, mut count) = (DVec3::ZERO, 0);
+        for corner in 0..8 {
+            for axis in (0..3).filter(|a| corner >> a & 1 == 0) {
+                let (a, b) = (i + offset(corner), i + offset(corner | 1 << axis));
+                let (va, vb) = (values[a], values[b]);
+                if (va < 0.0) != (vb < 0.0) {
+                    sum += at(cell_of(a)).lerp(at(cell_of(b)), va / (va - vb));
+                    count += 1;
+                }
+            }
+        }
+        if count > 0 {
+            corner_of.insert(i, positions.len() as u32);
+            positions.push(sum / f64::from(count));
+        }
+    }
+    for i in 0..values.len() {
+        let cell = cell_of(i);
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            if cell[axis] + 1 >= n[axis] || cell[u] == 0 || cell[v] == 0 {
+                continue;
+            }
+            let (inside, ahead) = (values[i] < 0.0, values[i + stride[axis]] < 0.0);
+            if inside == ahead {
+                continue;
+            }
+            let cells = [i - stride[u] - stride[v], i - stride[v], i, i - stride[u]];
+            let quad = cells.map(|c| corner_of[&c]);
+            // As listed it faces along the axis, where the air must be.
+            let [a, b, c, d] = if ahead {
+                quad
+            } else {
+                [quad[3], quad[2], quad[1], quad[0]]
+            };
+            p.indices.extend([a, b, c, a, c, d]);
+        }
+    }
+    for &q in &positions {
+        p.positions.push(q.as_vec3().to_array());
+        p.normals.push(
+            (-field.gradient(q))
+                .normalize_or(DVec3::Y)
+                .as_vec3()
+                .to_array(),
+        );
+    }
+    debug_assert!(p.indices.chunks_exact(3).any(|t| {
+        let t = [0, 1, 2].map(|k| positions[t[k] as usize]);
+        newell(&t).dot(-field.gradient(t[0])) > 0.0
+    }));
+    Mesh {
+        name: "cave walls".into(),
+        primitives: vec![p],
+    }
+}

@@ -1,0 +1,130 @@
+//! Surfaces of air seen from inside, as shared corners and triangles.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+use enfilade_geom::DVec3;
+use enfilade_geom::scene::{Mesh, Primitive};
+
+use crate::solid::{newell, triangulate};
+
+/// A triangle mesh with shared corners.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Interior {
+    pub(crate) corners: Vec<DVec3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+impl Interior {
+    /// Adds a corner and gives its index.
+    pub(crate) fn corner(&mut self, p: DVec3) -> u32 {
+        self.corners.push(p);
+        self.corners.len() as u32 - 1
+    }
+
+    /// Adds a quadrangle as two triangles, split from its first corner.
+    pub(crate) fn quad(&mut self, q: [u32; 4]) {
+        self.triangles
+            .extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+    }
+
+    /// Adds a simple polygon.
+    pub(crate) fn polygon(&mut self, corners: &[u32]) {
+        let at: Vec<DVec3> = corners.iter().map(|&i| self.corners[i as usize]).collect();
+        self.triangles
+            .extend(triangulate(&at).iter().map(|t| t.map(|i| corners[i])));
+    }
+
+    /// Splits the longest edge in the middle, over and over, until there are `n` triangles.
+    ///
+    /// Each split adds a corner and two triangles, so the mesh must be closed, without
+    /// T-junctions, and `n` even like the number of its triangles. O(n log n).
+    pub(crate) fn bisect_to(&mut self, n: usize) {
+        let mut owner: HashMap<(u32, u32), usize> = HashMap::new();
+        let mut longest = BinaryHeap::new();
+        let corners = &mut self.corners;
+        // Bits of positive numbers compare as the numbers do; ties go to the older corners.
+        let entry = |corners: &[DVec3], a: u32, b: u32| {
+            let length = corners[a as usize].distance_squared(corners[b as usize]);
+            (length.to_bits(), Reverse(a.min(b)), Reverse(a.max(b)))
+        };
+        for (i, t) in self.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                owner.insert((a, b), i);
+                if a < b {
+                    longest.push(entry(corners, a, b));
+                }
+            }
+        }
+        while self.triangles.len() < n {
+            let Some((_, Reverse(a), Reverse(b))) = longest.pop() else {
+                return;
+            };
+            let (Some(&left), Some(&right)) = (owner.get(&(a, b)), owner.get(&(b, a))) else {
+                continue;
+            };
+            corners.push(corners[a as usize].midpoint(corners[b as usize]));
+            let middle = corners.len() as u32 - 1;
+            for (triangle, from, to) in [(left, a, b), (right, b, a)] {
+                let t = self.triangles[triangle];
+                let apex = t
+                    .into_iter()
+                    .find(|&c| c != from && c != to)
+                    .unwrap_or(from);
+                let added = self.triangles.len();
+                self.triangles[triangle] = [from, middle, apex];
+                self.triangles.push([middle, to, apex]);
+                owner.remove(&(from, to));
+                owner.insert((from, middle), triangle);
+                owner.insert((middle, apex), triangle);
+                owner.insert((middle, to), added);
+                owner.insert((to, apex), added);
+                owner.insert((apex, middle), added);
+                longest.push(entry(corners, middle, apex));
+            }
+            longest.push(entry(corners, a, middle));
+            longest.push(entry(corners, middle, b));
+        }
+    }
+
+    /// Volume of the air inside, with its openings closed by `plugs` (quadrangles that face it).
+    pub(crate) fn air_volume(&self, triangles: &[[u32; 3]], plugs: &[[u32; 4]]) -> f64 {
+        let at = |i: u32| self.corners[i as usize];
+        let six = |a: u32, b: u32, c: u32| at(a).dot(at(b).cross(at(c)));
+        let walls: f64 = triangles.iter().map(|t| six(t[0], t[1], t[2])).sum();
+        let plugs: f64 = plugs
+            .iter()
+            .map(|q| six(q[0], q[1], q[2]) + six(q[0], q[2], q[3]))
+            .sum();
+        -(walls + plugs) / 6.0
+    }
+
+    /// The mesh with one flat normal a triangle, or with shared corners and no normals.
+    pub(crate) fn into_mesh(self, name: &str, material: u32, flat: bool) -> Mesh {
+        let mut p = Primitive {
+            material: Some(material),
+            ..Primitive::default()
+        };
+        if flat {
+            for t in &self.triangles {
+                let corners = t.map(|i| self.corners[i as usize]);
+                let normal = newell(&corners).normalize_or_zero().as_vec3().to_array();
+                p.positions.extend(corners.map(|c| c.as_vec3().to_array()));
+                p.normals.extend([normal; 3]);
+            }
+            p.indices = (0..p.positions.len() as u32).collect();
+        } else {
+            p.positions = self
+                .corners
+                .iter()
+                .map(|c| c.as_vec3().to_array())
+                .collect();
+            p.indices = self.triangles.concat();
+        }
+        Mesh {
+            name: name.into(),
+            primitives: vec![p],
+        }
+    }
+}

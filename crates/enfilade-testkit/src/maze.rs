@@ -1,0 +1,338 @@
+//! The maze of Dirkse, "Portal processing in 3D-environments: visibility determination and other
+//! applications" (master's thesis, 2002), section 8.2, built from its counts.
+//!
+//! The text gives 583 cells, 29,988 wall triangles and 2,735 dots of 20 triangles each, 1 dot in
+//! the smallest cells and up to 12 in the largest. So cells differ in size as dots do: ours are
+//! rectangles of 1 to 12 squares with a dot in the middle of every square, which fill a plan of
+//! 50 × 55 squares but for a block of 3 × 5. Sizes in meters and the layout are ours.
+
+use enfilade_geom::scene::Role;
+use enfilade_geom::{DMat4, DVec3};
+
+use crate::interior::Interior;
+use crate::rng::Rng;
+use crate::site::{Generated, Site};
+use crate::solid::{MeshBuilder, aabb};
+use crate::truth::{OpeningKind, Side};
+
+const N_CELLS: usize = 583;
+const N_WALL_TRIANGLES: usize = 29_988;
+/// Squares along x and z, and the block without cells: `[[x0, z0], [x1, z1]]`.
+const PLAN: [usize; 2] = [50, 55];
+const BLOCK: [[usize; 2]; 2] = [[23, 25], [26, 30]];
+const LARGEST: usize = 12;
+/// Side of a square, thickness of walls, height of cells. [Units: wu]
+const SQUARE: f64 = 2.0;
+const WALL: f64 = 0.3;
+const CEILING: f64 = 2.2;
+/// Width and height of passages. [Units: wu]
+const PASSAGE: [f64; 2] = [1.0, 1.6];
+
+/// A rectangle of squares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Plot {
+    low: [usize; 2],
+    high: [usize; 2],
+}
+
+impl Plot {
+    fn size(&self, axis: usize) -> usize {
+        self.high[axis] - self.low[axis]
+    }
+
+    fn area(&self) -> usize {
+        self.size(0) * self.size(1)
+    }
+
+    fn split(self, rng: &mut Rng) -> [Self; 2] {
+        let longer = usize::from(self.size(1) > self.size(0));
+        // Mostly across the longer side; the exceptions give corridors.
+        let axis = if self.size(1 - longer) > 1 && rng.chance(0.2) {
+            1 - longer
+        } else {
+            longer
+        };
+        let n = self.size(axis);
+        // Away from the ends where there is room.
+        let margin = if n > 5 { n / 4 } else { 0 };
+        let at = self.low[axis] + 1 + margin + rng.below(n - 1 - 2 * margin);
+        let (mut a, mut b) = (self, self);
+        a.high[axis] = at;
+        b.low[axis] = at;
+        [a, b]
+    }
+}
+
+/// A way from plot `from`, through its wall towards greater x or z, to plot `to`; `square` along
+/// the wall.
+#[derive(Clone, Copy, Debug)]
+struct Passage {
+    from: usize,
+    to: usize,
+    axis: usize,
+    square: usize,
+}
+
+/// Where a passage ends in a wall: place along it; floor corners and head corners, in the wall's
+/// direction.
+type End = (f64, [u32; 4]);
+
+fn plots(rng: &mut Rng) -> Vec<Plot> {
+    let [[bx0, bz0], [bx1, bz1]] = BLOCK;
+    let mut open = vec![
+        Plot {
+            low: [0, 0],
+            high: [bx0, PLAN[1]],
+        },
+        Plot {
+            low: [bx1, 0],
+            high: PLAN,
+        },
+        Plot {
+            low: [bx0, 0],
+            high: [bx1, bz0],
+        },
+        Plot {
+            low: [bx0, bz1],
+            high: [bx1, PLAN[1]],
+        },
+    ];
+    let mut done: Vec<Plot> = Vec::new();
+    while let Some(plot) = open.pop() {
+        if plot.area() > LARGEST {
+            open.extend(plot.split(rng));
+        } else {
+            done.push(plot);
+        }
+    }
+    // Far fewer than 583 by now; split at random, sparing some of the largest.
+    while done.len() < N_CELLS {
+        let i = rng.below(done.len());
+        if done[i].area() > 1 && (done[i].area() < LARGEST || rng.chance(0.5)) {
+            let [a, b] = done[i].split(rng);
+            done[i] = a;
+            done.push(b);
+        }
+    }
+    done
+}
+
+fn passages(plots: &[Plot], rng: &mut Rng) -> Vec<Passage> {
+    let mut at = vec![None; PLAN[0] * PLAN[1]];
+    for (i, p) in plots.iter().enumerate() {
+        for z in p.low[1]..p.high[1] {
+            at[z * PLAN[0] + p.low[0]..z * PLAN[0] + p.high[0]].fill(Some(i));
+        }
+    }
+    let mut candidates = Vec::new();
+    for z in 0..PLAN[1] {
+        for x in 0..PLAN[0] {
+            for axis in 0..2 {
+                let (nx, nz) = if axis == 0 { (x + 1, z) } else { (x, z + 1) };
+                if nx == PLAN[0] || nz == PLAN[1] {
+                    continue;
+                }
+                let pair = (at[z * PLAN[0] + x], at[nz * PLAN[0] + nx]);
+                if let (Some(from), Some(to)) = pair
+                    && from != to
+                {
+                    candidates.push(Passage {
+                        from,
+                        to,
+                        axis,
+                        square: [z, x][axis],
+                    });
+                }
+            }
+        }
+    }
+    rng.shuffle(&mut candidates);
+    let mut group: Vec<usize> = (0..plots.len()).collect();
+    let mut joined = std::collections::BTreeSet::new();
+    candidates.retain(|p| {
+        let (a, b) = (group[p.from], group[p.to]);
+        // A tree that reaches all, and one more in twelve so that there are ways around.
+        let wanted = (a != b || rng.chance(1.0 / 12.0)) && joined.insert((p.from, p.to));
+        if wanted {
+            group.iter_mut().filter(|g| **g == a).for_each(|g| *g = b);
+        }
+        wanted
+    });
+    candidates.sort_by_key(|p| (p.from, p.to));
+    candidates
+}
+
+/// The maze of Dirkse 2002, section 8.2: 583 cells, 29,988 wall triangles, 2,735 dots.
+///
+/// Walls are one closed surface that faces the cells, without T-junctions; another object, `shell`
+/// of 12 triangles, makes a solid of it that stands in the open. Dots are detail.
+#[must_use]
+pub fn dirkse_maze(seed: u64) -> Generated {
+    let mut rng = Rng::new(seed);
+    let plots = plots(&mut rng);
+    let passages = passages(&plots, &mut rng);
+    let mut site = Site::new("dirkse-maze");
+    let storey = site.storey("maze", 0.0);
+
+    let face = |p: &Plot, axis: usize, high: bool| {
+        let at = if high { p.high[axis] } else { p.low[axis] } as f64 * SQUARE;
+        if high {
+            at - WALL * 0.5
+        } else {
+            at + WALL * 0.5
+        }
+    };
+    let sides: Vec<Side> = plots
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let (low, high) = (
+                [0, 1].map(|a| face(p, a, false)),
+                [0, 1].map(|a| face(p, a, true)),
+            );
+            let air = aabb([low[0], 0.0, low[1]], [high[0], CEILING, high[1]]);
+            site.room(&format!("cell {i}"), storey, air)
+        })
+        .collect();
+
+    let mut mesh = Interior::default();
+    // By plot and wall.
+    let mut ends: Vec<[Vec<End>; 4]> = vec![Default::default(); plots.len()];
+    for p in &passages {
+        let wall = [
+            face(&plots[p.from], p.axis, true),
+            face(&plots[p.to], p.axis, false),
+        ];
+        let middle = (p.square as f64 + 0.5) * SQUARE;
+        let along = [middle - PASSAGE[0] * 0.5, middle + PASSAGE[0] * 0.5];
+        let point = |across: f64, along: f64, y: f64| {
+            if p.axis == 0 {
+                DVec3::new(across, y, along)
+            } else {
+                DVec3::new(along, y, across)
+            }
+        };
+        let hole = [
+            point(wall[0], along[0], 0.0),
+            point(wall[1], along[1], PASSAGE[1]),
+        ];
+        let hole = enfilade_geom::Aabb::new(hole[0].min(hole[1]), hole[0].max(hole[1]));
+        let world_axis = if p.axis == 0 { 0 } else { 2 };
+        site.opening(
+            OpeningKind::Opening,
+            hole,
+            world_axis,
+            [sides[p.from], sides[p.to]],
+        );
+        let mut end = |across: f64| {
+            [
+                (along[0], 0.0),
+                (along[1], 0.0),
+                (along[0], PASSAGE[1]),
+                (along[1], PASSAGE[1]),
+            ]
+            .map(|(a, y)| mesh.corner(point(across, a, y)))
+        };
+        let (a, b) = (end(wall[0]), end(wall[1]));
+        // Walls turn as the corners of a plan do, (x0, z0), (x1, z0), (x1, z1), (x0, z1): along z
+        // in the wall at greater x, against x in the wall at greater z.
+        let flip = |e: [u32; 4]| [e[1], e[0], e[3], e[2]];
+        let (p_end, q_end, walls) = if p.axis == 0 {
+            (a, flip(b), [1, 3])
+        } else {
+            (flip(a), b, [2, 0])
+        };
+        mesh.quad([p_end[0], p_end[1], q_end[0], q_end[1]]);
+        mesh.quad([p_end[2], q_end[3], q_end[2], p_end[3]]);
+        mesh.quad([p_end[0], q_end[1], q_end[3], p_end[2]]);
+        mesh.quad([p_end[1], p_end[3], q_end[2], q_end[0]]);
+        ends[p.from][walls[0]].push((middle, p_end));
+        ends[p.to][walls[1]].push((middle, q_end));
+    }
+    for (p, ends) in plots.iter().zip(&mut ends) {
+        let (x, z) = (
+            [false, true].map(|h| face(p, 0, h)),
+            [false, true].map(|h| face(p, 1, h)),
+        );
+        let plan = [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]];
+        let low = plan.map(|[x, z]| mesh.corner(DVec3::new(x, 0.0, z)));
+        let high = plan.map(|[x, z]| mesh.corner(DVec3::new(x, CEILING, z)));
+        let mut floor = Vec::new();
+        for j in 0..4 {
+            let k = (j + 1) % 4;
+            let sign = if j < 2 { 1.0 } else { -1.0 };
+            ends[j].sort_by(|a, b| (a.0 * sign).total_cmp(&(b.0 * sign)));
+            floor.push(low[j]);
+            let mut wall = vec![low[j]];
+            for (_, [f0, f1, h0, h1]) in &ends[j] {
+                floor.extend([*f0, *f1]);
+                wall.extend([*f0, *h0, *h1, *f1]);
+            }
+            wall.extend([low[k], high[k], high[j]]);
+            mesh.polygon(&wall);
+        }
+        floor.reverse();
+        mesh.polygon(&floor);
+        mesh.quad(high);
+    }
+    mesh.bisect_to(N_WALL_TRIANGLES);
+
+    let stone = site.material("maze wall", [0.10, 0.12, 0.55]);
+    let gold = site.material("dot", [0.95, 0.75, 0.25]);
+    let walls = site.add_mesh(mesh.into_mesh("maze walls", stone, true));
+    site.place("maze walls", walls, DMat4::IDENTITY, Role::Structural);
+    let mut shell = MeshBuilder::new(stone);
+    let end = PLAN.map(|n| n as f64 * SQUARE + WALL * 0.5);
+    shell.cuboid(aabb(
+        [-WALL * 0.5, -WALL, -WALL * 0.5],
+        [end[0], CEILING + WALL, end[1]],
+    ));
+    site.structure("shell", shell);
+    let mut dot = MeshBuilder::new(gold);
+    dot.icosahedron(DVec3::ZERO, DVec3::splat(0.12));
+    let dot = site.mesh("dot", dot);
+    for p in &plots {
+        for z in p.low[1]..p.high[1] {
+            for x in p.low[0]..p.high[0] {
+                let at = DVec3::new((x as f64 + 0.5) * SQUARE, 0.8, (z as f64 + 0.5) * SQUARE);
+                site.furnish("dot", dot, at, 0.0);
+            }
+        }
+    }
+    site.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oracle::{n_open_edges, object_triangles, signed_volume};
+
+    #[test]
+    fn the_maze_has_the_counts_of_the_thesis() {
+        for seed in 0..3 {
+            let g = dirkse_maze(seed);
+            assert_eq!(g.truth.rooms.len(), 583);
+            assert_eq!(g.n_triangles(Role::Detail), 2735 * 20);
+            let walls = object_triangles(&g.scene, 0);
+            assert_eq!(walls.len(), 29_988);
+            assert_eq!(n_open_edges(&walls), 0);
+            // Volume of the air: cells and passages, corners rounded to f32.
+            let rooms: f64 = g.truth.rooms.iter().map(|r| r.volume).sum();
+            let holes: f64 = g
+                .truth
+                .openings
+                .iter()
+                .map(|o| o.area() * o.thickness)
+                .sum();
+            assert!((signed_volume(&walls) + rooms + holes).abs() < 0.05);
+        }
+    }
+
+    #[test]
+    fn cells_hold_one_to_twelve_dots() {
+        let sizes: Vec<usize> = plots(&mut Rng::new(4)).iter().map(Plot::area).collect();
+        assert_eq!(sizes.iter().sum::<usize>(), 2735);
+        assert_eq!(sizes.iter().min(), Some(&1));
+        assert_eq!(sizes.iter().max(), Some(&12));
+    }
+}
