@@ -1,1 +1,20 @@
 //! Reports on enfilade worlds for people: floor plans as SVG.
+//!
+//! ```
+//! use enfilade_cpg::World;
+//! use enfilade_report::{PlanOptions, plan_svg};
+//!
+//! let svg = plan_svg(&World::default(), &PlanOptions::default());
+//! assert!(svg.starts_with("<?xml"));
+//! ```
+//!
+//! Everything here reads a valid world (`World::validate`) and gives the same bytes every time. A
+//! plan is a drawing: shapes are accurate to about a pixel of its sampling grid, not evidence.
+
+mod plan;
+mod section;
+mod storeys;
+mod svg;
+
+pub use plan::{PlanOptions, plan_svg};
+pub use storeys::{Storey, find_storeys};

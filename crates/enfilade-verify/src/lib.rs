@@ -132,7 +132,10 @@ pub fn verify_world_with_progress(
                     complete::try_ray(&subject, &mut rng, i, &mut tally);
                 }
             }
-            progress(done.fetch_add(n, Ordering::Relaxed) + n, 2 * options.rays);
+            progress(
+                done.fetch_add(n, Ordering::Relaxed) + n,
+                options.rays.saturating_mul(2),
+            );
             tally
         })
         .reduce(Tally::default, Tally::merged);

@@ -2,11 +2,9 @@
 
 mod common;
 
-use common::{
-    A, B, DOOR, DOOR_X, OUTDOORS, WINDOW, house, house_with_locator_plane, moved, triangles,
-};
+use common::{A, B, DOOR, DOOR_X, OUTDOORS, WINDOW, house, house_with_locator_plane, moved};
 use enfilade_cpg::World;
-use enfilade_geom::{DMat4, DVec3};
+use enfilade_geom::{DMat4, DVec3, Triangle};
 use enfilade_verify::{FailureKind, VerifyOptions, VerifyReport, verify_world};
 
 fn verify(world: &World) -> VerifyReport {
@@ -18,6 +16,11 @@ fn verify(world: &World) -> VerifyReport {
             ..VerifyOptions::default()
         },
     )
+}
+
+fn triangles(world: &World) -> Vec<Triangle> {
+    let own = enfilade_verify::structural_triangles(world);
+    own.into_iter().map(|t| t.0).collect()
 }
 
 fn kinds(report: &VerifyReport) -> Vec<FailureKind> {

@@ -9,7 +9,7 @@ use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, Locator, LocatorNode, Portal, PortalId, PortalKind, World,
 };
 use enfilade_geom::scene::Primitive;
-use enfilade_geom::{Aabb, DMat4, DVec3, Plane, Triangle};
+use enfilade_geom::{Aabb, DMat4, DVec3, Plane};
 
 pub(crate) const A: CellId = CellId(0);
 pub(crate) const B: CellId = CellId(1);
@@ -275,11 +275,4 @@ pub(crate) fn moved(mut world: World, by: &DMat4) -> World {
         *p = [turned.normal.x, turned.normal.y, turned.normal.z, turned.d];
     }
     world
-}
-
-pub(crate) fn triangles(world: &World) -> Vec<Triangle> {
-    enfilade_verify::structural_triangles(world)
-        .into_iter()
-        .map(|t| t.0)
-        .collect()
 }
