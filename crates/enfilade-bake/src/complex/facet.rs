@@ -212,7 +212,12 @@ impl OpenPieces {
     ///
     /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], are closed.
     pub(super) fn of(facet: &RawFacet<'_>, normal: DVec3, tolerance: &Tolerance) -> Self {
-        let open = |p: &Poly| poly::area(p) >= MIN_AREA && poly::width(p) >= tolerance.width;
+        // Beside a triangle that was moved into its plane, a gap may be nothing but that move; away
+        // from triangles a sliver is as open as any facet, and closing it would part a cell.
+        let is_bare = facet.covers.iter().all(|c| c.screen.is_some());
+        let (min_area, min_width) =
+            if is_bare { (0.0, 2.0 * tolerance.cut) } else { (MIN_AREA, tolerance.width) };
+        let open = |p: &Poly| poly::area(p) >= min_area && poly::width(p) >= min_width;
         let mut rest: Vec<Poly> = vec![facet.points.into()];
         rest.retain(open);
         for cover in facet.covers.iter().filter(|c| c.screen.is_none()) {
