@@ -198,15 +198,15 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
     let mut site = Site::new(name);
     let storey = site.storey("rooms", 0.0);
     for (r, corners) in rooms.iter().enumerate() {
-        // Corners moved outwards leave faces that are not planar; cut as triangles they bound
-        // the room, or a little less of it.
+        // Faces of distorted rooms are not planar; cut as the mesh cuts them where it does not
+        // make room for a corridor, they bound the room to within a few centimeters.
         let faces: [[u32; 4]; 6] = [
-            [0, 1, 2, 3],
-            [7, 6, 5, 4],
-            [4, 5, 1, 0],
-            [5, 6, 2, 1],
-            [6, 7, 3, 2],
-            [7, 4, 0, 3],
+            [1, 2, 3, 0],
+            [4, 7, 6, 5],
+            [0, 4, 5, 1],
+            [1, 5, 6, 2],
+            [2, 6, 7, 3],
+            [3, 7, 4, 0],
         ];
         let triangles = faces
             .iter()

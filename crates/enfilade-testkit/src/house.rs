@@ -333,7 +333,7 @@ pub fn furnished_house() -> Generated {
 fn roof(house: &mut House, loft: Side) {
     let tiles = house.site.material("roof tiles", [0.42, 0.13, 0.08]);
     let brick = house.site.material("brick", [0.45, 0.20, 0.14]);
-    let grass = house.site.material("grass", [0.13, 0.30, 0.09]);
+    let turf = house.site.material("turf", [0.13, 0.30, 0.09]);
     ROOF.add_to(&mut house.site, tiles, house.plaster);
     for (i, sides) in [[Side::Outside, loft], [loft, Side::Outside]]
         .into_iter()
@@ -346,7 +346,7 @@ fn roof(house: &mut House, loft: Side) {
     let mut chimney = MeshBuilder::new(brick);
     chimney.cuboid(aabb([8.0, 9.2, 3.2], [8.6, 10.9, 3.8]));
     house.site.structure("chimney", chimney);
-    let mut lawn = MeshBuilder::new(grass);
+    let mut lawn = MeshBuilder::new(turf);
     lawn.cuboid(aabb(
         [-12.0, -0.5, -12.0],
         [LENGTH + 12.0, -0.15, DEPTH + 12.0],
@@ -370,8 +370,8 @@ fn furnish(house: &mut House) {
     put("plant", f.plant, 4.85, 0.0, 2.9, 0.0);
     put("cabinet", f.cabinet, 4.75, 0.0, 6.0, 90.0);
     put("toilet", f.toilet, 6.6, 0.0, 0.72, 0.0);
-    put("counter", f.counter, 10.3, 0.0, 6.0, -90.0);
-    put("counter", f.counter, 9.0, 0.0, 7.9, 180.0);
+    put("kitchen cabinet", f.counter, 10.3, 0.0, 6.0, -90.0);
+    put("kitchen cabinet", f.counter, 9.0, 0.0, 7.9, 180.0);
     put("table", f.table, 8.9, 0.0, 2.2, 90.0);
     for (x, z, yaw) in [
         (8.2, 1.7, 90.0),
@@ -393,7 +393,7 @@ fn furnish(house: &mut House) {
     put("chair", f.chair, 9.4, up, 6.3, 90.0);
     put("shelf", f.shelf, 8.2, up, 4.6, 0.0);
     put("plant", f.plant, 10.2, up, 7.8, 0.0);
-    put("bath tub", f.tub, 6.6, up, 1.3, 90.0);
+    put("bathtub", f.tub, 6.6, up, 1.3, 90.0);
     put("toilet", f.toilet, 4.9, up, 0.72, 0.0);
     put("lamp", f.lamp, 4.8, up, 5.2, 0.0);
     put("cabinet", f.cabinet, 2.5, ATTIC, 3.0, 10.0);

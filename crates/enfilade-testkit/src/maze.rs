@@ -290,12 +290,12 @@ pub fn dirkse_maze(seed: u64) -> Generated {
     site.structure("shell", shell);
     let mut dot = MeshBuilder::new(gold);
     dot.icosahedron(DVec3::ZERO, DVec3::splat(0.12));
-    let dot = site.mesh("dot", dot);
+    let dot = site.mesh("dot prop", dot);
     for p in &plots {
         for z in p.low[1]..p.high[1] {
             for x in p.low[0]..p.high[0] {
                 let at = DVec3::new((x as f64 + 0.5) * SQUARE, 0.8, (z as f64 + 0.5) * SQUARE);
-                site.furnish("dot", dot, at, 0.0);
+                site.furnish("dot prop", dot, at, 0.0);
             }
         }
     }

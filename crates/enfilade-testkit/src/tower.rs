@@ -273,8 +273,8 @@ impl Tower<'_> {
         roof.cuboid(aabb([0.0, top - SLAB, 0.0], [size.x, top, size.z]));
         self.site.structure("roof", roof);
         if self.params.ground {
-            let grass = self.site.material("grass", [0.2, 0.35, 0.15]);
-            let mut ground = MeshBuilder::new(grass);
+            let turf = self.site.material("turf", [0.2, 0.35, 0.15]);
+            let mut ground = MeshBuilder::new(turf);
             ground.cuboid(aabb(
                 [-10.0, -0.6, -10.0],
                 [size.x + 10.0, -0.15, size.z + 10.0],

@@ -43,7 +43,12 @@ fn check_truth_is_in_order(g: &Generated) {
                 room.name
             );
             let w = winding_number(&triangles, p);
-            assert!(w <= 0, "{}: {p} lies in a solid", room.name);
+            // Rooms and caves without thickness are enclosed by surfaces that face them.
+            let hollow = ["gjorup", "cave"]
+                .iter()
+                .any(|n| g.truth.scene.starts_with(n));
+            let solid = if hollow { w != -1 } else { w > 0 };
+            assert!(!solid, "{}: {p} lies in a solid", room.name);
         }
     }
 }
@@ -167,7 +172,7 @@ fn check_rooms_are_apart(g: &Generated, voxel: f64, plug: f64) {
 
 /// Monte Carlo estimate of each room's air against what the truth says.
 fn check_volumes(g: &Generated) {
-    const N: i32 = 1500;
+    const N: i32 = 500;
     let triangles = structural_triangles(&g.scene);
     let mut rng = Rng::new(5);
     for room in &g.truth.rooms {
@@ -455,5 +460,30 @@ fn truth_json_is_json_of_the_agreed_shape() {
             let side = side.as_str().expect("a name");
             assert!(side == "outside" || ids.contains(&side), "{side}");
         }
+    }
+}
+
+#[test]
+fn roles_are_found_again_by_name() {
+    let maze = dirkse_maze(2);
+    let tower = office_tower(&TowerParams {
+        leaves: true,
+        ..TowerParams::with_rooms(16, 2)
+    });
+    for g in [furnished_house(), tower, maze, mixed::glass_facade_office()] {
+        let folder = std::env::temp_dir();
+        let path = folder.join(format!("{}-{}.glb", g.truth.scene, std::process::id()));
+        std::fs::write(&path, enfilade_import::export_glb(&g.scene)).expect("a writable folder");
+        let read = enfilade_import::import(std::slice::from_ref(&path), &[], &Default::default());
+        std::fs::remove_file(&path).expect("just written");
+        let read = read.expect("our own file").scene;
+        let tally = |objects: &[enfilade_geom::scene::Object]| {
+            let mut names: Vec<(String, Role)> =
+                objects.iter().map(|o| (o.name.clone(), o.role)).collect();
+            names.sort();
+            names.dedup();
+            names
+        };
+        assert_eq!(tally(&read.objects), tally(&g.scene.objects));
     }
 }
