@@ -1,8 +1,17 @@
 //! Point to cell: a tree of planes whose leaves are cells.
 
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use crate::CellId;
+
+/// What is this close to a plane of the locator touches both its sides. [Units: wu]
+const TOUCH: f64 = 1e-4;
+
+/// The corners of `polygon` that lie on `plane`: a corner or an edge of it.
+fn on_plane(polygon: &Winding, plane: &Plane) -> Winding {
+    let near = |p: &&DVec3| plane.signed_distance(**p).abs() <= TOUCH;
+    Winding::new(polygon.points.iter().filter(near).copied().collect())
+}
 
 /// Answers which cell a point lies in, whatever built the graph.
 ///
@@ -51,6 +60,61 @@ impl Locator {
         match cell {
             None => -1,
             Some(CellId(id)) => -2 - id as i32,
+        }
+    }
+
+    /// Adds the cells that a convex polygon touches to `cells`, which stays ascending and without
+    /// repeats. What lies within [`TOUCH`] of a plane is on both sides of it: errs to "touches".
+    ///
+    /// `corners` in order; any number of them. Corners that are not finite touch nothing.
+    pub fn cells_touching(&self, corners: &[DVec3], cells: &mut Vec<CellId>) {
+        if corners.is_empty() || corners.iter().any(|p| !p.is_finite()) {
+            return;
+        }
+        let mut add = |cell: Option<CellId>| {
+            if let Some(cell) = cell
+                && let Err(at) = cells.binary_search(&cell)
+            {
+                cells.insert(at, cell);
+            }
+        };
+        if corners.iter().any(|&p| !self.bounds.contains(p)) {
+            add(self.outside);
+        }
+        let mut stack = vec![(self.root, Winding::new(corners.to_vec()))];
+        while let Some((at, polygon)) = stack.pop() {
+            if at < 0 {
+                add((at <= -2).then(|| CellId((-2 - at) as u32)));
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            let [x, y, z, d] = self.planes[node.plane as usize];
+            let plane = Plane {
+                normal: DVec3::new(x, y, z),
+                d,
+            };
+            let (front, back) = polygon.split(&plane, TOUCH);
+            match (front, back) {
+                // In the plane: both sides.
+                (None, None) => {
+                    stack.push((node.children[0], polygon.clone()));
+                    stack.push((node.children[1], polygon));
+                }
+                (front, back) => {
+                    let touches = polygon
+                        .points
+                        .iter()
+                        .any(|&p| plane.signed_distance(p).abs() <= TOUCH);
+                    for (child, part) in node.children.into_iter().zip([front, back]) {
+                        match part {
+                            Some(part) => stack.push((child, part)),
+                            // Ends at the plane: what is behind it is touched by an edge or corner.
+                            None if touches => stack.push((child, on_plane(&polygon, &plane))),
+                            None => {}
+                        }
+                    }
+                }
+            }
         }
     }
 

@@ -63,13 +63,13 @@ fn a_world_that_breaks_an_invariant_is_not_written() {
 #[test]
 fn a_batch_with_more_corners_than_u16_comes_back() {
     let mut world = two_rooms();
-    let many = 65_536;
+    let many = 70_000;
     let mut p = floor(0.0, 1.0);
     p.positions = (0..many).map(|i| [i as f32, 0.0, (i % 7) as f32]).collect();
     p.normals = vec![[0.0, 1.0, 0.0]; many];
     p.uvs.clear();
     p.material = None;
-    p.indices = vec![0, 1, 65_535];
+    p.indices = vec![0, 1, 69_999];
     world.batches[0].primitive = p;
     let back = decode_glb(&encode_glb(&world).unwrap()).unwrap();
     assert!(geometry(&back) == geometry(&world));
@@ -137,9 +137,10 @@ fn a_detail_that_gltf_cannot_place_is_drawn_where_it_was() {
         let m = DMat4::from_cols_array(&detail.transform.map(f64::from));
         for ((a, n), (b, m_n)) in before.iter().zip(&after) {
             let (mut a, b) = (*a, *b);
-            if a[1].distance(b[1]) > 1e-3 {
-                // A mirror turns the triangle around, so that its front stays its front.
-                assert!(m.determinant() < 0.0, "{}", detail.name);
+            // A mirror that is no longer in the node turns the triangle around, so that its front
+            // stays its front.
+            let is_flattened = back.details[i].transform != detail.transform;
+            if is_flattened && m.determinant() < 0.0 {
                 a.swap(1, 2);
             }
             for k in 0..3 {

@@ -229,6 +229,15 @@ pub(crate) fn nasty_rooms() -> World {
     many.uvs.clear();
     many.indices = vec![65_534, 65_533, 0];
     many.material = None;
+    // One more, and the largest index would restart the triangles if it were of 16 bits.
+    let mut more = many.clone();
+    more.positions.push([7.0, 0.0, 1.0]);
+    more.normals.push([0.0, 1.0, 0.0]);
+    more.indices = vec![65_535, 65_534, 0];
+    world.batches.push(Batch {
+        cells: vec![CellId(2)],
+        primitive: more,
+    });
     world.batches.push(Batch {
         cells: vec![CellId(1)],
         primitive: Primitive::default(),
