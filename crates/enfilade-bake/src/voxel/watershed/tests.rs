@@ -1,3 +1,6 @@
+use std::collections::BTreeMap;
+
+use super::queue::{BATCH, NONE, Queue, Shape};
 use super::*;
 use crate::voxel::distance_squared;
 use proptest::prelude::*;
@@ -224,6 +227,69 @@ proptest! {
         let squared = distance_squared(&BitVolume::from_fn(dims, |v| occupied[v]));
         check(dims, &squared, h, None);
     }
+}
+
+proptest! {
+    /// Against one list a level. Long bursts cross the ends of chunks, full and empty.
+    #[test]
+    fn queues_are_first_in_first_out(bursts in prop::collection::vec((0u32..3, 0u32..1200, 0usize..50), 1..60)) {
+        let mut queue = Queue::new(3);
+        let mut plain = [(); 3].map(|()| std::collections::VecDeque::new());
+        let mut next = 0;
+        for (level, pushes, pops) in bursts {
+            for _ in 0..pushes {
+                queue.push(level, next);
+                plain[level as usize].push_back(next);
+                next += 1;
+            }
+            for _ in 0..pops {
+                let mut batch = [0; BATCH];
+                let n = queue.pop(level, &mut batch);
+                prop_assert_eq!(n == 0, plain[level as usize].is_empty());
+                for &v in &batch[..n] {
+                    prop_assert_eq!(Some(v), plain[level as usize].pop_front());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn neighbors_are_found_without_dividing(
+        nx in 1usize..70_000, ny in 1usize..300, nz in 1usize..40, at in prop::array::uniform3(any::<usize>()),
+    ) {
+        let dims = [nx, ny, nz];
+        let n = (nx * ny * nz).min(u32::MAX as usize);
+        let voxels = at.map(|a| a % n).into_iter().chain([0, n - 1, n / 2]);
+        for v in voxels.filter(|&v| v < n) {
+            let mut found: Vec<usize> =
+                Shape::new(dims).neighbors(v as u32).into_iter().filter(|&q| q != NONE).map(|q| q as usize).collect();
+            let mut expected: Vec<usize> = plain_neighbors(dims, v).collect();
+            found.sort_unstable();
+            expected.sort_unstable();
+            prop_assert_eq!(found, expected);
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let (dims, occupied) = two_rooms();
+    let run = |n| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let w = watershed(
+                dims,
+                distance_squared(&occupied),
+                &WatershedOptions::default(),
+            );
+            let dams = mark_dams(dims, &w.labels);
+            (w, dams)
+        })
+    };
+    assert_eq!(run(1), run(5));
 }
 
 /// Two rooms of different height, joined by a doorway, in a wall all around.
