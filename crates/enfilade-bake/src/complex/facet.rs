@@ -215,8 +215,11 @@ impl OpenPieces {
         // Beside a triangle that was moved into its plane, a gap may be nothing but that move; away
         // from triangles a sliver is as open as any facet, and closing it would part a cell.
         let is_bare = facet.covers.iter().all(|c| c.screen.is_some());
-        let (min_area, min_width) =
-            if is_bare { (0.0, 2.0 * tolerance.cut) } else { (MIN_AREA, tolerance.width) };
+        let (min_area, min_width) = if is_bare {
+            (0.0, 2.0 * tolerance.cut)
+        } else {
+            (MIN_AREA, tolerance.width)
+        };
         let open = |p: &Poly| poly::area(p) >= min_area && poly::width(p) >= min_width;
         let mut rest: Vec<Poly> = vec![facet.points.into()];
         rest.retain(open);

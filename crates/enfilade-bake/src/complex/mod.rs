@@ -24,7 +24,8 @@
 //! **Which way it errs:** openings too narrow to be told from the rounding of `f32` corners (see
 //! [`Complex::opening_tolerance`]) are closed; surfaces that are too thin, or too dense to be cut,
 //! do not block. The second joins cells or adds portals and keeps every promise; through the first
-//! only a sight line within that tolerance of an edge could pass.
+//! only a sight line within that tolerance of an edge could pass. Slivers away from triangles stay
+//! open whatever their width; those of them where cells meet are kept as [`Partition::hairlines`].
 //!
 //! **Complexity:** `n` surfaces make `O(n)` leaves and facets where surfaces are spread out, and up
 //! to `k²` where `k` of them pass through one small box; time `O(n log n)`, about 20 bytes a facet.

@@ -31,6 +31,9 @@ pub struct Partition {
     pub outside: Option<u32>,
     /// All openings between different cells.
     pub portals: Vec<PartitionPortal>,
+    /// Openings narrower than [`Complex::opening_tolerance`]: slivers between planes that nearly
+    /// coincide. Following sight lines to the last bit needs them; an `f32` file cannot hold them.
+    pub hairlines: Vec<PartitionPortal>,
     /// The portals that lie on no screen: where cells leak into each other.
     pub leaks: Vec<Leak>,
     /// The cells that see each triangle.
@@ -254,7 +257,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         );
     }
     let Sink { pieces, boxes, .. } = sink;
-    let portals: Vec<PartitionPortal> = pieces::group(pieces, &tree.planes)
+    let (portals, hairlines): (Vec<_>, Vec<_>) = pieces::group(pieces, &tree.planes)
         .into_iter()
         .map(
             |Opening {
@@ -285,7 +288,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
                 }
             },
         )
-        .collect();
+        .partition(|p: &PartitionPortal| p.width >= complex.tolerance.width);
     let leaks = portals
         .iter()
         .enumerate()
@@ -315,6 +318,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         aabbs,
         outside: cells.outside,
         portals,
+        hairlines,
         leaks,
         triangle_cells,
         locator,

@@ -114,7 +114,12 @@ fn walk(triangles: &[Triangle], partition: &Partition, bounds: &Aabb, n: usize, 
             .min_by(|x, y| x.0.total_cmp(&y.0));
         let end = first.map_or(1.0, |f| f.0);
         let mut crossed: Vec<(f64, usize)> = Vec::new();
-        for (k, portal) in partition.portals.iter().enumerate() {
+        let portals: Vec<&PartitionPortal> = partition
+            .portals
+            .iter()
+            .chain(&partition.hairlines)
+            .collect();
+        for (k, portal) in portals.iter().enumerate() {
             let (da, de) = (
                 portal.plane.signed_distance(a),
                 portal.plane.signed_distance(e),
@@ -131,7 +136,7 @@ fn walk(triangles: &[Triangle], partition: &Partition, bounds: &Aabb, n: usize, 
         let mut at = locate(a);
         let mut is_sealed = true;
         for &(_, k) in &crossed {
-            let portal = &partition.portals[k];
+            let portal = portals[k];
             let along = d.dot(portal.plane.normal) > 0.0;
             let (from, to) = (
                 portal.cells[usize::from(!along)],
@@ -359,6 +364,47 @@ fn walls_without_thickness_part_rooms_and_show_both_sides() {
         assert_eq!(p.triangle_cells.both(sheet), [0, 1]);
         assert_eq!(p.triangle_cells.front(sheet).len(), 1);
     }
+    assert_promises(&t, &p, &c.bounds(), 20_000);
+}
+
+/// The planes of two sheets cross in the opening between them at an angle of 3e-6: too steep to be
+/// one plane, and the wedges between them are thinner than the tolerance.
+#[test]
+fn slivers_in_an_opening_are_as_open_as_the_rest() {
+    let mut t = Vec::new();
+    block(&mut t, [-3.0, 0.0, 0.0], [3.0, 2.5, 4.0]);
+    sheet(&mut t, 0.0, [0.0, 2.5], [0.0, 1.0]);
+    let x = |z: f64| 3e-6 * (z - 2.0);
+    quad(
+        &mut t,
+        [
+            v(x(3.0), 0.0, 3.0),
+            v(x(3.0), 2.5, 3.0),
+            v(x(4.0), 2.5, 4.0),
+            v(x(4.0), 0.0, 4.0),
+        ],
+    );
+    // Things beside the opening, so that boxes are cut across it.
+    for i in 0..8 {
+        let z = 1.1 + 0.2 * f64::from(i);
+        block(&mut t, [0.5, 0.4, z], [0.6, 0.5, z + 0.1]);
+        block(&mut t, [-0.6, 1.4, z], [-0.5, 1.5, z + 0.1]);
+    }
+    let c = build(&t, &[]);
+    let inside = Aabb::new(DVec3::new(-3.0, 0.0, 0.0), DVec3::new(3.0, 2.5, 4.0));
+    let label = |p: DVec3| {
+        Some(if !inside.contains(p) {
+            3
+        } else {
+            1 + u32::from(p.x > 0.0)
+        })
+    };
+    let p = c.partition(&votes(&c.bounds(), 0.1, label), &LabelSettings::default());
+    assert_eq!(p.label_of_cell, [1, 2, 3]);
+    let thin = Aabb::new(DVec3::new(-6e-6, 0.1, 0.5), DVec3::new(6e-6, 2.4, 3.5));
+    let found = walk(&t, &p, &thin, 20_000, 3);
+    assert_eq!((found.n_unsealed, found.n_incomplete), (0, 0), "{found:?}");
+    assert!(found.n_through > 1_000, "{found:?}");
     assert_promises(&t, &p, &c.bounds(), 20_000);
 }
 
