@@ -5,10 +5,10 @@
 
 mod inspect;
 mod locate;
-#[allow(dead_code, reason = "for the commands that write files")]
 mod output;
-#[allow(dead_code, reason = "for the commands that take long")]
+mod plan;
 mod progress;
+mod verify;
 mod world;
 
 use std::io;
@@ -28,12 +28,16 @@ struct Cli {
 enum Command {
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
+    Plan(plan::Plan),
+    Verify(verify::Verify),
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
+        Command::Plan(args) => plan::run(&args),
+        Command::Verify(args) => verify::run(&args),
     }
 }
 

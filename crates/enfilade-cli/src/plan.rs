@@ -1,0 +1,47 @@
+//! `enfilade plan`: a floor plan per storey.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use enfilade_report::{PlanOptions, plan_svg};
+
+use crate::output::write_atomically;
+use crate::world::read_world;
+
+/// Draws the floor plan of every storey as one SVG: rooms colored, doorways at their width.
+#[derive(clap::Args)]
+pub(crate) struct Plan {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+    /// Where to write the drawing.
+    #[arg(short, long, value_name = "SVG")]
+    output: PathBuf,
+    /// Height of the cut above each storey's floor, in meters.
+    #[arg(long, default_value_t = 1.2, value_name = "METERS", value_parser = height)]
+    height: f64,
+}
+
+pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
+    let world = read_world(&args.world)?;
+    if let Err(errors) = world.validate() {
+        let first = errors.first().map(ToString::to_string).unwrap_or_default();
+        bail!(
+            "{}: the world is broken, so no plan is drawn: {first}",
+            args.world.display()
+        );
+    }
+    let svg = plan_svg(
+        &world,
+        &PlanOptions {
+            cut_height: args.height,
+        },
+    );
+    write_atomically(&args.output, svg.as_bytes())
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x < 100.0 => Ok(x),
+        _ => Err("a height in meters between 0 and 100 is needed, e.g. 1.2".into()),
+    }
+}

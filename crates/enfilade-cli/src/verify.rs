@@ -1,0 +1,95 @@
+//! `enfilade verify`: does a world keep its promises?
+
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use enfilade::geom::Triangle;
+use enfilade::geom::scene::Role;
+use enfilade::import::{ImportOptions, import};
+use enfilade_verify::{VerifyOptions, verify_world_with_progress};
+
+use crate::progress::StageBar;
+use crate::world::read_world;
+
+/// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
+#[derive(clap::Args)]
+pub(crate) struct Verify {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+    /// The scene that it was baked from, read with default settings: its structural triangles
+    /// decide what blocks, instead of those that the world holds.
+    #[arg(long, num_args = 1.., value_name = "IN")]
+    source: Vec<PathBuf>,
+    /// Segments for `sealed`, and as many rays for `complete`.
+    #[arg(long, default_value_t = 1_000_000, value_name = "N")]
+    rays: u64,
+    /// Start of the random sequences; equal seeds give equal reports.
+    #[arg(long, default_value_t = 1, value_name = "S")]
+    seed: u64,
+    /// Distance up to which planes may be snapped and corners rounded, in meters; from the size of
+    /// the scene when left out.
+    #[arg(long, value_name = "METERS", value_parser = positive)]
+    tolerance: Option<f64>,
+    /// Kinds of failure listed at most.
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    list: usize,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
+    let world = read_world(&args.world)?;
+    let source = if args.source.is_empty() {
+        None
+    } else {
+        Some(read_source(&args.source)?)
+    };
+    let options = VerifyOptions {
+        rays: args.rays,
+        seed: args.seed,
+        tolerance: args.tolerance,
+        max_listed: args.list,
+    };
+    let bar = StageBar::new();
+    bar.start("shooting rays", args.rays.saturating_mul(2));
+    let report = verify_world_with_progress(&world, source.as_deref(), &options, &|done, _| {
+        bar.set(done)
+    });
+    bar.finish();
+    let mut out = BufWriter::new(io::stdout().lock());
+    if args.json {
+        serde_json::to_writer(&mut out, &report).map_err(io::Error::from)?;
+        writeln!(out)?;
+    } else {
+        write!(out, "{report}")?;
+    }
+    out.flush().context("cannot write to standard output")?;
+    if !report.holds() {
+        bail!(
+            "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} problems",
+            args.world.display(),
+            report.unsealed,
+            report.incomplete,
+            report.problems.len()
+        );
+    }
+    Ok(())
+}
+
+/// The structural triangles of a scene, as the builder saw them.
+fn read_source(paths: &[PathBuf]) -> anyhow::Result<Vec<Triangle>> {
+    let scene = import(paths, &[], &ImportOptions::default())?.scene;
+    Ok(scene
+        .triangle_sources(Role::Structural)
+        .map(|source| scene.world_triangle(source))
+        .collect())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("a number of meters greater than 0 is needed, e.g. 1e-4".into()),
+    }
+}

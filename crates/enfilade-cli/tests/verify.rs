@@ -1,0 +1,92 @@
+//! Runs `verify` and `plan` on a house made by hand.
+
+#[path = "../../enfilade-verify/tests/common/mod.rs"]
+mod common;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use common::house;
+use enfilade_cpg::wire::encode_glb;
+use serde_json::Value;
+
+fn enfilade(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+/// Writes a world to a file of this test alone.
+fn file(name: &str, world: &enfilade_cpg::World) -> String {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::write(&path, encode_glb(world).unwrap()).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_good_world_passes_and_is_its_own_source() {
+    let path = file("verify-good.glb", &house());
+    for source in [&[][..], &["--source", &path][..]] {
+        let args = [&["verify", &path, "--rays", "3000", "--json"][..], source].concat();
+        let done = enfilade(&args);
+        assert_eq!(
+            done.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
+        let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(report["unsealed"], 0);
+        assert_eq!(report["has_source"], !source.is_empty());
+        assert!(
+            report["sealed"]["judged"].as_u64().unwrap() > 500,
+            "{report}"
+        );
+    }
+}
+
+#[test]
+fn a_broken_promise_ends_in_exit_code_1_and_says_where() {
+    let mut world = house();
+    world.batches[5].cells = vec![common::A];
+    let path = file("verify-broken.glb", &world);
+    let done = enfilade(&["verify", &path, "--rays", "20000"]);
+    assert_eq!(done.status.code(), Some(1));
+    let (out, err) = (
+        String::from_utf8(done.stdout).unwrap(),
+        String::from_utf8(done.stderr).unwrap(),
+    );
+    assert!(
+        out.contains("a triangle's batch lacks a cell that sees it; seen from cell 1"),
+        "{out}"
+    );
+    assert!(err.contains("breaks a promise"), "{err}");
+    assert_eq!(
+        enfilade(&["verify", &path, "--tolerance", "0"])
+            .status
+            .code(),
+        Some(2)
+    );
+}
+
+#[test]
+fn a_plan_is_written() {
+    let path = file("plan.glb", &house());
+    let svg = format!("{path}.svg");
+    let done = enfilade(&["plan", &path, "-o", &svg, "--height", "1.5"]);
+    assert_eq!(
+        done.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    assert!(fs::read_to_string(&svg).unwrap().contains("cut +1.50 m"));
+    assert_eq!(
+        enfilade(&["plan", &path, "-o", &svg, "--height", "-1"])
+            .status
+            .code(),
+        Some(2)
+    );
+}
