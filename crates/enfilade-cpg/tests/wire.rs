@@ -8,6 +8,7 @@ use enfilade_cpg::{Batch, CellId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3};
 use proptest::prelude::*;
+use serde_json::Value;
 
 /// Everything but materials and images, whose form changes on the first way through.
 fn geometry(world: &World) -> String {
@@ -169,6 +170,33 @@ fn pictures_keep_their_bytes_and_get_their_true_type() {
     assert_eq!(back.textures[3].image, Some(1));
     assert_eq!(back.textures[4].image, None);
     assert!(back.images[0].bytes.starts_with(b"\x89PNG"));
+}
+
+/// The JSON of an encoded world.
+fn json(bytes: &[u8]) -> Value {
+    let len = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    serde_json::from_slice(&bytes[20..20 + len]).unwrap()
+}
+
+#[test]
+fn buffer_views_start_at_multiples_of_eight_whatever_lies_before_them() {
+    let mut world = two_rooms();
+    let node = world.graph.locator.nodes[1];
+    for n in 1..20 {
+        world.images[0].bytes = vec![7; n];
+        world.graph.locator.nodes = vec![node; n];
+        world.graph.locator.root = n as i32 - 1;
+        let bytes = encode_glb(&world).unwrap();
+        let root = json(&bytes);
+        for view in root["bufferViews"].as_array().unwrap() {
+            assert_eq!(view["byteOffset"].as_u64().unwrap() % 8, 0, "{view}");
+        }
+        let header = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
+        assert_eq!((header as usize, bytes.len() % 4), (bytes.len(), 0));
+        let back = decode_glb(&bytes).unwrap();
+        assert_eq!(back.images[0].bytes, world.images[0].bytes);
+        assert_eq!(back.graph, world.graph);
+    }
 }
 
 #[test]
