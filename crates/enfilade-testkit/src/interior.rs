@@ -128,3 +128,45 @@ impl Interior {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oracle::{n_open_edges, signed_volume};
+
+    #[test]
+    fn bisection_evens_out_the_triangles_and_keeps_the_surface() {
+        let mut mesh = Interior::default();
+        let c: Vec<u32> = (0..8)
+            .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
+            .map(|p| mesh.corner(p * DVec3::new(8.0, 1.0, 2.0)))
+            .collect();
+        for q in [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ] {
+            mesh.quad(q.map(|i| c[i]));
+        }
+        mesh.bisect_to(2000);
+        assert_eq!((mesh.triangles.len(), mesh.corners.len()), (2000, 1002));
+        let triangles: Vec<[DVec3; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| mesh.corners[i as usize]))
+            .collect();
+        assert_eq!(n_open_edges(&triangles), 0);
+        // Halves of binary fractions: exact but for the sum's rounding.
+        assert!((signed_volume(&triangles) - 16.0).abs() < 1e-9);
+        let longest = triangles
+            .iter()
+            .flat_map(|t| (0..3).map(|i| t[i].distance(t[(i + 1) % 3])))
+            .fold(0.0, f64::max);
+        // Triangles of 52 / 2000 square units, half a square each: the long side is 0.32. A
+        // factor of 2 for one bisection more or less.
+        assert!(longest < 0.65, "{longest}");
+    }
+}

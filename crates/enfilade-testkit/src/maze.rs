@@ -335,4 +335,29 @@ mod tests {
         assert_eq!(sizes.iter().min(), Some(&1));
         assert_eq!(sizes.iter().max(), Some(&12));
     }
+
+    #[test]
+    fn every_cell_can_be_reached_and_there_are_ways_around() {
+        let mut rng = Rng::new(4);
+        let plots = plots(&mut rng);
+        let passages = passages(&plots, &mut rng);
+        assert!(
+            passages.len() > N_CELLS - 1 + 50,
+            "{} passages",
+            passages.len()
+        );
+        let mut reached = vec![false; N_CELLS];
+        let mut stack = vec![0];
+        while let Some(cell) = stack.pop() {
+            if !std::mem::replace(&mut reached[cell], true) {
+                let next = passages.iter().filter_map(|p| match cell {
+                    c if c == p.from => Some(p.to),
+                    c if c == p.to => Some(p.from),
+                    _ => None,
+                });
+                stack.extend(next);
+            }
+        }
+        assert!(reached.iter().all(|r| *r));
+    }
 }

@@ -6,8 +6,8 @@ use enfilade_testkit::oracle::{
     FloodGrid, n_open_edges, segment_is_blocked, structural_triangles, winding_number,
 };
 use enfilade_testkit::{
-    Generated, OpeningKind, Rng, Side, TowerParams, Variant, cave, dirkse_maze, furnished_house,
-    gjorup_cavern, gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
+    Convex, Generated, OpeningKind, Rng, Side, TowerParams, Variant, cave, dirkse_maze,
+    furnished_house, gjorup_cavern, gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
 };
 
 /// Triangles whose box comes near `bounds`, to keep the brute-force rays short.
@@ -172,20 +172,22 @@ fn check_rooms_are_apart(g: &Generated, voxel: f64, plug: f64) {
 
 /// Monte Carlo estimate of each room's air against what the truth says.
 fn check_volumes(g: &Generated) {
-    const N: i32 = 500;
     let triangles = structural_triangles(&g.scene);
     let mut rng = Rng::new(5);
     for room in &g.truth.rooms {
         let b = room.aabb();
         let mut air = 0;
-        for _ in 0..N {
+        // Stairs are a few percent of their room, which takes a finer estimate to see.
+        let empty: f64 = room.parts.iter().map(Convex::volume).sum();
+        let n = if room.volume < empty { 20_000 } else { 300 };
+        for _ in 0..n {
             let p = b.min + b.size() * DVec3::new(rng.unit(), rng.unit(), rng.unit());
             air += i32::from(room.contains(p, 0.0) && winding_number(&triangles, p) <= 0);
         }
-        let share = f64::from(air) / f64::from(N);
+        let share = f64::from(air) / f64::from(n);
         let estimate = share * b.volume();
         // Five standard deviations of the estimate.
-        let slack = 5.0 * (share * (1.0 - share) / f64::from(N)).sqrt() * b.volume() + 1e-6;
+        let slack = 5.0 * (share * (1.0 - share) / f64::from(n)).sqrt() * b.volume() + 1e-6;
         let off = (estimate - room.volume).abs();
         assert!(
             off <= slack,
@@ -217,7 +219,7 @@ fn a_turned_house_is_sound() {
     check_solids_are_closed(&g);
     check_truth_is_in_order(&g);
     check_openings_are_open(&g, 0.8);
-    check_rooms_are_apart(&g, 0.05, 1.0);
+    check_rooms_are_apart(&g, 0.08, 1.0);
 }
 
 #[test]
@@ -270,7 +272,7 @@ fn small_buildings_are_sound() {
         check_truth_is_in_order(&g);
         check_openings_are_open(&g, share);
         check_openings_fill_their_holes(&g);
-        check_rooms_are_apart(&g, 0.05, 1.0);
+        check_rooms_are_apart(&g, 0.08, 1.0);
         check_volumes(&g);
     }
 }
@@ -427,10 +429,14 @@ fn shuffling_keeps_every_triangle_and_moves_most() {
         all.sort_unstable();
         (in_order, all)
     };
-    let ((a, a_sorted), (b, b_sorted)) = (triangles(&plain), triangles(&mixed_up));
-    assert!(a_sorted == b_sorted);
-    let same = a.iter().zip(&b).filter(|(x, y)| x == y).count();
-    assert!(same * 20 < a.len(), "{same} of {} stayed", a.len());
+    // Two rooms are one object: there only the order within it can change.
+    let one = [mixed::two_rooms(), shuffled(mixed::two_rooms(), 3)];
+    for [x, y] in [[&plain, &mixed_up], [&one[0], &one[1]]] {
+        let ((a, a_sorted), (b, b_sorted)) = (triangles(x), triangles(y));
+        assert!(a_sorted == b_sorted);
+        let same = a.iter().zip(&b).filter(|(x, y)| x == y).count();
+        assert!(same * 20 < a.len(), "{same} of {} stayed", a.len());
+    }
     assert_eq!(plain.truth, mixed_up.truth);
     check_solids_are_closed(&mixed_up);
 }
