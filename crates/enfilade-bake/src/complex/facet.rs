@@ -250,3 +250,41 @@ impl OpenPieces {
         Self { pieces }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Open pieces of a facet in z = 0, 1 m long and a fourth of the tolerance wide.
+    fn pieces_of_sliver(covers: &[Cover]) -> usize {
+        let tolerance = Tolerance::for_extent(10.0);
+        let w = 0.25 * tolerance.width;
+        let points = [
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::new(1.0, w, 0.0),
+            DVec3::new(0.0, w, 0.0),
+        ];
+        let facet = RawFacet {
+            plane: 0,
+            leaves: [0, 1],
+            points: &points,
+            covers,
+        };
+        OpenPieces::of(&facet, DVec3::Z, &tolerance).pieces.len()
+    }
+
+    #[test]
+    fn a_sliver_is_open_unless_it_lies_beside_a_triangle() {
+        assert_eq!(pieces_of_sliver(&[]), 1);
+        let points = Poly::from_slice(&[DVec3::ZERO, DVec3::NEG_Y, DVec3::X]);
+        let bounds = Aabb::of_points(&points);
+        let beside = |screen| Cover {
+            screen,
+            points: points.clone(),
+            bounds,
+        };
+        assert_eq!(pieces_of_sliver(&[beside(None)]), 0);
+        assert_eq!(pieces_of_sliver(&[beside(Some(0))]), 1);
+    }
+}
