@@ -198,3 +198,62 @@ fn each_texture_reference(value: &Value, visit: &mut dyn FnMut(Option<u64>)) {
         _ => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_coordinate_sets_are_counted_wherever_a_texture_is_read() {
+        for (text, n) in [
+            ("{}", 0),
+            (r#"{"normalTexture":{"index":0}}"#, 1),
+            (
+                r#"{"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":1}}}"#,
+                2,
+            ),
+            (
+                r#"{"extensions":{"X":{"sheenTexture":{"index":0,"texCoord":2}}}}"#,
+                3,
+            ),
+            // The transform's set takes the place of the texture's.
+            (
+                r#"{"normalTexture":{"index":0,"extensions":{"KHR_texture_transform":{"texCoord":3}}}}"#,
+                4,
+            ),
+            (r#"{"normalTexture":{"index":0,"texCoord":4294967295}}"#, 0),
+            (r#"{"extras":{"normalTexture":{"index":0}}}"#, 0),
+        ] {
+            assert_eq!(n_texcoord_sets(text), n, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_material_is_transparent_when_it_blends_or_transmits() {
+        for (text, transparent) in [
+            ("{}", false),
+            (r#"{"alphaMode":"MASK"}"#, false),
+            (r#"{"alphaMode":"BLEND"}"#, true),
+            (
+                r#"{"extensions":{"KHR_materials_transmission":{"transmissionFactor":0.5}}}"#,
+                true,
+            ),
+            (r#"{"extensions":{"KHR_materials_transmission":{}}}"#, false),
+        ] {
+            assert_eq!(
+                material_of_text(text).unwrap().transparent,
+                transparent,
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn extensions_are_found_at_any_depth_but_not_in_extras() {
+        let mut used = BTreeSet::new();
+        let text = r#"{"extensions":{"A_a":{"t":{"extensions":{"B_b":{}}}}},
+            "extras":{"extensions":{"no":{}}}}"#;
+        add_extensions(&mut used, text);
+        assert_eq!(used.into_iter().collect::<Vec<_>>(), ["A_a", "B_b"]);
+    }
+}

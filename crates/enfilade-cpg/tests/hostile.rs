@@ -4,6 +4,7 @@
 mod common;
 
 use common::two_rooms;
+use enfilade_cpg::World;
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -38,7 +39,7 @@ fn parts() -> (String, Vec<u8>) {
 }
 
 /// The two rooms with one piece of the JSON replaced.
-fn with(from: &str, to: &str) -> Result<enfilade_cpg::World, WireError> {
+fn with(from: &str, to: &str) -> Result<World, WireError> {
     let (json, bin) = parts();
     assert!(json.contains(from), "{from} is not in {json}");
     decode_glb(&glb(&json.replacen(from, to, 1), &bin))
@@ -165,6 +166,26 @@ fn the_same_bytes_cannot_be_decoded_a_thousand_times() {
             "{error}"
         );
     }
+}
+
+#[test]
+fn a_header_that_tells_another_length_is_an_error() {
+    // A file of one chunk, which nothing else holds against the length.
+    let mut bytes = encode_glb(&World::default()).unwrap();
+    bytes[8] ^= 4;
+    assert!(matches!(
+        decode_glb(&bytes),
+        Err(WireError::Damaged { at: 8, .. })
+    ));
+}
+
+#[test]
+fn corners_of_no_portal_are_an_error() {
+    let result = with("\"pieces\":[4,4]", "\"pieces\":[4]");
+    assert!(
+        matches!(result, Err(WireError::Structure { .. })),
+        "{result:?}"
+    );
 }
 
 #[test]
