@@ -131,7 +131,9 @@ pub const fn levels_per_voxel() -> u32 {
 /// memory becomes the labels.
 ///
 /// Time is linear in the voxels. On top of the 2 bytes a voxel it takes about 4 bytes for each
-/// voxel of the widest shell one voxel thick, and 8 for each local maximum.
+/// voxel of the widest shell one voxel thick (0.4 bytes a voxel of a furnished building at 5 cm),
+/// and 8 for each local maximum. When more than 8,191 basins are alive at once it takes 4 bytes a
+/// voxel, and 6 while it moves.
 ///
 /// # Panics
 /// When `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is

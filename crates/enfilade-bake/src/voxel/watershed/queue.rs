@@ -38,7 +38,6 @@ impl Queue {
                 self.next.push(NONE);
                 self.chunks.len() as u32 - 1
             });
-            self.next[fresh as usize] = NONE;
             if end[0] == NONE {
                 end[0] = fresh;
                 end[2] = 0;
