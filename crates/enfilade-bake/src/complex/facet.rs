@@ -1,6 +1,7 @@
 //! The facets between leaves: every node's plane polygon, pushed down both subtrees.
 //!
-//! This is how portals of a BSP are made (Lefebvre & Hornus 2003, §2.1). No polygon outlives its
+//! This is how portals of a BSP are made (Lefebvre & Hornus 2003, in the notes on BSP construction
+//! that follow §3.0.2: clip the plane by its parents, split it by its children). No polygon outlives its
 //! visit: the first visit keeps a few numbers a facet, the second makes the polygons again where
 //! two cells meet.
 

@@ -9,10 +9,10 @@
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
-//! | surfaces share one list of planes | `surface` | ours |
-//! | a tree of planes, leaves convex | `tree` | Lefebvre & Hornus 2003, §2.1, under boxes |
-//! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., §2.1 |
-//! | leaves to cells | `label` | ours; grouping by what separates, ibid., §3, is done by the votes |
+//! | surfaces share one list of planes, by id | `surface` | Lefebvre & Hornus 2003, notes after §3.0.2 |
+//! | a tree of planes, leaves convex | `tree` | ibid., §2 step 1, under boxes as the notes suggest |
+//! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., notes after §3.0.2 |
+//! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
 //! | portals, what each cell sees, the locator | `partition` | ours |
 //!
 //! Where it departs from Lefebvre & Hornus: their cells are grown by choosing among separators that

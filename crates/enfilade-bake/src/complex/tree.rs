@@ -1,8 +1,9 @@
 //! The plane tree: axis-aligned splits while a box holds many surfaces, then the planes of the
 //! surfaces themselves.
 //!
-//! The lower part is the autopartition of (Lefebvre & Hornus 2003, §2.1). A pure autopartition
-//! lets every wall's plane cut the whole building; boxes first keep each plane local, which is
+//! The lower part is the BSP of Lefebvre & Hornus 2003 (§2, step 1), split by the surfaces' own
+//! planes; that one may begin with given planes, such as a grid's, is in their notes after §3.0.2.
+//! A pure autopartition lets every wall's plane cut the whole building; boxes first keep each plane local, which is
 //! what makes the number of leaves near-linear. A box side is put on a large axis-aligned surface
 //! where there is one, as that surface then needs no split of its own.
 
@@ -13,8 +14,7 @@ use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
 /// A box with this many fragments or fewer is split by their own planes.
 ///
-/// Fewer makes more boxes, more makes planes cut more of each other; 4 to 12 differ by under a
-/// fifth in leaves on the buildings tried (institute, duplex) and on the aorta mesh.
+/// Fewer makes more boxes, more makes planes cut more of each other.
 const MAX_BOX_FRAGMENTS: usize = 8;
 
 /// Boxes are not split below this edge length. [Units: wu]
