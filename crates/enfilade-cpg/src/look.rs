@@ -144,8 +144,10 @@ pub(crate) fn n_texcoord_sets(text: &str) -> usize {
                             .get("extensions")
                             .and_then(|e| e.get("KHR_texture_transform"))
                             .and_then(|t| t.get("texCoord"));
-                        let sets = [inner.get("texCoord"), transformed];
-                        for set in sets.map(|s| s.and_then(Value::as_u64).unwrap_or(0)) {
+                        // A renderer without the transform reads the texture's own set.
+                        let own = inner.get("texCoord").and_then(Value::as_u64).unwrap_or(0);
+                        let other = transformed.and_then(Value::as_u64);
+                        for set in [Some(own), other].into_iter().flatten() {
                             if set < MAX_TEXCOORD_SETS {
                                 *most = (*most).max(set + 1);
                             }
@@ -216,7 +218,6 @@ mod tests {
                 r#"{"extensions":{"X":{"sheenTexture":{"index":0,"texCoord":2}}}}"#,
                 3,
             ),
-            // The transform's set takes the place of the texture's.
             (
                 r#"{"normalTexture":{"index":0,"extensions":{"KHR_texture_transform":{"texCoord":3}}}}"#,
                 4,
