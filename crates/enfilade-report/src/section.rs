@@ -316,3 +316,42 @@ fn simplify(points: &[DVec2], tolerance: f64) -> Vec<DVec2> {
         .map(|(p, _)| *p)
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbors_share_every_point_of_a_jagged_border() {
+        let (width, height) = (120, 90);
+        let label = |i: usize| {
+            // Uneven teeth: many corners are equally far from a line, and which of them is
+            // kept depends on the direction of walking.
+            let (x, z) = (i % width, i / width);
+            Label::Cell(u32::from(x > 50 + z * z % 7 % 4))
+        };
+        let section = Section {
+            origin: DVec2::ZERO,
+            step: 0.1,
+            width,
+            height,
+            labels: (0..width * height).map(label).collect(),
+        };
+        let regions = section.regions();
+        let inner = |cell: u32| -> Vec<DVec2> {
+            let borders = regions[&Label::Cell(cell)].borders.iter().flatten();
+            borders
+                .copied()
+                .filter(|p| p.x > 0.01 && p.x < 11.99)
+                .collect()
+        };
+        let (mut left, mut right) = (inner(0), inner(1));
+        let order = |a: &DVec2, b: &DVec2| a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x));
+        left.sort_by(order);
+        right.sort_by(order);
+        assert!(left.len() > 10 && left.len() < 200, "{}", left.len());
+        assert_eq!(left, right);
+        let area: f64 = regions.values().map(|r| r.area).sum();
+        assert!((area - 12.0 * 9.0).abs() < 1e-9);
+    }
+}

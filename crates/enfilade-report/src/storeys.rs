@@ -12,8 +12,9 @@ const LEVEL: f64 = 0.1;
 const LEAST_SHARE: f64 = 0.05;
 /// Spacing of the points at which a floor is asked whether a room stands on it. [Units: wu]
 const SPACING: f64 = 0.5;
-/// How far above a floor its air is looked for. [Units: wu]
-const ABOVE: f64 = 0.1;
+/// How far above a floor rooms must be: just above it, and at the height of the usual cut, so that
+/// the top of a suspended ceiling or of a wall under the roof is no floor. [Units: wu]
+const ABOVE: [f64; 2] = [0.1, 1.2];
 
 /// A storey: what stands on one floor level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +29,7 @@ pub struct Storey {
 
 /// The storeys, lowest first; one at least where there is an indoor cell.
 ///
-/// Level triangles with an indoor cell above them vote for their height by area; heights are taken
+/// Level triangles with indoor cells above them, headroom included, vote for their height by area; heights are taken
 /// by votes, those within 1.5 m of one taken before join it. O(floor area + triangles).
 #[must_use]
 pub fn find_storeys(world: &World) -> Vec<Storey> {
@@ -127,8 +128,11 @@ fn vote(world: &World, t: &Triangle, area: f64, votes: &mut Vec<(f64, f64)>) {
                 (column + third / 3.0) / n as f64,
             );
             let p = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
-            let cell = world.graph.locator.locate(p + DVec3::Y * ABOVE);
-            if cell.is_some_and(|c| !world.graph.cells[c.0 as usize].outdoor) {
+            let is_indoor = |up: f64| {
+                let cell = world.graph.locator.locate(p + DVec3::Y * up);
+                cell.is_some_and(|c| !world.graph.cells[c.0 as usize].outdoor)
+            };
+            if ABOVE.into_iter().all(is_indoor) {
                 votes.push((p.y, each));
             }
         }

@@ -1,13 +1,14 @@
 //! *Planar, convex outline*: every portal, straight from its corners.
 
 use enfilade_cpg::World;
-use enfilade_geom::DVec3;
+use enfilade_geom::ray::closest_point_on_segment;
+use enfilade_geom::{DVec3, Plane, Winding};
 
 use crate::subject::to_dvec;
 
 /// What is wrong with outlines and pieces, a line each.
 ///
-/// Asked independently of `validate()`, from Newell normals and edge functions alone. Lengths within
+/// Asked independently of `validate()`, from Newell normals, hulls and distances. Lengths within
 /// `eps` pass: that is how far a corner may be snapped and rounded.
 pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
     let mut problems = Vec::new();
@@ -22,6 +23,10 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
             say("it has no outline".into());
             continue;
         };
+        // The outline may be dented by less than the tolerance; its hull is what it bounds.
+        let plane = Plane::through(origin, normal);
+        let hull_of = |polygon: &[DVec3]| Winding::hull_in_plane(&plane, polygon).points;
+        let outline_hull = hull_of(&outline);
         let mut area = 0.0;
         let pieces = portal
             .pieces
@@ -54,10 +59,10 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
             if turn <= 0.0 || turn.is_nan() {
                 say(format!("{name} runs clockwise, or has no area"));
             }
-            if let Some(dent) = worst_outside(&polygon, &polygon, normal, eps) {
+            if let Some(dent) = worst_dent(&hull_of(&polygon), &polygon, eps) {
                 say(format!("{name} is not convex, by {dent:.2e} m"));
             }
-            if let Some(out) = worst_outside(&outline, &polygon, normal, eps) {
+            if let Some(out) = worst_outside(&outline_hull, &polygon, normal, eps) {
                 say(format!("{name} reaches out of the outline by {out:.2e} m"));
             }
         }
@@ -83,18 +88,34 @@ fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
     (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
 }
 
-/// How far the farthest of `points` lies beyond an edge of `polygon`; `None` when within `eps`.
-fn worst_outside(polygon: &[DVec3], points: &[DVec3], normal: DVec3, eps: f64) -> Option<f64> {
-    let mut worst = 0.0_f64;
-    for (p, q) in edges(polygon) {
-        // The line through an edge shorter than eps has no direction to speak of.
-        if p.distance(q) <= eps {
-            continue;
+/// How far the farthest of `points` lies from the region that `hull` bounds; `None` when within
+/// `2 eps`.
+fn worst_outside(hull: &[DVec3], points: &[DVec3], normal: DVec3, eps: f64) -> Option<f64> {
+    let outside = |x: &DVec3| {
+        let is_inside = edges(hull).all(|(p, q)| normal.cross(q - p).dot(*x - p) >= 0.0);
+        if is_inside {
+            0.0
+        } else {
+            distance_to_border(hull, *x)
         }
-        let inward = normal.cross(q - p).normalize_or_zero();
-        for x in points {
-            worst = worst.max(-inward.dot(*x - p));
-        }
-    }
+    };
+    let worst = points.iter().map(outside).fold(0.0, f64::max);
     (worst > 2.0 * eps).then_some(worst)
+}
+
+/// How far the corner that dents the polygon most lies inside its hull; `None` when within `2 eps`.
+fn worst_dent(hull: &[DVec3], polygon: &[DVec3], eps: f64) -> Option<f64> {
+    let worst = polygon
+        .iter()
+        .map(|&x| distance_to_border(hull, x))
+        .fold(0.0, f64::max);
+    (worst > 2.0 * eps).then_some(worst)
+}
+
+/// Measured to the border itself, never to lines through its edges: the direction of an edge not
+/// much longer than `eps` is noise, and a line carries it across the whole polygon.
+fn distance_to_border(hull: &[DVec3], x: DVec3) -> f64 {
+    edges(hull)
+        .map(|(p, q)| closest_point_on_segment(x, p, q).distance(x))
+        .fold(f64::INFINITY, f64::min)
 }

@@ -229,9 +229,14 @@ fn hostile_triangles_neither_panic_nor_hide_the_others() {
         1000,
     ));
     // Centers that shrink towards a corner make the heuristic peel one triangle a level.
+    // Their boxes all hold the origin, so that nothing there is spared the whole depth.
     soup.extend((0..2000).map(|i| {
         let s = 0.5f64.powi(i / 2) * 1e12;
-        [DVec3::splat(s), DVec3::new(s, -s, s), DVec3::new(-s, s, s)]
+        [
+            DVec3::splat(s),
+            DVec3::new(-0.5, 1.0, -0.5) * s,
+            DVec3::new(1.0, -0.5, -0.5) * s,
+        ]
     }));
     let bvh = Bvh::build(&soup);
     assert_eq!(bvh.len(), soup.len() - 3);
@@ -242,6 +247,16 @@ fn hostile_triangles_neither_panic_nor_hide_the_others() {
         Some(4)
     );
     assert!(!bvh.any_hit(a, DVec3::NAN, |_| false));
+    let tiny = Aabb::new(DVec3::splat(-1e-9), DVec3::splat(1e-9));
+    let mut in_box = 0;
+    bvh.for_each_in_box(&tiny, |_| in_box += 1);
+    let finite = |t: &&Triangle| t.iter().all(|p| p.abs().max_element() < 1e15);
+    let expected = soup
+        .iter()
+        .filter(finite)
+        .filter(|t| triangle_touches_box(t, &tiny))
+        .count();
+    assert_eq!(in_box, expected);
     assert!(bvh.nearest(DVec3::NAN, 1.0).is_none());
     assert!(bvh.nearest(DVec3::splat(1e200), f64::INFINITY).is_some());
     let none = Bvh::build(&[]);
@@ -250,4 +265,40 @@ fn hostile_triangles_neither_panic_nor_hide_the_others() {
             && none.nearest(a, f64::INFINITY).is_none()
             && !none.any_hit(a, b, |_| false)
     );
+}
+
+proptest! {
+    #[test]
+    fn specks_are_hit_from_far_away(
+        specks in proptest::collection::vec((point(), [point(), point(), point()]), 1..80),
+        away in 1.0..1e5f64,
+        direction in point(),
+    ) {
+        // Boxes thinner than the rounding of the origin to `f32`.
+        let soup: Vec<Triangle> =
+            specks.iter().map(|(at, shape)| shape.map(|p| *at + p * 1e-5)).collect();
+        let bvh = Bvh::build(&soup);
+        prop_assume!(direction.length() > 0.1);
+        for t in &soup {
+            let target = (t[0] + t[1] + t[2]) / 3.0;
+            let ray = Ray { origin: target - direction * away, direction, t_max: f64::INFINITY };
+            let expected = soup.iter().filter(|t| hit_triangle(&ray, t).is_some()).count();
+            let mut found = 0;
+            bvh.for_each_hit(&ray, |_| found += 1);
+            prop_assert_eq!(found, expected);
+        }
+    }
+}
+
+#[test]
+fn of_equal_triangles_the_first_is_hit_and_nearest() {
+    let t = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    let far = |i: usize| t.map(|p| p + DVec3::Z * -(1.0 + i as f64));
+    let mut soup: Vec<Triangle> = (0..40).map(far).collect();
+    soup.extend([t; 50]);
+    let bvh = Bvh::build(&soup);
+    let p = DVec3::new(0.25, 0.25, 1.0);
+    let hit = bvh.closest_hit(&Ray::segment(p, p - DVec3::Z * 9.0), |i| i == 40);
+    assert_eq!(hit.map(|h| h.triangle), Some(41));
+    assert_eq!(bvh.nearest(p, 2.0).map(|n| n.triangle), Some(40));
 }
