@@ -1,5 +1,19 @@
-//! enfilade-bake
+//! Finds the rooms and doorways of a scene.
+//!
+//! Start with [`pipeline`]: one function lists the stages in order. The *watershed* decides where
+//! rooms end, on voxels ([`voxel`], [`watershed`]); the *cell complex* makes it exact
+//! ([`complex`]), so that the promises hold whatever the voxels missed.
 
+mod assemble;
 pub mod complex;
+mod config;
+mod context;
+mod error;
+pub mod pipeline;
 pub mod voxel;
 pub mod watershed;
+
+pub use config::BakeConfig;
+pub use context::{BakeContext, Progress, Silent};
+pub use error::BakeError;
+pub use pipeline::{BakeOutput, bake};

@@ -3,6 +3,8 @@
 //! Results go to standard output, progress and messages to standard error. Exit code 0: done;
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
+mod bake;
+mod demo;
 mod inspect;
 mod locate;
 mod output;
@@ -26,6 +28,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Bake(bake::Bake),
+    Demo(demo::Demo),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Plan(plan::Plan),
@@ -34,6 +38,8 @@ enum Command {
 
 fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
+        Command::Bake(args) => bake::run(&args),
+        Command::Demo(args) => demo::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),

@@ -7,13 +7,15 @@
 
 mod closures;
 mod fit;
+mod hollow;
 mod regions;
 mod slabs;
 
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen};
+pub use hollow::hollow_regions;
 pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
-    group_faces, merge_basins,
+    group_faces, merge_basins, opening_of,
 };
 pub use slabs::{cut_at_slabs, slab_heights};

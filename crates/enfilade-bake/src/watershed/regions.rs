@@ -675,7 +675,9 @@ pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     patches.into_values().collect()
 }
 
-fn opening_of(
+/// What a set of faces says about the opening they fill.
+#[must_use]
+pub fn opening_of(
     grid: &Grid,
     faces: Faces,
     is_lesser: &dyn Fn(usize) -> bool,

@@ -1,0 +1,396 @@
+//! The last stage: from the partition of space to a world that can be written.
+//!
+//! Structural triangles go to batches by the set of cells that see them and by material, so that
+//! each is stored, and drawn, once. Detail objects keep their identity and list the cells they touch.
+
+use std::collections::{BTreeMap, HashMap};
+
+use enfilade_cpg::{
+    Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, Portal, PortalId, PortalKind,
+    Provenance, Statistics, World,
+};
+use enfilade_geom::scene::{Mesh, Primitive, Role, Scene, TriangleSource};
+use enfilade_geom::{Aabb, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
+use rayon::prelude::*;
+
+use crate::complex::{Partition, PartitionPortal};
+use crate::watershed::Screen;
+
+/// What the last stage is made from.
+pub(crate) struct Parts<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) sources: &'a [TriangleSource],
+    pub(crate) triangles: &'a [Triangle],
+    pub(crate) bvh: &'a Bvh,
+    pub(crate) partition: Partition,
+    pub(crate) screens: &'a [Screen],
+    /// Outlines are grown by this much, so that rounding never cuts into an opening. [Units: wu]
+    pub(crate) outward: f64,
+    /// Share of an opening that a leaf or pane must fill to make a door of it.
+    pub(crate) closed_share: f64,
+    pub(crate) provenance: Provenance,
+    pub(crate) statistics: Statistics,
+}
+
+pub(crate) fn assemble(parts: Parts<'_>) -> World {
+    let Parts {
+        scene, partition, ..
+    } = &parts;
+    let mut cells: Vec<Cell> = (0..partition.label_of_cell.len())
+        .map(|i| {
+            let outdoor = partition.outside == Some(i as u32);
+            let b = partition.aabbs[i];
+            Cell {
+                name: if outdoor {
+                    "outdoors".to_owned()
+                } else {
+                    format!("cell-{i}")
+                },
+                aabb: [b.min.as_vec3().to_array(), b.max.as_vec3().to_array()],
+                volume: partition.volumes[i] as f32,
+                n_triangles: 0,
+                n_detail_triangles: 0,
+                portals: Vec::new(),
+                outdoor,
+            }
+        })
+        .collect();
+    let portals: Vec<Portal> = partition
+        .portals
+        .par_iter()
+        .map(|p| portal(&parts, p))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .flatten()
+        .collect();
+    for (i, p) in portals.iter().enumerate() {
+        for c in p.cells {
+            cells[c.0 as usize].portals.push(PortalId(i as u32));
+        }
+    }
+    let batches = batches(&parts, &mut cells);
+    let (details, detail_meshes) = details(scene, &partition.locator, &mut cells);
+    World {
+        graph: CellPortalGraph {
+            cells,
+            portals,
+            locator: partition.locator.clone(),
+            provenance: parts.provenance.clone(),
+            statistics: parts.statistics.clone(),
+        },
+        batches,
+        details,
+        detail_meshes,
+        materials: scene.materials.clone(),
+        textures: scene.textures.clone(),
+        images: scene.images.clone(),
+    }
+}
+
+/// Pieces narrower than this are lost when their corners are rounded to `f32`. [Units: wu]
+const HAIR: f64 = 1e-5;
+
+/// The portal in its final form; `None` when nothing of it is wider than a rounding.
+fn portal(parts: &Parts<'_>, p: &PartitionPortal) -> Option<Portal> {
+    let to_f32 = |w: &Winding| {
+        w.points
+            .iter()
+            .map(|p| p.as_vec3().to_array())
+            .collect::<Vec<_>>()
+    };
+    let rounded = |piece: &Vec<[f32; 3]>| {
+        Winding::new(
+            piece
+                .iter()
+                .map(|&p| DVec3::from(p.map(f64::from)))
+                .collect(),
+        )
+    };
+    let is_there = |piece: &Vec<[f32; 3]>| {
+        let w = rounded(piece);
+        let n = w.points.len();
+        let rim: f64 = (0..n)
+            .map(|i| w.points[i].distance(w.points[(i + 1) % n]))
+            .sum();
+        w.area_normal().dot(p.plane.normal) > HAIR * rim
+    };
+    let pieces: Vec<Vec<[f32; 3]>> = p.pieces.iter().map(to_f32).filter(is_there).collect();
+    if pieces.is_empty() {
+        return None;
+    }
+    let outline = grown(&p.outline, &p.plane, parts.outward);
+    Some(Portal {
+        cells: p.cells.map(CellId),
+        kind: kind_of(parts, p),
+        normal: p.plane.normal.as_vec3().to_array(),
+        outline: to_f32(&outline),
+        area: pieces
+            .iter()
+            .map(|piece| rounded(piece).area())
+            .sum::<f64>() as f32,
+        pieces,
+    })
+}
+
+/// Corners nearer than this to the line between their neighbors are dropped from outlines, and
+/// outlines narrower than this become rectangles: rounding to `f32` turns short edges at will, and a
+/// turned edge makes a long outline concave. [Units: wu]
+const STRAIGHT: f64 = 2e-4;
+
+/// `outline` with its rim moved outward by at least `by`, still convex and in the plane, and with
+/// edges long enough to keep their directions in `f32`.
+fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
+    let mut points = outline.points.clone();
+    let along = |points: &[DVec3]| {
+        let n = points.len();
+        (0..n)
+            .map(|i| points[(i + 1) % n] - points[i])
+            .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+            .and_then(DVec3::try_normalize)
+            .unwrap_or_else(|| plane.basis().0)
+    };
+    let mut moved_in = 0.0_f64;
+    let mut i = 0;
+    while points.len() > 3 && i < points.len() {
+        let n = points.len();
+        let (a, p, b) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
+        let off = (b - a).cross(p - a).length() / (b - a).length().max(1e-12);
+        if off < STRAIGHT {
+            moved_in = moved_in.max(off);
+            points.remove(i);
+            i = i.saturating_sub(1);
+        } else {
+            i += 1;
+        }
+    }
+    let by = by + moved_in;
+    let u = along(&points);
+    let v = plane.normal.cross(u);
+    let range = |d: DVec3| {
+        outline
+            .points
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(lo, hi), p| {
+                (lo.min(d.dot(*p)), hi.max(d.dot(*p)))
+            })
+    };
+    let ((u0, u1), (v0, v1)) = (range(u), range(v));
+    let n = points.len();
+    // Each edge moves out along its own normal; corners go to where the moved edges meet.
+    let moved: Option<Vec<DVec3>> = (0..n)
+        .map(|i| {
+            let (a, p, b) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
+            let (e, f) = ((p - a).try_normalize()?, (b - p).try_normalize()?);
+            let (m, n) = (e.cross(plane.normal), f.cross(plane.normal));
+            let cos_half_squared = (1.0 + m.dot(n)) * 0.5;
+            // Corners sharper than 20 degrees would run far off.
+            (cos_half_squared > 0.03).then(|| p + (m + n) * (by * 0.5 / cos_half_squared))
+        })
+        .collect();
+    match moved {
+        Some(moved) if n > 3 && v1 - v0 > 100.0 * STRAIGHT => Winding::new(moved),
+        _ => {
+            let origin = plane.normal * -plane.d;
+            let corner = |s: f64, t: f64| origin + u * s + v * t;
+            Winding::new(vec![
+                corner(u0 - by, v0 - by),
+                corner(u1 + by, v0 - by),
+                corner(u1 + by, v1 + by),
+                corner(u0 - by, v1 + by),
+            ])
+        }
+    }
+}
+
+/// Parapets higher than this make a window of an opening. [Units: wu]
+const PARAPET: f64 = 0.4;
+
+fn kind_of(parts: &Parts<'_>, p: &PartitionPortal) -> PortalKind {
+    if p.kind == PortalKind::Crack {
+        return PortalKind::Crack;
+    }
+    let n = p.plane.normal;
+    let closed = p.screen.map_or(0.0, |s| parts.screens[s as usize].closed);
+    let is_closed = closed >= parts.closed_share;
+    if n.y.abs() < 0.5 {
+        let bottom = p
+            .outline
+            .points
+            .iter()
+            .map(|q| q.y)
+            .fold(f64::MAX, f64::min);
+        let center = p.outline.centroid();
+        // Height of the sill over the ground half a meter away, on either side.
+        let drop = |side: f64| {
+            let foot = DVec3::new(center.x, bottom + 0.05, center.z)
+                + DVec3::new(n.x, 0.0, n.z).normalize_or_zero() * (0.5 * side);
+            let ray = Ray {
+                origin: foot,
+                direction: -DVec3::Y,
+                t_max: 100.0,
+            };
+            parts
+                .bvh
+                .closest_hit(&ray, |_| false)
+                .map_or(f64::INFINITY, |h| h.t - 0.05)
+        };
+        if drop(1.0).min(drop(-1.0)) > PARAPET {
+            return PortalKind::Window;
+        }
+    } else if is_closed {
+        return PortalKind::Window;
+    }
+    if is_closed {
+        PortalKind::Door
+    } else {
+        PortalKind::Open
+    }
+}
+
+/// Which attributes a batch's primitive carries: normals, tangents, sets of texture coordinates,
+/// colors. Primitives that carry different ones cannot share a vertex buffer.
+type Layout = (bool, bool, usize, bool);
+
+#[derive(Default)]
+struct BatchBuilder {
+    primitive: Primitive,
+    vertices: HashMap<(u32, u32, u32), u32>,
+}
+
+fn batches(parts: &Parts<'_>, cells: &mut [Cell]) -> Vec<Batch> {
+    let scene = parts.scene;
+    let mut builders: BTreeMap<(Vec<u32>, Option<u32>, Layout), BatchBuilder> = BTreeMap::new();
+    let mut normal_matrix: Option<(u32, DMat3)> = None;
+    for (t, source) in parts.sources.iter().enumerate() {
+        let seen_from = parts.partition.triangle_cells.both(t);
+        for &c in &seen_from {
+            cells[c as usize].n_triangles += 1;
+        }
+        let object = &scene.objects[source.object as usize];
+        let from = &scene.meshes[object.mesh as usize].primitives[source.primitive as usize];
+        let layout = (
+            !from.normals.is_empty(),
+            !from.tangents.is_empty(),
+            from.uvs.len(),
+            !from.colors.is_empty(),
+        );
+        if normal_matrix.is_none_or(|(o, _)| o != source.object) {
+            let m = DMat3::from_mat4(object.transform);
+            normal_matrix = Some((source.object, m.inverse().transpose()));
+        }
+        let normals = normal_matrix.map_or(DMat3::IDENTITY, |(_, m)| m);
+        let builder = builders
+            .entry((seen_from, from.material, layout))
+            .or_default();
+        let to = &mut builder.primitive;
+        to.material = from.material;
+        to.uvs.resize(from.uvs.len(), Vec::new());
+        for (corner, position) in parts.triangles[t].iter().enumerate() {
+            let v = from.indices[source.triangle as usize * 3 + corner];
+            let key = (source.object, source.primitive, v);
+            let index = *builder.vertices.entry(key).or_insert_with(|| {
+                let i = v as usize;
+                to.positions.push(position.as_vec3().to_array());
+                if layout.0 {
+                    to.normals.push(turned(from.normals[i], |n| normals * n));
+                }
+                if layout.1 {
+                    let [x, y, z, w] = from.tangents[i];
+                    let [x, y, z] = turned([x, y, z], |n| object.transform.transform_vector3(n));
+                    to.tangents.push([x, y, z, w]);
+                }
+                for (set, uvs) in to.uvs.iter_mut().zip(&from.uvs) {
+                    set.push(uvs[i]);
+                }
+                if layout.3 {
+                    to.colors.push(from.colors[i]);
+                }
+                to.positions.len() as u32 - 1
+            });
+            to.indices.push(index);
+        }
+    }
+    builders
+        .into_iter()
+        .map(|((cells, _, _), b)| Batch {
+            cells: cells.into_iter().map(CellId).collect(),
+            primitive: b.primitive,
+        })
+        .collect()
+}
+
+/// A direction moved by `by` and made unit length again; left as it was where that fails.
+fn turned(n: [f32; 3], by: impl Fn(DVec3) -> DVec3) -> [f32; 3] {
+    let v = DVec3::new(n[0].into(), n[1].into(), n[2].into());
+    by(v).try_normalize().map_or(n, |v| v.as_vec3().to_array())
+}
+
+fn details(scene: &Scene, locator: &Locator, cells: &mut [Cell]) -> (Vec<DetailObject>, Vec<Mesh>) {
+    let ids: Vec<usize> = (0..scene.objects.len())
+        .filter(|&i| scene.objects[i].role == Role::Detail)
+        .collect();
+    let touched: Vec<Vec<CellId>> = ids
+        .par_iter()
+        .map(|&i| cells_of_object(scene, i, locator))
+        .collect();
+    let mut meshes = Vec::new();
+    let mut new_index: HashMap<u32, u32> = HashMap::new();
+    let mut out = Vec::new();
+    for (&i, touched) in ids.iter().zip(touched) {
+        let object = &scene.objects[i];
+        let mesh = &scene.meshes[object.mesh as usize];
+        let n: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
+        for c in &touched {
+            cells[c.0 as usize].n_detail_triangles += n as u32;
+        }
+        let mesh = *new_index.entry(object.mesh).or_insert_with(|| {
+            meshes.push(mesh.clone());
+            meshes.len() as u32 - 1
+        });
+        out.push(DetailObject {
+            name: object.name.clone(),
+            mesh,
+            transform: object.transform.to_cols_array().map(|v| v as f32),
+            cells: touched,
+        });
+    }
+    (out, meshes)
+}
+
+/// The cells that an object's triangles touch; when all of it is buried in solid matter (a door
+/// frame in its wall), the cells around it.
+fn cells_of_object(scene: &Scene, object: usize, locator: &Locator) -> Vec<CellId> {
+    let o = &scene.objects[object];
+    let mut cells = Vec::new();
+    for p in &scene.meshes[o.mesh as usize].primitives {
+        for t in p.indices.chunks_exact(3) {
+            let corners = [0, 1, 2].map(|i| {
+                let [x, y, z] = p.positions[t[i] as usize];
+                o.transform
+                    .transform_point3(DVec3::new(x.into(), y.into(), z.into()))
+            });
+            locator.cells_touching(&corners, &mut cells);
+        }
+    }
+    if cells.is_empty() {
+        let b: Aabb = scene.object_aabb(object);
+        for margin in [0.05, 0.2, 0.5] {
+            let around = b.expanded(margin);
+            let corners: Vec<DVec3> = (0..8)
+                .map(|k| {
+                    let pick = |bit: i32, lo: f64, hi: f64| if k & bit == 0 { lo } else { hi };
+                    DVec3::new(
+                        pick(1, around.min.x, around.max.x),
+                        pick(2, around.min.y, around.max.y),
+                        pick(4, around.min.z, around.max.z),
+                    )
+                })
+                .collect();
+            locator.cells_touching(&corners, &mut cells);
+            if !cells.is_empty() {
+                break;
+            }
+        }
+    }
+    cells
+}

@@ -1,0 +1,139 @@
+//! What can be chosen, and the resolved form that the stages work with.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::Aabb;
+
+use crate::BakeError;
+use crate::voxel::Grid;
+use crate::watershed::MergeSettings;
+
+/// Settings of a bake. The defaults are meant for everything; none is tuned to a scene.
+#[derive(Clone, Debug)]
+pub struct BakeConfig {
+    /// Edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size.
+    /// [Units: wu] [Limit: > 0]
+    pub voxel: Option<f64>,
+    /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: > 0]
+    pub min_opening: f64,
+    /// Most voxels; a larger scene gets larger voxels. About 2.5 bytes each. [Limit: > 0]
+    pub max_voxels: usize,
+    /// Basins shallower than this are noise. [Units: wu]
+    pub noise: f64,
+    /// How basins become rooms.
+    pub merge: MergeSettings,
+}
+
+impl Default for BakeConfig {
+    fn default() -> Self {
+        Self {
+            voxel: None,
+            min_opening: 0.6,
+            max_voxels: 1_600_000_000,
+            noise: 0.015,
+            merge: MergeSettings::default(),
+        }
+    }
+}
+
+/// Voxels of air around the scene: the outdoors must be wider than any opening into it.
+pub(crate) const PADDING: usize = 10;
+
+impl BakeConfig {
+    /// Every setting by name, as text, for the provenance of the file.
+    #[must_use]
+    pub fn to_settings(&self) -> BTreeMap<String, String> {
+        let m = &self.merge;
+        [
+            (
+                "voxel",
+                self.voxel
+                    .map_or_else(|| "auto".to_owned(), |v| v.to_string()),
+            ),
+            ("min_opening", self.min_opening.to_string()),
+            ("max_voxels", self.max_voxels.to_string()),
+            ("noise", self.noise.to_string()),
+            ("merge.threshold", m.threshold.to_string()),
+            ("merge.wall_threshold", m.wall_threshold.to_string()),
+            ("merge.wall_rim", m.wall_rim.to_string()),
+            ("merge.radius_gain", m.radius_gain.to_string()),
+            ("merge.reach", m.reach.to_string()),
+            ("merge.surround", m.surround.to_string()),
+            ("merge.outdoor_gain", m.outdoor_gain.to_string()),
+            ("merge.closed_share", m.closed_share.to_string()),
+            ("merge.min_radius", m.min_radius.to_string()),
+        ]
+        .map(|(k, v)| (k.to_owned(), v))
+        .into()
+    }
+
+    /// The grid for a scene of these bounds. All checks of settings live here.
+    ///
+    /// # Errors
+    /// When a setting is out of its limits.
+    pub(crate) fn grid(&self, bounds: &Aabb) -> Result<Grid, BakeError> {
+        let positive = |name: &'static str, value: f64| {
+            if value > 0.0 && value.is_finite() {
+                Ok(value)
+            } else {
+                Err(BakeError::Setting {
+                    name,
+                    value: value.to_string(),
+                    limit: "a number above 0",
+                })
+            }
+        };
+        positive("min_opening", self.min_opening)?;
+        let wanted = positive("voxel", self.voxel.unwrap_or(self.min_opening / 6.0))?;
+        if self.max_voxels < 1000 {
+            return Err(BakeError::Setting {
+                name: "max_voxels",
+                value: self.max_voxels.to_string(),
+                limit: "at least 1000",
+            });
+        }
+        let mut voxel = wanted;
+        // Growing by a tenth at a time ends close below the budget.
+        while n_voxels(bounds, voxel) > self.max_voxels as f64 {
+            voxel *= 1.1;
+        }
+        Ok(Grid::covering(bounds, voxel, PADDING))
+    }
+}
+
+fn n_voxels(bounds: &Aabb, voxel: f64) -> f64 {
+    let n = (bounds.size() / voxel).ceil() + 2.0 * PADDING as f64;
+    n.x * n.y * n.z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::DVec3;
+
+    #[test]
+    fn a_large_scene_gets_larger_voxels_and_stays_within_the_budget() {
+        let config = BakeConfig {
+            max_voxels: 1_000_000,
+            ..BakeConfig::default()
+        };
+        let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
+        let grid = config.grid(&bounds).unwrap();
+        assert!(grid.n_voxels() <= 1_000_000);
+        assert!(grid.voxel > 0.1);
+        let small = Aabb::new(DVec3::ZERO, DVec3::splat(5.0));
+        assert!((config.grid(&small).unwrap().voxel - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn settings_out_of_limits_are_named() {
+        let config = BakeConfig {
+            voxel: Some(-1.0),
+            ..BakeConfig::default()
+        };
+        let error = config
+            .grid(&Aabb::new(DVec3::ZERO, DVec3::ONE))
+            .unwrap_err();
+        assert!(error.to_string().contains("voxel"));
+    }
+}

@@ -1,0 +1,326 @@
+//! The main flow: scene → voxels → rooms → screens → cell complex → world.
+//!
+//! Read this first. Each step is one call on a named intermediate; how a step works is told in its
+//! own module.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use enfilade_cpg::{Provenance, Statistics, World};
+use enfilade_geom::scene::{Role, Scene, TriangleSource};
+use enfilade_geom::{Aabb, Bvh, Triangle, triangle_area_normal};
+use rayon::prelude::*;
+
+use crate::assemble::{Parts, assemble};
+use crate::complex::{ComplexInput, LabelSettings, Leak, Vote, build_complex};
+use crate::voxel::{
+    BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
+};
+use crate::watershed::{
+    Flooded, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
+    fit_screen, flood_closures, hollow_regions, merge_basins, opening_of, slab_heights,
+};
+use crate::{BakeConfig, BakeContext, BakeError};
+
+/// What a bake gives besides the world.
+#[derive(Clone, Debug)]
+pub struct BakeOutput {
+    /// Cells, portals, geometry.
+    pub world: World,
+    /// Edge of a voxel. [Units: wu]
+    pub voxel: f64,
+    /// Voxels along each axis.
+    pub dims: [usize; 3],
+    /// Wall time of each stage.
+    pub times: Vec<(&'static str, Duration)>,
+    /// Where cells meet though no opening was foreseen: cracks and holes of the model.
+    pub leaks: Vec<Leak>,
+}
+
+/// Finds the rooms and doorways of a scene.
+///
+/// Deterministic: equal input and settings give an equal world on any number of threads. Time is
+/// linear in voxels and about linear in triangles; memory about 2.5 bytes a voxel plus the scene.
+///
+/// # Errors
+/// When there is nothing structural, a setting is out of limits, or the caller cancels.
+pub fn bake(
+    scene: &Scene,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    // 1. What bounds rooms.
+    context.stage(0)?;
+    let (sources, triangles) = structural_triangles(scene);
+    if triangles.is_empty() {
+        return Err(BakeError::NothingStructural {
+            n_objects: scene.objects.len(),
+        });
+    }
+    let bvh = Bvh::build(&triangles);
+    let grid = config.grid(&bounds_of(&triangles))?;
+    let occupied = voxelize(&grid, &triangles);
+    let closures = voxelize(&grid, &closure_triangles(scene));
+
+    // 2. How far every voxel of air is from a surface; door leaves count as surfaces here.
+    context.stage(1)?;
+    let mut blocked = occupied.clone();
+    blocked.union_with(&closures);
+    let distances = distance_squared(&blocked);
+    drop(blocked);
+
+    // 3. Basins, cut where a slab ends a storey.
+    context.stage(2)?;
+    let border = border_of(grid.dims);
+    let options = WatershedOptions {
+        h: config.noise / grid.voxel,
+        outdoors: Some(&border),
+    };
+    let flood = watershed(grid.dims, distances, &options);
+    drop(border);
+    let mut labels = flood.labels;
+    let mut peaks: Vec<f32> = std::iter::once(0.0)
+        .chain(flood.basins.iter().map(|b| b.peak as f32))
+        .collect();
+    let n_basins = flood.basins.len();
+    let saddles: BTreeMap<(u32, u32), f32> = flood
+        .saddles
+        .iter()
+        .map(|s| ((s.a, s.b), s.distance as f32))
+        .collect();
+    flood_closures(grid.dims, &mut labels, &occupied);
+    let slabs = slab_heights(&triangles);
+    for parent in cut_at_slabs(&grid, &mut labels, peaks.len(), &slabs) {
+        peaks.push(peaks[parent as usize]);
+    }
+    let n_occupied = occupied.count();
+    drop(occupied);
+
+    // 4. Rooms.
+    context.stage(3)?;
+    let flooded = Flooded {
+        grid: &grid,
+        labels: &labels,
+        peaks: &peaks,
+        closures: Some(&closures),
+        slabs: &slabs,
+    };
+    let regions = merge_basins(flooded, &saddles, &config.merge);
+    let hollow = hollow_regions(&grid, &labels, &regions, &peaks, &bvh);
+
+    // 5. Where rooms meet: a screen in each real opening.
+    context.stage(4)?;
+    let screens = fit_screens(&grid, &labels, &regions, &closures, &triangles, &bvh);
+    let votes = votes(&grid, &labels, &regions, &hollow);
+    drop(labels);
+    drop(closures);
+
+    // 6. Screens and triangles cut space into convex pieces, exactly.
+    context.stage(5)?;
+    let windings: Vec<_> = screens.iter().map(|s| s.winding.clone()).collect();
+    let complex = build_complex(&ComplexInput {
+        triangles: &triangles,
+        screens: &windings,
+        bounds: grid.aabb(),
+    });
+
+    // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
+    context.stage(6)?;
+    let partition = complex.partition(&votes, &LabelSettings::default());
+    drop(votes);
+    let outward = complex.opening_tolerance();
+    let counts = [
+        (
+            "input_triangles",
+            (sources.len() + scene.triangle_sources(Role::Detail).count()) as f64,
+        ),
+        ("structural_triangles", sources.len() as f64),
+        ("voxel_size", grid.voxel),
+        ("voxels", grid.n_voxels() as f64),
+        ("occupied_voxels", n_occupied as f64),
+        ("basins", n_basins as f64),
+        ("screens", screens.len() as f64),
+        ("leaves", complex.n_leaves() as f64),
+        ("leaks", partition.leaks.len() as f64),
+    ];
+    drop(complex);
+
+    // 8. Geometry to the cells that see it.
+    context.stage(7)?;
+    let leaks = partition.leaks.clone();
+    let settings = config.to_settings();
+    let world = assemble(Parts {
+        scene,
+        sources: &sources,
+        triangles: &triangles,
+        bvh: &bvh,
+        partition,
+        screens: &screens,
+        outward,
+        closed_share: config.merge.closed_share,
+        provenance: Provenance {
+            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
+            method: "watershed".to_owned(),
+            input_hash: input_hash(&triangles, &settings),
+            settings,
+        },
+        statistics: Statistics {
+            counts: counts.map(|(k, v)| (k.to_owned(), v)).into(),
+        },
+    });
+    context.end_stage();
+    Ok(BakeOutput {
+        world,
+        voxel: grid.voxel,
+        dims: grid.dims,
+        times: context.times(),
+        leaks,
+    })
+}
+
+/// Structural triangles that have an area, with where they came from.
+fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<Triangle>) {
+    scene
+        .triangle_sources(Role::Structural)
+        .map(|s| (s, scene.world_triangle(s)))
+        .filter(|(_, t)| {
+            t.iter().all(|p| p.is_finite()) && triangle_area_normal(t).length_squared() > 0.0
+        })
+        .unzip()
+}
+
+/// The outermost layer of voxels, which the padding keeps empty.
+fn border_of(dims: [usize; 3]) -> BitVolume {
+    let [nx, ny, nz] = dims;
+    BitVolume::from_fn(dims, |i| {
+        let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
+        x == 0 || y == 0 || z == 0 || x + 1 == nx || y + 1 == ny || z + 1 == nz
+    })
+}
+
+/// Openings smaller than this many voxel faces are left to the complex, which finds them as cracks.
+const MIN_FACES: usize = 4;
+
+fn fit_screens(
+    grid: &Grid,
+    labels: &Labels,
+    regions: &Regions,
+    closures: &BitVolume,
+    triangles: &[Triangle],
+    bvh: &Bvh,
+) -> Vec<Screen> {
+    let openings: Vec<([u32; 2], Vec<u64>)> = regions
+        .contacts
+        .iter()
+        .flat_map(|(&(a, b), faces)| {
+            connected_patches(grid, faces)
+                .into_iter()
+                .filter(|patch| patch.len() >= MIN_FACES)
+                .map(move |patch| ([a, b], patch))
+        })
+        .collect();
+    openings
+        .into_par_iter()
+        .map(|(pair, faces)| {
+            let is_lesser = |i: usize| regions.region_of_basin[labels.get(i) as usize] == pair[0];
+            let opening = opening_of(grid, faces, &is_lesser, Some(closures));
+            let near = |bounds: &Aabb| {
+                let mut found = Vec::new();
+                bvh.for_each_in_box(bounds, |t| found.push(t));
+                found.sort_unstable();
+                found
+            };
+            fit_screen(grid, &opening, pair, triangles, &near)
+        })
+        .collect()
+}
+
+/// At most about this many voxels vote.
+const MAX_VOTES: usize = 1_000_000;
+/// Voxels this close to where two regions meet do not vote: a screen may lie on either side of
+/// them. [Units: wu]
+const UNSURE: f64 = 0.35;
+
+/// One voxel of each block of `n`³ speaks for its region.
+fn votes(grid: &Grid, labels: &Labels, regions: &Regions, hollow: &[u32]) -> Vec<Vote> {
+    let mut unsure = BitVolume::new(grid.dims);
+    let reach = (UNSURE / grid.voxel).ceil() as usize;
+    for faces in regions.contacts.values() {
+        let mut last = u64::MAX;
+        for &face in faces {
+            if face / 4 == last {
+                continue;
+            }
+            last = face / 4;
+            let at = grid.coords(last as usize);
+            let range =
+                |k: usize| at[k].saturating_sub(reach)..(at[k] + reach + 1).min(grid.dims[k]);
+            for z in range(2) {
+                for y in range(1) {
+                    for x in range(0) {
+                        unsure.set(x, y, z, true);
+                    }
+                }
+            }
+        }
+    }
+    let mut block = 1;
+    while grid.n_voxels() / (block * block * block) > MAX_VOTES {
+        block += 1;
+    }
+    let weight = (grid.voxel * block as f64).powi(3) as f32;
+    let [nx, ny, nz] = grid.dims;
+    (0..nz.div_ceil(block))
+        .into_par_iter()
+        .flat_map_iter(|bz| {
+            let unsure = &unsure;
+            (0..ny.div_ceil(block)).flat_map(move |by| {
+                (0..nx.div_ceil(block)).filter_map(move |bx| {
+                    let range = |b: usize, n: usize| b * block..((b + 1) * block).min(n);
+                    for z in range(bz, nz) {
+                        for y in range(by, ny) {
+                            for x in range(bx, nx) {
+                                let i = grid.index(x, y, z);
+                                let region = regions.region_of_basin[labels.get(i) as usize];
+                                if region == 0
+                                    || unsure.get(x, y, z)
+                                    || hollow.binary_search(&region).is_ok()
+                                {
+                                    continue;
+                                }
+                                return Some(Vote {
+                                    point: grid.center(x, y, z),
+                                    label: region,
+                                    weight,
+                                });
+                            }
+                        }
+                    }
+                    None
+                })
+            })
+        })
+        .collect()
+}
+
+/// FNV-1a over the triangles and settings, as 16 hexadecimal digits.
+fn input_hash(triangles: &[Triangle], settings: &BTreeMap<String, String>) -> String {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut add = |bytes: &[u8]| {
+        for &b in bytes {
+            hash = (hash ^ u64::from(b)).wrapping_mul(0x100_0000_01b3);
+        }
+    };
+    for p in triangles.iter().flatten() {
+        for v in p.as_vec3().to_array() {
+            add(&v.to_le_bytes());
+        }
+    }
+    for (k, v) in settings {
+        add(k.as_bytes());
+        add(&[0]);
+        add(v.as_bytes());
+        add(&[0]);
+    }
+    format!("{hash:016x}")
+}

@@ -1,0 +1,49 @@
+//! `enfilade demo`: a house of our own, baked.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use anyhow::Context;
+use enfilade::bake::BakeConfig;
+use enfilade::cpg::wire::encode_glb;
+use enfilade::import::export_glb;
+use enfilade_report::{PlanOptions, plan_svg};
+use enfilade_testkit::furnished_house;
+
+use crate::bake::{bake_scene, print_summary};
+use crate::output::write_atomically;
+
+/// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
+#[derive(clap::Args)]
+pub(crate) struct Demo {
+    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to.
+    #[arg(short, long, default_value = ".", value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
+    let scene = furnished_house().scene;
+    std::fs::create_dir_all(&args.output)
+        .with_context(|| format!("cannot make folder {}", args.output.display()))?;
+    let path = |name: &str| args.output.join(name);
+    write_atomically(&path("house.glb"), &export_glb(&scene))?;
+    let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
+    let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
+    write_atomically(&path("world.glb"), &bytes)?;
+    let plan = plan_svg(&baked.world, &PlanOptions::default());
+    write_atomically(&path("plan.svg"), plan.as_bytes())?;
+    let mut out = io::stdout().lock();
+    print_summary(&mut out, &baked.world)?;
+    let (house, world, plan) = (path("house.glb"), path("world.glb"), path("plan.svg"));
+    let (house, world, plan) = (house.display(), world.display(), plan.display());
+    writeln!(
+        out,
+        "\nwrote {house}, {world}, {plan}\n\nTry next:\n  \
+         enfilade inspect {world}\n  \
+         echo '2 1 2' | enfilade locate {world}\n  \
+         enfilade verify {world} --source {house}\n  \
+         enfilade bake YOUR.glb -o your-world.glb\n\
+         and open {plan} in a browser, {world} in any glTF viewer."
+    )?;
+    Ok(())
+}
