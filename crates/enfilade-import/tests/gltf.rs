@@ -207,8 +207,8 @@ fn counts_beyond_the_data_are_refused() {
         ),
         (
             "\"componentType\":5123",
-            "\"componentType\":5126",
-            "indices are F32",
+            "\"componentType\":5122",
+            "indices are I16",
         ),
         (
             "\"componentType\":5123",

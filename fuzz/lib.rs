@@ -1,0 +1,65 @@
+//! What every decoder must keep, whatever it is given.
+
+use enfilade_geom::scene::Role;
+use enfilade_import::{
+    CleaningOptions, ImportError, ImportOptions, Imported, Limits, cleaning_report, decode_gltf,
+    export_glb,
+};
+
+/// Small limits, but scenes of any size: most inputs would end at the size check otherwise.
+#[must_use]
+pub fn options() -> ImportOptions {
+    ImportOptions {
+        limits: Limits {
+            max_extent: f64::INFINITY,
+            min_extent: 0.0,
+            max_coordinate: f64::INFINITY,
+            ..Limits::tiny()
+        },
+        ..ImportOptions::default()
+    }
+}
+
+/// What is read keeps the scene's promises, can be looked at, written, and read again.
+///
+/// # Panics
+///
+/// When it does not.
+pub fn check(result: Result<Imported, ImportError>) {
+    let imported = match result {
+        Ok(imported) => imported,
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            return;
+        }
+    };
+    let scene = &imported.scene;
+    let n = |scene: &enfilade_geom::scene::Scene| {
+        [Role::Structural, Role::Detail].map(|role| scene.triangle_sources(role).count())
+    };
+    for role in [Role::Structural, Role::Detail] {
+        for source in scene.triangle_sources(role) {
+            assert!(scene.world_triangle(source).iter().all(|p| p.is_finite()));
+        }
+    }
+    for object in &scene.objects {
+        assert!(object.transform.determinant() >= 0.0);
+    }
+    let cleaning = CleaningOptions {
+        has_detail: true,
+        ..CleaningOptions::default()
+    };
+    let report = cleaning_report(scene, Some(&imported.report), &cleaning).expect("good options");
+    assert!(!report.to_string().is_empty());
+    let mut options = options();
+    // What is written is longer than what was read, and less of it is shared.
+    options.limits = Limits {
+        max_extent: f64::INFINITY,
+        min_extent: 0.0,
+        ..Limits::default()
+    };
+    options.limits.max_coordinate = f64::INFINITY;
+    let again = decode_gltf(&export_glb(scene), &options).expect("what is written can be read");
+    let total = |n: [usize; 2]| n[0] + n[1];
+    assert_eq!(total(n(&again.scene)), total(n(scene)));
+}
