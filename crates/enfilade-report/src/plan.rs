@@ -38,14 +38,16 @@ impl Default for PlanOptions {
 pub fn plan_svg(world: &World, options: &PlanOptions) -> String {
     let storeys = find_storeys(world);
     let (min, max) = extent(world);
-    let size = max - min + 2.0 * MARGIN;
+    let zoom = lettering(max - min, storeys.len());
+    let margin = MARGIN * zoom;
+    let size = max - min + 2.0 * margin;
     // Rows and columns that make the sheet about three wide by two high.
     let n = storeys.len().max(1);
     let columns = ((n as f64 * 1.5 * size.y / size.x).sqrt().round() as usize).clamp(1, n);
     let rows = n.div_ceil(columns);
     let sheet = DVec2::new(
-        (size.x * columns as f64).max(7.0),
-        size.y * rows as f64 + FOOT,
+        (size.x * columns as f64).max(8.5 * zoom),
+        size.y * rows as f64 + FOOT * zoom,
     );
     let mut out = String::new();
     let (w, h) = (number(sheet.x * SCALE), number(sheet.y * SCALE));
@@ -62,14 +64,14 @@ pub fn plan_svg(world: &World, options: &PlanOptions) -> String {
     );
     for (k, storey) in storeys.iter().enumerate() {
         let place = DVec2::new((k % columns) as f64, (k / columns) as f64) * size;
-        let origin = place + MARGIN - min;
+        let origin = place + margin - min;
         let _ = writeln!(
             out,
             "<g class=\"storey\" transform=\"translate({} {})\">",
             number(origin.x * SCALE),
             number(origin.y * SCALE)
         );
-        draw_storey(&mut out, world, options, storey, (min, max));
+        draw_storey(&mut out, world, options, storey, (min, max), zoom);
         let title = format!(
             "Storey {} of {} · floor {:+.2} m, cut {:+.2} m",
             k + 1,
@@ -78,18 +80,19 @@ pub fn plan_svg(world: &World, options: &PlanOptions) -> String {
             storey.floor + options.cut_height
         );
         // A letter is about 0.6 of its height wide; the title must not reach the next plan.
-        let room = (max.x - min.x + MARGIN) * SCALE;
-        let height = (room / (0.6 * title.chars().count() as f64)).min(45.0);
+        let room = (max.x - min.x + margin) * SCALE;
+        let height = (room / (0.6 * title.chars().count() as f64)).min(45.0 * zoom);
         text(
             &mut out,
-            min - DVec2::new(0.0, 0.4),
+            min - DVec2::new(0.0, 0.4 * zoom),
             height,
             "start",
             &title,
         );
         out.push_str("</g>\n");
     }
-    draw_foot(&mut out, DVec2::new(MARGIN, size.y * rows as f64 + 0.5));
+    let foot = DVec2::new(margin, size.y * rows as f64 + 0.5 * zoom);
+    draw_foot(&mut out, foot, zoom);
     out.push_str("</svg>\n");
     out
 }
@@ -102,6 +105,16 @@ const STYLE: &str = "<style>\
 .low{stroke:#e8590c;stroke-width:3;stroke-dasharray:10 8}\
 .stair{stroke:#e8590c;stroke-width:4;stroke-dasharray:16 10;fill:none}\
 text{fill:#222}</style>\n";
+
+/// How much larger than usual letters and margins are: sheets are looked at as a whole, whatever
+/// the size of the building. Whole numbers keep the scale bar round.
+fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
+    let side = (plan.x * plan.y * n_storeys.max(1) as f64).sqrt();
+    [4.0, 2.0]
+        .into_iter()
+        .find(|zoom| side > 20.0 * zoom)
+        .unwrap_or(1.0)
+}
 
 /// The rectangle (x and z) around all indoor cells; around the triangles where there is none.
 fn extent(world: &World) -> (DVec2, DVec2) {
@@ -138,6 +151,7 @@ fn draw_storey(
     options: &PlanOptions,
     storey: &Storey,
     (min, max): (DVec2, DVec2),
+    zoom: f64,
 ) {
     let y = storey.floor + options.cut_height + OFF_PLANES;
     let regions = Section::sample(world, y, min, max).regions();
@@ -164,7 +178,7 @@ fn draw_storey(
     for (label, region) in &regions {
         let Label::Cell(id) = label else { continue };
         // Legible where there is room; small cells get a number that still fits.
-        let height = (region.radius * 0.55).clamp(0.06, 0.32) * SCALE;
+        let height = (region.radius * 0.55).clamp(0.06, 0.32 * zoom) * SCALE;
         text(out, region.inner, height, "middle", &id.to_string());
         if region.radius > 0.25 {
             let below = region.inner + DVec2::new(0.0, height / SCALE * 0.9);
@@ -270,8 +284,9 @@ fn draw_portal(out: &mut String, id: usize, portal: &Portal, storey: &Storey, y:
     let mut segments: Vec<(DVec2, DVec2)> = pieces.collect();
     let mut class = kind;
     if segments.is_empty() {
-        // Not cut: what is in the storey all the same is drawn as wide as it is.
-        let is_inside = high > storey.floor && low < storey.top;
+        // Not cut: what is in the storey all the same, by half of its height at least (a lintel
+        // may hang through a ceiling, and a sill stand in the floor), is drawn as wide as it is.
+        let is_inside = high.min(storey.top) - low.max(storey.floor) > 0.5 * (high - low);
         if !is_inside {
             return;
         }
@@ -380,8 +395,12 @@ fn draw_details(out: &mut String, world: &World, storey: &Storey, y: f64) {
 }
 
 /// Scale bar and legend.
-fn draw_foot(out: &mut String, at: DVec2) {
-    let _ = writeln!(out, "<g transform=\"translate({})\">", point(at));
+fn draw_foot(out: &mut String, at: DVec2, zoom: f64) {
+    let _ = writeln!(
+        out,
+        "<g transform=\"translate({}) scale({zoom})\">",
+        point(at)
+    );
     for k in 0..5 {
         let fill = if k % 2 == 0 { "#000" } else { "#fff" };
         let _ = writeln!(
@@ -391,7 +410,13 @@ fn draw_foot(out: &mut String, at: DVec2) {
         );
     }
     text(out, DVec2::new(0.0, 0.4), 22.0, "middle", "0");
-    text(out, DVec2::new(5.0, 0.4), 22.0, "middle", "5 m");
+    text(
+        out,
+        DVec2::new(5.0, 0.4),
+        22.0,
+        "middle",
+        &format!("{} m", 5.0 * zoom),
+    );
     let entries = [
         ("open", "opening"),
         ("door", "door"),

@@ -181,6 +181,23 @@ fn a_window_above_the_cut_is_drawn_and_a_hatch_below_it_too() {
 }
 
 #[test]
+fn a_door_that_only_touches_a_storey_is_left_to_its_own() {
+    let mut world = two_storeys();
+    let (x, y) = (1.0, 3.2);
+    // Its sill stands 5 cm below the upper floor.
+    let quad = [[x, y, 1.0], [x, 5.2, 1.0], [x, 5.2, 2.0], [x, y, 2.0]];
+    world
+        .graph
+        .portals
+        .push(portal([CellId(0), CellId(1)], PortalKind::Open, quad));
+    let svg = plan(&world);
+    assert_eq!(
+        (paths(&svg, "low").len(), paths(&svg, "open").len()),
+        (0, 1)
+    );
+}
+
+#[test]
 fn storeys_are_found_by_their_floors_and_share_the_stair_hole() {
     let world = two_storeys();
     let storeys = find_storeys(&world);
