@@ -43,7 +43,7 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     }
     // The end of the segment is on a boundary, so it is followed to a point short of the triangle
     // by more than the triangle may be misplaced.
-    let slack = 2.0 * subject.eps / surface_slope(subject, hit.triangle, ray.direction).max(1e-3);
+    let slack = 3.0 * subject.eps / surface_slope(subject, hit.triangle, ray.direction).max(1e-3);
     let end = ray.at(hit.t - slack);
     let mut crossings = Vec::new();
     subject.crossings(a, at, &mut crossings);
@@ -53,10 +53,16 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
         counts.grazing += 1;
         return;
     }
-    let Ok(cell) = follow(subject, rng, a, end, start, &mut crossings) else {
-        // The way there is not sealed; the other promise reports that.
-        counts.unresolved += 1;
-        return;
+    let cell = match follow(subject, rng, a, end, start, &mut crossings) {
+        Ok(cell) => cell,
+        Err(wrong) => {
+            // The way there is a segment like any other, so it breaks the other promise.
+            counts.unresolved += 1;
+            if !subject.is_close_to_surface(end) {
+                tally.add_failure(subject, Failure::of_break(&wrong, i, [a, end], &crossings));
+            }
+            return;
+        }
     };
     let (mut is_listed, mut is_present) = (false, false);
     let window = Ray {

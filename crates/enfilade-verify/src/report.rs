@@ -51,7 +51,7 @@ pub struct CompleteCounts {
     pub grazing: u64,
     /// Started on a surface.
     pub on_surface: u64,
-    /// The portals on the way did not lead to a cell; *sealed* judges that.
+    /// The portals on the way did not lead to a cell; listed as breaks of *sealed*.
     pub unresolved: u64,
 }
 
@@ -247,7 +247,7 @@ pub struct VerifyReport {
     pub complete: CompleteCounts,
     /// Cells in which no point was found, so that nothing is known about them.
     pub unsampled_cells: Vec<u32>,
-    /// Segments that break *sealed*.
+    /// Segments, and ways of rays to their triangles, that break *sealed*.
     pub unsealed: u64,
     /// Rays that break *complete*.
     pub incomplete: u64,
