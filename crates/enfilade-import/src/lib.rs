@@ -8,6 +8,16 @@
 //! Each object's transform has a determinant of at least 0: a mirrored placement gets a mirrored
 //! mesh, so front faces are counter-clockwise in world space without further thought.
 //!
+//! ```
+//! use enfilade_import::{ImportOptions, decode_obj};
+//!
+//! let text = b"o Wall\nv 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nf 1 2 3 4\n";
+//! let imported = decode_obj(text, &ImportOptions::default())?;
+//! assert_eq!(imported.scene.objects[0].reason, "name: 'wall'");
+//! assert_eq!(imported.scene.meshes[0].primitives[0].indices.len(), 6);
+//! # Ok::<(), enfilade_import::ImportError>(())
+//! ```
+//!
 //! Not promised: animation, skins, morph targets, cameras, lights, curves, points and lines; they
 //! are left out with a note.
 

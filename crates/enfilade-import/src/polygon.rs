@@ -95,6 +95,7 @@ impl Splitter {
             &[] as &[u32],
             &mut self.triangles,
         );
+        // All seen are counter-clockwise, but the crate does not promise it.
         let mut triangles = std::mem::take(&mut self.triangles);
         for t in triangles.chunks_exact_mut(3) {
             if self.area([t[0], t[1], t[2]].map(|i| i as usize)) < 0.0 {

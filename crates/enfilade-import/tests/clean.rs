@@ -95,6 +95,15 @@ fn faults_are_told_apart() {
 }
 
 #[test]
+fn an_open_surface_has_no_inside() {
+    // Turned inwards and without its top: no shell, whatever its signed volume.
+    let mut open = cube();
+    open.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
+    open.indices.drain(18..24);
+    assert_eq!(counts(&of(open)), [("open edges", 4)]);
+}
+
+#[test]
 fn a_corner_in_the_middle_of_an_edge_is_a_t_junction() {
     let primitive = |y: f32| Primitive {
         positions: vec![
@@ -240,5 +249,29 @@ proptest! {
         }
         let expected = uses.values().filter(|&&n| n == 1).count() as u64;
         prop_assert_eq!(of(mesh).open_edges.n, expected);
+    }
+
+    /// Corners nearer than the welding distance are one, wherever they lie; farther ones are two.
+    #[test]
+    fn welding_knows_no_borders(
+        at in prop::array::uniform3(-2e-4f32..2e-4),
+        off in prop::array::uniform3(-1.0f64..1.0),
+    ) {
+        let off = DVec3::from_array(off).try_normalize().unwrap_or(DVec3::X);
+        // Two triangles with a common edge, whose second one is moved by `step`.
+        let n_open = |step: f64| {
+            let p = |q: DVec3| q.to_array().map(|c| c as f32);
+            let a = v(at[0].into(), at[1].into(), at[2].into());
+            let b = a + DVec3::X * 0.01;
+            let move_by = off * step;
+            of(Primitive {
+                positions: vec![p(a), p(b), p(a + DVec3::Y), p(b + move_by), p(a + move_by),
+                    p(a - DVec3::Y)],
+                indices: vec![0, 1, 2, 3, 4, 5],
+                ..Primitive::default()
+            }).open_edges.n
+        };
+        prop_assert_eq!(n_open(0.9e-5), 4);
+        prop_assert_eq!(n_open(1.1e-5), 6);
     }
 }

@@ -103,6 +103,33 @@ fn quantized_sparse_and_unindexed_positions_are_read() {
 }
 
 #[test]
+fn sparse_indices_out_of_order_and_overlapping_elements_are_errors() {
+    let sparse = |indices: [u8; 2]| {
+        let mut bin = vec![0; 24];
+        bin.extend(indices);
+        let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+            "accessors":[{"componentType":5126,"count":3,"type":"VEC3",
+            "sparse":{"count":2,"indices":{"bufferView":1,"componentType":5121},
+            "values":{"bufferView":0}}}],
+            "bufferViews":[{"buffer":0,"byteLength":24},
+            {"buffer":0,"byteOffset":24,"byteLength":2}],"buffers":[{"byteLength":26}]}"#;
+        read(json, &bin).unwrap_err().to_string()
+    };
+    for bad in [[2, 1], [1, 1], [1, 3]] {
+        assert!(
+            sparse(bad).contains("do not increase or are out of range"),
+            "{bad:?}"
+        );
+    }
+    assert!(sparse([1, 2]).contains("one point"), "all corners are zero");
+    let json = triangle_json(r#""nodes":[{"mesh":0}]"#)
+        .replace("\"byteLength\":36}", "\"byteLength\":36,\"byteStride\":4}");
+    let error = read(&json, &triangle_bin()).unwrap_err().to_string();
+    assert!(error.contains("stride 4 is less than"), "{error}");
+}
+
+#[test]
 fn bad_node_trees_are_errors() {
     for (members, text) in [
         (
