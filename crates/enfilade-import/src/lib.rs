@@ -1,4 +1,4 @@
-//! Reads glTF, GLB, OBJ, PLY and STL into one [`Scene`](enfilade_geom::scene::Scene).
+//! Reads glTF, GLB, OBJ, PLY and STL into one [`Scene`].
 //!
 //! [`import`] takes any number of files and gives one scene, in meters and +Y up, with a role for
 //! each object and a report of everything skipped or repaired. Input is not trusted: each count,
