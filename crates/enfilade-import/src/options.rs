@@ -16,7 +16,7 @@ pub enum Up {
 /// How to read.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
-    /// Meters per input unit; `None` is 1. [Limit: > 0, finite]
+    /// Meters per input unit; `None` is 1, and it must be from 1e-9 to 1e9.
     pub unit: Option<f64>,
     /// The input's up axis; `None` is [`Up::Y`] for every format.
     pub up: Option<Up>,
