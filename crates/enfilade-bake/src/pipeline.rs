@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use enfilade_cpg::{Provenance, Statistics, World};
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Bvh, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
 use crate::assemble::{Parts, assemble};
@@ -18,7 +18,8 @@ use crate::voxel::{
 };
 use crate::watershed::{
     Flooded, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
-    fit_screen, flood_closures, hollow_regions, merge_basins, opening_of, slab_heights,
+    find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
+    slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -59,7 +60,18 @@ pub fn bake(
     }
     let bvh = Bvh::build(&triangles);
     let grid = config.grid(&bounds_of(&triangles))?;
-    let occupied = voxelize(&grid, &triangles);
+    // Stairs stand in rooms and bound none.
+    let is_stair = find_stairs(&sources, &triangles);
+    let part = |stairs: bool| -> Vec<Triangle> {
+        triangles
+            .iter()
+            .zip(&is_stair)
+            .filter(|t| *t.1 == stairs)
+            .map(|t| *t.0)
+            .collect()
+    };
+    let (walls, stairs) = (part(false), part(true));
+    let occupied = voxelize(&grid, &walls);
     let closures = voxelize(&grid, &closure_triangles(scene));
 
     // 2. How far every voxel of air is from a surface; door leaves count as surfaces here.
@@ -89,7 +101,7 @@ pub fn bake(
         .map(|s| ((s.a, s.b), s.distance as f32))
         .collect();
     flood_closures(grid.dims, &mut labels, &occupied);
-    let slabs = slab_heights(&triangles);
+    let slabs = slab_heights(&walls);
     for parent in cut_at_slabs(&grid, &mut labels, peaks.len(), &slabs) {
         peaks.push(peaks[parent as usize]);
     }
@@ -110,8 +122,15 @@ pub fn bake(
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
-    let screens = fit_screens(&grid, &labels, &regions, &closures, &triangles, &bvh);
-    let votes = votes(&grid, &labels, &regions, &hollow);
+    let screens = fit_screens(&grid, &labels, &regions, &closures, &walls);
+    let votes = votes(
+        &grid,
+        &labels,
+        &regions,
+        &hollow,
+        &inside_of(&stairs, &grid, &bvh),
+    );
+    drop(walls);
     drop(labels);
     drop(closures);
 
@@ -207,8 +226,8 @@ fn fit_screens(
     regions: &Regions,
     closures: &BitVolume,
     triangles: &[Triangle],
-    bvh: &Bvh,
 ) -> Vec<Screen> {
+    let bvh = Bvh::build(triangles);
     let openings: Vec<([u32; 2], Vec<u64>)> = regions
         .contacts
         .iter()
@@ -242,7 +261,13 @@ const MAX_VOTES: usize = 1_000_000;
 const UNSURE: f64 = 0.35;
 
 /// One voxel of each block of `n`³ speaks for its region.
-fn votes(grid: &Grid, labels: &Labels, regions: &Regions, hollow: &[u32]) -> Vec<Vote> {
+fn votes(
+    grid: &Grid,
+    labels: &Labels,
+    regions: &Regions,
+    hollow: &[u32],
+    solid: &BitVolume,
+) -> Vec<Vote> {
     let mut unsure = BitVolume::new(grid.dims);
     let reach = (UNSURE / grid.voxel).ceil() as usize;
     for faces in regions.contacts.values() {
@@ -284,6 +309,7 @@ fn votes(grid: &Grid, labels: &Labels, regions: &Regions, hollow: &[u32]) -> Vec
                                 let region = regions.region_of_basin[labels.get(i) as usize];
                                 if region == 0
                                     || unsure.get(x, y, z)
+                                    || solid.get(x, y, z)
                                     || hollow.binary_search(&region).is_ok()
                                 {
                                     continue;
@@ -301,6 +327,48 @@ fn votes(grid: &Grid, labels: &Labels, regions: &Regions, hollow: &[u32]) -> Vec
             })
         })
         .collect()
+}
+
+/// Voxels that stairs fill: those that they touch, and those between from which one sees backs.
+fn inside_of(stairs: &[Triangle], grid: &Grid, bvh: &Bvh) -> BitVolume {
+    let mut filled = voxelize(grid, stairs);
+    let bounds = bounds_of(stairs);
+    let (Some(lo), Some(hi)) = (grid.voxel_at(bounds.min), grid.voxel_at(bounds.max)) else {
+        return filled;
+    };
+    let up_and_down = [
+        DVec3::new(0.013, 1.0, 0.007),
+        DVec3::new(-0.007, -1.0, 0.013),
+    ];
+    let inner: Vec<[usize; 3]> = (lo[2]..=hi[2])
+        .into_par_iter()
+        .flat_map_iter(|z| {
+            let filled = &filled;
+            (lo[1]..=hi[1]).flat_map(move |y| {
+                (lo[0]..=hi[0])
+                    .filter(move |&x| !filled.get(x, y, z))
+                    .filter_map(move |x| {
+                        let origin = grid.center(x, y, z);
+                        let sees_back = |direction: DVec3| {
+                            let ray = Ray {
+                                origin,
+                                direction,
+                                t_max: f64::INFINITY,
+                            };
+                            bvh.closest_hit(&ray, |_| false).is_some_and(|h| !h.front)
+                        };
+                        up_and_down
+                            .iter()
+                            .all(|&d| sees_back(d))
+                            .then_some([x, y, z])
+                    })
+            })
+        })
+        .collect();
+    for [x, y, z] in inner {
+        filled.set(x, y, z, true);
+    }
+    filled
 }
 
 /// FNV-1a over the triangles and settings, as 16 hexadecimal digits.

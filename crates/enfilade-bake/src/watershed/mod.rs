@@ -10,6 +10,7 @@ mod fit;
 mod hollow;
 mod regions;
 mod slabs;
+mod stairs;
 
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen};
@@ -19,3 +20,4 @@ pub use regions::{
     group_faces, merge_basins, opening_of,
 };
 pub use slabs::{cut_at_slabs, slab_heights};
+pub use stairs::find_stairs;

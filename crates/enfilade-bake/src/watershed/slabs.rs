@@ -17,7 +17,7 @@ use crate::voxel::{Grid, Labels};
 use super::regions::OUTDOORS;
 
 /// A level counts when its surfaces cover this share of the scene's plan.
-const MIN_SHARE: f64 = 0.02;
+const MIN_SHARE: f64 = 0.08;
 /// The two faces of one slab lie no further apart than this. [Units: wu]
 const MAX_SLAB: f64 = 0.5;
 /// A part of a basin smaller than this is not worth a cut. [Units: wu³]

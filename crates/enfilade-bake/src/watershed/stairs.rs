@@ -1,0 +1,225 @@
+//! Stairs: structure that bounds no room.
+//!
+//! A flight of stairs stands in a room like furniture, but it is as large as a wall: treads without
+//! risers fence off the space below them, and a winding flight pinches the room it stands in. The
+//! flood therefore does not see stairs (Haumont et al. 2003, §6.1 leave furniture out for the same
+//! reason); everything exact, the cell complex above all, still does.
+//!
+//! A group of triangles is a flight when it holds a chain of level surfaces, each a riser above the
+//! one before and a step aside. Shelves and louvers lie straight above each other and are none.
+
+use std::collections::HashMap;
+
+use enfilade_geom::scene::TriangleSource;
+use enfilade_geom::{Aabb, DVec3, Triangle, triangle_area_normal};
+
+/// Rise from one step to the next. [Units: wu]
+const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.25;
+/// Level distance between the middles of one step and the next. [Units: wu]
+const GOING: std::ops::RangeInclusive<f64> = 0.12..=1.2;
+/// Area of a step. [Units: wu²]
+const STEP_AREA: std::ops::RangeInclusive<f64> = 0.03..=4.0;
+/// Steps in a row that make a flight.
+const MIN_STEPS: usize = 4;
+/// Objects with a larger plan are looked at shell by shell: a whole building may be one. [Units: wu²]
+const MAX_PLAN: f64 = 40.0;
+
+/// Which triangles belong to stairs.
+#[must_use]
+pub fn find_stairs(sources: &[TriangleSource], triangles: &[Triangle]) -> Vec<bool> {
+    let mut is_stair = vec![false; triangles.len()];
+    let mut start = 0;
+    while start < sources.len() {
+        let object = sources[start].object;
+        let len = sources[start..]
+            .iter()
+            .take_while(|s| s.object == object)
+            .count();
+        let members: Vec<usize> = (start..start + len).collect();
+        start += len;
+        let size = bounds(triangles, &members).size();
+        let groups = if size.x * size.z <= MAX_PLAN {
+            vec![members]
+        } else {
+            shells(triangles, &members)
+        };
+        for group in groups {
+            if is_flight(triangles, &group) {
+                group.iter().for_each(|&t| is_stair[t] = true);
+            }
+        }
+    }
+    is_stair
+}
+
+fn bounds(triangles: &[Triangle], members: &[usize]) -> Aabb {
+    Aabb::of_points(members.iter().flat_map(|&t| &triangles[t]))
+}
+
+/// Triangles that hang together by equal corners, in order of their first triangle.
+fn shells(triangles: &[Triangle], members: &[usize]) -> Vec<Vec<usize>> {
+    let mut parent: Vec<u32> = (0..members.len() as u32).collect();
+    fn root(parent: &mut [u32], mut a: u32) -> u32 {
+        while parent[a as usize] != a {
+            parent[a as usize] = parent[parent[a as usize] as usize];
+            a = parent[a as usize];
+        }
+        a
+    }
+    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
+    for (i, &t) in members.iter().enumerate() {
+        for p in triangles[t] {
+            // Adding zero makes -0 and 0 one key.
+            let key = (p + DVec3::ZERO).to_array().map(f64::to_bits);
+            let other = *first_at.entry(key).or_insert(i as u32);
+            let (a, b) = (root(&mut parent, i as u32), root(&mut parent, other));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut index: HashMap<u32, usize> = HashMap::new();
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (i, &t) in members.iter().enumerate() {
+        let r = root(&mut parent, i as u32);
+        let at = *index.entry(r).or_insert_with(|| {
+            groups.push(Vec::new());
+            groups.len() - 1
+        });
+        groups[at].push(t);
+    }
+    groups
+}
+
+fn is_flight(triangles: &[Triangle], members: &[usize]) -> bool {
+    if members.len() < 2 * MIN_STEPS {
+        return false;
+    }
+    let size = bounds(triangles, members).size();
+    if size.x * size.z > MAX_PLAN {
+        return false;
+    }
+    // Treads face up; in a model turned inside out, down.
+    [1.0, -1.0]
+        .iter()
+        .any(|&side| longest_flight(&levels(triangles, members, side)) >= MIN_STEPS)
+}
+
+/// A level surface: its middle and area. Triangles at one height that touch in plan are one.
+struct Level {
+    middle: DVec3,
+    area: f64,
+}
+
+fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
+    let mut flat: Vec<(f64, DVec3, f64)> = members
+        .iter()
+        .filter_map(|&t| {
+            let n = triangle_area_normal(&triangles[t]);
+            let area = n.length() * 0.5;
+            (n.y * side > 0.95 * n.length() && area > 1e-6).then(|| {
+                let middle = (triangles[t][0] + triangles[t][1] + triangles[t][2]) / 3.0;
+                (middle.y, middle, area)
+            })
+        })
+        .collect();
+    flat.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut out: Vec<Level> = Vec::new();
+    for (y, middle, area) in flat {
+        // A step is small: what lies further off at the same height is a step of another flight.
+        let home = out
+            .iter_mut()
+            .rev()
+            .take_while(|l| y - l.middle.y < 0.02)
+            .find(|l| {
+                let d = l.middle - middle;
+                DVec3::new(d.x, 0.0, d.z).length() < 1.2
+            });
+        match home {
+            Some(l) => {
+                l.middle = (l.middle * l.area + middle * area) / (l.area + area);
+                l.area += area;
+            }
+            None => out.push(Level { middle, area }),
+        }
+    }
+    out.retain(|l| STEP_AREA.contains(&l.area));
+    out
+}
+
+/// Steps of the longest chain in which each is a rise above and a going aside from the one before.
+fn longest_flight(levels: &[Level]) -> usize {
+    // Levels ascend, so that a chain only looks back.
+    let mut longest = vec![1_usize; levels.len()];
+    for i in 0..levels.len() {
+        for j in (0..i).rev() {
+            let d = levels[i].middle - levels[j].middle;
+            if d.y > *RISE.end() + 0.05 {
+                break;
+            }
+            let going = DVec3::new(d.x, 0.0, d.z).length();
+            if RISE.contains(&d.y) && GOING.contains(&going) {
+                longest[i] = longest[i].max(longest[j] + 1);
+            }
+        }
+    }
+    longest.into_iter().max().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quad(out: &mut Vec<Triangle>, a: DVec3, u: DVec3, v: DVec3) {
+        out.push([a, a + u, a + u + v]);
+        out.push([a, a + u + v, a + v]);
+    }
+
+    /// `n` treads, each `going` further along x and 0.18 m higher.
+    fn treads(n: usize, going: f64) -> Vec<Triangle> {
+        let mut out = Vec::new();
+        for i in 0..n {
+            let at = DVec3::new(i as f64 * going, i as f64 * 0.18, 0.0);
+            quad(&mut out, at, DVec3::Z, DVec3::X * 0.28);
+        }
+        out
+    }
+
+    fn sources(n: usize) -> Vec<TriangleSource> {
+        (0..n)
+            .map(|i| TriangleSource {
+                object: 0,
+                primitive: 0,
+                triangle: i as u32,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_flight_is_found_and_a_shelf_is_not() {
+        let flight = treads(8, 0.28);
+        assert!(find_stairs(&sources(16), &flight).iter().all(|&s| s));
+        let shelf = treads(8, 0.0);
+        assert!(!find_stairs(&sources(16), &shelf).iter().any(|&s| s));
+        let two_steps = treads(3, 0.28);
+        assert!(!find_stairs(&sources(6), &two_steps).iter().any(|&s| s));
+    }
+
+    #[test]
+    fn a_flight_inside_one_large_mesh_is_found_by_its_shell() {
+        let mut all = Vec::new();
+        for i in 0..8 {
+            let at = DVec3::new(f64::from(i) * 0.28, f64::from(i) * 0.18, 0.0);
+            quad(&mut all, at, DVec3::Z, DVec3::X * 0.28);
+            quad(&mut all, at + DVec3::X * 0.28, DVec3::Z, DVec3::Y * 0.18);
+        }
+        let n = all.len();
+        quad(
+            &mut all,
+            DVec3::new(-20.0, -1.0, -20.0),
+            DVec3::Z * 40.0,
+            DVec3::X * 40.0,
+        );
+        let found = find_stairs(&sources(n + 2), &all);
+        assert!(found[..n].iter().all(|&s| s));
+        assert!(!found[n..].iter().any(|&s| s));
+    }
+}
