@@ -9,6 +9,7 @@ pub mod complex;
 mod config;
 mod context;
 mod error;
+mod join;
 pub mod pipeline;
 pub mod voxel;
 pub mod watershed;

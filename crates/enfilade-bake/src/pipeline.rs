@@ -12,14 +12,15 @@ use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
 use crate::assemble::{Parts, assemble};
-use crate::complex::{ComplexInput, LabelSettings, Leak, Vote, build_complex};
+use crate::complex::{ComplexInput, LabelSettings, Leak, Partition, Vote, build_complex};
+use crate::join::{VOID, join_voids};
 use crate::voxel::{
     BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
 };
 use crate::watershed::{
     Flooded, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
     find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
-    slab_heights,
+    shallow_voids, slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -123,13 +124,18 @@ pub fn bake(
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
     let screens = fit_screens(&grid, &labels, &regions, &closures, &walls);
-    let votes = votes(
+    let mut votes = votes(
         &grid,
         &labels,
         &regions,
         &hollow,
         &inside_of(&stairs, &grid, &bvh),
     );
+    let voids = shallow_voids(&walls, &bvh, &|p| {
+        grid.voxel_at(p).map_or(0, |[x, y, z]| {
+            regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
+        })
+    });
     drop(walls);
     drop(labels);
     drop(closures);
@@ -145,7 +151,38 @@ pub fn bake(
 
     // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
     context.stage(6)?;
-    let partition = complex.partition(&votes, &LabelSettings::default());
+    let mut partition = complex.partition(&votes, &LabelSettings::default());
+    // What rays found above ceilings and no room's votes reached.
+    let unreached: Vec<Vote> = voids
+        .into_iter()
+        .filter(|(p, _)| partition.locator.locate(*p).is_none())
+        .map(|(point, region)| Vote {
+            point,
+            label: VOID | region,
+            weight: 1e-3,
+        })
+        .collect();
+    if !unreached.is_empty() {
+        let n = votes.len();
+        votes.extend(unreached);
+        partition = complex.partition(&votes, &LabelSettings::default());
+        // What opens to something is a cavity of the construction, not a void: left as it was.
+        let opens = portalled_cells(&partition);
+        let mut rest = votes.split_off(n);
+        let n_voids = rest.len();
+        rest.retain(|v| {
+            partition
+                .locator
+                .locate(v.point)
+                .is_none_or(|c| !opens[c.0 as usize])
+        });
+        let is_final = rest.len() == n_voids;
+        votes.extend(rest);
+        if !is_final {
+            partition = complex.partition(&votes, &LabelSettings::default());
+        }
+        join_voids(&mut partition);
+    }
     drop(votes);
     let outward = complex.opening_tolerance();
     let counts = [
@@ -195,6 +232,15 @@ pub fn bake(
         times: context.times(),
         leaks,
     })
+}
+
+/// Which cells have a portal.
+fn portalled_cells(partition: &Partition) -> Vec<bool> {
+    let mut opens = vec![false; partition.label_of_cell.len()];
+    for p in &partition.portals {
+        p.cells.iter().for_each(|&c| opens[c as usize] = true);
+    }
+    opens
 }
 
 /// Structural triangles that have an area, with where they came from.

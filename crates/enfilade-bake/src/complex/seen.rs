@@ -51,6 +51,28 @@ impl TriangleCells {
             [self.offsets[2 * triangle + 1] as usize..self.offsets[2 * triangle + 2] as usize]
     }
 
+    /// The same with each cell `c` called `number[c]`; several may become one.
+    ///
+    /// # Panics
+    /// When a cell has no number.
+    #[must_use]
+    pub fn renumbered(&self, number: &[u32]) -> Self {
+        let mut out = Self {
+            offsets: Vec::with_capacity(self.offsets.len()),
+            cells: Vec::with_capacity(self.cells.len()),
+        };
+        out.offsets.push(0);
+        for list in self.offsets.windows(2) {
+            let old = &self.cells[list[0] as usize..list[1] as usize];
+            let mut new: SmallVec<[u32; 8]> = old.iter().map(|&c| number[c as usize]).collect();
+            new.sort_unstable();
+            new.dedup();
+            out.cells.extend(new);
+            out.offsets.push(out.cells.len() as u32);
+        }
+        out
+    }
+
     /// Cells that see either side, ascending, none twice.
     ///
     /// # Panics

@@ -164,7 +164,7 @@ fn sample_points(
 }
 
 /// Rays that meet a back, and rays that meet anything.
-fn count_backs(bvh: &Bvh, points: &[DVec3]) -> (f64, f64) {
+pub(super) fn count_backs(bvh: &Bvh, points: &[DVec3]) -> (f64, f64) {
     let mut directions = Vec::new();
     for x in -1..=1 {
         for y in -1..=1 {

@@ -11,6 +11,7 @@ mod hollow;
 mod regions;
 mod slabs;
 mod stairs;
+mod voids;
 
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen};
@@ -21,3 +22,4 @@ pub use regions::{
 };
 pub use slabs::{cut_at_slabs, slab_heights};
 pub use stairs::find_stairs;
+pub use voids::shallow_voids;

@@ -1,0 +1,88 @@
+//! Shallow voids: the air above a hung ceiling, below a raised floor.
+//!
+//! Nothing can get into them and no ball of a room's size fits, yet they are air between two front
+//! faces, not the inside of anything. They are part of the room whose ceiling they lie on. Voxels are
+//! too coarse for them, so they are found by rays: straight up from every surface that faces up, a
+//! surface that faces down, close above.
+//!
+//! Cost: a ray for each 0.5 m² of level surface, and a walk down a few voxels.
+
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
+use rayon::prelude::*;
+
+use super::hollow::count_backs;
+
+/// Voids are lower than this. [Units: wu] From there on they are rooms of their own.
+const MAX_HEIGHT: f64 = 0.5;
+/// What lies between a void and its room is thinner than this. [Units: wu]
+const MAX_CEILING: f64 = 0.4;
+/// One sample for each piece of surface of this area. [Units: wu²]
+const SAMPLE_AREA: f64 = 0.5;
+/// Most samples on one triangle.
+const MAX_SAMPLES: usize = 64;
+
+/// Points in shallow voids, each with the region below its floor, in order of the triangles.
+///
+/// `region_at` tells the region of a point, 0 where there is none.
+#[must_use]
+pub fn shallow_voids(
+    triangles: &[Triangle],
+    bvh: &Bvh,
+    region_at: &(dyn Fn(DVec3) -> u32 + Sync),
+) -> Vec<(DVec3, u32)> {
+    triangles
+        .par_iter()
+        .flat_map_iter(|t| {
+            let n = triangle_area_normal(t);
+            let faces_up = n.y > 0.95 * n.length();
+            let wanted = (n.length() * 0.5 / SAMPLE_AREA).ceil() as usize;
+            let samples = if faces_up {
+                wanted.clamp(1, MAX_SAMPLES)
+            } else {
+                0
+            };
+            (0..samples).filter_map(move |k| {
+                let p = sample(t, k, samples);
+                let ray = Ray {
+                    origin: p + DVec3::Y * 1e-3,
+                    direction: DVec3::Y,
+                    t_max: MAX_HEIGHT,
+                };
+                let hit = bvh.closest_hit(&ray, |_| false)?;
+                if !hit.front {
+                    return None; // the back of a face: we are inside something
+                }
+                let middle = p + DVec3::Y * (hit.t * 0.5);
+                // Where solids overlap, one sees fronts up and down and backs to the sides.
+                if count_backs(bvh, &[middle]).0 > 0.0 {
+                    return None;
+                }
+                let mut depth = 0.05;
+                while depth <= MAX_CEILING {
+                    let region = region_at(p - DVec3::Y * depth);
+                    if region != 0 {
+                        return Some((middle, region));
+                    }
+                    depth += 0.05;
+                }
+                None
+            })
+        })
+        .collect()
+}
+
+/// The `k`-th of `n` points spread over a triangle by the R2 sequence (Roberts 2018), folded.
+fn sample(t: &Triangle, k: usize, n: usize) -> DVec3 {
+    if n == 1 {
+        return (t[0] + t[1] + t[2]) / 3.0;
+    }
+    let i = k as f64 + 1.0;
+    let (mut u, mut v) = (
+        (0.5 + i * 0.754_877_666_2).fract(),
+        (0.5 + i * 0.569_840_291).fract(),
+    );
+    if u + v > 1.0 {
+        (u, v) = (1.0 - u, 1.0 - v);
+    }
+    t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v
+}
