@@ -119,7 +119,14 @@ pub fn bake(
         slabs: &slabs,
     };
     let regions = merge_basins(flooded, &saddles, &config.merge);
-    let hollow = hollow_regions(&grid, &labels, &regions, &peaks, &bvh);
+    let hollow = hollow_regions(
+        &grid,
+        &labels,
+        &regions,
+        &peaks,
+        &bvh,
+        config.merge.min_radius,
+    );
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;

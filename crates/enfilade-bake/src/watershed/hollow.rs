@@ -23,7 +23,9 @@ const NARROW: f64 = 0.5;
 /// Points that ask around in each region.
 const POINTS: usize = 32;
 
-/// The region labels that are solid matter, ascending.
+/// The region labels that are no rooms, ascending: solid matter, and closed-off spaces in which no
+/// ball of `min_radius` fits (bays between rafters, gaps in the construction). What of the latter
+/// leaks into a room is part of that room after all: the cell complex sees to it.
 #[must_use]
 pub fn hollow_regions(
     grid: &Grid,
@@ -31,6 +33,7 @@ pub fn hollow_regions(
     regions: &Regions,
     peaks: &[f32],
     bvh: &Bvh,
+    min_radius: f64,
 ) -> Vec<u32> {
     let enclosed = enclosed_groups(regions);
     let mut radius: BTreeMap<u32, f32> = BTreeMap::new();
@@ -63,11 +66,14 @@ pub fn hollow_regions(
     let mut doubtful: Vec<u32> = Vec::new();
     let mut any_room = enclosed.len() < n_groups(regions);
     for group in &enclosed {
-        let narrow = group
+        // A voxel center next to a wall is already half a voxel away from it at least.
+        let widest = group
             .iter()
-            .all(|r| f64::from(radius[r]) * grid.voxel < NARROW);
+            .map(|r| f64::from(radius[r]) - 0.5)
+            .fold(0.0, f64::max)
+            * grid.voxel;
         let back = share(group);
-        if back > 0.6 && narrow {
+        if widest < min_radius || (back > 0.6 && widest < NARROW) {
             hollow.extend(group);
         } else if back > 0.9 && trusted {
             doubtful.extend(group);

@@ -334,14 +334,22 @@ impl Merger<'_> {
         self.queue.clear();
     }
 
-    /// Joins `b` into `a` (`a < b`, so outdoors always survives).
+    /// Joins two cells. The one with more neighbors survives, except that outdoors always does.
     fn merge(&mut self, a: u32, b: u32) {
+        let pair = (a.min(b), a.max(b));
+        let n = |c: u32| self.neighbors[c as usize].len();
+        let (a, b) = if a != OUTDOORS && (b == OUTDOORS || n(b) > n(a)) {
+            (b, a)
+        } else {
+            (a, b)
+        };
         self.parent[b as usize] = a;
         self.peak[a as usize] = self.peak[a as usize].max(self.peak[b as usize]);
         self.version[a as usize] += 1;
-        self.contacts.remove(&(a, b));
-        self.saddles.remove(&(a, b));
+        self.contacts.remove(&pair);
+        self.saddles.remove(&pair);
         self.neighbors[a as usize].remove(&b);
+        let mut changed = Vec::new();
         for c in std::mem::take(&mut self.neighbors[b as usize]) {
             if c == a {
                 continue;
@@ -361,14 +369,12 @@ impl Merger<'_> {
             self.neighbors[c as usize].remove(&b);
             self.neighbors[c as usize].insert(a);
             self.neighbors[a as usize].insert(c);
+            changed.push(new);
         }
-        // What the grown cell touches is weighed again: now, in parallel, and in order of labels.
-        let around: Vec<(u32, u32)> = self.neighbors[a as usize]
-            .iter()
-            .map(|&c| (a.min(c), a.max(c)))
-            .collect();
-        let ratios: Vec<f64> = around.par_iter().map(|&(p, q)| self.ratio(p, q)).collect();
-        for (&(p, q), ratio) in around.iter().zip(ratios) {
+        // Pairs whose opening changed are weighed again at once. The others only compare with a cell
+        // that grew, which can but lower their ratio: they are weighed again when their turn comes.
+        let ratios: Vec<f64> = changed.par_iter().map(|&(p, q)| self.ratio(p, q)).collect();
+        for (&(p, q), ratio) in changed.iter().zip(ratios) {
             self.push(p, q, ratio);
         }
     }
