@@ -32,10 +32,10 @@ pub(crate) struct Parts<'a> {
     pub(crate) statistics: Statistics,
 }
 
-pub(crate) fn assemble(parts: Parts<'_>) -> World {
+pub(crate) fn assemble(parts: &Parts<'_>) -> World {
     let Parts {
         scene, partition, ..
-    } = &parts;
+    } = parts;
     let mut cells: Vec<Cell> = (0..partition.label_of_cell.len())
         .map(|i| {
             let outdoor = partition.outside == Some(i as u32);
@@ -58,7 +58,7 @@ pub(crate) fn assemble(parts: Parts<'_>) -> World {
     let portals: Vec<Portal> = partition
         .portals
         .par_iter()
-        .map(|p| portal(&parts, p))
+        .map(|p| portal(parts, p))
         .collect::<Vec<_>>()
         .into_iter()
         .flatten()
@@ -68,7 +68,7 @@ pub(crate) fn assemble(parts: Parts<'_>) -> World {
             cells[c.0 as usize].portals.push(PortalId(i as u32));
         }
     }
-    let batches = batches(&parts, &mut cells);
+    let batches = batches(parts, &mut cells);
     let (details, detail_meshes) = details(scene, &partition.locator, &mut cells);
     World {
         graph: CellPortalGraph {

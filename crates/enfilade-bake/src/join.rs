@@ -65,14 +65,17 @@ pub(crate) fn join_voids(partition: &mut Partition) {
     renumber_locator(&mut partition.locator, &number);
 }
 
-fn renumber_locator(locator: &mut Locator, number: &[u32]) {
-    let new = |child: i32| match child {
+fn renumbered(child: i32, number: &[u32]) -> i32 {
+    match child {
         c if c <= -2 => Locator::leaf(Some(CellId(number[(-2 - c) as usize]))),
         c => c,
-    };
-    locator.root = new(locator.root);
+    }
+}
+
+fn renumber_locator(locator: &mut Locator, number: &[u32]) {
+    locator.root = renumbered(locator.root, number);
     locator.outside = locator.outside.map(|c| CellId(number[c.0 as usize]));
     for node in &mut locator.nodes {
-        node.children = node.children.map(new);
+        node.children = node.children.map(|c| renumbered(c, number));
     }
 }

@@ -212,7 +212,7 @@ pub fn bake(
     context.stage(7)?;
     let leaks = partition.leaks.clone();
     let settings = config.to_settings();
-    let world = assemble(Parts {
+    let world = assemble(&Parts {
         scene,
         sources: &sources,
         triangles: &triangles,

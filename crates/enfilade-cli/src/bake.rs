@@ -141,8 +141,10 @@ fn settings(options: &BakeOptions) -> anyhow::Result<(ImportOptions, BakeConfig)
                 .with_context(|| format!("settings {} are not understood", path.display()))?
         }
     };
-    let mut config = BakeConfig::default();
-    config.voxel = options.voxel.or(file.voxel);
+    let mut config = BakeConfig {
+        voxel: options.voxel.or(file.voxel),
+        ..BakeConfig::default()
+    };
     if let Some(v) = options.min_opening.or(file.min_opening) {
         config.min_opening = v;
     }

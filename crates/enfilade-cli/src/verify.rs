@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let bar = StageBar::new();
     bar.start("shooting rays", args.rays.saturating_mul(2));
     let report = verify_world_with_progress(&world, source.as_deref(), &options, &|done, _| {
-        bar.set(done)
+        bar.set(done);
     });
     bar.finish();
     let mut out = BufWriter::new(io::stdout().lock());

@@ -13,7 +13,10 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that holds nothing; growing it by a point gives that point.
-    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+    pub const EMPTY: Self = Self {
+        min: DVec3::INFINITY,
+        max: DVec3::NEG_INFINITY,
+    };
 
     /// The box from two corners.
     #[must_use]
@@ -30,25 +33,37 @@ impl Aabb {
     /// This box, grown to hold `p`.
     #[must_use]
     pub fn including(self, p: DVec3) -> Self {
-        Self { min: self.min.min(p), max: self.max.max(p) }
+        Self {
+            min: self.min.min(p),
+            max: self.max.max(p),
+        }
     }
 
     /// The smallest box around both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
     }
 
     /// What both share; may be empty.
     #[must_use]
     pub fn intersection(self, other: Self) -> Self {
-        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
+        Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
     }
 
     /// Grown by `margin` on every side.
     #[must_use]
     pub fn expanded(self, margin: f64) -> Self {
-        Self { min: self.min - margin, max: self.max + margin }
+        Self {
+            min: self.min - margin,
+            max: self.max + margin,
+        }
     }
 
     /// Whether nothing is inside.
@@ -84,7 +99,10 @@ impl Aabb {
     /// Squared distance from `p` to the box; 0 inside.
     #[must_use]
     pub fn distance_squared(&self, p: DVec3) -> f64 {
-        (self.min - p).max(p - self.max).max(DVec3::ZERO).length_squared()
+        (self.min - p)
+            .max(p - self.max)
+            .max(DVec3::ZERO)
+            .length_squared()
     }
 
     /// Surface area; 0 when empty.

@@ -15,7 +15,10 @@ impl Plane {
     /// The plane through `point` with unit `normal`.
     #[must_use]
     pub fn through(point: DVec3, normal: DVec3) -> Self {
-        Self { normal, d: -normal.dot(point) }
+        Self {
+            normal,
+            d: -normal.dot(point),
+        }
     }
 
     /// The plane of a triangle, facing its counter-clockwise side; `None` when it has no area.
@@ -35,7 +38,10 @@ impl Plane {
     /// The same plane facing the other way.
     #[must_use]
     pub fn flipped(self) -> Self {
-        Self { normal: -self.normal, d: -self.d }
+        Self {
+            normal: -self.normal,
+            d: -self.d,
+        }
     }
 
     /// `p` moved onto the plane along its normal.

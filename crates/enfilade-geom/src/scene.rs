@@ -131,25 +131,33 @@ impl Scene {
         [0, 1, 2].map(|i| {
             let p = primitive.positions[primitive.indices[first + i] as usize];
             let local = DVec3::new(p[0].into(), p[1].into(), p[2].into());
-            object.transform.transform_point3(local).as_vec3().as_dvec3()
+            object
+                .transform
+                .transform_point3(local)
+                .as_vec3()
+                .as_dvec3()
         })
     }
 
     /// All triangles of objects with `role`, in order of object, primitive and triangle.
     pub fn triangle_sources(&self, role: Role) -> impl Iterator<Item = TriangleSource> + '_ {
-        self.objects.iter().enumerate().filter(move |(_, o)| o.role == role).flat_map(
-            move |(object, o)| {
-                self.meshes[o.mesh as usize].primitives.iter().enumerate().flat_map(
-                    move |(primitive, p)| {
+        self.objects
+            .iter()
+            .enumerate()
+            .filter(move |(_, o)| o.role == role)
+            .flat_map(move |(object, o)| {
+                self.meshes[o.mesh as usize]
+                    .primitives
+                    .iter()
+                    .enumerate()
+                    .flat_map(move |(primitive, p)| {
                         (0..p.indices.len() / 3).map(move |triangle| TriangleSource {
                             object: object as u32,
                             primitive: primitive as u32,
                             triangle: triangle as u32,
                         })
-                    },
-                )
-            },
-        )
+                    })
+            })
     }
 
     /// World box of one object.

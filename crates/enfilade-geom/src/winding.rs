@@ -44,8 +44,13 @@ impl Winding {
     /// Twice the area times the unit normal (Newell's sum, about the first corner).
     #[must_use]
     pub fn area_normal(&self) -> DVec3 {
-        let Some(&o) = self.points.first() else { return DVec3::ZERO };
-        self.points.windows(2).map(|e| (e[0] - o).cross(e[1] - o)).sum()
+        let Some(&o) = self.points.first() else {
+            return DVec3::ZERO;
+        };
+        self.points
+            .windows(2)
+            .map(|e| (e[0] - o).cross(e[1] - o))
+            .sum()
     }
 
     /// Area. [Units: wu²]
@@ -57,7 +62,9 @@ impl Winding {
     /// Centroid of the area; the mean of the corners when there is none.
     #[must_use]
     pub fn centroid(&self) -> DVec3 {
-        let Some(&o) = self.points.first() else { return DVec3::ZERO };
+        let Some(&o) = self.points.first() else {
+            return DVec3::ZERO;
+        };
         let n = self.area_normal();
         let (mut sum, mut total) = (DVec3::ZERO, 0.0);
         for e in self.points.windows(2) {
@@ -65,7 +72,11 @@ impl Winding {
             sum += (o + e[0] + e[1]) * (a / 3.0);
             total += a;
         }
-        if total > 0.0 { sum / total } else { self.mean() }
+        if total > 0.0 {
+            sum / total
+        } else {
+            self.mean()
+        }
     }
 
     /// Mean of the corners.
@@ -101,7 +112,11 @@ impl Winding {
     #[must_use]
     pub fn split(&self, plane: &Plane, eps: f64) -> (Option<Self>, Option<Self>) {
         let n = self.points.len();
-        let dist: Vec<f64> = self.points.iter().map(|&p| plane.signed_distance(p)).collect();
+        let dist: Vec<f64> = self
+            .points
+            .iter()
+            .map(|&p| plane.signed_distance(p))
+            .collect();
         let (mut any_front, mut any_back) = (false, false);
         for &d in &dist {
             any_front |= d > eps;
@@ -125,7 +140,11 @@ impl Winding {
             }
             if (dp > eps && dq < -eps) || (dp < -eps && dq > eps) {
                 // Always cut from the front corner, so that both directions of a shared edge round alike.
-                let (a, b, da, db) = if dp > 0.0 { (p, q, dp, dq) } else { (q, p, dq, dp) };
+                let (a, b, da, db) = if dp > 0.0 {
+                    (p, q, dp, dq)
+                } else {
+                    (q, p, dq, dp)
+                };
                 let cut = a + (b - a) * (da / (da - db));
                 front.push(cut);
                 back.push(cut);
@@ -140,7 +159,10 @@ impl Winding {
         let normal = self.area_normal().normalize_or_zero();
         let n = self.points.len();
         (0..n).all(|i| {
-            let (a, b) = (self.points[i], self.points[if i + 1 == n { 0 } else { i + 1 }]);
+            let (a, b) = (
+                self.points[i],
+                self.points[if i + 1 == n { 0 } else { i + 1 }],
+            );
             let inward = normal.cross(b - a);
             inward.dot(p - a) >= -eps * inward.length()
         })
@@ -190,7 +212,10 @@ mod tests {
     #[test]
     fn a_split_keeps_the_area() {
         let w = unit_square();
-        let plane = Plane::through(DVec3::new(0.3, 0.1, 0.0), DVec3::new(1.0, 0.4, 0.2).normalize());
+        let plane = Plane::through(
+            DVec3::new(0.3, 0.1, 0.0),
+            DVec3::new(1.0, 0.4, 0.2).normalize(),
+        );
         let (f, b) = w.split(&plane, 1e-9);
         assert!((f.unwrap().area() + b.unwrap().area() - 1.0).abs() < 1e-12);
     }
@@ -204,7 +229,10 @@ mod tests {
 
     #[test]
     fn the_hull_of_a_square_with_points_inside_is_the_square() {
-        let plane = Plane { normal: DVec3::Z, d: 0.0 };
+        let plane = Plane {
+            normal: DVec3::Z,
+            d: 0.0,
+        };
         let mut points = unit_square().points;
         points.extend([DVec3::new(0.5, 0.5, 0.0), DVec3::new(0.5, 0.0, 0.0)]);
         let hull = Winding::hull_in_plane(&plane, &points);

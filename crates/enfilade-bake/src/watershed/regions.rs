@@ -505,16 +505,6 @@ impl Merger<'_> {
         } else {
             opening.area / (smaller as f64 * step * step)
         };
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "DBG {a} {b} area {:.2} n {:.2} c {:.2} sec {:.2} {:.2} ratio {ratio:.2} wall {wall:.2}",
-                opening.area,
-                n,
-                opening.center,
-                best_a as f64 * step * step,
-                best_b as f64 * step * step
-            );
-        }
         (ratio, wall)
     }
 }

@@ -1,0 +1,168 @@
+//! `cargo xtask test`: everything that must hold before a change lands.
+
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+
+use crate::{
+    bake_command, binary, cargo, output_of, root, run_to_end, scenes, score, target_dir, tidy,
+};
+
+/// Sight lines and completeness rays on each scene; the whole 10⁷ are for by hand.
+const RAYS: &str = "200000";
+
+pub(crate) fn run() -> anyhow::Result<()> {
+    let start = Instant::now();
+    let mut steps = Steps { passed: 0 };
+    steps.step("tools", tools)?;
+    steps.step("tidy", tidy::run)?;
+    steps.step("format", || {
+        run_to_end(&mut cargo(&["fmt", "--all", "--check"]))
+    })?;
+    steps.step("lint", || {
+        let args = [
+            "clippy",
+            "--release",
+            "--workspace",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ];
+        run_to_end(&mut cargo(&args))
+    })?;
+    steps.step("tests", || {
+        run_to_end(cargo(&["test", "--release", "--workspace"]).env("NODE_PATH", node_path()))
+    })?;
+    steps.step("docs", || {
+        run_to_end(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+    })?;
+    steps.step("build", || {
+        run_to_end(&mut cargo(&["build", "--release", "--workspace"]))
+    })?;
+    steps.step("demo", demo)?;
+    for scene in scenes() {
+        let name = scene
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        steps.step(&format!("scene {name}"), || check_scene(&scene, &name))?;
+    }
+    if scenes().is_empty() {
+        println!("no real scenes: set ENFILADE_SCENES to their folder to run them too");
+    } else {
+        steps.step("score", || score::run(&[]))?;
+    }
+    println!("all of it took {:.0} s", start.elapsed().as_secs_f64());
+    println!("{} passed, 0 failed", steps.passed);
+    Ok(())
+}
+
+struct Steps {
+    passed: usize,
+}
+
+impl Steps {
+    fn step(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        println!("== {name}");
+        let start = Instant::now();
+        work().with_context(|| format!("step '{name}' failed"))?;
+        println!("== {name}: {:.1} s", start.elapsed().as_secs_f64());
+        self.passed += 1;
+        Ok(())
+    }
+}
+
+fn tools_dir() -> PathBuf {
+    target_dir().join("tools")
+}
+
+fn node_path() -> PathBuf {
+    tools_dir().join("node_modules")
+}
+
+/// The one outside tool is the Khronos glTF validator, a package for node.
+fn tools() -> anyhow::Result<()> {
+    let has = |name: &str| {
+        Command::new(name)
+            .arg("--version")
+            .output()
+            .is_ok_and(|o| o.status.success())
+    };
+    if !has("node") || !has("npm") {
+        bail!(
+            "node and npm are needed for the glTF validator; install them (e.g. `apt-get install nodejs npm`)"
+        );
+    }
+    if !node_path().join("gltf-validator").is_dir() {
+        std::fs::create_dir_all(tools_dir())?;
+        println!("installing gltf-validator into {}", tools_dir().display());
+        let npm = [
+            "install",
+            "--no-audit",
+            "--no-fund",
+            "--prefix",
+            ".",
+            "gltf-validator@2",
+        ];
+        run_to_end(Command::new("npm").current_dir(tools_dir()).args(npm))?;
+    }
+    Ok(())
+}
+
+fn validate(world: &std::path::Path) -> anyhow::Result<()> {
+    let mut node = Command::new("node");
+    node.current_dir(root())
+        .env("NODE_PATH", node_path())
+        .arg("scripts/validate_gltf.mjs")
+        .arg(world);
+    let said = output_of(&mut node, None)?;
+    print!(
+        "{}",
+        said.lines()
+            .next()
+            .map(|l| format!("{l}\n"))
+            .unwrap_or_default()
+    );
+    Ok(())
+}
+
+fn verify(world: &std::path::Path) -> anyhow::Result<()> {
+    let mut command = Command::new(binary("enfilade"));
+    command.arg("verify").arg(world).args(["--rays", RAYS]);
+    print!("{}", output_of(&mut command, None)?);
+    Ok(())
+}
+
+fn demo() -> anyhow::Result<()> {
+    let dir = target_dir().join("demo");
+    print!(
+        "{}",
+        output_of(
+            Command::new(binary("enfilade"))
+                .arg("demo")
+                .arg("-o")
+                .arg(&dir),
+            None
+        )?
+    );
+    let world = dir.join("world.glb");
+    validate(&world)?;
+    verify(&world)
+}
+
+fn check_scene(scene: &std::path::Path, name: &str) -> anyhow::Result<()> {
+    let dir = target_dir().join("scenes");
+    std::fs::create_dir_all(&dir)?;
+    let world = dir.join(name).with_extension("glb");
+    print!("{}", output_of(&mut bake_command(scene, &world), None)?);
+    validate(&world)?;
+    verify(&world)
+}

@@ -1,0 +1,371 @@
+//! `cargo xtask score`: rooms, doors and windows found, against what the architects modeled.
+//!
+//! A scene folder with a `truth.json` is baked with default settings and asked through `inspect
+//! --json` and `locate`, as a user would. What is counted stands in `docs/benchmarks/rooms.md`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use serde_json::Value;
+
+use crate::{bake_command, binary, cargo, output_of, root, run_to_end, scenes, target_dir};
+
+type V3 = [f64; 3];
+
+fn sub(a: V3, b: V3) -> V3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+fn dot(a: V3, b: V3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+fn cross(a: V3, b: V3) -> V3 {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+fn unit(a: V3) -> V3 {
+    a.map(|x| x / dot(a, a).sqrt())
+}
+fn along(a: V3, d: V3, t: f64) -> V3 {
+    [a[0] + d[0] * t, a[1] + d[1] * t, a[2] + d[2] * t]
+}
+
+fn vec3(v: &Value) -> Option<V3> {
+    let a = v.as_array()?;
+    Some([
+        a.first()?.as_f64()?,
+        a.get(1)?.as_f64()?,
+        a.get(2)?.as_f64()?,
+    ])
+}
+
+/// Centroid and area of a convex polygon.
+fn center_and_area(points: &[V3]) -> (V3, f64) {
+    let (mut center, mut area) = ([0.0; 3], 0.0);
+    for i in 1..points.len().saturating_sub(1) {
+        let n = cross(sub(points[i], points[0]), sub(points[i + 1], points[0]));
+        let a = dot(n, n).sqrt() / 2.0;
+        area += a;
+        for k in 0..3 {
+            center[k] += a * (points[0][k] + points[i][k] + points[i + 1][k]) / 3.0;
+        }
+    }
+    if area == 0.0 {
+        (points[0], 0.0)
+    } else {
+        (center.map(|c| c / area), area)
+    }
+}
+
+/// One row of the table; `None` where a scene has nothing of the kind.
+struct Row {
+    name: String,
+    n_rooms: usize,
+    figures: [Option<f64>; 6],
+    seconds: f64,
+    failed: Vec<String>,
+}
+
+const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
+
+pub(crate) fn run(args: &[String]) -> anyhow::Result<()> {
+    let write = args.iter().any(|a| a == "--write");
+    let mut dirs: Vec<PathBuf> = args
+        .iter()
+        .filter(|a| *a != "--write")
+        .map(PathBuf::from)
+        .collect();
+    if dirs.is_empty() {
+        dirs = scenes();
+    }
+    dirs.retain(|d| d.join("truth.json").is_file());
+    if dirs.is_empty() {
+        bail!("no scene with a truth.json; name folders, or set ENFILADE_SCENES");
+    }
+    run_to_end(&mut cargo(&["build", "--release", "-p", "enfilade-cli"]))?;
+    let rows = dirs
+        .iter()
+        .map(|d| score_scene(d))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let table = table(&rows);
+    println!("{table}");
+    for row in &rows {
+        if !row.failed.is_empty() {
+            println!("{}: {}", row.name, row.failed.join("; "));
+        }
+    }
+    if write {
+        let path = root().join("docs/benchmarks/rooms-table.md");
+        std::fs::write(
+            &path,
+            format!("Made by `cargo xtask score --write`.\n\n{table}"),
+        )
+        .with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+fn table(rows: &[Row]) -> String {
+    let show = |f: Option<f64>| f.map_or_else(|| "–".to_owned(), |f| format!("{f:.2}"));
+    let mut out = format!("| scene | n | {} | seconds |\n", COLUMNS.join(" | "));
+    out += "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
+    for r in rows {
+        let figures: Vec<String> = r.figures.iter().map(|&f| show(f)).collect();
+        let _ = writeln!(
+            out,
+            "| {} | {} | {} | {:.2} |",
+            r.name,
+            r.n_rooms,
+            figures.join(" | "),
+            r.seconds
+        );
+    }
+    let mean = |k: usize| {
+        let known: Vec<f64> = rows.iter().filter_map(|r| r.figures[k]).collect();
+        show((!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64))
+    };
+    let means: Vec<String> = (0..6).map(mean).collect();
+    let _ = writeln!(out, "| **average** | | {} | |", means.join(" | "));
+    out
+}
+
+fn locate(world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
+    let text: String = points
+        .iter()
+        .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
+        .collect();
+    let said = output_of(
+        Command::new(binary("enfilade")).arg("locate").arg(world),
+        Some(&text),
+    )?;
+    let lines: Vec<String> = said.split_whitespace().map(str::to_owned).collect();
+    if lines.len() != points.len() {
+        bail!(
+            "locate printed {} answers for {} points",
+            lines.len(),
+            points.len()
+        );
+    }
+    Ok(lines)
+}
+
+fn text(v: &Value) -> String {
+    v.as_str().map_or_else(|| v.to_string(), str::to_owned)
+}
+
+/// Rooms joined by boundaries without a wall are one group: telling them apart is optional.
+fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
+    let mut group: BTreeMap<String, String> = rooms
+        .iter()
+        .map(|r| (text(&r["id"]), text(&r["id"])))
+        .collect();
+    for o in openings.iter().filter(|o| o["kind"] == "virtual") {
+        let (a, b) = (text(&o["rooms"][0]), text(&o["rooms"][1]));
+        if let (Some(from), Some(to)) = (group.get(&a).cloned(), group.get(&b).cloned()) {
+            group
+                .values_mut()
+                .filter(|g| **g == from)
+                .for_each(|g| g.clone_from(&to));
+        }
+    }
+    group
+}
+
+fn score_scene(dir: &Path) -> anyhow::Result<Row> {
+    let name = dir
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)
+        .with_context(|| format!("{name}/truth.json"))?;
+    let world = target_dir().join(format!("score-{name}.glb"));
+    let start = Instant::now();
+    output_of(&mut bake_command(dir, &world), None)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let said = output_of(
+        Command::new(binary("enfilade"))
+            .arg("inspect")
+            .arg(&world)
+            .arg("--json"),
+        None,
+    )?;
+    let graph: Value = serde_json::from_str(&said)?;
+    let empty = Vec::new();
+    let list = |v: &'_ Value| v.as_array().cloned().unwrap_or_else(|| empty.clone());
+    let (rooms, openings) = (list(&truth["rooms"]), list(&truth["openings"]));
+    let group = groups(&rooms, &openings);
+    let mut failed = Vec::new();
+
+    // Rooms.
+    let (mut points, mut owner) = (Vec::new(), Vec::new());
+    for r in &rooms {
+        for p in list(&r["sample_points"]).iter().filter_map(vec3) {
+            points.push(p);
+            owner.push(text(&r["id"]));
+        }
+    }
+    let cells = locate(&world, &points)?;
+    // A point that is nowhere shares its cell with no other.
+    let found: Vec<String> = cells
+        .iter()
+        .enumerate()
+        .map(|(i, c)| {
+            if c == "-" {
+                format!("none{i}")
+            } else {
+                c.clone()
+            }
+        })
+        .collect();
+    let (mut per_room, mut per_cell) = (
+        BTreeMap::<&str, BTreeMap<&str, usize>>::new(),
+        BTreeMap::<&str, BTreeMap<&str, usize>>::new(),
+    );
+    for (room, cell) in owner.iter().zip(&found) {
+        *per_room.entry(room).or_default().entry(cell).or_default() += 1;
+        *per_cell
+            .entry(cell)
+            .or_default()
+            .entry(&group[room])
+            .or_default() += 1;
+    }
+    let mut good = 0;
+    for r in &rooms {
+        let id = text(&r["id"]);
+        let Some(counts) = per_room.get(id.as_str()) else {
+            continue;
+        };
+        let Some((cell, n)) = counts.iter().max_by_key(|c| c.1) else {
+            continue;
+        };
+        let whole = *n as f64 >= 0.95 * counts.values().sum::<usize>() as f64;
+        let inside = &per_cell[cell];
+        let own = inside.get(group[&id].as_str()).copied().unwrap_or(0);
+        let alone = own as f64 >= 0.95 * inside.values().sum::<usize>() as f64;
+        if whole && alone {
+            good += 1;
+        } else {
+            let why = if whole { "shares its cell" } else { "is split" };
+            failed.push(format!("room {} {why}", text(&r["name"])));
+        }
+    }
+
+    // Doors and windows.
+    let portals: Vec<(u64, V3, f64, V3, BTreeSet<String>)> = list(&graph["portals"])
+        .iter()
+        .filter_map(|p| {
+            let outline: Vec<V3> = list(&p["outline"]).iter().filter_map(vec3).collect();
+            let (center, area) = center_and_area(&outline);
+            let sides = list(&p["cells"]).iter().map(ToString::to_string).collect();
+            Some((
+                p["id"].as_u64()?,
+                center,
+                area,
+                unit(vec3(&p["normal"])?),
+                sides,
+            ))
+        })
+        .collect();
+    let usable: Vec<&Value> = openings
+        .iter()
+        .filter(|o| o.get("usable").is_none_or(|u| u == true) && !list(&o["corners"]).is_empty())
+        .collect();
+    let place = |o: &Value| -> Option<(V3, V3, f64)> {
+        let thickness = o["thickness"].as_f64().unwrap_or(0.0);
+        Some((vec3(&o["centre"])?, unit(vec3(&o["normal"])?), thickness))
+    };
+    let mut probes = Vec::new();
+    for o in &usable {
+        let (c, n, t) = place(o).context("an opening without place")?;
+        probes.extend([along(c, n, 0.35 + t / 2.0), along(c, n, -0.35 - t / 2.0)]);
+    }
+    let sides = locate(&world, &probes)?;
+    let (mut hits, mut tried) = (
+        BTreeMap::<String, usize>::new(),
+        BTreeMap::<String, usize>::new(),
+    );
+    let mut used = BTreeSet::new();
+    for (k, o) in usable.iter().enumerate() {
+        let (c, n, t) = place(o).context("an opening without place")?;
+        let want: BTreeSet<String> = sides[2 * k..2 * k + 2].iter().cloned().collect();
+        let corners: Vec<V3> = list(&o["corners"]).iter().filter_map(vec3).collect();
+        let size = center_and_area(&corners).1;
+        let mut hit = false;
+        for (id, center, area, normal, cells) in &portals {
+            let off = sub(*center, c);
+            let depth = dot(off, n).abs();
+            let across = (dot(off, off) - depth * depth).max(0.0).sqrt();
+            let is_turned = dot(*normal, n).abs() < 15.0_f64.to_radians().cos();
+            if depth > 0.3 + t / 2.0 || across > 0.3 || is_turned {
+                continue;
+            }
+            used.insert(*id);
+            hit |= (0.5 * size..=2.0 * size).contains(area) && *cells == want && want.len() == 2;
+        }
+        let kind = text(&o["kind"]);
+        *tried.entry(kind.clone()).or_default() += 1;
+        if hit {
+            *hits.entry(kind).or_default() += 1;
+        } else if kind == "door" || kind == "window" {
+            failed.push(format!("{kind} {} missed", text(&o["name"])));
+        }
+    }
+    let outdoor: BTreeSet<String> = list(&graph["cells"])
+        .iter()
+        .filter(|c| c["outdoor"] == true)
+        .map(|c| c["id"].to_string())
+        .collect();
+    let extra = portals
+        .iter()
+        .filter(|p| p.4.is_disjoint(&outdoor) && !used.contains(&p.0))
+        .count();
+    let n = rooms.len();
+    let per_n = |x: usize| (n > 0).then(|| x as f64 / n as f64);
+    let share = |kind: &str| {
+        tried
+            .get(kind)
+            .map(|&t| hits.get(kind).copied().unwrap_or(0) as f64 / t as f64)
+    };
+    let with_points: BTreeSet<&String> = cells.iter().filter(|c| *c != "-").collect();
+    let owner_group: Vec<String> = owner.iter().map(|o| group[o].clone()).collect();
+    Ok(Row {
+        name,
+        n_rooms: n,
+        figures: [
+            per_n(good),
+            share("door"),
+            share("window"),
+            per_n(with_points.len()),
+            per_n(extra),
+            pair_mcc(&owner, &owner_group, &found),
+        ],
+        seconds,
+        failed,
+    })
+}
+
+/// Matthews correlation over pairs of points: same room? same cell? Pairs of two rooms in one group
+/// do not count.
+fn pair_mcc(rooms: &[String], groups: &[String], cells: &[String]) -> Option<f64> {
+    fn pairs<K: Ord>(keys: impl Iterator<Item = K>) -> f64 {
+        let mut count: BTreeMap<K, usize> = BTreeMap::new();
+        for k in keys {
+            *count.entry(k).or_default() += 1;
+        }
+        count.values().map(|&n| (n * (n - 1) / 2) as f64).sum()
+    }
+    let n = rooms.len() as f64;
+    let tp = pairs(rooms.iter().zip(cells));
+    let fn_ = pairs(rooms.iter()) - tp;
+    let fp = pairs(cells.iter()) - pairs(groups.iter().zip(cells));
+    let tn = n * (n - 1.0) / 2.0 - pairs(groups.iter()) - fp;
+    let den = ((tp + fp) * (tp + fn_) * (tn + fp) * (tn + fn_)).sqrt();
+    (den > 0.0).then(|| (tp * tn - fp * fn_) / den)
+}
