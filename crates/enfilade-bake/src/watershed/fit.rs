@@ -63,17 +63,19 @@ pub fn fit_screen(
         .map(|&t| triangles[t as usize])
         .collect();
     let mut best: Option<Section> = None;
-    for normal in candidate_normals(opening, &around) {
-        for plane in candidate_planes(opening, normal, &around) {
-            let section = free_section(&plane, &centers, &around, grid.voxel);
-            let better = best
-                .as_ref()
-                .is_none_or(|b| section.cost(opening) < b.cost(opening) - 1e-9);
-            if better {
-                best = Some(section);
+    // Wall planes come first; others are asked only when no wall closes the opening.
+    for normals in candidate_normals(opening, &around) {
+        for normal in normals {
+            for plane in candidate_planes(opening, normal, &around) {
+                let section = free_section(&plane, &centers, &around, grid.voxel);
+                let better = best
+                    .as_ref()
+                    .is_none_or(|b| section.cost(opening) < b.cost(opening) - 1e-9);
+                if better {
+                    best = Some(section);
+                }
             }
         }
-        // Wall planes come first; the front's own plane is asked only when no wall closes it.
         if best.as_ref().is_some_and(|b| b.bounded) {
             break;
         }
@@ -89,8 +91,9 @@ pub fn fit_screen(
     }
 }
 
-/// Directions worth trying, best first, unit length, facing like the opening's own normal.
-fn candidate_normals(opening: &Opening, around: &[Triangle]) -> Vec<DVec3> {
+/// Directions worth trying, unit length, facing like the opening's own normal: those of walls, the
+/// front's own, and tilted ones.
+fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] {
     let own = opening.plane.normal;
     let mut normals: Vec<(DVec3, f64)> = Vec::new();
     for t in around {
@@ -103,8 +106,9 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> Vec<DVec3> {
         if n.dot(own) < 0.0 {
             n = -n;
         }
-        if n.dot(own) < 0.88 {
-            continue; // more than 28 degrees off: a side wall, not the wall that is pierced
+        // At a door in the corner of a room the front runs askew, by up to half a right angle.
+        if n.dot(own) < 0.65 {
+            continue;
         }
         // Large walls far off count no more than what stands right at the opening.
         let weight = area.min(opening.area);
@@ -119,19 +123,18 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> Vec<DVec3> {
     });
     normals.retain(|&(_, w)| w > 0.1 * opening.area);
     normals.truncate(3);
-    let mut out: Vec<DVec3> = normals.into_iter().map(|(n, _)| n).collect();
+    let walls: Vec<DVec3> = normals.into_iter().map(|(n, _)| n).collect();
+    let mut fronts: Vec<DVec3> = Vec::new();
     // The front is a little ragged: upright and level planes are what it means most of the time.
     let upright = DVec3::new(own.x, 0.0, own.z).normalize_or_zero();
     for n in [upright, DVec3::Y * own.y.signum(), own] {
-        if n.dot(own) > 0.94 && out.iter().all(|m| m.dot(n) < 0.9998) {
-            out.push(n);
+        if n.dot(own) > 0.94 && walls.iter().chain(&fronts).all(|m| m.dot(n) < 0.9998) {
+            fronts.push(n);
         }
     }
     let (u, v) = opening.plane.basis();
-    for tilt in [u, -u, v, -v] {
-        out.push((own + tilt * 0.2).normalize());
-    }
-    out
+    let tilted = [u, -u, v, -v].map(|tilt| (own + tilt * 0.2).normalize());
+    [walls, fronts, tilted.to_vec()]
 }
 
 /// Planes with this normal worth trying: those of walls, those midway between two, and a sweep.

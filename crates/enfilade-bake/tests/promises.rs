@@ -1,0 +1,130 @@
+//! Generated scenes keep the promises that the checker tries, survive the file, and come out the
+//! same on any number of threads and in any order of triangles.
+
+use enfilade_bake::{BakeConfig, BakeContext, BakeOutput, Silent, bake};
+use enfilade_cpg::World;
+use enfilade_cpg::wire::{decode_glb, encode_glb};
+use enfilade_testkit::{
+    Generated, TowerParams, Variant, furnished_house, gjorup_rooms, office_tower, shuffled,
+};
+use enfilade_verify::{VerifyOptions, verify_world};
+
+fn baked(g: &Generated) -> BakeOutput {
+    bake(
+        &g.scene,
+        &BakeConfig::default(),
+        &BakeContext::new(&Silent, None),
+    )
+    .unwrap()
+}
+
+fn keeps_promises(name: &str, world: &World) {
+    let options = VerifyOptions {
+        rays: 20_000,
+        ..VerifyOptions::default()
+    };
+    let report = verify_world(world, None, &options);
+    assert!(report.holds(), "{name}: {report}");
+    let bytes = encode_glb(world).unwrap();
+    let back = decode_glb(&bytes).unwrap();
+    assert_eq!(encode_glb(&back).unwrap(), bytes, "{name}");
+}
+
+#[test]
+fn mixed_scenes_keep_the_promises() {
+    for g in enfilade_testkit::mixed::all() {
+        keeps_promises(&g.truth.scene, &baked(&g).world);
+    }
+}
+
+#[test]
+fn a_tower_with_cracks_and_double_walls_keeps_the_promises() {
+    for (cracks, double_walls) in [(false, false), (true, false), (false, true)] {
+        let params = TowerParams {
+            cracks,
+            double_walls,
+            ..TowerParams::with_rooms(16, 7)
+        };
+        keeps_promises("tower", &baked(&office_tower(&params)).world);
+    }
+}
+
+#[test]
+fn the_house_keeps_the_promises() {
+    keeps_promises("house", &baked(&furnished_house()).world);
+}
+
+#[test]
+fn equal_bytes_on_any_number_of_threads() {
+    let g = furnished_house();
+    let bytes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| encode_glb(&baked(&g).world).unwrap())
+    };
+    let one = bytes(1);
+    assert_eq!(one, bytes(2));
+    assert_eq!(one, bytes(16));
+}
+
+/// What a graph is, numbering apart: volumes of cells, and what each portal joins, with its area.
+/// Rounded to what `f32` and another order of additions leave alone.
+fn shape(world: &World) -> (Vec<i64>, Vec<(i64, i64, i64)>) {
+    let round = |x: f32| (f64::from(x) * 100.0).round() as i64;
+    let graph = &world.graph;
+    let mut cells: Vec<i64> = graph.cells.iter().map(|c| round(c.volume)).collect();
+    let mut portals: Vec<(i64, i64, i64)> = graph
+        .portals
+        .iter()
+        .map(|p| {
+            let [a, b] = p.cells.map(|c| round(graph.cells[c.0 as usize].volume));
+            (a.min(b), a.max(b), round(p.area))
+        })
+        .collect();
+    cells.sort_unstable();
+    portals.sort_unstable();
+    (cells, portals)
+}
+
+#[test]
+fn the_order_of_triangles_does_not_matter() {
+    let g = office_tower(&TowerParams::with_rooms(16, 3));
+    let plain = shape(&baked(&g).world);
+    for seed in [1, 2] {
+        assert_eq!(shape(&baked(&shuffled(g.clone(), seed)).world), plain);
+    }
+}
+
+#[test]
+fn gjorup_s_rooms_are_parted_by_exactly_their_openings_however_they_are_turned() {
+    for variant in [Variant::Optimised, Variant::Tessellated, Variant::Distorted] {
+        for degrees in [0.0, 7.0, 8.0, 9.0] {
+            let g = gjorup_rooms(variant, [0.0, degrees, 0.0]);
+            let world = baked(&g).world;
+            let indoor = world.graph.cells.iter().filter(|c| !c.outdoor).count();
+            let what = format!("{variant:?} turned by {degrees} degrees");
+            assert_eq!(indoor, g.truth.rooms.len(), "cells of {what}");
+            assert_eq!(
+                world.graph.portals.len(),
+                g.truth.openings.len(),
+                "portals of {what}"
+            );
+            for o in &g.truth.openings {
+                let found = world.graph.portals.iter().any(|p| {
+                    let n = p.outline.len() as f32;
+                    let center = [0, 1, 2]
+                        .map(|k| f64::from(p.outline.iter().map(|q| q[k]).sum::<f32>() / n));
+                    let d = [
+                        center[0] - o.center.x,
+                        center[1] - o.center.y,
+                        center[2] - o.center.z,
+                    ];
+                    d.iter().map(|x| x * x).sum::<f64>().sqrt() < 0.3 + o.thickness * 0.5
+                });
+                assert!(found, "opening {} of {what}", o.name);
+            }
+        }
+    }
+}
