@@ -2,8 +2,8 @@
 //! same on any number of threads and in any order of triangles.
 
 use enfilade_bake::{BakeConfig, BakeContext, BakeOutput, Silent, bake};
-use enfilade_cpg::World;
 use enfilade_cpg::wire::{decode_glb, encode_glb};
+use enfilade_cpg::{PortalKind, World};
 use enfilade_testkit::{
     Generated, TowerParams, Variant, furnished_house, gjorup_rooms, office_tower, shuffled,
 };
@@ -106,13 +106,16 @@ fn gjorup_s_rooms_are_parted_by_exactly_their_openings_however_they_are_turned()
             let indoor = world.graph.cells.iter().filter(|c| !c.outdoor).count();
             let what = format!("{variant:?} turned by {degrees} degrees");
             assert_eq!(indoor, g.truth.rooms.len(), "cells of {what}");
-            assert_eq!(
-                world.graph.portals.len(),
-                g.truth.openings.len(),
-                "portals of {what}"
-            );
+            // Hairline gaps where distorted walls meet are faults of the model, and kept apart as such.
+            let openings: Vec<_> = world
+                .graph
+                .portals
+                .iter()
+                .filter(|p| p.kind != PortalKind::Crack)
+                .collect();
+            assert_eq!(openings.len(), g.truth.openings.len(), "portals of {what}");
             for o in &g.truth.openings {
-                let found = world.graph.portals.iter().any(|p| {
+                let found = openings.iter().any(|p| {
                     let n = p.outline.len() as f32;
                     let center = [0, 1, 2]
                         .map(|k| f64::from(p.outline.iter().map(|q| q[k]).sum::<f32>() / n));

@@ -207,9 +207,10 @@ mod tests {
     fn a_flight_inside_one_large_mesh_is_found_by_its_shell() {
         let mut all = Vec::new();
         for i in 0..8 {
-            let at = DVec3::new(f64::from(i) * 0.28, f64::from(i) * 0.18, 0.0);
-            quad(&mut all, at, DVec3::Z, DVec3::X * 0.28);
-            quad(&mut all, at + DVec3::X * 0.28, DVec3::Z, DVec3::Y * 0.18);
+            // Multiples of a power of two: corners of neighbors are equal to the bit.
+            let at = DVec3::new(f64::from(i) * 0.25, f64::from(i) * 0.1875, 0.0);
+            quad(&mut all, at, DVec3::Z, DVec3::X * 0.25);
+            quad(&mut all, at + DVec3::X * 0.25, DVec3::Z, DVec3::Y * 0.1875);
         }
         let n = all.len();
         quad(
