@@ -110,7 +110,7 @@ fn tools() -> anyhow::Result<()> {
             "--no-fund",
             "--prefix",
             ".",
-            "gltf-validator@2",
+            "gltf-validator@2.0.0-dev.3.10",
         ];
         run_to_end(Command::new("npm").current_dir(tools_dir()).args(npm))?;
     }
