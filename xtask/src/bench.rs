@@ -1,106 +1,233 @@
-//! `cargo xtask bench`: how time and memory of a bake grow with the building.
+//! `cargo xtask bench`: how time and memory of a bake grow with the building, and the voxel kernels
+//! beside other implementations.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use serde_json::Value;
 
 use crate::{bake_command, binary, cargo, output_of, root, run_to_end, target_dir};
 
+/// Rooms of the towers, a factor of 4 apart.
 const SIZES: [usize; 4] = [16, 64, 256, 1024];
 
-pub(crate) fn run(args: &[String]) -> anyhow::Result<()> {
-    let write = args.iter().any(|a| a == "--write");
+/// Prints the table of growth, and puts it into `docs/benchmarks/growth.md` if `is_written`. With
+/// `peers`, the folder of the scripts that make the kernels' inputs, the kernels' table too.
+pub(crate) fn run(peers: Option<&Path>, is_written: bool) -> anyhow::Result<()> {
+    if let Some(peers) = peers {
+        kernels(peers)?;
+    }
+    growth(is_written)
+}
+
+fn kernels(peers: &Path) -> anyhow::Result<()> {
+    run_to_end(&mut cargo(&[
+        "build",
+        "--release",
+        "-p",
+        "enfilade-bake",
+        "--example",
+        "kernel_bench",
+    ]))?;
+    let data = target_dir().join("kernel-bench");
+    std::fs::create_dir_all(&data)?;
+    let mut python = Command::new("python3");
+    python
+        .arg(root().join("scripts/bench_kernels.py"))
+        .arg("--bench")
+        .arg(target_dir().join("release/examples/kernel_bench"))
+        .arg("--data")
+        .arg(data)
+        .arg("--peers")
+        .arg(peers);
+    run_to_end(&mut python)
+}
+
+fn growth(is_written: bool) -> anyhow::Result<()> {
     run_to_end(&mut cargo(&["build", "--release", "-p", "enfilade-cli"]))?;
-    let example = [
+    run_to_end(&mut cargo(&[
         "build",
         "--release",
         "-p",
         "enfilade-testkit",
         "--example",
         "generate",
-    ];
-    run_to_end(&mut cargo(&example))?;
-    let mut out = String::from(
-        "| rooms | triangles | voxels | occupied | seconds | exponent | peak MB | bytes a voxel |\n\
-         | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+    ]))?;
+    let mut table = String::from(
+        "| rooms | cells | triangles | M voxels | M occupied | wall s | user s | exponent | peak MiB | bytes a voxel |\n\
+         | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
     );
+    let mut stages: Vec<(String, Vec<String>)> = Vec::new();
     let mut before: Option<(f64, f64)> = None;
-    let mut stages = String::new();
     for rooms in SIZES {
-        let dir = target_dir().join(format!("tower-{rooms}"));
-        let mut generate = Command::new(target_dir().join("release/examples/generate"));
-        output_of(
-            generate
-                .args(["tower", "--rooms", &rooms.to_string(), "-o"])
-                .arg(&dir),
-            None,
-        )?;
-        let world = dir.join("world.glb");
-        let start = Instant::now();
-        let (said, peak) = with_peak(bake_command(&dir, &world).arg("-v"))?;
-        let seconds = start.elapsed().as_secs_f64();
-        let graph: Value = serde_json::from_str(&output_of(
-            Command::new(binary("enfilade"))
-                .arg("inspect")
-                .arg(&world)
-                .arg("--json"),
-            None,
-        )?)?;
-        let count = |name: &str| graph["stats"]["counts"][name].as_f64().unwrap_or(f64::NAN);
-        let (voxels, occupied) = (count("voxels"), count("occupied_voxels"));
+        let row = bake_tower(rooms)?;
         let exponent = before.map_or_else(
             || "–".to_owned(),
-            |(s, o)| format!("{:.2}", (seconds / s).ln() / (occupied / o).ln()),
+            |(seconds, occupied)| {
+                format!(
+                    "{:.2}",
+                    (row.used.user / seconds).ln() / (row.occupied / occupied).ln()
+                )
+            },
         );
-        before = Some((seconds, occupied));
+        before = Some((row.used.user, row.occupied));
         let _ = writeln!(
-            out,
-            "| {rooms} | {} | {voxels} | {occupied} | {seconds:.1} | {exponent} | {:.0} | {:.2} |",
-            count("input_triangles"),
-            peak / 1e6,
-            peak / voxels
+            table,
+            "| {rooms} | {} | {} | {:.1} | {:.2} | {:.1} | {:.1} | {exponent} | {:.0} | {:.2} |",
+            row.n_cells,
+            row.triangles,
+            row.voxels / 1e6,
+            row.occupied / 1e6,
+            row.used.wall,
+            row.used.user,
+            row.used.peak / f64::from(1 << 20),
+            row.used.peak / row.voxels
         );
-        let lines: Vec<&str> = said
-            .lines()
-            .filter(|l| l.ends_with(" s"))
-            .map(str::trim)
-            .collect();
-        let _ = writeln!(stages, "- {rooms} rooms: {}", lines.join(", "));
+        for (i, (name, seconds)) in row.stages.into_iter().enumerate() {
+            if stages.len() <= i {
+                stages.push((name, Vec::new()));
+            }
+            stages[i].1.push(seconds);
+        }
     }
-    println!("{out}\n{stages}");
-    if write {
+    let sizes = SIZES.map(|n| n.to_string()).join(" | ");
+    let mut stage_table = format!("| stage, s | {sizes} |\n| --- | ---: | ---: | ---: | ---: |\n");
+    for (name, seconds) in stages {
+        let _ = writeln!(stage_table, "| {name} | {} |", seconds.join(" | "));
+    }
+    println!("{table}\n{stage_table}");
+    if is_written {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let path = root().join("docs/benchmarks/growth.md");
         let text = format!(
-            "# Growth of a bake\n\nOffice towers of the test kit, whole `bake`, default settings, two \
-             cores. Made by `cargo xtask bench --write`.\n\n{out}\nThe exponent is that of wall time in \
-             occupied voxels, from the row above. Stage times:\n\n{stages}"
+            "# Growth of a bake\n\n\
+             Furnished office towers of the test kit, the whole of `enfilade bake` with default settings. The\n\
+             command that writes this page:\n\n\
+             ```text\ncargo xtask bench --write\n```\n\n\
+             {table}\n\
+             *exponent*: of user time (all threads) in occupied voxels, from the row above; 1 is linear. *peak*: the\n\
+             most resident memory of the process, scene and world included; *bytes a voxel*: that over all voxels.\n\
+             Taken on a shared virtual machine of {cores} cores: the seconds say little, their growth more.\n\n\
+             Wall time of each stage, by number of rooms:\n\n\
+             {stage_table}"
         );
         std::fs::write(&path, text).with_context(|| path.display().to_string())?;
     }
     Ok(())
 }
 
-/// Runs under `time -v`, and gives standard error and the peak of resident memory in bytes.
-fn with_peak(command: &mut Command) -> anyhow::Result<(String, f64)> {
+/// A tower's bake.
+struct Tower {
+    n_cells: usize,
+    triangles: f64,
+    voxels: f64,
+    occupied: f64,
+    used: Used,
+    /// Name and seconds, in order.
+    stages: Vec<(String, String)>,
+}
+
+fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
+    let dir = target_dir().join(format!("tower-{rooms}"));
+    let mut generate = Command::new(target_dir().join("release/examples/generate"));
+    output_of(
+        generate
+            .args(["tower", "--rooms", &rooms.to_string(), "-o"])
+            .arg(&dir),
+        None,
+    )?;
+    let world = dir.join("world.glb");
+    let used = used_by(bake_command(&dir, &world).arg("-v"))?;
+    let graph: Value = serde_json::from_str(&output_of(
+        Command::new(binary("enfilade"))
+            .arg("inspect")
+            .arg(&world)
+            .arg("--json"),
+        None,
+    )?)?;
+    let count = |name: &str| {
+        graph["stats"]["counts"][name]
+            .as_f64()
+            .with_context(|| format!("inspect gives no count of {name}"))
+    };
+    Ok(Tower {
+        n_cells: graph["cells"].as_array().map_or(0, Vec::len),
+        triangles: graph["stats"]["input_triangles"]
+            .as_f64()
+            .map_or_else(|| count("input_triangles"), Ok)?,
+        voxels: count("voxels")?,
+        occupied: count("occupied_voxels")?,
+        stages: stage_times(&used.said),
+        used,
+    })
+}
+
+/// The lines `NAME  1.23 s` that `bake -v` prints among others.
+fn stage_times(said: &str) -> Vec<(String, String)> {
+    said.lines()
+        .filter_map(|line| {
+            let (name, seconds) = line.strip_suffix(" s")?.trim().rsplit_once(' ')?;
+            seconds.parse::<f64>().ok()?;
+            Some((name.trim().to_owned(), seconds.to_owned()))
+        })
+        .collect()
+}
+
+/// What a command took.
+struct Used {
+    /// Standard error.
+    said: String,
+    /// Wall time. [Units: s]
+    wall: f64,
+    /// User time of all threads. [Units: s]
+    user: f64,
+    /// Most resident memory. [Units: bytes]
+    peak: f64,
+}
+
+/// Runs a command under GNU time.
+fn used_by(command: &Command) -> anyhow::Result<Used> {
     let mut timed = Command::new("/usr/bin/time");
     timed
         .arg("-v")
         .arg(command.get_program())
         .args(command.get_args());
+    let start = Instant::now();
     let done = timed
         .output()
         .context("needs GNU time as /usr/bin/time (`apt-get install time`)")?;
+    let wall = start.elapsed().as_secs_f64();
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    let peak = said
-        .lines()
-        .find_map(|l| {
-            l.trim()
-                .strip_prefix("Maximum resident set size (kbytes): ")
-        })
-        .and_then(|n| n.parse::<f64>().ok())
-        .context("time printed no peak")?;
-    Ok((said, peak * 1024.0))
+    if !done.status.success() {
+        bail!("{command:?}: {}\n{said}", done.status);
+    }
+    let figure = |name: &str| {
+        said.lines()
+            .find_map(|l| l.trim().strip_prefix(name)?.parse::<f64>().ok())
+            .with_context(|| format!("time printed no line '{name}'"))
+    };
+    Ok(Used {
+        wall,
+        user: figure("User time (seconds): ")?,
+        peak: figure("Maximum resident set size (kbytes): ")? * 1024.0,
+        said,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stage_times_are_told_from_other_lines() {
+        let said = "read a.glb: 12 triangles\n  fit screens     0.25 s\nflood 1.50 s\n about s\n";
+        let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+        assert_eq!(
+            stage_times(said),
+            [pair("fit screens", "0.25"), pair("flood", "1.50")]
+        );
+    }
 }

@@ -13,9 +13,21 @@ use crate::{
 /// Sight lines and completeness rays on each scene; the whole 10⁷ are for by hand.
 const RAYS: &str = "200000";
 
+/// Runs all steps, stops at the first that fails, and prints `N passed, N failed` last.
 pub(crate) fn run() -> anyhow::Result<()> {
     let start = Instant::now();
     let mut steps = Steps { passed: 0 };
+    let result = run_steps(&mut steps);
+    println!("all of it took {:.0} s", start.elapsed().as_secs_f64());
+    if let Err(error) = &result {
+        println!("{error:#}");
+    }
+    let n_failed = usize::from(result.is_err());
+    println!("{} passed, {n_failed} failed", steps.passed);
+    result
+}
+
+fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("tools", tools)?;
     steps.step("tidy", tidy::run)?;
     steps.step("format", || {
@@ -37,7 +49,10 @@ pub(crate) fn run() -> anyhow::Result<()> {
         run_to_end(cargo(&["test", "--release", "--workspace"]).env("NODE_PATH", node_path()))
     })?;
     steps.step("docs", || {
-        run_to_end(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+        run_to_end(
+            cargo(&["doc", "--release", "--workspace", "--no-deps"])
+                .env("RUSTDOCFLAGS", "-D warnings"),
+        )
     })?;
     steps.step("build", || {
         run_to_end(&mut cargo(&["build", "--release", "--workspace"]))
@@ -54,10 +69,8 @@ pub(crate) fn run() -> anyhow::Result<()> {
     if scenes().is_empty() {
         println!("no real scenes: set ENFILADE_SCENES to their folder to run them too");
     } else {
-        steps.step("score", || score::run(&[]))?;
+        steps.step("score", || score::run(&[], false))?;
     }
-    println!("all of it took {:.0} s", start.elapsed().as_secs_f64());
-    println!("{} passed, 0 failed", steps.passed);
     Ok(())
 }
 
@@ -88,7 +101,8 @@ fn node_path() -> PathBuf {
     tools_dir().join("node_modules")
 }
 
-/// The one outside tool is the Khronos glTF validator, a package for node.
+/// Says what is missing, a line each, and installs what it can: the Khronos glTF validator, a package
+/// for node, which goes below the target folder.
 fn tools() -> anyhow::Result<()> {
     let has = |name: &str| {
         Command::new(name)
@@ -96,10 +110,18 @@ fn tools() -> anyhow::Result<()> {
             .output()
             .is_ok_and(|o| o.status.success())
     };
-    if !has("node") || !has("npm") {
-        bail!(
-            "node and npm are needed for the glTF validator; install them (e.g. `apt-get install nodejs npm`)"
-        );
+    let needed = [
+        ("git", "lists the files to check", "apt-get install git"),
+        ("node", "runs the glTF validator", "apt-get install nodejs"),
+        ("npm", "installs the glTF validator", "apt-get install npm"),
+    ];
+    let missing: Vec<String> = needed
+        .iter()
+        .filter(|n| !has(n.0))
+        .map(|(name, why, how)| format!("missing: {name}, which {why}; `{how}` or alike"))
+        .collect();
+    if !missing.is_empty() {
+        bail!("{}", missing.join("\n"));
     }
     if !node_path().join("gltf-validator").is_dir() {
         std::fs::create_dir_all(tools_dir())?;
@@ -169,8 +191,10 @@ fn check_scene(scene: &std::path::Path, name: &str) -> anyhow::Result<()> {
     print!("{}", output_of(&mut bake_command(scene, &world), None)?);
     validate(&world)?;
     match verify(&world) {
-        Err(why) if KNOWN_BROKEN.contains(&name) => println!("KNOWN TO BREAK: {why:#}"),
-        other => return other,
+        Err(why) if KNOWN_BROKEN.contains(&name) => {
+            println!("KNOWN TO BREAK: {why:#}");
+            Ok(())
+        }
+        other => other,
     }
-    Ok(())
 }

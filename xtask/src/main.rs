@@ -13,24 +13,28 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
 
-const USAGE: &str = "usage: cargo xtask test | score [--write] [SCENE_DIR...] | bench [--write]
+const USAGE: &str = "\
+usage: cargo xtask test
+       cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
+       cargo xtask bench [--write] [--peers DIR]
 
-  test    checks tools, formats, lints, tests, docs; bakes, validates and verifies scenes
+  test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
   score   rooms and doors found, against the rooms that architects modeled
-  bench   growth of time and memory with the size of an office tower
+  bench   growth of time and memory with the size of an office tower; with --peers, the voxel
+          kernels beside other implementations too (scripts/bench_kernels.py)
 
-Real scenes are looked for in $ENFILADE_SCENES, then in ../shared/scenes.";
+--write puts the table into docs/benchmarks/. Real scenes (folders with a scene.glb) are looked for
+in $ENFILADE_SCENES, then in ../shared/scenes.";
 
 fn main() -> ExitCode {
-    let args: Vec<String> = std::env::args().skip(1).collect();
-    let result = match args.first().map(String::as_str) {
-        Some("test") => check::run(),
-        Some("score") => score::run(&args[1..]),
-        Some("bench") => bench::run(&args[1..]),
-        _ => {
-            eprintln!("{USAGE}");
-            return ExitCode::from(2);
-        }
+    let Some(task) = Task::parse(std::env::args().skip(1)) else {
+        eprintln!("{USAGE}");
+        return ExitCode::from(2);
+    };
+    let result = match task {
+        Task::Test => check::run(),
+        Task::Score { is_written, dirs } => score::run(&dirs, is_written),
+        Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -41,15 +45,51 @@ fn main() -> ExitCode {
     }
 }
 
+/// What is asked for.
+enum Task {
+    Test,
+    Score {
+        is_written: bool,
+        dirs: Vec<PathBuf>,
+    },
+    Bench {
+        is_written: bool,
+        peers: Option<PathBuf>,
+    },
+}
+
+impl Task {
+    /// `None` for arguments that mean nothing.
+    fn parse(mut args: impl Iterator<Item = String>) -> Option<Self> {
+        let name = args.next()?;
+        let (mut is_written, mut dirs, mut peers) = (false, Vec::new(), None);
+        while let Some(arg) = args.next() {
+            match (name.as_str(), arg.as_str()) {
+                ("score" | "bench", "--write") => is_written = true,
+                ("score", "--scenes") => dirs.extend(scenes_in(Path::new(&args.next()?))),
+                ("bench", "--peers") => peers = Some(PathBuf::from(args.next()?)),
+                ("score", dir) if !dir.starts_with('-') => dirs.push(PathBuf::from(dir)),
+                _ => return None,
+            }
+        }
+        match name.as_str() {
+            "test" => Some(Self::Test),
+            "score" => Some(Self::Score { is_written, dirs }),
+            "bench" => Some(Self::Bench { is_written, peers }),
+            _ => None,
+        }
+    }
+}
+
 /// The workspace's root.
 fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_path_buf()
 }
 
-/// Where builds go.
+/// Where builds go. A relative `CARGO_TARGET_DIR` is meant from the root, where cargo is run.
 fn target_dir() -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+    root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
 /// The release binary `name`.
@@ -67,11 +107,13 @@ fn scenes_dir() -> Option<PathBuf> {
     dir.is_dir().then_some(dir)
 }
 
-/// The real scenes (folders with a `scene.glb`), by name.
+/// The real scenes, by name.
 fn scenes() -> Vec<PathBuf> {
-    let Some(dir) = scenes_dir() else {
-        return Vec::new();
-    };
+    scenes_dir().map_or_else(Vec::new, |dir| scenes_in(&dir))
+}
+
+/// The folders with a `scene.glb` in `dir`, by name.
+fn scenes_in(dir: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(dir) else {
         return Vec::new();
     };
@@ -135,9 +177,11 @@ fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<Strin
     }
     let done = child.wait_with_output()?;
     if !done.status.success() {
+        // The reports of `verify` and of the validator stand on standard output.
         bail!(
-            "{command:?}: {}\n{}",
+            "{command:?}: {}\n{}{}",
             done.status,
+            String::from_utf8_lossy(&done.stdout),
             String::from_utf8_lossy(&done.stderr)
         );
     }

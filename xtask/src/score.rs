@@ -74,16 +74,18 @@ struct Row {
 
 const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
 
-pub(crate) fn run(args: &[String]) -> anyhow::Result<()> {
-    let write = args.iter().any(|a| a == "--write");
-    let mut dirs: Vec<PathBuf> = args
-        .iter()
-        .filter(|a| *a != "--write")
-        .map(PathBuf::from)
-        .collect();
-    if dirs.is_empty() {
-        dirs = scenes();
-    }
+/// The lines of `docs/benchmarks/rooms.md` between which the table stands.
+const TABLE_BEGIN: &str = "<!-- written by `cargo xtask score --write` -->\n";
+const TABLE_END: &str = "<!-- end -->\n";
+
+/// Scores `dirs`, or all the real scenes where that is empty; prints the table, and puts it into
+/// `docs/benchmarks/rooms.md` if `is_written`.
+pub(crate) fn run(dirs: &[PathBuf], is_written: bool) -> anyhow::Result<()> {
+    let mut dirs = if dirs.is_empty() {
+        scenes()
+    } else {
+        dirs.to_vec()
+    };
     dirs.retain(|d| d.join("truth.json").is_file());
     if dirs.is_empty() {
         bail!("no scene with a truth.json; name folders, or set ENFILADE_SCENES");
@@ -91,47 +93,73 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<()> {
     run_to_end(&mut cargo(&["build", "--release", "-p", "enfilade-cli"]))?;
     let rows = dirs
         .iter()
-        .map(|d| score_scene(d))
+        .map(|d| score_scene(d).with_context(|| d.display().to_string()))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let table = table(&rows);
-    println!("{table}");
+    println!("{}", table(&rows, true));
     for row in &rows {
         if !row.failed.is_empty() {
             println!("{}: {}", row.name, row.failed.join("; "));
         }
     }
-    if write {
-        let path = root().join("docs/benchmarks/rooms-table.md");
+    if is_written {
+        let path = root().join("docs/benchmarks/rooms.md");
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let (before, rest) = text
+            .split_once(TABLE_BEGIN)
+            .context("rooms.md has lost the line where the table begins")?;
+        let (_, after) = rest
+            .split_once(TABLE_END)
+            .context("rooms.md has lost the line where the table ends")?;
+        // Without seconds: they say more about the machine than about us.
+        let table = table(&rows, false);
         std::fs::write(
             &path,
-            format!("Made by `cargo xtask score --write`.\n\n{table}"),
-        )
-        .with_context(|| path.display().to_string())?;
+            format!("{before}{TABLE_BEGIN}\n{table}\n{TABLE_END}{after}"),
+        )?;
     }
     Ok(())
 }
 
-fn table(rows: &[Row]) -> String {
+/// Markdown; the last row is the average over the scenes that have a figure.
+fn table(rows: &[Row], with_seconds: bool) -> String {
     let show = |f: Option<f64>| f.map_or_else(|| "–".to_owned(), |f| format!("{f:.2}"));
-    let mut out = format!("| scene | n | {} | seconds |\n", COLUMNS.join(" | "));
-    out += "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
+    let seconds = |text: String| {
+        if with_seconds {
+            format!(" {text} |")
+        } else {
+            String::new()
+        }
+    };
+    let mut out = format!(
+        "| scene | n | {} |{}\n| --- |{}{}\n",
+        COLUMNS.join(" | "),
+        seconds("seconds".into()),
+        " ---: |".repeat(1 + COLUMNS.len()),
+        seconds("---:".into()),
+    );
     for r in rows {
         let figures: Vec<String> = r.figures.iter().map(|&f| show(f)).collect();
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {:.2} |",
+            "| {} | {} | {} |{}",
             r.name,
             r.n_rooms,
             figures.join(" | "),
-            r.seconds
+            seconds(format!("{:.2}", r.seconds))
         );
     }
     let mean = |k: usize| {
         let known: Vec<f64> = rows.iter().filter_map(|r| r.figures[k]).collect();
         show((!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64))
     };
-    let means: Vec<String> = (0..6).map(mean).collect();
-    let _ = writeln!(out, "| **average** | | {} | |", means.join(" | "));
+    let means: Vec<String> = (0..COLUMNS.len()).map(mean).collect();
+    let total = rows.iter().map(|r| r.seconds).sum::<f64>();
+    let _ = writeln!(
+        out,
+        "| **average** | | {} |{}",
+        means.join(" | "),
+        seconds(format!("{:.2}", total / rows.len() as f64))
+    );
     out
 }
 

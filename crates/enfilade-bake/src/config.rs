@@ -12,11 +12,11 @@ use crate::watershed::MergeSettings;
 #[derive(Clone, Debug)]
 pub struct BakeConfig {
     /// Edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size.
-    /// [Units: wu] [Limit: > 0]
+    /// [Units: wu] [Limit: above 0]
     pub voxel: Option<f64>,
-    /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: > 0]
+    /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: above 0]
     pub min_opening: f64,
-    /// Most voxels; a larger scene gets larger voxels. About 2.5 bytes each. [Limit: > 0]
+    /// Most voxels; a larger scene gets larger voxels. About 2.5 bytes each. [Limit: above 0]
     pub max_voxels: usize,
     /// Basins shallower than this are noise. [Units: wu]
     pub noise: f64,

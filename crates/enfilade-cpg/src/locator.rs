@@ -64,7 +64,7 @@ impl Locator {
     }
 
     /// Adds the cells that a convex polygon touches to `cells`, which stays ascending and without
-    /// repeats. What lies within [`TOUCH`] of a plane is on both sides of it: errs to "touches".
+    /// repeats. What lies within 0.1 mm of a plane is on both sides of it: errs to "touches".
     ///
     /// `corners` in order; any number of them. Corners that are not finite touch nothing.
     pub fn cells_touching(&self, corners: &[DVec3], cells: &mut Vec<CellId>) {

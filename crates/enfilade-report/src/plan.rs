@@ -19,7 +19,7 @@ const OFF_PLANES: f64 = 1.37e-4;
 /// How to draw plans.
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
-    /// Height of the cut above each storey's floor. [Units: wu] [Limit: > 0]
+    /// Height of the cut above each storey's floor. [Units: wu] [Limit: above 0]
     pub cut_height: f64,
 }
 

@@ -48,7 +48,7 @@ impl Rng {
         low + (high - low) * self.unit()
     }
 
-    /// An index in `0..n`. [Limit: 0 < n < 2³²]
+    /// An index in `0..n`. `n` is above 0 and below 2³².
     pub fn below(&mut self, n: usize) -> usize {
         ((u64::from(self.next_u32()) * n as u64) >> 32) as usize
     }

@@ -12,7 +12,7 @@ use enfilade_geom::{Aabb, DVec2, DVec3};
 /// and, in scenes up to a kilometer, above the spacing of `f32`.
 const SNAP: f64 = 1e-4;
 
-/// `x` on the grid of [`SNAP`], so that neighbors that compute a coordinate in different ways
+/// `x` on the grid of `SNAP`, so that neighbors that compute a coordinate in different ways
 /// still share it to the last bit.
 #[must_use]
 pub fn snapped(x: f64) -> f64 {

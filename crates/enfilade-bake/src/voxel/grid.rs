@@ -7,7 +7,7 @@ use enfilade_geom::{Aabb, DVec3};
 pub struct Grid {
     /// Least corner of voxel `(0, 0, 0)`. [Units: wu]
     pub origin: DVec3,
-    /// Edge of a voxel. [Units: wu] [Limit: > 0]
+    /// Edge of a voxel. [Units: wu] [Limit: above 0]
     pub voxel: f64,
     /// Voxels along x, y and z.
     pub dims: [usize; 3],

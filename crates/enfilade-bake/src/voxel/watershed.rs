@@ -34,7 +34,7 @@ const STEPS: u32 = 64;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WatershedOptions<'a> {
     /// Basins with dynamics (peak minus highest saddle) below this join a deeper one. [Units: vx]
-    /// [Limit: >= 0]
+    /// [Limit: 0 and above]
     pub h: f64,
     /// The free voxels set here are one basin, infinitely deep, with label 1.
     pub outdoors: Option<&'a BitVolume>,
