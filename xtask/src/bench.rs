@@ -9,7 +9,9 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::{bake_command, binary, cargo, output_of, root, run_to_end, target_dir};
+use crate::{
+    bake_command, binary, cargo, output_of, root, run_to_end, target_dir, write_between_marks,
+};
 
 /// Rooms of the towers, a factor of 4 apart.
 const SIZES: [usize; 4] = [16, 64, 256, 1024];
@@ -100,21 +102,7 @@ fn growth(is_written: bool) -> anyhow::Result<()> {
     }
     println!("{table}\n{stage_table}");
     if is_written {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let path = root().join("docs/benchmarks/growth.md");
-        let text = format!(
-            "# Growth of a bake\n\n\
-             Furnished office towers of the test kit, the whole of `enfilade bake` with default settings. The\n\
-             command that writes this page:\n\n\
-             ```text\ncargo xtask bench --write\n```\n\n\
-             {table}\n\
-             *exponent*: of user time (all threads) in occupied voxels, from the row above; 1 is linear. *peak*: the\n\
-             most resident memory of the process, scene and world included; *bytes a voxel*: that over all voxels.\n\
-             Taken on a shared virtual machine of {cores} cores: the seconds say little, their growth more.\n\n\
-             Wall time of each stage, by number of rooms:\n\n\
-             {stage_table}"
-        );
-        std::fs::write(&path, text).with_context(|| path.display().to_string())?;
+        write_between_marks("growth.md", &format!("{table}\n{stage_table}"))?;
     }
     Ok(())
 }

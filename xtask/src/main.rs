@@ -156,6 +156,22 @@ fn bake_command(scene: &Path, world: &Path) -> Command {
     command
 }
 
+/// Puts `text` between the two marks of a page of `docs/benchmarks/`; what people wrote around it stays.
+fn write_between_marks(page: &str, text: &str) -> anyhow::Result<()> {
+    const BEGIN: &str = "<!-- written by `cargo xtask";
+    const END: &str = "<!-- end -->";
+    let path = root().join("docs/benchmarks").join(page);
+    let old = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let marks = || {
+        let begin = old.find(BEGIN)?;
+        let begin = begin + old[begin..].find('\n')? + 1;
+        Some((begin, begin + old[begin..].find(END)?))
+    };
+    let (begin, end) = marks().with_context(|| format!("{page} has lost its marks"))?;
+    let new = format!("{}\n{}\n\n{}", &old[..begin], text.trim_end(), &old[end..]);
+    std::fs::write(&path, new).with_context(|| path.display().to_string())
+}
+
 /// Standard output of a command that must succeed; what it says goes into the error.
 fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<String> {
     use std::io::Write as _;

@@ -12,7 +12,9 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::{bake_command, binary, cargo, output_of, root, run_to_end, scenes, target_dir};
+use crate::{
+    bake_command, binary, cargo, output_of, run_to_end, scenes, target_dir, write_between_marks,
+};
 
 type V3 = [f64; 3];
 
@@ -74,10 +76,6 @@ struct Row {
 
 const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
 
-/// The lines of `docs/benchmarks/rooms.md` between which the table stands.
-const TABLE_BEGIN: &str = "<!-- written by `cargo xtask score --write` -->\n";
-const TABLE_END: &str = "<!-- end -->\n";
-
 /// Scores `dirs`, or all the real scenes where that is empty; prints the table, and puts it into
 /// `docs/benchmarks/rooms.md` if `is_written`.
 pub(crate) fn run(dirs: &[PathBuf], is_written: bool) -> anyhow::Result<()> {
@@ -102,20 +100,8 @@ pub(crate) fn run(dirs: &[PathBuf], is_written: bool) -> anyhow::Result<()> {
         }
     }
     if is_written {
-        let path = root().join("docs/benchmarks/rooms.md");
-        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        let (before, rest) = text
-            .split_once(TABLE_BEGIN)
-            .context("rooms.md has lost the line where the table begins")?;
-        let (_, after) = rest
-            .split_once(TABLE_END)
-            .context("rooms.md has lost the line where the table ends")?;
         // Without seconds: they say more about the machine than about us.
-        let table = table(&rows, false);
-        std::fs::write(
-            &path,
-            format!("{before}{TABLE_BEGIN}\n{table}\n{TABLE_END}{after}"),
-        )?;
+        write_between_marks("rooms.md", &table(&rows, false))?;
     }
     Ok(())
 }
