@@ -10,6 +10,7 @@ mod locate;
 mod output;
 mod plan;
 mod progress;
+mod see;
 mod verify;
 mod world;
 
@@ -33,6 +34,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Plan(plan::Plan),
+    See(see::See),
     Verify(verify::Verify),
 }
 
@@ -43,6 +45,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::See(args) => see::run(&args),
         Command::Verify(args) => verify::run(&args),
     }
 }

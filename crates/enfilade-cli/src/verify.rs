@@ -4,12 +4,17 @@ use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
+use enfilade::cpg::World;
 use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
 use enfilade::import::{ImportOptions, import};
-use enfilade_verify::{VerifyOptions, verify_world_with_progress};
+use enfilade::runtime::{SeeOptions, Sight};
+use enfilade_verify::{
+    VerifyOptions, ViewOptions, ViewReport, verify_views, verify_world_with_progress,
+};
 
 use crate::progress::StageBar;
+use crate::see::Answers;
 use crate::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
@@ -24,6 +29,10 @@ pub(crate) struct Verify {
     /// Segments for `sealed`, and as many rays for `complete`.
     #[arg(long, default_value_t = 1_000_000, value_name = "N")]
     rays: u64,
+    /// Views tried for *conservative per frame*, with 100 rays in each: what they hit must be in the
+    /// run-time's answer.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    sight: u64,
     /// Start of the random sequences; equal seeds give equal reports.
     #[arg(long, default_value_t = 1, value_name = "S")]
     seed: u64,
@@ -58,12 +67,22 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         bar.set(done);
     });
     bar.finish();
+    let sight = (args.sight > 0)
+        .then(|| verify_sight(args, &world))
+        .transpose()?;
     let mut out = BufWriter::new(io::stdout().lock());
     if args.json {
-        serde_json::to_writer(&mut out, &report).map_err(io::Error::from)?;
+        let mut value = serde_json::to_value(&report)?;
+        if let Some(sight) = &sight {
+            value["sight"] = serde_json::to_value(sight)?;
+        }
+        serde_json::to_writer(&mut out, &value).map_err(io::Error::from)?;
         writeln!(out)?;
     } else {
         write!(out, "{report}")?;
+        if let Some(sight) = &sight {
+            write!(out, "{sight}")?;
+        }
     }
     out.flush().context("cannot write to standard output")?;
     if !report.holds() {
@@ -75,7 +94,33 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             report.problems.len()
         );
     }
+    if let Some(sight) = sight.filter(|s| !s.holds()) {
+        bail!(
+            "{} is not seen whole: {} of {} hits are missing from the answers",
+            args.world.display(),
+            sight.missed,
+            sight.hits
+        );
+    }
     Ok(())
+}
+
+/// Asks the run-time what random views see, and casts rays in them.
+fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
+    let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
+    let answers = Answers::new(world, &sight);
+    let options = ViewOptions {
+        views: args.sight,
+        seed: args.seed,
+        tolerance: args.tolerance,
+        ..ViewOptions::default()
+    };
+    let bar = StageBar::new();
+    bar.start("casting rays in views", args.sight);
+    let seer = || answers.seer(Some(SeeOptions::default()));
+    let report = verify_views(world, &options, &seer, &|done, _| bar.set(done));
+    bar.finish();
+    Ok(report)
 }
 
 /// The structural triangles of a scene, as the builder saw them.

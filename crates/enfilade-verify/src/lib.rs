@@ -38,6 +38,7 @@ mod rng;
 mod sample;
 mod sealed;
 mod subject;
+mod views;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -47,6 +48,7 @@ use rayon::prelude::*;
 
 pub use report::{CompleteCounts, Failure, FailureKind, SealedCounts, VerifyReport};
 pub use subject::{structural_triangles, tolerance};
+pub use views::{Missed, Seer, ViewAnswer, ViewOptions, ViewQuery, ViewReport, verify_views};
 
 use report::Tally;
 use rng::Rng;

@@ -1,0 +1,279 @@
+//! `enfilade see`: what one view sees.
+
+use std::collections::HashMap;
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Context;
+use clap::ValueEnum;
+use enfilade::cpg::World;
+use enfilade::runtime::{Narrowing, SeeOptions, Seen, Sight, SightState, View, Viewer};
+use enfilade_verify::{Seer, ViewAnswer, ViewQuery};
+use serde_json::json;
+
+use crate::world::read_world;
+
+/// Prints the cells, portals and triangles that a view sees, near to far, and how long it took to
+/// find out.
+#[derive(clap::Args)]
+pub(crate) struct See {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+    /// Where the eye is, in meters.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    eye: [f32; 3],
+    /// The point looked at, in meters; not a direction. +Y is up in the picture.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    look: [f32; 3],
+    /// Angle from the lower to the upper edge of the picture, in degrees; from 180 on, and where the
+    /// picture is wider than 170 degrees, everything around the eye is answered.
+    #[arg(long, value_name = "DEG", default_value_t = 60.0)]
+    fov: f32,
+    /// Width and height of the picture; only their ratio counts.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
+    size: [u32; 2],
+    /// Nothing farther than this along the view direction is seen, in meters.
+    #[arg(long, value_name = "METERS")]
+    far: Option<f32>,
+    /// How portals narrow the view: by rectangles, by their outlines, or by outlines of 8 edges.
+    #[arg(long, value_enum, default_value_t = Mode::PolygonK)]
+    mode: Mode,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How portals narrow the view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Mode {
+    Rect,
+    Polygon,
+    PolygonK,
+}
+
+impl Mode {
+    pub(crate) fn narrowing(self) -> Narrowing {
+        match self {
+            Self::Rect => Narrowing::Rectangle,
+            Self::Polygon => Narrowing::Polygon,
+            Self::PolygonK => SeeOptions::default().narrowing,
+        }
+    }
+}
+
+/// Times a view is asked; the least is printed.
+const REPEATS: usize = 21;
+
+pub(crate) fn run(args: &See) -> anyhow::Result<()> {
+    let world = read_world(&args.world)?;
+    let toward = [0, 1, 2].map(|k| args.look[k] - args.eye[k]);
+    let aspect = args.size[0] as f32 / args.size[1] as f32;
+    let up = [0.0, 1.0, 0.0];
+    let mut view = View::perspective(args.eye, toward, up, args.fov.to_radians(), aspect)?;
+    if let Some(far) = args.far {
+        view = view.with_far(far)?;
+    }
+    let sight = Sight::build(&world).with_context(|| args.world.display().to_string())?;
+    let state = SightState::new(&sight);
+    let options = SeeOptions {
+        narrowing: args.mode.narrowing(),
+        ..SeeOptions::default()
+    };
+    let mut viewer = Viewer::with_options(&sight, options);
+    let mut seconds = f64::INFINITY;
+    for _ in 0..REPEATS {
+        let start = Instant::now();
+        std::hint::black_box(viewer.see(&sight, &state, &view));
+        seconds = seconds.min(start.elapsed().as_secs_f64());
+    }
+    let seen = viewer.see(&sight, &state, &view);
+    let eye_cell = sight.locate(args.eye).map(|c| c.0);
+    let mut out = BufWriter::new(io::stdout().lock());
+    if args.json {
+        print_json(&mut out, &world, &sight, &seen, eye_cell, seconds)?;
+    } else {
+        print_table(&mut out, &world, &sight, &seen, eye_cell, seconds)?;
+    }
+    out.flush().context("cannot write to standard output")
+}
+
+/// Triangles seen of structure and of details.
+fn triangles(sight: &Sight, seen: &Seen<'_>) -> [u64; 2] {
+    let chunks = seen.chunks().iter();
+    let structure = chunks
+        .map(|c| u64::from(sight.chunks()[c.0 as usize].n_triangles()))
+        .sum();
+    [structure, seen.n_triangles() - structure]
+}
+
+fn print_json(
+    out: &mut impl Write,
+    world: &World,
+    sight: &Sight,
+    seen: &Seen<'_>,
+    eye_cell: Option<u32>,
+    seconds: f64,
+) -> anyhow::Result<()> {
+    let visits: Vec<_> = seen
+        .visits()
+        .iter()
+        .map(|v| {
+            json!({
+                "cell": v.cell.0, "via": v.via.map(|p| p.0), "rectangle": v.rectangle,
+                "face": v.face, "depth": v.depth,
+            })
+        })
+        .collect();
+    let [structure, details] = triangles(sight, seen);
+    let counts = seen.counts();
+    let mut batches: Vec<u32> = seen
+        .chunks()
+        .iter()
+        .map(|c| sight.chunks()[c.0 as usize].batch)
+        .collect();
+    batches.sort_unstable();
+    batches.dedup();
+    let report = json!({
+        "eye_cell": eye_cell,
+        "cells": seen.cells().iter().map(|c| c.0).collect::<Vec<_>>(),
+        "portals": seen.portals().iter().map(|p| p.0).collect::<Vec<_>>(),
+        "batches": batches,
+        "details": seen.details().iter().map(|d| d.0).collect::<Vec<_>>(),
+        "visits": visits,
+        "counts": {
+            "cells": seen.cells().len(), "of_cells": world.graph.cells.len(),
+            "portals": seen.portals().len(), "of_portals": world.graph.portals.len(),
+            "triangles": structure, "detail_triangles": details,
+            "of_triangles": sight.n_triangles(), "clips": counts.clips,
+            "spared": counts.spared, "shadowed": counts.shadowed,
+            "capped": counts.is_capped,
+        },
+        "seconds": seconds,
+    });
+    serde_json::to_writer(&mut *out, &report).map_err(io::Error::from)?;
+    writeln!(out)?;
+    Ok(())
+}
+
+fn print_table(
+    out: &mut impl Write,
+    world: &World,
+    sight: &Sight,
+    seen: &Seen<'_>,
+    eye_cell: Option<u32>,
+    seconds: f64,
+) -> anyhow::Result<()> {
+    let name = |c: u32| world.graph.cells[c as usize].name.as_str();
+    match eye_cell {
+        Some(c) => writeln!(out, "eye in {}", name(c))?,
+        None => writeln!(
+            out,
+            "eye in no cell: all that meets the view counts as visible"
+        )?,
+    }
+    writeln!(out, "{:>8} {:>8}  cell", "depth m", "portal")?;
+    for v in seen.visits() {
+        let via = v.via.map_or("-".to_owned(), |p| p.0.to_string());
+        writeln!(out, "{:>8.2} {via:>8}  {}", v.depth, name(v.cell.0))?;
+    }
+    let [structure, details] = triangles(sight, seen);
+    writeln!(
+        out,
+        "{} of {} cells, {} of {} portals, {} of {} triangles ({} of details), {:.1} us",
+        seen.cells().len(),
+        world.graph.cells.len(),
+        seen.portals().len(),
+        world.graph.portals.len(),
+        structure + details,
+        sight.n_triangles(),
+        details,
+        seconds * 1e6
+    )?;
+    Ok(())
+}
+
+fn point(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|w| w.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => Ok([x, y, z]),
+        _ => Err("three numbers of meters are needed, e.g. 1,1.6,-2.5".into()),
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parse = || {
+        let (w, h) = text.split_once('x')?;
+        let (w, h) = (w.parse::<u32>().ok()?, h.parse::<u32>().ok()?);
+        (w > 0 && h > 0).then_some([w, h])
+    };
+    parse().ok_or_else(|| "a width and a height are needed, e.g. 1280x720".into())
+}
+
+/// Answers the views of `verify --sight` and of the tables: the run-time behind the checker's door.
+pub(crate) struct Answers<'w> {
+    pub(crate) sight: &'w Sight,
+    state: SightState,
+    /// By chunk: its triangles as the batch numbers them.
+    triangles: Vec<Vec<u32>>,
+}
+
+impl<'w> Answers<'w> {
+    pub(crate) fn new(world: &World, sight: &'w Sight) -> Self {
+        let mut numbers: Vec<HashMap<[u32; 3], Vec<u32>>> = Vec::new();
+        for batch in &world.batches {
+            let mut by_corners: HashMap<[u32; 3], Vec<u32>> = HashMap::new();
+            for (i, t) in batch.primitive.indices.chunks_exact(3).enumerate() {
+                let corners = [t[0], t[1], t[2]];
+                by_corners.entry(corners).or_default().push(i as u32);
+            }
+            numbers.push(by_corners);
+        }
+        let triangles = sight
+            .chunks()
+            .iter()
+            .map(|c| {
+                let first = c.first_index as usize;
+                let indices = &sight.indices(c.batch)[first..first + c.n_indices as usize];
+                indices
+                    .chunks_exact(3)
+                    .filter_map(|t| numbers[c.batch as usize].get(&[t[0], t[1], t[2]]))
+                    .flatten()
+                    .copied()
+                    .collect()
+            })
+            .collect();
+        Self {
+            sight,
+            state: SightState::new(sight),
+            triangles,
+        }
+    }
+
+    /// One that answers by portals; `options: None` for the view frustum alone.
+    pub(crate) fn seer(&self, options: Option<SeeOptions>) -> Seer<'_> {
+        let mut viewer = Viewer::with_options(self.sight, options.unwrap_or_default());
+        Box::new(move |query: &ViewQuery, answer: &mut ViewAnswer<'_>| {
+            let view =
+                View::perspective(query.eye, query.toward, query.up, query.fov_y, query.aspect);
+            // A view that cannot be is answered by nothing, and shows as misses.
+            let Ok(view) = view else { return };
+            let seen = match options {
+                Some(_) => viewer.see(self.sight, &self.state, &view),
+                None => viewer.see_through_walls(self.sight, &view),
+            };
+            for c in seen.chunks() {
+                let batch = self.sight.chunks()[c.0 as usize].batch;
+                for &t in &self.triangles[c.0 as usize] {
+                    answer.add_triangle(batch, t);
+                }
+            }
+            for d in seen.details() {
+                answer.add_detail(d.0);
+            }
+            for c in seen.cells() {
+                answer.add_cell(c.0);
+            }
+        })
+    }
+}

@@ -1,0 +1,263 @@
+//! Trees of boxes, and which boxes a set of planes lets through.
+//!
+//! Four boxes are tested at a time (after Assarsson & Möller, "Optimized View Frustum Culling
+//! Algorithms for Bounding Boxes", 2000: only the corner farthest along a plane's normal is looked
+//! at). Errs to "inside".
+
+use glam::{DVec3, Vec4};
+
+use enfilade_geom::Aabb;
+
+/// A child that is not there.
+const NONE: u32 = u32::MAX;
+/// Marks a child that is an item, not a node.
+const ITEM: u32 = 1 << 31;
+/// Levels of a tree of 2³¹ items, three siblings waiting at each, and room to spare.
+const STACK: usize = 64;
+
+/// Four children: their boxes as `[min, max][axis]`, and what they are.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Node {
+    bounds: [[Vec4; 3]; 2],
+    children: [u32; 4],
+}
+
+/// Many trees in one list of nodes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct BoxTrees {
+    nodes: Vec<Node>,
+}
+
+/// The root of a tree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Root(u32);
+
+impl Root {
+    pub(crate) const EMPTY: Self = Self(NONE);
+}
+
+/// An item and its box.
+pub(crate) struct Boxed {
+    pub(crate) bounds: Aabb,
+    pub(crate) item: u32,
+}
+
+impl BoxTrees {
+    /// Adds a tree over `items`, which it sorts. O(n log² n).
+    ///
+    /// Boxes are rounded outwards and grown by `margin`.
+    pub(crate) fn add(&mut self, items: &mut [Boxed], margin: f64) -> Root {
+        if items.is_empty() {
+            return Root::EMPTY;
+        }
+        let at = self.nodes.len() as u32;
+        self.nodes.push(Node {
+            bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]],
+            children: [NONE; 4],
+        });
+        let n = items.len();
+        if n > 4 {
+            sort_longest(items);
+            let (low, high) = items.split_at_mut(n / 2);
+            sort_longest(low);
+            sort_longest(high);
+        }
+        let cuts = [0, n / 4, n / 2, n / 2 + (n - n / 2) / 2, n];
+        for k in 0..4 {
+            let part = if n > 4 {
+                &mut items[cuts[k]..cuts[k + 1]]
+            } else if k < n {
+                &mut items[k..=k]
+            } else {
+                break;
+            };
+            let bounds = part.iter().fold(Aabb::EMPTY, |b, i| b.union(i.bounds));
+            let child = match part {
+                [] => continue,
+                [one] => ITEM | one.item,
+                _ => self.add(part, margin).0,
+            };
+            let node = &mut self.nodes[at as usize];
+            node.children[k] = child;
+            for axis in 0..3 {
+                node.bounds[0][axis][k] = ((bounds.min[axis] - margin) as f32).next_down();
+                node.bounds[1][axis][k] = ((bounds.max[axis] + margin) as f32).next_up();
+            }
+        }
+        Root(at)
+    }
+
+    /// Calls `visit` with every item of a tree whose box no plane leaves out altogether.
+    #[inline]
+    pub(crate) fn for_each_inside(
+        &self,
+        root: Root,
+        planes: &Planes,
+        mut visit: impl FnMut(u32, [Vec4; 2]),
+    ) {
+        if root.0 == NONE {
+            return;
+        }
+        let mut stack = [0; STACK];
+        stack[0] = root.0;
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let node = &self.nodes[stack[len] as usize];
+            let mut mask = planes.boxes_inside(&node.bounds);
+            while mask != 0 {
+                let k = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                let child = node.children[k];
+                if child == NONE {
+                    continue;
+                }
+                if child & ITEM == 0 {
+                    stack[len] = child;
+                    len += 1;
+                    continue;
+                }
+                let corner = |side: usize| {
+                    let b = &node.bounds[side];
+                    Vec4::new(b[0][k], b[1][k], b[2][k], 1.0)
+                };
+                visit(child & !ITEM, [corner(0), corner(1)]);
+            }
+        }
+    }
+}
+
+fn sort_longest(items: &mut [Boxed]) {
+    let centers = items
+        .iter()
+        .fold(Aabb::EMPTY, |b, i| b.including(i.bounds.center()));
+    let size = centers.size();
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    // By item where equal, so that the same world gives the same tree.
+    items.sort_unstable_by(|a, b| {
+        let (x, y) = (a.bounds.center()[axis], b.bounds.center()[axis]);
+        x.total_cmp(&y).then(a.item.cmp(&b.item))
+    });
+}
+
+/// Planes a region may have: its edges, four sides, entry, far.
+const MAX_PLANES: usize = crate::region::MAX_EDGES + 6;
+
+/// Half-spaces `n · p + d >= 0` in world space, wide enough that rounding leaves nothing out.
+#[derive(Clone, Debug)]
+pub(crate) struct Planes {
+    planes: [Vec4; MAX_PLANES],
+    len: usize,
+    eye: DVec3,
+    /// How far planes are moved outwards. [Units: wu]
+    margin: f64,
+}
+
+impl Planes {
+    /// No planes, for boxes of coordinates up to `extent` seen from `eye`.
+    pub(crate) fn new(eye: DVec3, extent: f64) -> Self {
+        // Three products and sums of up to twice the reach in `f32`, doubled.
+        let reach = extent.max(eye.abs().max_element());
+        Self {
+            planes: [Vec4::ZERO; MAX_PLANES],
+            len: 0,
+            eye,
+            margin: reach * (12.0 / 16_777_216.0),
+        }
+    }
+
+    /// What rounding may move a plane by. [Units: wu]
+    pub(crate) fn margin(&self) -> f64 {
+        self.margin
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds `normal · (p - eye) >= least`; `normal` of any length.
+    pub(crate) fn add(&mut self, normal: DVec3, least: f64) {
+        let scale = 1.0 / normal.length();
+        if !scale.is_finite() || self.len == MAX_PLANES {
+            return;
+        }
+        let n = normal * scale;
+        let d = self.margin - least * scale - n.dot(self.eye);
+        self.planes[self.len] = n.extend(d).as_vec4();
+        self.len += 1;
+    }
+
+    pub(crate) fn as_slice(&self) -> &[Vec4] {
+        &self.planes[..self.len]
+    }
+
+    /// Bit `k` is set where box `k` of four is not outside any plane. Empty boxes are outside.
+    #[inline]
+    fn boxes_inside(&self, bounds: &[[Vec4; 3]; 2]) -> u32 {
+        let mut inside = bounds[0][0].cmple(bounds[1][0]);
+        for plane in self.as_slice() {
+            let far = |axis: usize| bounds[usize::from(plane[axis] >= 0.0)][axis];
+            let reach = far(0) * plane.x + far(1) * plane.y + far(2) * plane.z + plane.w;
+            // What is no number (an infinite box) stays in.
+            inside &= !reach.cmplt(Vec4::ZERO);
+            if !inside.any() {
+                return 0;
+            }
+        }
+        inside.bitmask()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_tree_finds_what_looking_at_every_box_finds(
+            corners in prop::collection::vec((prop::array::uniform3(-9.0f64..9.0),
+                prop::array::uniform3(0.0f64..3.0)), 0..70),
+            planes in prop::collection::vec((prop::array::uniform3(-1.0f64..1.0), -4.0f64..4.0), 0..6),
+        ) {
+            let boxes: Vec<Aabb> = corners.iter()
+                .map(|(a, s)| Aabb::new((*a).into(), DVec3::from(*a) + DVec3::from(*s)))
+                .collect();
+            let mut items: Vec<Boxed> = boxes.iter().enumerate()
+                .map(|(i, &bounds)| Boxed { bounds, item: i as u32 })
+                .collect();
+            let mut trees = BoxTrees::default();
+            trees.add(&mut [Boxed { bounds: Aabb::new(DVec3::ZERO, DVec3::ONE), item: 7 }], 0.0);
+            let root = trees.add(&mut items, 0.0);
+            let eye = DVec3::new(0.5, 1.0, -2.0);
+            let mut set = Planes::new(eye, 12.0);
+            for (n, d) in &planes {
+                set.add((*n).into(), *d);
+            }
+            let mut found = Vec::new();
+            trees.for_each_inside(root, &set, |i, _| found.push(i));
+            found.sort_unstable();
+            prop_assert!(found.windows(2).all(|w| w[0] < w[1]), "twice");
+            for (i, b) in boxes.iter().enumerate() {
+                // The best corner for each plane, in f64, without margin.
+                let is_inside = |slack: f64| planes.iter().all(|(n, d)| {
+                    let n = DVec3::from(*n);
+                    n.length() < 1e-300 || (0..8).any(|c| {
+                        let p = DVec3::select(glam::BVec3::new(c & 1 > 0, c & 2 > 0, c & 4 > 0), b.min, b.max);
+                        n.dot(p - eye) - d >= -slack * n.length()
+                    })
+                });
+                let is_found = found.binary_search(&(i as u32)).is_ok();
+                prop_assert!(is_found || !is_inside(0.0), "lost {b:?}");
+                prop_assert!(!is_found || is_inside(1e-4), "kept {b:?}");
+            }
+        }
+    }
+}

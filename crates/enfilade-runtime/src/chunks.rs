@@ -1,0 +1,143 @@
+//! Structural batches cut into small groups of neighboring triangles.
+
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{Aabb, DVec3};
+
+use crate::sight::point;
+
+/// A group of triangles of one batch that is culled, and drawn, as one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chunk {
+    /// Index into `World::batches`.
+    pub batch: u32,
+    /// First index (three a triangle) in [`Sight::indices`](crate::Sight::indices) of the batch.
+    pub first_index: u32,
+    /// How many indices.
+    pub n_indices: u32,
+    /// Least and greatest corner. [Units: wu]
+    pub aabb: [[f32; 3]; 2],
+}
+
+impl Chunk {
+    /// Its triangles.
+    #[must_use]
+    pub fn n_triangles(&self) -> u32 {
+        self.n_indices / 3
+    }
+
+    pub(crate) fn bounds(&self) -> Aabb {
+        Aabb::new(point(self.aabb[0]), point(self.aabb[1]))
+    }
+}
+
+/// A triangle to be grouped.
+struct Entry {
+    corners: [u32; 3],
+    center: DVec3,
+    /// Which way it faces, in eighths of the sphere and by its main axis.
+    facing: u8,
+}
+
+/// Adds the chunks of one batch to `chunks`; returns its indices in their order.
+///
+/// Splits at the median of the longest axis until groups are small. Same input, same chunks.
+pub(crate) fn chunks_of(
+    batch: u32,
+    primitive: &Primitive,
+    size: usize,
+    chunks: &mut Vec<Chunk>,
+) -> Vec<u32> {
+    let mut entries: Vec<Entry> = primitive
+        .indices
+        .chunks_exact(3)
+        .map(|t| {
+            let p = [0, 1, 2].map(|k| point(primitive.positions[t[k] as usize]));
+            let normal = (p[1] - p[0]).cross(p[2] - p[0]);
+            let a = normal.abs();
+            let axis = if a.x >= a.y && a.x >= a.z {
+                0
+            } else if a.y >= a.z {
+                1
+            } else {
+                2
+            };
+            Entry {
+                corners: [t[0], t[1], t[2]],
+                center: Aabb::of_points(&p).center(),
+                facing: axis * 2 + u8::from(normal[usize::from(axis)] < 0.0),
+            }
+        })
+        .collect();
+    let mut out = Vec::with_capacity(primitive.indices.len());
+    split(batch, primitive, size, &mut entries, chunks, &mut out);
+    out
+}
+
+fn split(
+    batch: u32,
+    primitive: &Primitive,
+    size: usize,
+    entries: &mut [Entry],
+    chunks: &mut Vec<Chunk>,
+    out: &mut Vec<u32>,
+) {
+    if entries.is_empty() {
+        return;
+    }
+    let centers = entries
+        .iter()
+        .fold(Aabb::EMPTY, |b, e| b.including(e.center));
+    if entries.len() > size {
+        let extent = centers.size();
+        let axis = if extent.x >= extent.y && extent.x >= extent.z {
+            0
+        } else if extent.y >= extent.z {
+            1
+        } else {
+            2
+        };
+        // Few triangles are the walls of a room, which boxes tell apart best by the way they face.
+        let by_facing =
+            entries.len() <= 4 * size && entries.iter().any(|e| e.facing != entries[0].facing);
+        entries.sort_by(|a, b| {
+            let side = if by_facing {
+                a.facing.cmp(&b.facing)
+            } else {
+                std::cmp::Ordering::Equal
+            };
+            side.then(a.center[axis].total_cmp(&b.center[axis]))
+        });
+        let middle = entries.len() / 2;
+        // Not within a wall, where another place is near the middle.
+        let at = if by_facing {
+            (1..entries.len())
+                .filter(|&i| entries[i].facing != entries[i - 1].facing)
+                .min_by_key(|i| i.abs_diff(middle))
+                .unwrap_or(middle)
+        } else {
+            middle
+        };
+        let (low, high) = entries.split_at_mut(at);
+        split(batch, primitive, size, low, chunks, out);
+        split(batch, primitive, size, high, chunks, out);
+        return;
+    }
+    let first_index = out.len() as u32;
+    let mut aabb = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+    for e in entries.iter() {
+        out.extend(e.corners);
+        for i in e.corners {
+            let p = primitive.positions[i as usize];
+            for axis in 0..3 {
+                aabb[0][axis] = aabb[0][axis].min(p[axis]);
+                aabb[1][axis] = aabb[1][axis].max(p[axis]);
+            }
+        }
+    }
+    chunks.push(Chunk {
+        batch,
+        first_index,
+        n_indices: out.len() as u32 - first_index,
+        aabb,
+    });
+}

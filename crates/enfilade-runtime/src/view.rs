@@ -1,0 +1,310 @@
+//! The eye: where it is, which way it looks, how wide.
+//!
+//! A view is a map from world to clip space with the eye at the origin: `q = F · (p - eye)` gives
+//! `q = (x, y, w)`, and what the eye sees has `|x| <= w` and `|y| <= w`. Depth is `w`, in meters along
+//! the view direction. No division takes place here: points beside and behind the eye (`w <= 0`) are
+//! ordinary points, and clipping deals with them.
+//!
+//! A view of 180 degrees and more has no such map. It is taken as six faces of a cube, which hold all
+//! directions: a superset.
+
+use glam::{DMat3, DVec3};
+
+use enfilade_geom::DMat4;
+
+/// Widest angle between opposite sides of a view of one face; wider views look all around.
+/// [Units: rad]
+///
+/// At 170 degrees the screen is 11 times as wide as it is far; beyond, its middle is so small that a
+/// cube of six faces narrows better.
+const MAX_FOV: f64 = 170.0 / 180.0 * std::f64::consts::PI;
+
+/// Why there can be no such view.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ViewError {
+    /// Eye, direction or matrix holds a number that is not finite.
+    #[error("the view's {what} is not finite")]
+    NotFinite {
+        /// What it is.
+        what: &'static str,
+    },
+    /// A direction without a length.
+    #[error("the view has no direction: the point looked at must differ from the eye")]
+    NoDirection,
+    /// An angle or aspect that is not positive.
+    #[error("the view's {what} is {value}; it must be greater than 0")]
+    NotPositive {
+        /// What it is.
+        what: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// The matrix is no perspective projection: it has no eye, or not this one.
+    #[error("the matrix is no perspective projection seen from the eye given")]
+    NotPerspective,
+}
+
+/// One face of a view: a map from world to clip space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Face {
+    /// `q = map · (p - eye)`; the third row, which gives `w`, has unit length.
+    pub(crate) map: DMat3,
+    /// Takes normals of world planes to clip space: the inverse transposed.
+    pub(crate) normals: DMat3,
+    /// Longest change of `a x + b y + c w` for a step of one meter in the world, where `(a, b)` has
+    /// unit length and `|c|` is at most that of a line that meets the screen.
+    pub(crate) stretch: f64,
+}
+
+impl Face {
+    fn new(map: DMat3) -> Option<Self> {
+        let rows = map.transpose();
+        let scale = 1.0 / rows.z_axis.length();
+        let map = map * scale;
+        let inverse = map.inverse();
+        if !(scale.is_finite() && map.is_finite() && inverse.is_finite()) {
+            return None;
+        }
+        let rows = map.transpose();
+        // |a r0 + b r1| <= hypot(|r0|, |r1|); a line that meets [-1, 1]² has |c| <= sqrt 2.
+        let stretch = rows.x_axis.length().hypot(rows.y_axis.length()) + std::f64::consts::SQRT_2;
+        Some(Self {
+            map,
+            normals: inverse.transpose(),
+            stretch,
+        })
+    }
+}
+
+/// Where the eye is, which way it looks, and how wide.
+#[derive(Clone, Debug)]
+pub struct View {
+    pub(crate) eye: DVec3,
+    pub(crate) faces: [Face; 6],
+    pub(crate) n_faces: usize,
+    /// What is farther along the view direction is not seen. Infinite for none.
+    pub(crate) far: f64,
+}
+
+fn finite(v: [f32; 3], what: &'static str) -> Result<DVec3, ViewError> {
+    let v = DVec3::new(v[0].into(), v[1].into(), v[2].into());
+    if v.is_finite() {
+        Ok(v)
+    } else {
+        Err(ViewError::NotFinite { what })
+    }
+}
+
+impl View {
+    /// A camera at `eye` that looks along `toward` (any length), upright towards `up`.
+    ///
+    /// `fov_y` is the angle from the lower to the upper edge [Units: rad] [Limit: > 0], `aspect` the
+    /// width of the picture divided by its height [Limit: > 0]. A view wider or higher than 170
+    /// degrees looks [all around](View::around), which holds it.
+    ///
+    /// An `up` that is parallel to `toward`, or zero, is replaced by another direction.
+    ///
+    /// # Errors
+    ///
+    /// What is not finite, a direction without length, an angle or aspect that is not positive.
+    pub fn perspective(
+        eye: [f32; 3],
+        toward: [f32; 3],
+        up: [f32; 3],
+        fov_y: f32,
+        aspect: f32,
+    ) -> Result<Self, ViewError> {
+        let at = finite(eye, "eye")?;
+        let forward = finite(toward, "direction")?;
+        let up = finite(up, "up direction")?;
+        for (what, value) in [("angle", fov_y), ("aspect", aspect)] {
+            if value.is_nan() || value <= 0.0 {
+                return Err(ViewError::NotPositive { what, value });
+            }
+        }
+        let forward = forward.try_normalize().ok_or(ViewError::NoDirection)?;
+        let tan_y = (f64::from(fov_y) * 0.5).tan();
+        let tan_x = tan_y * f64::from(aspect);
+        let limit = (MAX_FOV * 0.5).tan();
+        // A tangent beyond 90 degrees is negative.
+        if f64::from(fov_y) > MAX_FOV || tan_x.is_nan() || tan_x > limit {
+            return Self::around(eye);
+        }
+        let right = forward
+            .cross(up.normalize_or_zero())
+            .try_normalize()
+            .filter(|r| r.is_finite() && forward.cross(up.normalize_or_zero()).length() > 1e-6)
+            .unwrap_or_else(|| forward.any_orthonormal_vector());
+        let up = right.cross(forward);
+        let rows = DMat3::from_cols(right / tan_x, up / tan_y, forward);
+        Self::of_face(at, rows.transpose()).ok_or(ViewError::NotPerspective)
+    }
+
+    /// The camera of an engine: its `view_projection` matrix (column-major, world to clip, either
+    /// direction of depth, with or without a far plane) and its `eye`.
+    ///
+    /// Only the rows of `x`, `y` and `w` are used; near and far planes are not. The eye is asked for
+    /// because a matrix in `f32` knows it only to a millimeter or so.
+    ///
+    /// # Errors
+    ///
+    /// What is not finite; an orthographic or singular matrix, or one with another eye.
+    pub fn from_view_projection(
+        eye: [f32; 3],
+        view_projection: [[f32; 4]; 4],
+    ) -> Result<Self, ViewError> {
+        let at = finite(eye, "eye")?;
+        let m = DMat4::from_cols_array_2d(&view_projection.map(|c| c.map(f64::from)));
+        if !m.is_finite() {
+            return Err(ViewError::NotFinite { what: "matrix" });
+        }
+        let row = |i: usize| m.row(i);
+        let rows = [row(0), row(1), row(3)];
+        let map = DMat3::from_cols(rows[0].truncate(), rows[1].truncate(), rows[2].truncate())
+            .transpose();
+        // The eye is where x, y and w vanish, but for the rounding of the matrix.
+        for r in rows {
+            let (direction, offset) = (r.truncate(), r.w);
+            let size = direction.length() * (1.0 + at.length()) + offset.abs();
+            if (direction.dot(at) + offset).abs() > 1e-3 * size {
+                return Err(ViewError::NotPerspective);
+            }
+        }
+        Self::of_face(at, map).ok_or(ViewError::NotPerspective)
+    }
+
+    /// Every direction from `eye`: for shadows, sound, or who can be seen from here at all.
+    ///
+    /// # Errors
+    ///
+    /// An eye that is not finite.
+    pub fn around(eye: [f32; 3]) -> Result<Self, ViewError> {
+        let at = finite(eye, "eye")?;
+        let face = |x: DVec3, y: DVec3, w: DVec3| Face::new(DMat3::from_cols(x, y, w).transpose());
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        let faces = [
+            face(y, z, x),
+            face(y, z, -x),
+            face(z, x, y),
+            face(z, x, -y),
+            face(x, y, z),
+            face(x, y, -z),
+        ];
+        let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f)] = faces else {
+            return Err(ViewError::NotPerspective);
+        };
+        Ok(Self {
+            eye: at,
+            faces: [a, b, c, d, e, f],
+            n_faces: 6,
+            far: f64::INFINITY,
+        })
+    }
+
+    /// The same view, cut off `far` meters along the view direction (in every direction for a view
+    /// all around, whose faces are cut each by its own plane). [Units: wu] [Limit: > 0]
+    ///
+    /// # Errors
+    ///
+    /// A distance that is not greater than 0: nothing could be seen.
+    pub fn with_far(mut self, far: f32) -> Result<Self, ViewError> {
+        if far.is_nan() || far <= 0.0 {
+            return Err(ViewError::NotPositive {
+                what: "far plane",
+                value: far,
+            });
+        }
+        self.far = far.into();
+        Ok(self)
+    }
+
+    /// Where the eye is. [Units: wu]
+    #[must_use]
+    pub fn eye(&self) -> [f32; 3] {
+        self.eye.as_vec3().to_array()
+    }
+
+    /// How many faces it has: 1, or 6 where it looks all around.
+    #[must_use]
+    pub fn n_faces(&self) -> usize {
+        self.n_faces
+    }
+
+    fn of_face(eye: DVec3, map: DMat3) -> Option<Self> {
+        let face = Face::new(map)?;
+        Some(Self {
+            eye,
+            faces: [face; 6],
+            n_faces: 1,
+            far: f64::INFINITY,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EYE: [f32; 3] = [1.0, 2.0, 3.0];
+    const UP: [f32; 3] = [0.0, 1.0, 0.0];
+
+    #[test]
+    fn the_corners_of_the_picture_are_the_corners_of_the_screen() {
+        let view = View::perspective(EYE, [0.0, 0.0, -2.0], UP, 1.0, 2.0).unwrap();
+        let t = f64::from(0.5_f32).tan();
+        let p = view.eye + 3.0 * DVec3::new(2.0 * t, t, -1.0);
+        let q = view.faces[0].map * (p - view.eye);
+        assert!((q - DVec3::splat(3.0)).length() < 1e-6, "{q}");
+    }
+
+    #[test]
+    fn a_matrix_gives_the_view_that_it_was_made_for() {
+        let a = View::perspective(EYE, [1.0, 0.3, -2.0], UP, 1.0, 2.0).unwrap();
+        let f = (0.5f64).tan().recip();
+        let look = DMat4::look_to_rh(a.eye, DVec3::new(1.0, 0.3, -2.0).normalize(), DVec3::Y);
+        let projection = DMat4::from_cols_array_2d(&[
+            [f / 2.0, 0.0, 0.0, 0.0],
+            [0.0, f, 0.0, 0.0],
+            [0.0, 0.0, -1.0, -1.0],
+            [0.0, 0.0, -0.1, 0.0],
+        ]);
+        let m = (projection * look).as_mat4().to_cols_array_2d();
+        let b = View::from_view_projection(EYE, m).unwrap();
+        let (p, q) = (a.faces[0].map, b.faces[0].map);
+        assert!(p.abs_diff_eq(q, 1e-6), "{p} {q}");
+        assert_eq!(
+            View::from_view_projection([9.0, 9.0, 9.0], m).unwrap_err(),
+            ViewError::NotPerspective
+        );
+        let flat = DMat4::orthographic_rh(-1.0, 1.0, -1.0, 1.0, 0.1, 9.0);
+        let flat = flat.as_mat4().to_cols_array_2d();
+        assert_eq!(
+            View::from_view_projection(EYE, flat).unwrap_err(),
+            ViewError::NotPerspective
+        );
+    }
+
+    #[test]
+    fn hostile_views_are_errors_or_look_all_around() {
+        let view = |eye, toward, fov, aspect| View::perspective(eye, toward, UP, fov, aspect);
+        let ahead = [0.0, 0.0, -1.0];
+        assert_eq!(view(EYE, ahead, 3.2, 1.0).unwrap().n_faces(), 6);
+        assert_eq!(view(EYE, ahead, 9.0, 1.0).unwrap().n_faces(), 6);
+        assert_eq!(view(EYE, ahead, f32::INFINITY, 1.0).unwrap().n_faces(), 6);
+        assert_eq!(view(EYE, ahead, 1.0, f32::INFINITY).unwrap().n_faces(), 6);
+        assert_eq!(view(EYE, UP, 1.0, 1.0).unwrap().n_faces(), 1, "along up");
+        assert_eq!(
+            view(EYE, [0.0; 3], 1.0, 1.0).unwrap_err(),
+            ViewError::NoDirection
+        );
+        let broken = [f32::NAN, 0.0, 0.0];
+        assert!(view(broken, ahead, 1.0, 1.0).is_err());
+        assert!(view(EYE, broken, 1.0, 1.0).is_err());
+        for bad in [0.0, -1.0, f32::NAN] {
+            assert!(view(EYE, ahead, bad, 1.0).is_err());
+            assert!(view(EYE, ahead, 1.0, bad).is_err());
+            assert!(View::around(EYE).unwrap().with_far(bad).is_err());
+        }
+    }
+}
