@@ -8,6 +8,7 @@
 mod graph;
 mod locator;
 mod look;
+mod sight_graph;
 mod validate;
 pub mod wire;
 
@@ -16,4 +17,5 @@ pub use graph::{
     Statistics, World,
 };
 pub use locator::{Locator, LocatorNode};
+pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use validate::{GraphError, MAX_REPORTED};

@@ -32,6 +32,8 @@ mod obj;
 mod options;
 mod ply;
 mod polygon;
+mod prt;
+mod pvs_text;
 mod report;
 mod roles;
 mod soup;
@@ -42,6 +44,8 @@ pub use clean::{CleaningOptions, CleaningReport, cleaning_report};
 pub use error::ImportError;
 pub use export::export_glb;
 pub use options::{ImportOptions, Limits, Up};
+pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
+pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
 pub use report::{Example, FileReport, Finding, ImportReport, Note};
 pub use roles::RoleRules;
 
@@ -82,6 +86,7 @@ pub fn import(
         let bytes = files::read_file(path, options.limits.max_file_bytes)?;
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         builder.begin_file(path, Some(&folder), is_detail);
+        builder.add_read_bytes(bytes.len() as u64);
         read_any(&bytes, path, &mut builder)?;
     }
     finish(builder, options)
@@ -159,6 +164,7 @@ fn decode(
 ) -> Result<Imported, ImportError> {
     let mut builder = Builder::new(options)?;
     builder.begin_file(Path::new(name), None, false);
+    builder.add_read_bytes(bytes.len() as u64);
     read(bytes, &mut builder)?;
     finish(builder, options)
 }

@@ -1,0 +1,186 @@
+//! The least that visibility needs to know of a graph: cells joined by convex openings.
+
+use enfilade_geom::DVec3;
+
+use crate::CellPortalGraph;
+
+/// A convex opening between two cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SightPortal {
+    /// The two cells; the winding's normal leads from the first to the second.
+    pub cells: [u32; 2],
+    /// Corners, counter-clockwise seen from the second cell. [Units: wu]
+    pub winding: Vec<DVec3>,
+    /// The convex parts of the winding that are truly open, each with at least three corners that run the
+    /// same way; none where all of it is open.
+    pub pieces: Vec<Vec<DVec3>>,
+}
+
+/// Cells and the openings between them, whatever they came from: a world, a portal file of a game,
+/// a generator.
+///
+/// Directions of portals are numbered: `2 i` leads from the first cell of portal `i` to its second,
+/// `2 i + 1` the other way.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SightGraph {
+    /// Number of cells.
+    pub n_cells: u32,
+    /// The openings.
+    pub portals: Vec<SightPortal>,
+}
+
+/// Why cells and windings are no graph that sight lines can be followed through.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SightGraphError {
+    /// A portal names a cell that is not there.
+    #[error("portal {portal} names cell {cell}, but there are only {n_cells} cells")]
+    NoSuchCell {
+        /// Its number.
+        portal: usize,
+        /// The cell it names.
+        cell: u32,
+        /// How many there are.
+        n_cells: u32,
+    },
+    /// A portal leads from a cell to itself.
+    #[error("portal {portal} joins cell {cell} to itself; remove it")]
+    SelfLoop {
+        /// Its number.
+        portal: usize,
+        /// The cell.
+        cell: u32,
+    },
+    /// A portal has no area.
+    #[error("portal {portal} has {n} corners, at least 3 are needed; remove it")]
+    TooFewCorners {
+        /// Its number.
+        portal: usize,
+        /// Its corners.
+        n: usize,
+    },
+    /// A coordinate is no number or beyond [`SightGraph::MAX_COORDINATE`].
+    #[error("portal {portal}, corner {corner}: {value} is no usable coordinate")]
+    BadCoordinate {
+        /// Its number.
+        portal: usize,
+        /// Which corner.
+        corner: usize,
+        /// The coordinate.
+        value: f64,
+    },
+    /// More corners or portals than ids can hold.
+    #[error("{n} {what}, more than the limit of {limit}; split the graph")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many there are.
+        n: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+}
+
+impl SightGraph {
+    /// Largest coordinate. [Units: wu] Sums of products of three stay far inside `f64`.
+    pub const MAX_COORDINATE: f64 = 1e9;
+    /// Most portals. Search keeps a bit for each pair of directions.
+    pub const MAX_PORTALS: usize = 1 << 20;
+    /// Most corners of one portal.
+    pub const MAX_CORNERS: usize = 1024;
+    /// Most cells.
+    pub const MAX_CELLS: usize = 1 << 20;
+
+    /// The graph of a world: each portal by its convex outline.
+    #[must_use]
+    pub fn of_graph(graph: &CellPortalGraph) -> Self {
+        Self {
+            n_cells: u32::try_from(graph.cells.len()).unwrap_or(u32::MAX),
+            portals: graph
+                .portals
+                .iter()
+                .map(|portal| SightPortal {
+                    cells: [portal.cells[0].0, portal.cells[1].0],
+                    winding: corners(&portal.outline),
+                    pieces: portal.pieces.iter().map(|piece| corners(piece)).collect(),
+                })
+                .collect(),
+        }
+    }
+
+    /// Checks ids, numbers and limits.
+    ///
+    /// Windings with area zero are allowed: nothing is seen through them but by touching.
+    ///
+    /// # Errors
+    ///
+    /// The first fault found.
+    pub fn validate(&self) -> Result<(), SightGraphError> {
+        let limits = [
+            ("portals", self.portals.len(), Self::MAX_PORTALS),
+            ("cells", self.n_cells as usize, Self::MAX_CELLS),
+        ];
+        for (what, n, limit) in limits {
+            if n > limit {
+                return Err(SightGraphError::TooMany { what, n, limit });
+            }
+        }
+        for (i, portal) in self.portals.iter().enumerate() {
+            check_portal(i, portal, self.n_cells)?;
+        }
+        Ok(())
+    }
+}
+
+fn check_portal(i: usize, portal: &SightPortal, n_cells: u32) -> Result<(), SightGraphError> {
+    if let Some(&cell) = portal.cells.iter().find(|&&c| c >= n_cells) {
+        return Err(SightGraphError::NoSuchCell {
+            portal: i,
+            cell,
+            n_cells,
+        });
+    }
+    if portal.cells[0] == portal.cells[1] {
+        return Err(SightGraphError::SelfLoop {
+            portal: i,
+            cell: portal.cells[0],
+        });
+    }
+    check_winding(i, &portal.winding)?;
+    portal
+        .pieces
+        .iter()
+        .try_for_each(|piece| check_winding(i, piece))
+}
+
+fn check_winding(portal: usize, winding: &[DVec3]) -> Result<(), SightGraphError> {
+    let n = winding.len();
+    if n < 3 {
+        return Err(SightGraphError::TooFewCorners { portal, n });
+    }
+    if n > SightGraph::MAX_CORNERS {
+        return Err(SightGraphError::TooMany {
+            what: "corners of a portal",
+            n,
+            limit: SightGraph::MAX_CORNERS,
+        });
+    }
+    for (corner, p) in winding.iter().enumerate() {
+        for value in p.to_array() {
+            if value.is_nan() || value.abs() > SightGraph::MAX_COORDINATE {
+                return Err(SightGraphError::BadCoordinate {
+                    portal,
+                    corner,
+                    value,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn corners(outline: &[[f32; 3]]) -> Vec<DVec3> {
+    outline
+        .iter()
+        .map(|p| DVec3::from_array(p.map(f64::from)))
+        .collect()
+}
