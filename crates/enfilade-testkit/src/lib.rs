@@ -17,6 +17,7 @@
 mod cave;
 pub mod furniture;
 mod gjorup;
+mod graphs;
 mod house;
 mod interior;
 mod maze;
@@ -34,6 +35,7 @@ mod truth_json;
 
 pub use cave::cave;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
+pub use graphs::{GridParams, courtyard, room_grid};
 pub use house::furnished_house;
 pub use maze::dirkse_maze;
 pub use rng::Rng;
