@@ -291,14 +291,7 @@ impl Asking<'_, '_> {
         {
             return false;
         }
-        let corners = self.sight.corners_of(exit);
-        let turn = if exit.is_turned { 1.0 } else { -1.0 };
-        (0..corners.len()).all(|i| {
-            let a = point(corners[i]);
-            let along = point(corners[(i + 1) % corners.len()]) - a;
-            let inward = normal.cross(along) * turn;
-            inward.dot(self.view.eye - a) >= -near * inward.length()
-        })
+        self.sight.is_in_outline(exit, self.view.eye, near)
     }
 
     fn run(&mut self) {

@@ -57,7 +57,7 @@ pub(crate) struct Lists {
     pub(crate) counts: SeeCounts,
 }
 
-/// The answer of one view; borrowed from the [`Viewer`] until its next question.
+/// The answer of one view; borrowed from the [`Viewer`](crate::Viewer) until its next question.
 #[derive(Clone, Copy)]
 pub struct Seen<'a> {
     pub(crate) lists: &'a Lists,

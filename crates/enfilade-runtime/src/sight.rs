@@ -44,7 +44,7 @@ pub enum SightError {
 /// How a world is made ready.
 #[derive(Clone, Copy, Debug)]
 pub struct SightOptions {
-    /// Triangles that are culled together, at most. [Limit: > 0]
+    /// Triangles that are culled together, at most. [Limit: above 0]
     ///
     /// Smaller chunks are culled more tightly, and cost a box test of about 2 ns each.
     pub chunk_triangles: usize,
@@ -346,6 +346,19 @@ impl Sight {
     pub(crate) fn exits_of(&self, cell: u32) -> &[Exit] {
         let c = cell as usize;
         &self.exits[self.first_exit[c] as usize..self.first_exit[c + 1] as usize]
+    }
+
+    /// Whether a point of an exit's plane lies in its outline, or within `near` of each edge's line.
+    pub(crate) fn is_in_outline(&self, exit: &Exit, p: DVec3, near: f64) -> bool {
+        let normal = point(exit.normal);
+        let corners = self.corners_of(exit);
+        let turn = if exit.is_turned { 1.0 } else { -1.0 };
+        (0..corners.len()).all(|i| {
+            let a = point(corners[i]);
+            let along = point(corners[(i + 1) % corners.len()]) - a;
+            let inward = normal.cross(along) * turn;
+            inward.dot(p - a) >= -near * inward.length()
+        })
     }
 
     #[inline]

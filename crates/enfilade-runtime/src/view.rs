@@ -99,8 +99,8 @@ fn finite(v: [f32; 3], what: &'static str) -> Result<DVec3, ViewError> {
 impl View {
     /// A camera at `eye` that looks along `toward` (any length), upright towards `up`.
     ///
-    /// `fov_y` is the angle from the lower to the upper edge [Units: rad] [Limit: > 0], `aspect` the
-    /// width of the picture divided by its height [Limit: > 0]. A view wider or higher than 170
+    /// `fov_y` is the angle from the lower to the upper edge [Units: rad] [Limit: above 0], `aspect` the
+    /// width of the picture divided by its height [Limit: above 0]. A view wider or higher than 170
     /// degrees looks [all around](View::around), which holds it.
     ///
     /// An `up` that is parallel to `toward`, or zero, is replaced by another direction.
@@ -203,7 +203,7 @@ impl View {
     }
 
     /// The same view, cut off `far` meters along the view direction (in every direction for a view
-    /// all around, whose faces are cut each by its own plane). [Units: wu] [Limit: > 0]
+    /// all around, whose faces are cut each by its own plane). [Units: wu] [Limit: above 0]
     ///
     /// # Errors
     ///

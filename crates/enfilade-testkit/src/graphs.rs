@@ -17,7 +17,7 @@ use crate::rng::Rng;
 /// What grid of rooms to make.
 #[derive(Clone, Debug)]
 pub struct GridParams {
-    /// Squares along x, y (storeys) and z. [Limit: > 0]
+    /// Squares along x, y (storeys) and z. [Limit: above 0]
     pub size: [usize; 3],
     /// Start of the random choices.
     pub seed: u64,
@@ -148,8 +148,8 @@ impl Grid {
     fn locator(&self) -> Locator {
         let mut planes = Vec::new();
         let mut first = [0; 3];
-        for axis in 0..3 {
-            first[axis] = planes.len() as u32;
+        for (axis, first) in first.iter_mut().enumerate() {
+            *first = planes.len() as u32;
             let n = self.turn.col(axis);
             planes.extend(self.at[axis].iter().map(|x| [n.x, n.y, n.z, -x]));
         }
@@ -167,8 +167,8 @@ impl Grid {
         let mut nodes = Vec::new();
         // Six planes cut the box off from the ground or the outdoors, for turned grids.
         let outside = Locator::leaf(self.outdoors.map(CellId));
-        for axis in 0..3 {
-            for (side, plane) in [(0, first[axis]), (1, first[axis] + self.size[axis] as u32)] {
+        for (axis, &low) in first.iter().enumerate() {
+            for (side, plane) in [(0, low), (1, low + self.size[axis] as u32)] {
                 let next = nodes.len() as i32 + 1;
                 let children = if side == 0 {
                     [next, outside]
@@ -297,8 +297,8 @@ fn world_of(
             i / grid.size[0] / grid.size[1],
         ];
         let mut volume = 1.0;
-        for k in 0..3 {
-            volume *= grid.at[k][square[k] + 1] - grid.at[k][square[k]];
+        for (at, &i) in grid.at.iter().zip(&square) {
+            volume *= at[i + 1] - at[i];
         }
         cells[label as usize].volume += volume as f32;
         for corner in 0..8 {
@@ -542,8 +542,8 @@ mod tests {
         for (merges, turn, outdoors) in [(0.0, 0.0, true), (0.3, 0.5, true), (0.2, 1.0, false)] {
             let params = GridParams {
                 merges,
-                turn,
                 outdoors,
+                turn,
                 ..GridParams::offices(60, 3)
             };
             let world = room_grid(&params);
