@@ -4,6 +4,7 @@
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
 mod bake;
+mod bench;
 mod demo;
 mod inspect;
 mod locate;
@@ -30,6 +31,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Bake(bake::Bake),
+    Bench(bench::Bench),
     Demo(demo::Demo),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
@@ -41,6 +43,7 @@ enum Command {
 fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(args) => bake::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),

@@ -158,6 +158,32 @@ impl Viewer {
     /// When `sight` is of a larger world than the viewer was made for.
     pub fn see<'a>(&'a mut self, sight: &Sight, state: &SightState, view: &View) -> Seen<'a> {
         let start = sight.locator.locate(view.eye).map(|c| c.0);
+        self.see_in(sight, state, view, start)
+    }
+
+    /// The same for an eye whose cell is known, from a [`Follower`](crate::Follower) or because there is
+    /// no locator. Wrong where the eye is not in it.
+    ///
+    /// # Panics
+    ///
+    /// As [`Viewer::see`], and when there is no such cell.
+    pub fn see_from<'a>(
+        &'a mut self,
+        sight: &Sight,
+        state: &SightState,
+        view: &View,
+        cell: CellId,
+    ) -> Seen<'a> {
+        self.see_in(sight, state, view, Some(cell.0))
+    }
+
+    fn see_in<'a>(
+        &'a mut self,
+        sight: &Sight,
+        state: &SightState,
+        view: &View,
+        start: Option<u32>,
+    ) -> Seen<'a> {
         self.begin();
         for face in 0..view.n_faces {
             let mut asking = Asking {
