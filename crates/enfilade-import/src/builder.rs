@@ -3,7 +3,7 @@
 use crate::roles::{Facts, Verdict};
 use crate::{ImportError, ImportOptions, ImportReport, Limits};
 use enfilade_geom::scene::{Image, Material, Mesh, Object, Primitive, Role, Scene, Texture};
-use enfilade_geom::{DMat4, DVec3};
+use enfilade_geom::{DMat4, DVec3, Triangle};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,10 @@ pub(crate) struct Builder<'a> {
     n_placements: u64,
     n_vertices: u64,
     n_image_bytes: u64,
+    /// Bytes read from files.
+    n_read_bytes: u64,
+    /// Bytes that what was read asks for in memory, here or when it is baked.
+    n_held_bytes: u64,
     /// Meshes made from other meshes: which, mirrored or not, which primitives.
     variants: HashMap<(u32, bool, Part), u32>,
 }
@@ -62,6 +66,8 @@ impl<'a> Builder<'a> {
             n_placements: 0,
             n_vertices: 0,
             n_image_bytes: 0,
+            n_read_bytes: 0,
+            n_held_bytes: 0,
             variants: HashMap::new(),
         })
     }
@@ -121,6 +127,45 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
+    /// Says that so many bytes were read, of this file or one that it refers to.
+    pub(crate) fn add_read_bytes(&mut self, n: u64) {
+        self.n_read_bytes = self.n_read_bytes.saturating_add(n);
+    }
+
+    /// Counts `n` pieces of `size` bytes before they are allocated.
+    pub(crate) fn charge_memory(
+        &mut self,
+        place: &str,
+        n: u64,
+        size: u64,
+    ) -> Result<(), ImportError> {
+        self.n_held_bytes = self.n_held_bytes.saturating_add(n.saturating_mul(size));
+        let limits = self.limits();
+        let explained = self.n_read_bytes.saturating_mul(limits.max_expansion);
+        let limit = limits.max_bytes_of_small.max(explained);
+        if self.n_held_bytes > limit {
+            return Err(ImportError::Bomb {
+                path: self.path.clone(),
+                place: place.into(),
+                n: self.n_held_bytes,
+                limit,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks a number of placements before they are made; placing them counts them.
+    pub(crate) fn check_objects(&self, place: &str, n: u64) -> Result<(), ImportError> {
+        let (n, limit) = (
+            self.n_placements.saturating_add(n),
+            self.limits().max_objects,
+        );
+        if n > limit {
+            return Err(self.too_much(place, "objects", n, limit));
+        }
+        Ok(())
+    }
+
     /// Checks a number of triangles before they are allocated; placing them counts them.
     pub(crate) fn check_triangles(&self, place: &str, n: u64) -> Result<(), ImportError> {
         let limit = self.limits().max_triangles;
@@ -137,7 +182,7 @@ impl<'a> Builder<'a> {
         if self.n_image_bytes > limit {
             return Err(self.too_much(place, "picture bytes", self.n_image_bytes, limit));
         }
-        Ok(())
+        self.charge_memory(place, n, 1)
     }
 
     pub(crate) fn n_textures(&self) -> u32 {
@@ -233,13 +278,9 @@ impl<'a> Builder<'a> {
     /// scene has to think of the determinant's sign.
     pub(crate) fn place(&mut self, placement: &Placement<'_>) -> Result<(), ImportError> {
         // Counted first, so that placements that are then left out cost bounded time, too.
-        self.n_placements = self
-            .n_placements
-            .saturating_add(placement.transforms.len() as u64);
-        let limit = self.limits().max_objects;
-        if self.n_placements > limit {
-            return Err(self.too_much(placement.place, "objects", self.n_placements, limit));
-        }
+        let n_placed = placement.transforms.len() as u64;
+        self.check_objects(placement.place, n_placed)?;
+        self.n_placements = self.n_placements.saturating_add(n_placed);
         let mesh = &self.scene.meshes[placement.mesh as usize];
         let n_triangles: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
         if n_triangles == 0 {
@@ -292,6 +333,11 @@ impl<'a> Builder<'a> {
             .into_iter()
             .find(|n| !n.is_empty())
             .unwrap_or("");
+        let n_text_bytes = (name.len() + reason.len()) as u64;
+        self.charge_memory(placement.place, n_placed, OBJECT_BYTES + n_text_bytes)?;
+        if role == Role::Structural {
+            self.charge_memory(placement.place, n_placed_triangles, TRIANGLE_BYTES)?;
+        }
         let parts: &[(Part, Role, &str)] = if is_mixed && role == Role::Structural {
             &[
                 (Part::Opaque, role, ""),
@@ -382,6 +428,7 @@ impl<'a> Builder<'a> {
                 .collect(),
         };
         self.charge_vertices(placement.place, n_vertices)?;
+        self.charge_memory(placement.place, bytes_of(&mesh), 1)?;
         if is_mirrored {
             mesh.primitives.iter_mut().for_each(mirror);
             self.note(
@@ -415,6 +462,24 @@ impl<'a> Builder<'a> {
         self.scene.meshes = kept;
         (self.scene, self.report)
     }
+}
+
+/// Room for an object, its texts aside.
+const OBJECT_BYTES: u64 = 2 * size_of::<Object>() as u64;
+/// A triangle in world space, as the decomposition holds it.
+const TRIANGLE_BYTES: u64 = size_of::<Triangle>() as u64;
+
+/// Bytes that a mesh's lists hold.
+fn bytes_of(mesh: &Mesh) -> u64 {
+    let bytes = |p: &Primitive| {
+        size_of_val(&*p.positions)
+            + size_of_val(&*p.normals)
+            + size_of_val(&*p.tangents)
+            + size_of_val(&*p.colors)
+            + size_of_val(&*p.indices)
+            + p.uvs.iter().map(|u| size_of_val(&**u)).sum::<usize>()
+    };
+    mesh.primitives.iter().map(bytes).sum::<usize>() as u64
 }
 
 /// Mirrors at the plane `x = 0` and turns the winding round. Exact.

@@ -60,6 +60,23 @@ pub enum ImportError {
         /// How much is allowed.
         limit: u64,
     },
+    /// The input asks for far more memory than its size explains.
+    #[error(
+        "{path}: {place}: asks for {n} bytes of memory, over {limit}, the most for input of this size; \
+         it is damaged or made to harm, or places large structural meshes very often: split it, or \
+         make those detail",
+        path = path.display()
+    )]
+    Bomb {
+        /// The file.
+        path: PathBuf,
+        /// Element, index or line.
+        place: String,
+        /// Bytes asked for so far.
+        n: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
     /// No triangle was found in any file.
     #[error("no triangles in {paths}; {advice}")]
     NoTriangles {

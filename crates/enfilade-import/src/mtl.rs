@@ -205,6 +205,7 @@ fn read_texture(
     });
     let texture = match bytes {
         Ok(bytes) => {
+            builder.add_read_bytes(bytes.len() as u64);
             builder.charge_image(place, bytes.len() as u64)?;
             let image = builder.push_image(Image {
                 name: plain().to_owned(),

@@ -48,6 +48,13 @@ pub struct Limits {
     pub max_objects: u64,
     /// Most bytes of encoded pictures.
     pub max_image_bytes: u64,
+    /// Most bytes that meshes, objects and placed structural triangles may ask for.
+    ///
+    /// The larger of this and [`Limits::max_expansion`] times the bytes read counts, so that a small
+    /// file that names the same numbers over and over, or numbers that it does not hold, ends early.
+    pub max_bytes_of_small: u64,
+    /// Most such bytes for each byte read.
+    pub max_expansion: u64,
     /// Deepest node below a scene.
     pub max_node_depth: u32,
     /// Largest edge of the structural objects' box. [Units: wu]
@@ -69,6 +76,8 @@ impl Default for Limits {
             max_vertices: 100_000_000,
             max_objects: 2_000_000,
             max_image_bytes: 4 << 30,
+            max_bytes_of_small: 256 << 20,
+            max_expansion: 64,
             max_node_depth: 1024,
             max_extent: 2000.0,
             min_extent: 0.1,
@@ -88,6 +97,7 @@ impl Limits {
             max_vertices: 100_000,
             max_objects: 10_000,
             max_image_bytes: 1 << 20,
+            max_bytes_of_small: 64 << 20,
             max_node_depth: 64,
             ..Self::default()
         }

@@ -30,7 +30,11 @@ pub(super) fn read_materials(
         let sampler = match def.sampler {
             None => String::new(),
             Some(s) => match root.samplers.get(s as usize) {
-                Some(sampler) => sampler.to_string(),
+                Some(sampler) => {
+                    let text = sampler.to_string();
+                    builder.charge_memory(&place, text.len() as u64, 1)?;
+                    text
+                }
                 None => return Err(builder.malformed(place, format!("no sampler {s}"))),
             },
         };
@@ -159,7 +163,10 @@ fn read_image(
             }
             Some(Err(problem)) => return Err(builder.malformed(place, problem)),
             None => match read_picture_file(uri, builder) {
-                Ok(bytes) => bytes,
+                Ok(bytes) => {
+                    builder.add_read_bytes(bytes.len() as u64);
+                    bytes
+                }
                 Err(problem) => {
                     builder.note(place, format!("{problem}; the texture stays empty"));
                     return Ok(None);

@@ -69,6 +69,11 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         .map_err(|e| builder.malformed("JSON", format!("{e}; is the file whole?")))?;
     check_version(&root, builder)?;
     let buffers = read_buffers(&root, bin, builder)?;
+    let n_own = |b: &Option<Cow<'_, [u8]>>| match b {
+        Some(Cow::Owned(bytes)) => bytes.len() as u64,
+        _ => 0,
+    };
+    builder.add_read_bytes(buffers.iter().map(n_own).sum());
     let document = Document { root, buffers };
     let materials = look::read_materials(&document, builder)?;
     Reader {
@@ -398,9 +403,7 @@ impl Reader<'_, '_, '_> {
         let instances = match instancing {
             None => vec![DMat4::IDENTITY],
             Some(instancing) => {
-                let limit = self.builder.limits().max_objects;
-                primitive::read_instances(document, instancing, limit)
-                    .map_err(|problem| self.builder.malformed(&place, problem))?
+                primitive::read_instances(document, instancing, &place, self.builder)?
             }
         };
         let mesh_name = root.meshes[mesh as usize].name.as_deref().unwrap_or("");

@@ -7,6 +7,7 @@ use crate::ImportError;
 use crate::builder::Builder;
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3};
+use std::collections::BTreeMap;
 
 /// Most texture coordinate sets kept.
 const MAX_UV_SETS: usize = 8;
@@ -47,6 +48,7 @@ pub(super) fn read_primitive(
     let mut indices = match def.indices {
         None => {
             builder.charge_vertices(place, n_vertices)?;
+            builder.charge_memory(place, n_vertices, 4)?;
             (0..n_vertices as u32).collect()
         }
         Some(index) => {
@@ -54,6 +56,8 @@ pub(super) fn read_primitive(
                 .elements(index, &["SCALAR"])
                 .map_err(|problem| data_error(builder, place, &format!("indices: {problem}")))?;
             builder.check_triangles(place, elements.count / 3)?;
+            // A strip or fan grows to three times its length.
+            builder.charge_memory(place, elements.count, if mode == 4 { 4 } else { 12 })?;
             elements
                 .read_indices()
                 .map_err(|problem| builder.malformed(place, problem))?
@@ -103,6 +107,8 @@ pub(super) fn read_primitive(
         },
     };
     let used = used.as_deref();
+    let n_used = used.map_or(n_vertices, |u| u.len() as u64);
+    builder.charge_memory(place, n_used, bytes_a_vertex(&def.attributes))?;
     let mut primitive = Primitive {
         positions: positions.read(used, 0.0),
         indices,
@@ -167,6 +173,17 @@ pub(super) fn read_primitive(
     Ok(Some(primitive))
 }
 
+/// Bytes that the attributes of a vertex take here.
+fn bytes_a_vertex(attributes: &BTreeMap<String, u32>) -> u64 {
+    let bytes = |name: &String| match name.as_str() {
+        "POSITION" | "NORMAL" => 12,
+        "TANGENT" | "COLOR_0" => 16,
+        _ if name.starts_with("TEXCOORD_") => 8,
+        _ => 0,
+    };
+    attributes.keys().map(bytes).sum()
+}
+
 /// The indices in use, increasing.
 fn distinct(indices: &[u32], n_vertices: u64) -> Vec<u32> {
     // Marking is several times faster, but its time goes with all vertices, used or not.
@@ -224,8 +241,9 @@ fn unroll_fan(fan: &[u32]) -> Vec<u32> {
 pub(super) fn read_instances(
     document: &Document<'_>,
     instancing: &Instancing,
-    limit: u64,
-) -> Result<Vec<DMat4>, String> {
+    place: &str,
+    builder: &mut Builder<'_>,
+) -> Result<Vec<DMat4>, ImportError> {
     let mut count: Option<u64> = None;
     let mut attribute = |name: &str, shape: &str| -> Result<Option<Elements<'_>>, String> {
         let Some(&index) = instancing.attributes.get(name) else {
@@ -238,6 +256,8 @@ pub(super) fn read_instances(
         count = Some(elements.count);
         Ok(Some(elements))
     };
+    let mut attribute =
+        |name, shape| attribute(name, shape).map_err(|problem| builder.malformed(place, problem));
     let translations = attribute("TRANSLATION", "VEC3")?;
     let rotations = attribute("ROTATION", "VEC4")?;
     let scales = attribute("SCALE", "VEC3")?;
@@ -245,11 +265,8 @@ pub(super) fn read_instances(
         // Nothing placed by attributes that are known: one instance, where the node is.
         return Ok(vec![DMat4::IDENTITY]);
     };
-    if n > limit {
-        return Err(format!(
-            "{n} instances, more than the limit of {limit} objects"
-        ));
-    }
+    builder.check_objects(place, n)?;
+    builder.charge_memory(place, n, 2 * size_of::<DMat4>() as u64 + 40)?;
     let translations: Option<Vec<[f32; 3]>> = translations.map(|e| e.read(None, 0.0));
     let rotations: Option<Vec<[f32; 4]>> = rotations.map(|e| e.read(None, 0.0));
     let scales: Option<Vec<[f32; 3]>> = scales.map(|e| e.read(None, 0.0));
