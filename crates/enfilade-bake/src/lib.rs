@@ -11,6 +11,7 @@ mod context;
 mod error;
 mod join;
 pub mod pipeline;
+pub mod vis;
 pub mod voxel;
 pub mod watershed;
 

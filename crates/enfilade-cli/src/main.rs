@@ -11,6 +11,7 @@ mod locate;
 mod output;
 mod plan;
 mod progress;
+mod pvs;
 mod see;
 mod verify;
 mod world;
@@ -36,6 +37,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Plan(plan::Plan),
+    Pvs(pvs::Pvs),
     See(see::See),
     Verify(verify::Verify),
 }
@@ -48,6 +50,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Pvs(args) => pvs::run(&args),
         Command::See(args) => see::run(&args),
         Command::Verify(args) => verify::run(&args),
     }

@@ -1,0 +1,138 @@
+//! Rows of bits.
+
+/// A square table of bits, a row after the other.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct BitTable {
+    n_words: usize,
+    words: Vec<u64>,
+}
+
+impl BitTable {
+    pub(super) fn new(n_rows: usize, n_columns: usize) -> Self {
+        let n_words = n_columns.div_ceil(64);
+        Self {
+            n_words,
+            words: vec![0; n_rows * n_words],
+        }
+    }
+
+    pub(super) fn n_words(&self) -> usize {
+        self.n_words
+    }
+
+    pub(super) fn row(&self, row: usize) -> &[u64] {
+        &self.words[row * self.n_words..][..self.n_words]
+    }
+
+    pub(super) fn row_mut(&mut self, row: usize) -> &mut [u64] {
+        &mut self.words[row * self.n_words..][..self.n_words]
+    }
+
+    pub(super) fn get(&self, row: usize, column: usize) -> bool {
+        get(self.row(row), column)
+    }
+
+    pub(super) fn set(&mut self, row: usize, column: usize) {
+        set(self.row_mut(row), column);
+    }
+
+    pub(super) fn clear(&mut self, row: usize, column: usize) {
+        self.row_mut(row)[column / 64] &= !(1 << (column % 64));
+    }
+
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    pub(super) fn words_mut(&mut self) -> &mut [u64] {
+        &mut self.words
+    }
+}
+
+pub(super) fn get(row: &[u64], column: usize) -> bool {
+    row[column / 64] >> (column % 64) & 1 != 0
+}
+
+pub(super) fn set(row: &mut [u64], column: usize) {
+    row[column / 64] |= 1 << (column % 64);
+}
+
+/// Sets the bits `from..to`.
+pub(super) fn set_range(row: &mut [u64], from: usize, to: usize) {
+    for_words(from, to, |word, mask| row[word] |= mask);
+}
+
+/// Clears the bits `from..to`.
+pub(super) fn clear_range(row: &mut [u64], from: usize, to: usize) {
+    for_words(from, to, |word, mask| row[word] &= !mask);
+}
+
+/// Whether any of the bits `from..to` is set.
+pub(super) fn any_in_range(row: &[u64], from: usize, to: usize) -> bool {
+    let mut any = false;
+    for_words(from, to, |word, mask| any |= row[word] & mask != 0);
+    any
+}
+
+fn for_words(from: usize, to: usize, mut visit: impl FnMut(usize, u64)) {
+    let mut at = from;
+    while at < to {
+        let word = at / 64;
+        let end = to.min((word + 1) * 64);
+        let n = end - at;
+        let mask = if n == 64 { u64::MAX } else { (1 << n) - 1 };
+        visit(word, mask << (at % 64));
+        at = end;
+    }
+}
+
+/// Positions of the bits that are set, ascending.
+pub(super) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
+    row.iter().enumerate().flat_map(|(i, &word)| {
+        let mut rest = word;
+        std::iter::from_fn(move || {
+            (rest != 0).then(|| {
+                let bit = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                i * 64 + bit
+            })
+        })
+    })
+}
+
+pub(super) fn count(row: &[u64]) -> usize {
+    row.iter().map(|w| w.count_ones() as usize).sum()
+}
+
+/// Writes `a & b` and says whether it has a bit in common with `wanted`.
+pub(super) fn and_into(out: &mut [u64], a: &[u64], b: &[u64], wanted: &[u64]) -> bool {
+    let mut any = 0;
+    for (((o, &x), &y), &w) in out.iter_mut().zip(a).zip(b).zip(wanted) {
+        *o = x & y;
+        any |= *o & w;
+    }
+    any != 0
+}
+
+pub(super) fn meets(a: &[u64], b: &[u64]) -> bool {
+    a.iter().zip(b).any(|(x, y)| x & y != 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_reach_across_words() {
+        let mut row = vec![0; 3];
+        set_range(&mut row, 60, 130);
+        assert_eq!(
+            ones(&row).collect::<Vec<_>>(),
+            (60..130).collect::<Vec<_>>()
+        );
+        assert!(any_in_range(&row, 129, 140) && !any_in_range(&row, 130, 192));
+        clear_range(&mut row, 61, 129);
+        assert_eq!(ones(&row).collect::<Vec<_>>(), [60, 129]);
+        assert_eq!(count(&row), 2);
+    }
+}

@@ -1,0 +1,144 @@
+//! What might be seen through two openings in a row.
+//!
+//! Between the flood over sides of planes and the search lies a step that costs little and spares the search
+//! most of its work: the planes that separate an opening from each of its next ones bound all that lies
+//! behind both. (The Quake tools go straight to the search.)
+
+use rayon::prelude::*;
+
+use super::bits::{self, BitTable};
+use super::clip::{Arena, Separator, Tolerance, separators};
+use super::dirs::{Dirs, sine};
+use super::flow::{back_of, facing, front_of};
+
+/// Openings a round; see [`super::search`].
+const ROUND: usize = 128;
+
+/// Clears from `might` what no line through two openings in a row can reach.
+///
+/// Goes from the openings that might see least to the others, and what is cleared for one serves the rest.
+/// Time: openings, times their next ones, times what those might see.
+pub(super) fn narrow_might(dirs: &Dirs, might: &mut BitTable, tolerance: &Tolerance) {
+    let mut order: Vec<(usize, usize)> = (0..dirs.len())
+        .map(|d| (bits::count(might.row(d)), d))
+        .collect();
+    order.sort_unstable();
+    for round in order.chunks(ROUND) {
+        let rows: Vec<Vec<u64>> = round
+            .par_iter()
+            .with_max_len(4)
+            .map_init(Work::default, |work, &(_, source)| {
+                work.narrow(dirs, might, tolerance, source)
+            })
+            .collect();
+        for (&(_, source), row) in round.iter().zip(rows) {
+            let back = dirs.reverse[source] as usize;
+            for (word, &left) in row.iter().enumerate() {
+                let mut gone = might.row(source)[word] & !left;
+                might.row_mut(source)[word] &= left;
+                while gone != 0 {
+                    let q = word * 64 + gone.trailing_zeros() as usize;
+                    might.clear(dirs.reverse[q] as usize, back);
+                    gone &= gone - 1;
+                }
+            }
+        }
+    }
+}
+
+#[derive(Default)]
+struct Work {
+    arena: Arena,
+    planes: Vec<Separator>,
+    reached: Vec<u64>,
+    stack: Vec<u32>,
+}
+
+impl Work {
+    fn narrow(
+        &mut self,
+        dirs: &Dirs,
+        might: &BitTable,
+        tolerance: &Tolerance,
+        source: usize,
+    ) -> Vec<u64> {
+        let mut row = vec![0; might.n_words()];
+        let back = dirs.reverse[source];
+        for &next in dirs.exits(dirs.all[source].to) {
+            let pass = next as usize;
+            if next == back || !might.get(source, pass) {
+                continue;
+            }
+            self.arena.release(0);
+            let first = self.arena.push(dirs.winding(source), source as u32);
+            let second = self.arena.push(dirs.winding(pass), next);
+            let (turn, next_turn) = (dirs.all[source].turn, dirs.all[pass].turn);
+            let front = front_of(dirs, source as u32);
+            let Some(second) = self.arena.clip(second, front, next_turn, tolerance) else {
+                continue;
+            };
+            let behind = back_of(dirs, pass);
+            let Some(first) = self.arena.clip(first, behind, turn, tolerance) else {
+                continue;
+            };
+            self.planes.clear();
+            separators(
+                (self.arena.get(first), facing(dirs, source as u32)),
+                (self.arena.get(second), facing(dirs, next)),
+                tolerance,
+                &mut self.planes,
+            );
+            self.flood(dirs, might, tolerance, (source, pass));
+            for (r, &new) in row.iter_mut().zip(&self.reached) {
+                *r |= new;
+            }
+        }
+        row
+    }
+
+    /// Collects what lies behind `pass` in front of all planes.
+    fn flood(
+        &mut self,
+        dirs: &Dirs,
+        might: &BitTable,
+        tolerance: &Tolerance,
+        (source, pass): (usize, usize),
+    ) {
+        self.reached.clear();
+        self.reached.resize(might.n_words(), 0);
+        bits::set(&mut self.reached, pass);
+        self.stack.push(pass as u32);
+        let (from_source, from_pass) = (might.row(source), might.row(pass));
+        while let Some(at) = self.stack.pop() {
+            let from_here = might.row(at as usize);
+            for &next in dirs.exits(dirs.all[at as usize].to) {
+                let q = next as usize;
+                if bits::get(from_source, q)
+                    && bits::get(from_pass, q)
+                    && bits::get(from_here, q)
+                    && !bits::get(&self.reached, q)
+                    && self
+                        .planes
+                        .iter()
+                        .all(|plane| reaches(dirs, q, plane, tolerance))
+                {
+                    bits::set(&mut self.reached, q);
+                    self.stack.push(next);
+                }
+            }
+        }
+    }
+}
+
+/// Whether an opening reaches in front of a plane.
+pub(super) fn reaches(dirs: &Dirs, dir: usize, plane: &Separator, tolerance: &Tolerance) -> bool {
+    let opening = &dirs.all[dir];
+    let height = plane.normal.dot(opening.center) - plane.front;
+    if height.abs() > opening.radius {
+        return height > 0.0;
+    }
+    let need = tolerance.clearance * sine(plane.normal, opening.turn) - tolerance.outward;
+    dirs.winding(dir)
+        .iter()
+        .any(|&p| plane.normal.dot(p) - plane.front >= need)
+}

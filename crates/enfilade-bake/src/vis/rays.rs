@@ -1,0 +1,122 @@
+//! Sight lines followed from cell to cell: what one crosses, it proves visible.
+
+use enfilade_geom::DVec3;
+
+use super::dirs::Dirs;
+
+/// Tells whether something solid lies between two points.
+pub type Blocker<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
+
+/// A line that proves pairs of cells to see each other.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Line {
+    /// A point in the opening that the walk started from.
+    pub(super) origin: DVec3,
+    /// Any length.
+    pub(super) direction: DVec3,
+    /// The directions crossed, in order.
+    pub(super) chain: Vec<u32>,
+}
+
+/// Longest chain followed.
+const MAX_STEPS: usize = 4096;
+
+/// Follows the line from a point of the opening `first` through it and on; appends the directions crossed,
+/// without `first`.
+///
+/// Counts only crossings that lie `margin` inside an opening, so what it says is proved; it may stop early.
+pub(super) fn walk(
+    dirs: &Dirs,
+    first: usize,
+    origin: DVec3,
+    direction: DVec3,
+    margin: f64,
+    blocker: Option<Blocker<'_>>,
+    out: &mut Vec<u32>,
+) {
+    let mut at = first;
+    let mut t = 0.0;
+    for _ in 0..MAX_STEPS {
+        let back = dirs.reverse[at];
+        let mut best = None;
+        let mut best_t = f64::INFINITY;
+        for &exit in dirs.exits(dirs.all[at].to) {
+            let dir = &dirs.all[exit as usize];
+            let speed = dir.normal.dot(direction);
+            if exit == back || speed <= 0.0 {
+                continue;
+            }
+            let exit_t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / speed;
+            if exit_t < t || exit_t >= best_t {
+                continue;
+            }
+            if dirs.is_inside(exit as usize, origin + direction * exit_t, margin) {
+                best = Some(exit);
+                best_t = exit_t;
+            }
+        }
+        let Some(exit) = best else { return };
+        if let Some(is_blocked) = blocker
+            && is_blocked(origin + direction * t, origin + direction * best_t)
+        {
+            return;
+        }
+        out.push(exit);
+        at = exit as usize;
+        t = best_t;
+    }
+}
+
+impl Dirs {
+    /// Whether a point of an opening's plane lies at least `margin` inside one of its pieces.
+    pub(super) fn is_inside(&self, dir: usize, p: DVec3, margin: f64) -> bool {
+        let pieces = &self.all[dir].pieces;
+        self.pieces[pieces.start as usize..pieces.end as usize]
+            .iter()
+            .any(|piece| {
+                self.edges[piece.start as usize..piece.end as usize]
+                    .iter()
+                    .all(|(inward, offset)| inward.dot(p) - offset >= margin)
+            })
+    }
+
+    /// A random point of an opening, uniform over a random triangle of its fan.
+    pub(super) fn random_point(&self, dir: usize, rng: &mut Rng) -> DVec3 {
+        let pieces = &self.all[dir].pieces;
+        let n_pieces = (pieces.end - pieces.start) as usize;
+        let piece = &self.pieces[pieces.start as usize + rng.below(n_pieces)];
+        let corners = &self.points[piece.start as usize..piece.end as usize];
+        let k = 1 + rng.below(corners.len() - 2);
+        let (mut u, mut v) = (rng.unit(), rng.unit());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        corners[0] + (corners[k] - corners[0]) * u + (corners[k + 1] - corners[0]) * v
+    }
+}
+
+/// Xorshift: repeatable, and good enough to spread rays.
+pub(super) struct Rng(u64);
+
+impl Rng {
+    pub(super) fn new(seed: u64) -> Self {
+        // Odd multiplier and a shift spread neighboring seeds; zero must not be the state.
+        let x = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        Self((x ^ (x >> 29)) | 1)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    pub(super) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(super) fn below(&mut self, n: usize) -> usize {
+        ((self.next() >> 32) * n as u64 >> 32) as usize
+    }
+}

@@ -1,0 +1,240 @@
+//! Rounds of searches over all openings, the same on any number of threads.
+//!
+//! Openings that might see least come first, as in the Quake tools, because what they settle narrows the
+//! others. Those of one round see what earlier rounds settled and nothing of each other, so the order in
+//! which threads finish does not matter.
+
+use enfilade_geom::DVec3;
+use rayon::prelude::*;
+
+use super::bits::{self, BitTable};
+use super::clip::Tolerance;
+use super::dirs::Dirs;
+use super::flow::{Effort, Flow, Found, Shared};
+use super::rays::{self, Blocker, Line, Rng};
+
+/// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
+const ROUND: usize = 64;
+
+pub(super) struct Search<'a> {
+    pub(super) dirs: &'a Dirs,
+    pub(super) might: BitTable,
+    /// Pairs of cells proved visible.
+    pub(super) seen: BitTable,
+    /// Pairs of cells given up on, in `seen` as well.
+    pub(super) undecided: BitTable,
+    pub(super) lines: Vec<Line>,
+    pub(super) tolerance: Tolerance,
+    pub(super) blocker: Option<Blocker<'a>>,
+    pub(super) effort: Effort,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        dirs: &'a Dirs,
+        clearance: f64,
+        far: Option<f64>,
+        blocker: Option<Blocker<'a>>,
+    ) -> Self {
+        let n = dirs.n_cells;
+        let mut seen = BitTable::new(n, n);
+        for c in 0..n {
+            seen.set(c, c);
+        }
+        Self {
+            dirs,
+            might: dirs.might_see(clearance, far),
+            seen,
+            undecided: BitTable::new(n, n),
+            lines: Vec::new(),
+            tolerance: Tolerance::new(dirs.scale, clearance),
+            blocker,
+            effort: Effort::default(),
+        }
+    }
+
+    /// Random lines from every opening, some aimed at what is not yet seen.
+    pub(super) fn cast(&mut self, n_rays: usize) {
+        let openings: Vec<usize> = (0..self.dirs.len())
+            .filter(|&d| self.dirs.all[d].id % 2 == 0)
+            .collect();
+        for round in openings.chunks(ROUND * 4) {
+            let lines: Vec<Vec<Line>> = round
+                .par_iter()
+                .map(|&d| self.cast_from(d, n_rays))
+                .collect();
+            for line in lines.into_iter().flatten() {
+                self.keep(line);
+            }
+        }
+    }
+
+    fn cast_from(&self, opening: usize, n_rays: usize) -> Vec<Line> {
+        let dirs = self.dirs;
+        let mut rng = Rng::new(u64::from(dirs.all[opening].id));
+        let mut lines = Vec::new();
+        let mut wanted = [Vec::new(), Vec::new()];
+        let both = [opening, dirs.reverse[opening] as usize];
+        for (list, &d) in wanted.iter_mut().zip(&both) {
+            let from = dirs.all[d].from as usize;
+            let seen = self.seen.row(from);
+            list.extend(
+                bits::ones(self.might.row(d))
+                    .filter(|&t| !bits::get(seen, dirs.all[t].to as usize)),
+            );
+        }
+        let (mut ahead, mut behind) = (Vec::new(), Vec::new());
+        let margin = self.tolerance.rounding * 16.0;
+        for i in 0..n_rays {
+            let side = i % 2;
+            let d = both[side];
+            let (origin, direction) = if i == 0 {
+                // Straight through: neighbors see each other, whatever else is in sight.
+                let piece = dirs.pieces[dirs.all[d].pieces.start as usize].clone();
+                let corners = &dirs.points[piece.start as usize..piece.end as usize];
+                let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
+                (middle, dirs.all[d].normal)
+            } else if wanted[side].is_empty() {
+                continue;
+            } else {
+                let target = wanted[side][rng.below(wanted[side].len())];
+                let origin = dirs.random_point(d, &mut rng);
+                (origin, dirs.random_point(target, &mut rng) - origin)
+            };
+            if direction.dot(dirs.all[d].normal) <= 0.0 || !dirs.is_inside(d, origin, margin) {
+                continue;
+            }
+            ahead.clear();
+            behind.clear();
+            let blocker = self.blocker;
+            rays::walk(dirs, d, origin, direction, margin, blocker, &mut ahead);
+            let back = both[1 - side];
+            rays::walk(dirs, back, origin, -direction, margin, blocker, &mut behind);
+            let chain: Vec<u32> = behind
+                .iter()
+                .rev()
+                .map(|&b| dirs.reverse[b as usize])
+                .chain([d as u32])
+                .chain(ahead.iter().copied())
+                .collect();
+            if self.proves_new(&chain) {
+                lines.push(Line {
+                    origin,
+                    direction,
+                    chain,
+                });
+            }
+        }
+        lines
+    }
+
+    fn proves_new(&self, chain: &[u32]) -> bool {
+        let dirs = self.dirs;
+        (0..chain.len()).any(|i| {
+            let row = self.seen.row(dirs.all[chain[i] as usize].from as usize);
+            chain[i..]
+                .iter()
+                .any(|&b| !bits::get(row, dirs.all[b as usize].to as usize))
+        })
+    }
+
+    /// Marks what a line proves, and keeps it where that is new.
+    fn keep(&mut self, line: Line) {
+        let all = &self.dirs.all;
+        let mut is_new = false;
+        for i in 0..line.chain.len() {
+            let a = all[line.chain[i] as usize].from as usize;
+            for &b in &line.chain[i..] {
+                let b = all[b as usize].to as usize;
+                if !self.seen.get(a, b) || self.undecided.get(a, b) {
+                    self.seen.set(a, b);
+                    self.seen.set(b, a);
+                    self.undecided.clear(a, b);
+                    self.undecided.clear(b, a);
+                    is_new = true;
+                }
+            }
+        }
+        if is_new {
+            self.lines.push(line);
+        }
+    }
+
+    /// Searches from every opening. `on_round` hears the work done and the work in all, and says whether to
+    /// go on; work is counted in what openings might see at the start.
+    ///
+    /// Returns whether all was searched.
+    pub(super) fn run(
+        &mut self,
+        max_pieces: u32,
+        mut on_round: impl FnMut(u64, u64) -> bool,
+    ) -> bool {
+        let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
+            .map(|d| (bits::count(self.might.row(d)), d))
+            .collect();
+        order.sort_unstable();
+        let total = order.iter().map(|&(n, _)| n as u64).sum();
+        let mut done = 0;
+        for round in order.chunks(ROUND) {
+            if !on_round(done, total) {
+                return false;
+            }
+            done += round.iter().map(|&(n, _)| n as u64).sum::<u64>();
+            let shared = Shared {
+                dirs: self.dirs,
+                might: &self.might,
+                seen: &self.seen,
+                tolerance: self.tolerance,
+                blocker: self.blocker,
+                max_pieces,
+            };
+            let found: Vec<Found> = round
+                .par_iter()
+                .with_max_len(1)
+                .map_init(Flow::default, |flow, &(_, d)| flow.search(&shared, d))
+                .collect();
+            for found in found {
+                self.merge(found);
+            }
+        }
+        true
+    }
+
+    fn merge(&mut self, found: Found) {
+        let back = self.dirs.reverse[found.source] as usize;
+        for t in bits::ones(&found.hidden) {
+            self.might.clear(found.source, t);
+            self.might.clear(self.dirs.reverse[t] as usize, back);
+        }
+        let a = self.dirs.all[found.source].from as usize;
+        for &b in &found.undecided {
+            let b = b as usize;
+            if !self.seen.get(a, b) {
+                for (x, y) in [(a, b), (b, a)] {
+                    self.seen.set(x, y);
+                    self.undecided.set(x, y);
+                }
+            }
+        }
+        for line in found.lines {
+            self.keep(line);
+        }
+        self.effort.add(&found.effort);
+    }
+
+    /// Pairs of cells that may see each other.
+    pub(super) fn visible(&self) -> BitTable {
+        let n = self.dirs.n_cells;
+        let mut visible = BitTable::new(n, n);
+        for c in 0..n {
+            visible.set(c, c);
+        }
+        for (d, dir) in self.dirs.all.iter().enumerate() {
+            visible.set(dir.from as usize, dir.to as usize);
+            for t in bits::ones(self.might.row(d)) {
+                visible.set(dir.from as usize, self.dirs.all[t].to as usize);
+            }
+        }
+        visible
+    }
+}
