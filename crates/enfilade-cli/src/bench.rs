@@ -7,7 +7,9 @@ use anyhow::Context;
 use enfilade::cpg::{Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, World};
 use enfilade::geom::{DVec3, Winding};
 use enfilade::import::read_prt;
-use enfilade::runtime::{Narrowing, SeeOptions, Sight, SightState, Sightlines, View, Viewer};
+use enfilade::runtime::{
+    Narrowing, SeeOptions, Sight, SightOptions, SightState, Sightlines, View, Viewer,
+};
 use enfilade_testkit::{GridParams, Rng, courtyard, room_grid};
 use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 
@@ -52,6 +54,12 @@ enum What {
         /// Views on the path.
         #[arg(long, default_value_t = 290)]
         views: usize,
+        /// Height of the view, in degrees; it is 4:3.
+        #[arg(long, default_value_t = 60.0)]
+        fov: f32,
+        /// Triangles culled together.
+        #[arg(long, default_value_t = SightOptions::default().chunk_triangles)]
+        chunk: usize,
     },
     /// Lines of sight by cells against the tree of the whole world.
     Los {
@@ -79,7 +87,12 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             views,
             rays,
         } => bench_tight(&mut table, scenes, *views, *rays)?,
-        What::Maze { world, views } => bench_maze(&mut table, world, *views)?,
+        What::Maze {
+            world,
+            views,
+            fov,
+            chunk,
+        } => bench_maze(&mut table, world, *views, *fov, *chunk)?,
         What::Los {
             scenes,
             rooms,
@@ -436,14 +449,24 @@ fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])>
     out
 }
 
-fn bench_maze(table: &mut Vec<String>, path: &Path, views: usize) -> anyhow::Result<()> {
+fn bench_maze(
+    table: &mut Vec<String>,
+    path: &Path,
+    views: usize,
+    fov: f32,
+    chunk: usize,
+) -> anyhow::Result<()> {
     let world = read_world(path)?;
-    let sight = Sight::build(&world)?;
+    let options = SightOptions {
+        chunk_triangles: chunk,
+        ..SightOptions::default()
+    };
+    let sight = Sight::build_with(&world, &options)?;
     let state = SightState::new(&sight);
     let steps = walk(&world, &sight, views);
     let all = sight.n_triangles() as f64;
     table.push(format!(
-        "{} views on a path; {} cells, {} portals, {} triangles.",
+        "{} views of {fov} degrees on a path, chunks of {chunk}; {} cells, {} portals, {} triangles.",
         steps.len(),
         sight.n_cells(),
         sight.n_portals(),
@@ -462,7 +485,8 @@ fn bench_maze(table: &mut Vec<String>, path: &Path, views: usize) -> anyhow::Res
         }
         let mut shares = Vec::new();
         for &(eye, toward) in &steps {
-            let view = View::perspective(eye, toward, [0.0, 1.0, 0.0], 1.047, 4.0 / 3.0)?;
+            let view =
+                View::perspective(eye, toward, [0.0, 1.0, 0.0], fov.to_radians(), 4.0 / 3.0)?;
             let seen = match narrowing {
                 None => viewer.see_through_walls(&sight, &view),
                 Some(_) => viewer.see(&sight, &state, &view),
@@ -501,13 +525,13 @@ fn bench_los(
         let start = Instant::now();
         let by_cells: Vec<_> = segments
             .iter()
-            .map(|(a, b)| lines.first_hit(*a, *b))
+            .map(|(a, b)| lines.first_hit_by_cells(*a, *b))
             .collect();
         let cells_ns = start.elapsed().as_secs_f64() * 1e9 / pairs.max(1) as f64;
         let start = Instant::now();
         let whole: Vec<_> = segments
             .iter()
-            .map(|(a, b)| lines.first_hit_of_whole(*a, *b))
+            .map(|(a, b)| lines.first_hit(*a, *b))
             .collect();
         let whole_ns = start.elapsed().as_secs_f64() * 1e9 / pairs.max(1) as f64;
         let same = |a: &Option<enfilade::runtime::SightHit>,

@@ -128,6 +128,89 @@ impl BoxTrees {
     }
 }
 
+/// A ray made ready for boxes; its length counts in `t` as the caller's does.
+pub(crate) struct BoxRay {
+    origin: [Vec4; 3],
+    inverse: [Vec4; 3],
+    is_back: [usize; 3],
+}
+
+impl BoxRay {
+    pub(crate) fn new(origin: DVec3, direction: DVec3) -> Self {
+        // A component that vanishes is raised to what moves by nothing over the ray's length.
+        let least = direction.abs().max_element() * 1e-12;
+        let direction = direction
+            .abs()
+            .max(DVec3::splat(least))
+            .copysign(direction)
+            .as_vec3();
+        let inverse = direction.recip();
+        let origin = origin.as_vec3();
+        Self {
+            origin: [0, 1, 2].map(|k| Vec4::splat(origin[k])),
+            inverse: [0, 1, 2].map(|k| Vec4::splat(inverse[k])),
+            is_back: [0, 1, 2].map(|k| usize::from(direction[k] < 0.0)),
+        }
+    }
+}
+
+impl BoxTrees {
+    /// Calls `visit` with every item of a tree whose box the ray meets at `t` from 0 to `limit`, which
+    /// `visit` returns anew; roughly near to far. Boxes must be grown by what `f32` rounds off.
+    #[inline]
+    pub(crate) fn for_each_on_ray(
+        &self,
+        root: Root,
+        ray: &BoxRay,
+        mut limit: f32,
+        mut visit: impl FnMut(u32) -> f32,
+    ) {
+        if root.0 == NONE {
+            return;
+        }
+        let mut stack = [(0, 0.0_f32); STACK];
+        stack[0] = (root.0, 0.0);
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let (child, near) = stack[len];
+            if near > limit {
+                continue;
+            }
+            if child & ITEM != 0 {
+                limit = visit(child & !ITEM);
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            let at = |far: usize, axis: usize| {
+                (node.bounds[ray.is_back[axis] ^ far][axis] - ray.origin[axis]) * ray.inverse[axis]
+            };
+            let near = at(0, 0).max(at(0, 1)).max(at(0, 2)).max(Vec4::ZERO);
+            let far = at(1, 0).min(at(1, 1)).min(at(1, 2));
+            // Four roundings on either side.
+            let far = (far * (1.0 + 1e-6)).min(Vec4::splat(limit));
+            let mut mask = (near * (1.0 - 1e-6)).cmple(far).bitmask();
+            let base = len;
+            let near = near.to_array();
+            while mask != 0 {
+                let k = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                if node.children[k] == NONE {
+                    continue;
+                }
+                // The nearest last, to be taken first.
+                let mut i = len;
+                while i > base && stack[i - 1].1 < near[k] {
+                    stack[i] = stack[i - 1];
+                    i -= 1;
+                }
+                stack[i] = (node.children[k], near[k] * (1.0 - 1e-6));
+                len += 1;
+            }
+        }
+    }
+}
+
 fn sort_longest(items: &mut [Boxed]) {
     let centers = items
         .iter()

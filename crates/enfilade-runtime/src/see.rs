@@ -415,7 +415,7 @@ impl Asking<'_, '_> {
         self.cull(self.sight.cell_roots[cell as usize]);
         let entry_in_clip = entry.map(|(n, h)| (self.face.normals * n, h - 2.0 * sight.tolerance));
         for exit in sight.exits_of(cell) {
-            self.try_exit(exit, &region, entry, entry_in_clip);
+            self.try_exit(exit, &region, entry, entry_in_clip, near);
         }
     }
 
@@ -426,6 +426,7 @@ impl Asking<'_, '_> {
         region: &Region,
         entry: Option<(DVec3, f64)>,
         entry_in_clip: Option<(DVec3, f64)>,
+        nearest: f64,
     ) {
         let tolerance = self.sight.tolerance;
         let to_center = point(exit.center) - self.view.eye;
@@ -487,7 +488,8 @@ impl Asking<'_, '_> {
         // A plane so near says nothing, and its turning sense may be noise.
         let beyond = (ahead > 16.0 * tolerance).then_some((normal, ahead));
         self.add_portal(exit.portal);
-        self.push(exit.to, exit.portal, narrowed, beyond, near);
+        // Along every ray it lies beyond the portal entered by; less is rounding, or comes of joining.
+        self.push(exit.to, exit.portal, narrowed, beyond, near.max(nearest));
     }
 
     fn mark(&mut self, cell: u32) -> Mark {

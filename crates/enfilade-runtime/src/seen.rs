@@ -78,6 +78,26 @@ impl<'a> Seen<'a> {
         &self.lists.planes[first..first + visit.n_planes as usize]
     }
 
+    /// Whether an object that moves may be seen: one that stands in `cells` with the box `aabb`.
+    ///
+    /// For what is not in the world's lists: ask for each object and frame, with the cell of its
+    /// [`Follower`](crate::Follower) and those behind portals that its box reaches into. Costs a few box
+    /// tests for each visit of these cells.
+    #[must_use]
+    pub fn sees_box(&self, cells: &[CellId], aabb: [[f32; 3]; 2]) -> bool {
+        let [low, high] = aabb;
+        let is_inside = |plane: &[f32; 4]| {
+            let far = (0..3).map(|k| plane[k] * if plane[k] >= 0.0 { high[k] } else { low[k] });
+            let reach = far.sum::<f32>() + plane[3];
+            // What is no number counts as inside.
+            reach >= 0.0 || reach.is_nan()
+        };
+        self.visits()
+            .iter()
+            .filter(|v| cells.contains(&v.cell))
+            .any(|v| self.planes(v).iter().all(is_inside))
+    }
+
     /// The visible cells, each once, near to far.
     #[must_use]
     pub fn cells(&self) -> &'a [CellId] {

@@ -59,7 +59,7 @@ impl Default for SightOptions {
         Self {
             // A wall with a door is 8 to 20 triangles, a room's shell about 50 (office towers,
             // Dirkse's maze): 12 splits rooms by their walls.
-            chunk_triangles: 12,
+            chunk_triangles: 4,
             occluders: 16,
             occluder_area: 2.0,
         }

@@ -11,12 +11,11 @@
 //! matter, leaves a cell where no portal is, or meets a triangle that another of other cells overlaps.
 //! The tests of triangles are the same in all trees, to the bit.
 
-use std::ops::ControlFlow;
-
 use enfilade_cpg::{CellId, Locator, PortalId, World};
-use enfilade_geom::ray::segment_to_edges_distance;
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle};
+use enfilade_geom::ray::hit_triangle;
+use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle};
 
+use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
 use crate::sight::point;
 use crate::state::SightState;
 
@@ -36,21 +35,23 @@ pub struct SightHit {
     pub triangle: u32,
     /// Whether its front was met: the side from which the corners run counter-clockwise.
     pub front: bool,
-    /// The cell in which the segment ended; `None` where the whole world's tree was asked.
+    /// The cell in which the segment ended, where it was followed from cell to cell without doubt.
     pub cell: Option<CellId>,
 }
 
-/// The trees of one cell.
+/// A triangle of an opening.
 #[derive(Clone, Debug)]
-struct CellTrees {
-    walls: Bvh,
-    /// Triangle of the world by triangle of `walls`, ascending: ties are broken alike.
-    triangle_of: Vec<u32>,
-    /// Fans over the openings of the portals.
-    openings: Bvh,
-    /// Portal, and whether the edges of the fan's triangle are the opening's rim.
-    opening_of: Vec<(u32, u32, [bool; 3])>,
+struct Opening {
+    corners: Triangle,
+    portal: u32,
+    /// The two cells.
+    cells: [u32; 2],
+    /// Which edges, opposite each corner, are the opening's rim.
+    is_rim: [bool; 3],
 }
+
+/// Marks an item that is an opening, not a wall.
+const OPENING: u32 = 1 << 30;
 
 /// A world made ready for lines of sight. Apart from [`Sight`](crate::Sight), because it holds the
 /// triangles themselves: about 150 bytes each, more for those that several cells see.
@@ -62,7 +63,12 @@ pub struct Sightlines {
     source: Vec<(u32, u32)>,
     /// Overlapped by a triangle that other cells list.
     is_doubtful: Vec<bool>,
-    cells: Vec<CellTrees>,
+    /// Of all walls, for the cells.
+    triangles: Vec<Triangle>,
+    openings: Vec<Opening>,
+    trees: BoxTrees,
+    /// By cell: over its walls and openings.
+    roots: Vec<Root>,
     near: f64,
 }
 
@@ -99,10 +105,42 @@ impl Sightlines {
         };
         // As for `Sight`: twice what a builder may snap.
         let near = 2.0 * (4e-7 * extent).max(2e-5);
-        let cells = by_cell
+        let mut openings = Vec::new();
+        let mut opening_boxes: Vec<Vec<u32>> = vec![Vec::new(); by_cell.len()];
+        for (i, portal) in world.graph.portals.iter().enumerate() {
+            for piece in &portal.pieces {
+                let n = piece.len();
+                for k in 1..n.saturating_sub(1) {
+                    for c in portal.cells {
+                        opening_boxes[c.0 as usize].push(openings.len() as u32);
+                    }
+                    openings.push(Opening {
+                        corners: [piece[0], piece[k], piece[k + 1]].map(point),
+                        portal: i as u32,
+                        cells: portal.cells.map(|c| c.0),
+                        is_rim: [true, k + 2 == n, k == 1],
+                    });
+                }
+            }
+        }
+        let mut trees = BoxTrees::default();
+        // Twice the tolerance, because the test of edges measures askew; and what `f32` rounds off.
+        let margin = 2.0 * near + extent * (1.0 / 1_048_576.0);
+        let roots = by_cell
             .iter()
-            .enumerate()
-            .map(|(c, list)| CellTrees::new(world, c, list, &triangles))
+            .zip(&opening_boxes)
+            .map(|(walls, fans)| {
+                let boxed = |t: &Triangle, item: u32| Boxed {
+                    bounds: Aabb::of_points(t),
+                    item,
+                };
+                let walls = walls.iter().map(|&i| boxed(&triangles[i as usize], i));
+                let fans = fans
+                    .iter()
+                    .map(|&i| boxed(&openings[i as usize].corners, i | OPENING));
+                let mut items: Vec<Boxed> = walls.chain(fans).collect();
+                trees.add(&mut items, margin)
+            })
             .collect();
         let is_doubtful = doubtful(world, &triangles, &source, &whole, near);
         Self {
@@ -110,60 +148,61 @@ impl Sightlines {
             whole,
             source,
             is_doubtful,
-            cells,
+            triangles,
+            openings,
+            trees,
+            roots,
             near,
         }
     }
 
-    /// The first structural triangle on the closed segment from `a` to `b`, as the tree of the whole
-    /// world would give it. Details do not count. `None` also for points that are not finite.
+    /// The first structural triangle on the closed segment from `a` to `b`. Details do not count.
+    /// `None` also for points that are not finite.
+    ///
+    /// By one tree over the whole world, which measured faster than following the segment from cell to
+    /// cell (`docs/benchmarks/sight.md`).
     #[must_use]
     pub fn first_hit(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
-        let (a, b) = (point(a), point(b));
-        let (hit, cell) = match self.walk(a, b) {
-            Walk::Sure(hit, cell) => (hit, Some(CellId(cell))),
-            Walk::Doubtful => (self.hit_of_whole(a, b), None),
-        };
-        hit.map(|(t, triangle, front)| {
-            let (batch, index) = self.source[triangle as usize];
-            SightHit {
-                t,
-                batch,
-                triangle: index,
-                front,
-                cell,
-            }
-        })
+        self.hit_of_whole(point(a), point(b))
+            .map(|hit| self.named(hit, None))
     }
 
-    /// The same from the tree of the whole world alone; for comparison.
+    /// The same answer, found by following the segment from cell to cell, with the cell where it ends.
     #[must_use]
-    pub fn first_hit_of_whole(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
-        let hit = self.hit_of_whole(point(a), point(b));
-        hit.map(|(t, triangle, front)| {
-            let (batch, index) = self.source[triangle as usize];
-            SightHit {
-                t,
-                batch,
-                triangle: index,
-                front,
-                cell: None,
-            }
-        })
+    pub fn first_hit_by_cells(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
+        let (a, b) = (point(a), point(b));
+        match self.walk(a, b) {
+            Walk::Sure(hit, cell) => hit.map(|hit| self.named(hit, Some(CellId(cell)))),
+            Walk::Doubtful => self.hit_of_whole(a, b).map(|hit| self.named(hit, None)),
+        }
+    }
+
+    fn named(&self, (t, triangle, front): (f64, u32, bool), cell: Option<CellId>) -> SightHit {
+        let (batch, triangle) = self.source[triangle as usize];
+        SightHit {
+            t,
+            batch,
+            triangle,
+            front,
+            cell,
+        }
     }
 
     /// Whether a segment meets neither a structural triangle nor a portal that is closed in `state`.
     #[must_use]
     pub fn is_clear(&self, state: &SightState, a: [f32; 3], b: [f32; 3]) -> bool {
-        self.first_hit(a, b).is_none() && !self.meets_closed(state, point(a), point(b))
+        let (a, b) = (point(a), point(b));
+        !self.whole.any_hit(a, b, |_| false) && !self.meets_closed(state, a, b)
     }
 
     fn meets_closed(&self, state: &SightState, a: DVec3, b: DVec3) -> bool {
-        let ray = Ray::segment(a, b);
+        let Some(look) = Look::new(&Ray::segment(a, b), self.near) else {
+            return false;
+        };
         let (mut t, mut came_by) = (0.0, NONE);
         let mut cell = self.locator.locate(a).map(|c| c.0);
         while let Some(from) = cell {
-            let Some((at, portal, to)) = self.next_opening(from, &ray, t, came_by) else {
+            let Some((at, portal, to)) = self.next_opening(from, &look, t, came_by) else {
                 return false;
             };
             if !state.is_open(PortalId(portal)) {
@@ -180,141 +219,264 @@ impl Sightlines {
         Some((hit.t, hit.triangle, hit.front))
     }
 
+    /// What the ray meets of one cell beyond `from`, but for the portal come by.
+    fn events(&self, cell: u32, look: &Look, from: f64, came_by: u32) -> Events {
+        let mut found = Events {
+            wall: (f64::INFINITY, NONE),
+            next_wall: f64::INFINITY,
+            opening: (f64::INFINITY, NONE),
+            edge: f64::INFINITY,
+        };
+        let root = self.roots[cell as usize];
+        let limit = |found: &Events| {
+            let until = found.wall.0.min(found.opening.0).min(1.0);
+            (until + look.step) as f32 * (1.0 + 1e-6)
+        };
+        let first = limit(&found);
+        self.trees
+            .for_each_on_ray(root, &look.boxes, first, |item| {
+                if item & OPENING == 0 {
+                    match look.meet(&self.triangles[item as usize], self.near, [true; 3]) {
+                        Met::Nothing => {}
+                        Met::Edge(low, high) => found.add_edge(low, high, from),
+                        Met::Inside(t) => {
+                            if t < found.wall.0 {
+                                found.next_wall = found.wall.0;
+                                found.wall = (t, item);
+                            } else {
+                                found.next_wall = found.next_wall.min(t);
+                            }
+                        }
+                    }
+                } else {
+                    let opening = &self.openings[(item & !OPENING) as usize];
+                    match look.meet(&opening.corners, self.near, opening.is_rim) {
+                        Met::Nothing => {}
+                        Met::Edge(low, high) => found.add_edge(low, high, from),
+                        // A straight line crosses a portal once.
+                        Met::Inside(t) if opening.portal != came_by && t >= from => {
+                            if t < found.opening.0 {
+                                found.opening = (t, item & !OPENING);
+                            }
+                        }
+                        Met::Inside(_) => {}
+                    }
+                }
+                limit(&found)
+            });
+        found
+    }
+
     /// The first opening of a cell from `t` on, but for the portal come by: where, its portal, and
     /// the cell behind.
-    fn next_opening(&self, cell: u32, ray: &Ray, t: f64, came_by: u32) -> Option<(f64, u32, u32)> {
-        let trees = &self.cells[cell as usize];
-        let mut first: Option<(f64, u32)> = None;
-        trees.openings.for_each_hit(ray, |hit| {
-            // A straight line crosses a portal once.
-            let is_new = trees.opening_of[hit.triangle as usize].0 != came_by;
-            if is_new && hit.t >= t && first.is_none_or(|f| (hit.t, hit.triangle) < f) {
-                first = Some((hit.t, hit.triangle));
+    fn next_opening(
+        &self,
+        cell: u32,
+        look: &Look,
+        t: f64,
+        came_by: u32,
+    ) -> Option<(f64, u32, u32)> {
+        let mut first = (f64::INFINITY, NONE);
+        let root = self.roots[cell as usize];
+        self.trees.for_each_on_ray(root, &look.boxes, 1.0, |item| {
+            if item & OPENING != 0 {
+                let opening = &self.openings[(item & !OPENING) as usize];
+                let met = look.meet(&opening.corners, self.near, [false; 3]);
+                if let Met::Inside(at) = met
+                    && opening.portal != came_by
+                    && at >= t
+                    && at <= 1.0
+                    && at < first.0
+                {
+                    first = (at, item & !OPENING);
+                }
             }
+            1.0
         });
-        let (at, triangle) = first?;
-        let (portal, to, _) = trees.opening_of[triangle as usize];
-        Some((at, portal, to))
+        let opening = self.openings.get(first.1 as usize)?;
+        Some((first.0, opening.portal, opening.other(cell)))
     }
 
     /// Follows the segment from cell to cell.
     fn walk(&self, a: DVec3, b: DVec3) -> Walk {
-        let length = a.distance(b);
-        if length.is_nan() || length <= 16.0 * self.near {
+        let ray = Ray::segment(a, b);
+        let Some(look) = Look::new(&ray, self.near) else {
             return Walk::Doubtful;
-        }
+        };
         let Some(start) = self.locator.locate(a) else {
             return Walk::Doubtful;
         };
-        let ray = Ray::segment(a, b);
         let (mut cell, mut came_by) = (start.0, NONE);
-        // Events nearer to each other than this may be in the other order.
-        let step = 4.0 * self.near / length;
+        let step = look.step;
         let mut t = 0.0;
         for _ in 0..MAX_CELLS {
-            let trees = &self.cells[cell as usize];
-            let hit = trees.walls.closest_hit(&ray, |_| false);
-            // What the cell lists and the segment met before it came here would have been in its way.
-            if hit.is_some_and(|h| h.t < t + step) {
+            let found = self.events(cell, &look, t - step, came_by);
+            let until = found.wall.0.min(found.opening.0).min(1.0);
+            let is_doubtful = found.edge <= until + step
+                // What the cell lists and the segment met before it came here would have been in
+                // its way.
+                || found.wall.0 < t + step
+                || found.opening.0 < t + step
+                // Two at once.
+                || (found.wall.0 - found.opening.0).abs() < step
+                || (found.opening.0 - 1.0).abs() < step
+                || (found.next_wall - found.wall.0) < 1e-3 * step;
+            if is_doubtful {
                 return Walk::Doubtful;
             }
-            let exit = self.next_opening(cell, &ray, t - step, came_by);
-            if exit.is_some_and(|e| e.0 < t + step || e.0 > 1.0 - step) {
-                return Walk::Doubtful;
-            }
-            let exit = match (exit, hit) {
-                (Some(e), Some(h)) if (e.0 - h.t).abs() < step => return Walk::Doubtful,
-                (Some(e), Some(h)) if e.0 > h.t => None,
-                (exit, _) => exit,
-            };
-            let until = exit.map_or(hit.map_or(1.0, |h| h.t), |e| e.0);
-            if self.is_near_edge(trees, &ray, t, until) {
-                return Walk::Doubtful;
-            }
-            if let Some((at, portal, to)) = exit {
-                (t, came_by, cell) = (at, portal, to);
+            if found.opening.0 < found.wall.0.min(1.0) {
+                let opening = &self.openings[found.opening.1 as usize];
+                (t, came_by, cell) = (found.opening.0, opening.portal, opening.other(cell));
                 continue;
             }
+            // The very test of the whole world's tree.
+            let hit = self
+                .triangles
+                .get(found.wall.1 as usize)
+                .and_then(|t| hit_triangle(&ray, t));
             let Some(hit) = hit else {
-                // Nothing met to the end: the end must be in this cell.
-                if self.locator.locate(b) != Some(CellId(cell)) {
+                if found.wall.0 < 1.0 || self.locator.locate(b) != Some(CellId(cell)) {
                     return Walk::Doubtful;
                 }
                 return Walk::Sure(None, cell);
             };
-            let triangle = trees.triangle_of[hit.triangle as usize];
-            if self.is_doubtful[triangle as usize] {
+            if self.is_doubtful[found.wall.1 as usize] {
                 return Walk::Doubtful;
             }
-            return Walk::Sure(Some((hit.t, triangle, hit.front)), cell);
+            return Walk::Sure(Some((hit.t, found.wall.1, hit.front)), cell);
         }
         Walk::Doubtful
     }
+}
 
-    /// Whether the ray passes an edge of a wall or the rim of an opening of the cell within the
-    /// tolerance, from `t` to `until`.
-    fn is_near_edge(&self, trees: &CellTrees, ray: &Ray, t: f64, until: f64) -> bool {
-        let past = 2.0 * self.near / ray.direction.length();
-        let (a, b) = (ray.at((t - past).max(0.0)), ray.at(until + past));
-        let near = self.near;
-        let walls = trees
-            .walls
-            .for_each_around_segment(a, b, near, |_, triangle| {
-                if is_near_edges(a, b, triangle, near) {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            });
-        let rims = trees
-            .openings
-            .for_each_around_segment(a, b, near, |i, triangle| {
-                let (_, _, is_rim) = trees.opening_of[i as usize];
-                for k in (0..3).filter(|&k| is_rim[k]) {
-                    let edge = [triangle[k], triangle[(k + 1) % 3], triangle[(k + 1) % 3]];
-                    if segment_to_edges_distance(a, b, &edge) < near {
-                        return ControlFlow::Break(());
-                    }
-                }
-                ControlFlow::Continue(())
-            });
-        walls.is_break() || rims.is_break()
+impl Opening {
+    fn other(&self, cell: u32) -> u32 {
+        self.cells[usize::from(self.cells[0] == cell)]
     }
 }
 
-/// Whether a segment is nearer than `near` to an edge of a triangle.
-fn is_near_edges(a: DVec3, b: DVec3, t: &Triangle, near: f64) -> bool {
-    // Far from the plane with both ends on one side: far from the edges.
-    let n = (t[1] - t[0]).cross(t[2] - t[0]);
-    let (da, db) = (n.dot(a - t[0]), n.dot(b - t[0]));
-    if da * db > 0.0 && da.abs().min(db.abs()) > 1.001 * near * n.length() {
-        return false;
-    }
-    segment_to_edges_distance(a, b, t) < near
+/// What a ray meets of one cell, each `t` the least.
+struct Events {
+    wall: (f64, u32),
+    next_wall: f64,
+    opening: (f64, u32),
+    edge: f64,
 }
 
-impl CellTrees {
-    fn new(world: &World, cell: usize, list: &[u32], triangles: &[Triangle]) -> Self {
-        let own: Vec<Triangle> = list.iter().map(|&i| triangles[i as usize]).collect();
-        let mut fans = Vec::new();
-        let mut opening_of = Vec::new();
-        for id in &world.graph.cells[cell].portals {
-            let portal = &world.graph.portals[id.0 as usize];
-            let to = portal.cells[usize::from(portal.cells[0].0 as usize == cell)].0;
-            for piece in &portal.pieces {
-                let n = piece.len();
-                for k in 1..n.saturating_sub(1) {
-                    fans.push([piece[0], piece[k], piece[k + 1]].map(point));
-                    opening_of.push((id.0, to, [k == 1, true, k + 2 == n]));
-                }
+impl Events {
+    fn add_edge(&mut self, low: f64, high: f64, from: f64) {
+        if high >= from {
+            self.edge = self.edge.min(low.max(from));
+        }
+    }
+}
+
+/// How a ray meets a triangle.
+enum Met {
+    Nothing,
+    /// It passes an edge within the tolerance, at `t` between these.
+    Edge(f64, f64),
+    /// It meets the inside at about this `t`.
+    Inside(f64),
+}
+
+/// A segment made ready for triangles, sheared as in `enfilade_geom::ray`.
+struct Look {
+    boxes: BoxRay,
+    origin: [f64; 3],
+    axes: [usize; 3],
+    shear: [f64; 3],
+    /// Parts of the segment nearer to each other than this may be in the other order.
+    step: f64,
+}
+
+impl Look {
+    /// `None` for a segment that is no longer than a few tolerances, or not finite.
+    fn new(ray: &Ray, near: f64) -> Option<Self> {
+        let d = ray.direction;
+        let length = d.length();
+        if !length.is_finite() || length <= 16.0 * near {
+            return None;
+        }
+        let a = d.abs();
+        let kz = if a.x >= a.y && a.x >= a.z {
+            0
+        } else if a.y >= a.z {
+            1
+        } else {
+            2
+        };
+        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
+        let inverse = 1.0 / d[kz];
+        Some(Self {
+            boxes: BoxRay::new(ray.origin, d),
+            origin: ray.origin.to_array(),
+            axes: [kx, ky, kz],
+            shear: [d[kx] * inverse, d[ky] * inverse, inverse],
+            step: 4.0 * near / length,
+        })
+    }
+
+    #[inline]
+    fn meet(&self, t: &Triangle, near: f64, is_rim: [bool; 3]) -> Met {
+        let [kx, ky, kz] = self.axes;
+        let [sx, sy, sz] = self.shear;
+        let o = &self.origin;
+        let p = t.map(|p| {
+            let z = p[kz] - o[kz];
+            (
+                DVec2::new(p[kx] - o[kx] - sx * z, p[ky] - o[ky] - sy * z),
+                z,
+            )
+        });
+        // Twice the area beside each edge, the edge opposite each corner.
+        let beside = |i: usize, j: usize| p[j].0.perp_dot(p[i].0);
+        let side = [beside(2, 1), beside(0, 2), beside(1, 0)];
+        let det = side[0] + side[1] + side[2];
+        let sign = if det < 0.0 { -1.0 } else { 1.0 };
+        // The shear measures along a coordinate plane: by up to √3 more than straight across. Squared.
+        let reach2 = 3.0625 * near * near;
+        let mut is_edge = false;
+        for k in 0..3 {
+            let d = p[(k + 1) % 3].0 - p[(k + 2) % 3].0;
+            let out = sign * side[k];
+            let is_clear = out * out > reach2 * d.length_squared();
+            if out < 0.0 && is_clear {
+                return Met::Nothing;
             }
+            is_edge |= is_rim[k] && !is_clear;
         }
-        Self {
-            walls: Bvh::build(&own),
-            triangle_of: list.to_vec(),
-            openings: Bvh::build(&fans),
-            opening_of,
+        let (low, high) = (
+            p[0].1.min(p[1].1).min(p[2].1),
+            p[0].1.max(p[1].1).max(p[2].1),
+        );
+        let (low, high) = if sz < 0.0 {
+            (high * sz, low * sz)
+        } else {
+            (low * sz, high * sz)
+        };
+        let at = (side[0] * p[0].1 + side[1] * p[1].1 + side[2] * p[2].1) * sz / det;
+        // Along the plane the place is rounding noise: anywhere on the triangle.
+        let is_steep = det.abs()
+            > 1e-3
+                * (p[0].0 - p[1].0)
+                    .length_squared()
+                    .max((p[0].0 - p[2].0).length_squared())
+                * 1e-3;
+        if !is_steep || !at.is_finite() {
+            return if high < -self.step || low > 1.0 + self.step {
+                Met::Nothing
+            } else {
+                Met::Edge(low, high)
+            };
         }
+        if at < -self.step || at > 1.0 + self.step {
+            return Met::Nothing;
+        }
+        if is_edge {
+            return Met::Edge(at - self.step, at + self.step);
+        }
+        Met::Inside(at)
     }
 }
 

@@ -33,15 +33,13 @@ fn a_million_segments_equal_brute_force() {
                 b = [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * 0.05);
             }
             if i % 32 == 1 {
-                // From corner to corner of portals: along walls, through rims.
-                let corner = |rng: &mut Rng| {
-                    let p = &world.graph.portals[rng.below(world.graph.portals.len())].outline;
-                    p[rng.below(p.len())]
-                };
-                b = corner(&mut rng);
+                // To corners of portals: along walls, through rims.
+                let portals = &world.graph.portals;
+                let outline = &portals[rng.below(portals.len())].outline;
+                b = outline[rng.below(outline.len())];
             }
-            let found = lines.first_hit(a, b);
-            let truth = lines.first_hit_of_whole(a, b);
+            let found = lines.first_hit_by_cells(a, b);
+            let truth = lines.first_hit(a, b);
             let plain = |h: SightHit| SightHit { cell: None, ..h };
             assert_eq!(found.map(plain), truth, "{a:?} {b:?}");
             n_hits += u32::from(truth.is_some());
