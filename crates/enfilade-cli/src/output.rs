@@ -21,6 +21,36 @@ pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> 
     })
 }
 
+/// Whether `path` can be written, asked before minutes of work are spent on what goes there.
+pub(crate) fn check_target(path: &Path) -> anyhow::Result<()> {
+    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let try_it = || match fs::metadata(&path) {
+        Ok(m) if m.is_dir() => Err(io::Error::other("it is a folder")),
+        Ok(m) if !m.is_file() => Ok(()),
+        _ => {
+            let aside = aside(&path)?;
+            File::create(&aside)?;
+            fs::remove_file(&aside)
+        }
+    };
+    try_it().with_context(|| {
+        let missing = path
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty() && !p.is_dir());
+        match missing {
+            Some(folder) => format!(
+                "cannot write {}: there is no folder {}; make it, or choose another place with -o",
+                path.display(),
+                folder.display()
+            ),
+            None => format!(
+                "cannot write {}; choose another place with -o",
+                path.display()
+            ),
+        }
+    })
+}
+
 fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if fs::metadata(&path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum ImportError {
     /// A file could not be read.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {reason}", path = path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
+        /// What the system said; part of the text, and so no source of its own.
+        reason: std::io::Error,
     },
     /// The file is of no format that is read here.
     #[error(
@@ -87,11 +87,13 @@ pub enum ImportError {
     },
     /// The scene is far larger or smaller than a building: the unit is probably wrong.
     #[error(
-        "the scene is {x:.4} x {y:.4} x {z:.4} m, {bound}{offender}; {advice}",
-        x = size[0], y = size[1], z = size[2],
+        "{paths}: the scene is {x} x {y} x {z} m, {bound}{offender}; {advice}",
+        x = meters(size[0]), y = meters(size[1]), z = meters(size[2]),
         offender = offender.as_ref().map(|name| format!(", because object '{name}' sticks out")).unwrap_or_default()
     )]
     Extent {
+        /// The files, comma separated.
+        paths: String,
         /// Edge lengths of the scene's box. [Units: wu]
         size: [f64; 3],
         /// The limit that it breaks, as text.
@@ -109,6 +111,15 @@ pub enum ImportError {
         /// What is wrong with it.
         problem: String,
     },
+}
+
+/// A length that fits a line, however wrong it is.
+fn meters(length: f64) -> String {
+    if length.abs() < 1e7 {
+        format!("{length:.4}")
+    } else {
+        format!("{length:.1e}")
+    }
 }
 
 impl ImportError {

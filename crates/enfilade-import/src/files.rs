@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 /// Reads a whole regular file of at most `limit` bytes.
 pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
-    let read_error = |source| ImportError::Read {
+    let read_error = |reason| ImportError::Read {
         path: path.to_path_buf(),
-        source,
+        reason,
     };
     let too_large = |n| ImportError::TooMuch {
         path: path.to_path_buf(),

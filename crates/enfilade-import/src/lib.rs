@@ -172,26 +172,30 @@ fn decode(
 fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, ImportError> {
     let (scene, report) = builder.finish();
     if scene.objects.is_empty() {
-        let paths: Vec<String> = report
-            .files
-            .iter()
-            .map(|f| f.path.display().to_string())
-            .collect();
         let advice = match report.notes.first() {
             Some(note) => format!("the first thing noticed: {note}"),
             None => "export the meshes, too".into(),
         };
         return Err(ImportError::NoTriangles {
-            paths: paths.join(", "),
+            paths: paths_of(&report),
             advice,
         });
     }
-    check_extent(&scene, options)?;
+    check_extent(&scene, &report, options)?;
     Ok(Imported { scene, report })
 }
 
+fn paths_of(report: &ImportReport) -> String {
+    let path = |f: &FileReport| f.path.display().to_string();
+    report.files.iter().map(path).collect::<Vec<_>>().join(", ")
+}
+
 /// Refuses scenes that are far larger or smaller than any building, or far off.
-fn check_extent(scene: &Scene, options: &ImportOptions) -> Result<(), ImportError> {
+fn check_extent(
+    scene: &Scene,
+    report: &ImportReport,
+    options: &ImportOptions,
+) -> Result<(), ImportError> {
     let limits = &options.limits;
     let boxes: Vec<Aabb> = (0..scene.objects.len())
         .map(|i| scene.object_aabb(i))
@@ -206,6 +210,7 @@ fn check_extent(scene: &Scene, options: &ImportOptions) -> Result<(), ImportErro
     let unit = options.unit.unwrap_or(1.0);
     let error = |bound: String, offender, advice| {
         Err(ImportError::Extent {
+            paths: paths_of(report),
             size: size.to_array(),
             bound,
             offender,

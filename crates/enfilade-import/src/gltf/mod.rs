@@ -192,7 +192,9 @@ fn read_buffers<'b>(
                 None => {
                     let path = files::resolve(builder.folder.as_deref(), uri)
                         .map_err(|problem| builder.malformed(&place, problem))?;
-                    let bytes = files::read_file(&path, budget)?;
+                    let bytes = files::read_file(&path, budget).map_err(|e| {
+                        builder.malformed(&place, format!("{e}; put the file there"))
+                    })?;
                     budget -= bytes.len() as u64;
                     bytes
                 }

@@ -1,0 +1,352 @@
+//! What a bake can be told, on the command line and in a settings file.
+//!
+//! Every value is checked where it is read, so that a wrong one is shown at its place.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use enfilade::bake::BakeConfig;
+use enfilade::geom::DVec3;
+use enfilade::import::{ImportOptions, RoleRules, Up};
+use serde::de::{Deserialize, Deserializer, Error};
+
+#[derive(clap::Args)]
+pub(crate) struct BakeOptions {
+    /// Files whose objects are all detail: furniture, door leaves, plants.
+    #[arg(long, value_name = "FILE")]
+    pub(super) detail: Vec<PathBuf>,
+    /// Objects whose object, mesh or material name fits this pattern (`*`, `?`) are detail.
+    #[arg(long, value_name = "PATTERN")]
+    detail_name: Vec<String>,
+    /// Objects whose name fits this pattern are structural, whatever else says they are detail.
+    #[arg(long, value_name = "PATTERN")]
+    structural_name: Vec<String>,
+    /// The input's unit: m, cm, mm, in, ft, or a number of meters.
+    #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
+    unit: Option<f64>,
+    /// The input's up axis.
+    #[arg(long, value_enum)]
+    up: Option<UpAxis>,
+    /// Point of the scene, in meters and with y up, that becomes the origin.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    origin: Option<DVec3>,
+    /// How cells are found.
+    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    method: Method,
+    /// Settings file in TOML; what is given on the command line wins.
+    #[arg(long, value_name = "FILE")]
+    pub(super) config: Option<PathBuf>,
+    /// Edge of a voxel in meters; chosen from the narrowest opening and the scene's size if not given.
+    #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
+    voxel: Option<f64>,
+    /// Width in meters of the narrowest opening that must be found [default: 0.6].
+    #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
+    min_opening: Option<f64>,
+    /// Threads to use; as many as there are cores if not given. The result is the same.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) threads: Option<u16>,
+    /// Print the role of each object with its reason, notes of the import and stage times.
+    #[arg(short, long)]
+    pub(super) verbose: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum UpAxis {
+    Y,
+    Z,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Method {
+    /// Choose by what the input is; the watershed so far.
+    Auto,
+    /// Voxels, distances, watershed.
+    Watershed,
+}
+
+/// The longest voxel and the widest "narrowest opening": past it no room is left to find.
+const LONGEST: f64 = 10.0;
+
+fn check_length(value: f64) -> Result<f64, String> {
+    if value > 0.0 && value <= LONGEST {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is not a length in meters above 0 and up to {LONGEST}"
+        ))
+    }
+}
+
+fn parse_length(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number of meters"))?;
+    check_length(number)
+}
+
+fn parse_unit(text: &str) -> Result<f64, String> {
+    Ok(match text {
+        "m" => 1.0,
+        "cm" => 0.01,
+        "mm" => 0.001,
+        "in" => 0.0254,
+        "ft" => 0.3048,
+        _ => text
+            .parse()
+            .ok()
+            .filter(|u| UNITS.contains(u))
+            .ok_or("give m, cm, mm, in, ft, or the meters of one unit, such as 0.001")?,
+    })
+}
+
+/// What the importer takes as a unit.
+const UNITS: RangeInclusive<f64> = 1e-9..=1e9;
+
+fn parse_point(text: &str) -> Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite()))
+        .collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
+        _ => Err("give three numbers with commas between, such as 5000,0,-1200".into()),
+    }
+}
+
+/// A length of the settings file. [Units: wu]
+struct Length(f64);
+
+impl<'de> Deserialize<'de> for Length {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Deserialize::deserialize(deserializer)?;
+        check_length(value).map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// A number of the settings file that is at least 0.
+struct Amount(f64);
+
+impl<'de> Deserialize<'de> for Amount {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value: f64 = Deserialize::deserialize(deserializer)?;
+        if value >= 0.0 && value.is_finite() {
+            Ok(Self(value))
+        } else {
+            Err(D::Error::custom(format!(
+                "{value} is not a number of at least 0"
+            )))
+        }
+    }
+}
+
+/// A number of voxels of the settings file.
+struct Budget(usize);
+
+impl<'de> Deserialize<'de> for Budget {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Deserialize::deserialize(deserializer)?;
+        if value >= LEAST_VOXELS {
+            Ok(Self(value))
+        } else {
+            Err(D::Error::custom(format!(
+                "{value} voxels are too few: at least {LEAST_VOXELS}"
+            )))
+        }
+    }
+}
+
+/// What the bake takes as a budget.
+const LEAST_VOXELS: usize = 1000;
+
+/// A unit of the settings file: a name or a number.
+struct Unit(f64);
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NameOrNumber;
+        impl serde::de::Visitor<'_> for NameOrNumber {
+            type Value = Unit;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(
+                    f,
+                    "\"m\", \"cm\", \"mm\", \"in\", \"ft\" or a number of meters"
+                )
+            }
+            fn visit_str<E: Error>(self, text: &str) -> Result<Unit, E> {
+                parse_unit(text).map(Unit).map_err(E::custom)
+            }
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Unit, E> {
+                self.visit_str(&value.to_string())
+            }
+            fn visit_i64<E: Error>(self, value: i64) -> Result<Unit, E> {
+                self.visit_str(&value.to_string())
+            }
+        }
+        deserializer.deserialize_any(NameOrNumber)
+    }
+}
+
+/// The settings file: the fields of the bake's configuration and of the import, all optional.
+#[derive(Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConfigFile {
+    voxel: Option<Length>,
+    min_opening: Option<Length>,
+    max_voxels: Option<Budget>,
+    noise: Option<Amount>,
+    unit: Option<Unit>,
+    up: Option<UpAxis>,
+    origin: Option<[f64; 3]>,
+    #[serde(default)]
+    detail_names: Vec<String>,
+    #[serde(default)]
+    structural_names: Vec<String>,
+    #[serde(default)]
+    merge: MergeTable,
+}
+
+/// The table `[merge]` of the settings file.
+#[derive(Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MergeTable {
+    threshold: Option<Amount>,
+    wall_threshold: Option<Amount>,
+    wall_rim: Option<Amount>,
+    radius_gain: Option<Amount>,
+    reach: Option<Amount>,
+    surround: Option<Amount>,
+    outdoor_gain: Option<Amount>,
+    closed_share: Option<Amount>,
+    min_radius: Option<Amount>,
+}
+
+impl ConfigFile {
+    fn read(path: &Path) -> anyhow::Result<Self> {
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("cannot read settings {}", path.display()))?;
+        toml::from_str(&text).with_context(|| {
+            format!(
+                "settings {} are not understood; correct or remove the line",
+                path.display()
+            )
+        })
+    }
+}
+
+/// Command line and settings file, resolved.
+pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, BakeConfig)> {
+    let file = match &options.config {
+        None => ConfigFile::default(),
+        Some(path) => ConfigFile::read(path)?,
+    };
+    let mut config = BakeConfig {
+        voxel: options.voxel.or(file.voxel.map(|v| v.0)),
+        ..BakeConfig::default()
+    };
+    if let Some(v) = options.min_opening.or(file.min_opening.map(|v| v.0)) {
+        config.min_opening = v;
+    }
+    if let Some(v) = file.max_voxels {
+        config.max_voxels = v.0;
+    }
+    let (m, table) = (&mut config.merge, file.merge);
+    for (field, given) in [
+        (&mut config.noise, file.noise),
+        (&mut m.threshold, table.threshold),
+        (&mut m.wall_threshold, table.wall_threshold),
+        (&mut m.wall_rim, table.wall_rim),
+        (&mut m.radius_gain, table.radius_gain),
+        (&mut m.reach, table.reach),
+        (&mut m.surround, table.surround),
+        (&mut m.outdoor_gain, table.outdoor_gain),
+        (&mut m.closed_share, table.closed_share),
+        (&mut m.min_radius, table.min_radius),
+    ] {
+        if let Some(Amount(value)) = given {
+            *field = value;
+        }
+    }
+    let import_options = ImportOptions {
+        unit: options.unit.or(file.unit.map(|u| u.0)),
+        up: options.up.or(file.up).map(|up| match up {
+            UpAxis::Y => Up::Y,
+            UpAxis::Z => Up::Z,
+        }),
+        origin: options
+            .origin
+            .or(file.origin.map(DVec3::from_array))
+            .unwrap_or(DVec3::ZERO),
+        roles: RoleRules {
+            structural: [options.structural_name.clone(), file.structural_names].concat(),
+            detail: [options.detail_name.clone(), file.detail_names].concat(),
+            ..RoleRules::default()
+        },
+        ..ImportOptions::default()
+    };
+    Ok((import_options, config))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_have_names() {
+        assert_eq!(parse_unit("mm"), Ok(0.001));
+        assert_eq!(parse_unit("0.5"), Ok(0.5));
+        for bad in ["feet", "", "0", "-1", "NaN", "inf", "1e99"] {
+            assert!(parse_unit(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn points_are_three_finite_numbers() {
+        assert_eq!(parse_point("1,-2, 3e2"), Ok(DVec3::new(1.0, -2.0, 300.0)));
+        for bad in ["", "1,2", "1,2,3,4", "1 2 3", "1,2,NaN", "1,2,inf"] {
+            assert!(parse_point(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn the_settings_file_says_which_line_is_wrong() {
+        let problem = |text: &str| {
+            toml::from_str::<ConfigFile>(text)
+                .err()
+                .unwrap()
+                .to_string()
+        };
+        let of_line = |text, line: usize, word| {
+            let problem = problem(text);
+            assert!(problem.contains(&format!("line {line}")), "{problem}");
+            assert!(problem.contains(word), "{problem}");
+        };
+        of_line("\nvoxell = 0.1", 2, "voxell");
+        of_line("voxel = -1", 1, "above 0");
+        of_line("min_opening = nan", 1, "above 0");
+        of_line("max_voxels = 999", 1, "at least 1000");
+        of_line("noise = -0.5", 1, "at least 0");
+        of_line("[merge]\nthreshold = inf", 2, "at least 0");
+        of_line("[merge]\n\nthreshhold = 0.7", 3, "threshhold");
+        of_line("unit = \"feet\"", 1, "ft");
+        of_line("up = \"x\"", 1, "up");
+        of_line("origin = [1, 2]", 1, "origin");
+    }
+
+    #[test]
+    fn the_settings_file_sets_what_it_names() {
+        let file: ConfigFile = toml::from_str(
+            "voxel = 0.2\nunit = \"mm\"\nup = \"z\"\norigin = [1, 2, 3.5]\n[merge]\nreach = 0.5",
+        )
+        .unwrap();
+        assert_eq!(file.voxel.unwrap().0, 0.2);
+        assert_eq!(file.unit.unwrap().0, 0.001);
+        assert!(file.up == Some(UpAxis::Z));
+        assert_eq!(file.origin, Some([1.0, 2.0, 3.5]));
+        assert_eq!(file.merge.reach.unwrap().0, 0.5);
+        let number: ConfigFile = toml::from_str("unit = 1").unwrap();
+        assert_eq!(number.unit.unwrap().0, 1.0);
+    }
+}
