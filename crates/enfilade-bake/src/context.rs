@@ -40,6 +40,9 @@ pub(crate) const STAGES: [&str; 8] = [
 ];
 
 impl<'a> BakeContext<'a> {
+    /// The names of the stages, in order, as [`Progress::stage`] hears them.
+    pub const STAGES: &'static [&'static str] = &STAGES;
+
     /// A context that tells `progress` and stops when `cancel` becomes true.
     #[must_use]
     pub fn new(progress: &'a dyn Progress, cancel: Option<&'a AtomicBool>) -> Self {

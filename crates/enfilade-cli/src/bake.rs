@@ -6,14 +6,14 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Progress, bake};
+use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
 
 use crate::output::{check_target, write_atomically};
-use crate::progress::StageBar;
+use crate::progress::{BakeBar, StageBar};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
@@ -44,7 +44,10 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     }
     let (import_options, config) = settings::resolve(options)?;
     check_target(&args.output)?;
+    let bar = StageBar::new();
+    bar.start("reading", 0);
     let imported = import(&args.inputs, &options.detail, &import_options)?;
+    bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let baked = bake_scene(&imported.scene, &config, options.threads.map(usize::from))?;
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
@@ -71,18 +74,12 @@ pub(crate) fn bake_scene(
     config: &BakeConfig,
     threads: Option<usize>,
 ) -> anyhow::Result<BakeOutput> {
-    struct Bar(StageBar);
-    impl Progress for Bar {
-        fn stage(&self, name: &'static str, index: usize, count: usize) {
-            self.0.start(&format!("{}/{count} {name}", index + 1), 0);
-        }
-    }
-    let bar = Bar(StageBar::new());
+    let bar = BakeBar::new(scene, config);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .build()?;
     let baked = pool.install(|| bake(scene, config, &BakeContext::new(&bar, None)))?;
-    bar.0.finish();
+    drop(bar);
     Ok(baked)
 }
 
