@@ -1,11 +1,13 @@
-//! Joins cells of a partition that belong together although no opening joins them: a shallow void
-//! becomes part of the room below it.
+//! Joins what belongs together: a shallow void and the room below it, although no opening joins
+//! them, and regions that no plane parts.
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{CellId, Locator};
+use enfilade_cpg::{CellId, Locator, PortalKind};
+use enfilade_geom::DVec3;
 
-use crate::complex::Partition;
+use crate::complex::{Partition, Vote};
+use crate::watershed::OUTDOORS;
 
 /// Marks the label of a void; the rest of the label is the region that the void belongs to.
 pub(crate) const VOID: u32 = 1 << 31;
@@ -78,4 +80,55 @@ fn renumber_locator(locator: &mut Locator, number: &[u32]) {
     for node in &mut locator.nodes {
         node.children = node.children.map(|c| renumbered(c, number));
     }
+}
+
+/// Regions that leak into each other over more than this, and over more than their screens cover,
+/// have no opening between them. [Units: wu²]
+const MAX_LEAK: f64 = 1.0;
+
+/// Gives regions that no plane parts one label, in the votes and the voids; whether there were any.
+///
+/// A portal is planar. Where two regions meet in the open, not in their screens (over a flight of
+/// stairs, say), the border between them would follow whatever planes the cell complex happens to
+/// have: dozens of portals that mean nothing. Such regions are one room.
+pub(crate) fn join_unparted(
+    partition: &Partition,
+    votes: &mut [Vote],
+    voids: &mut [(DVec3, u32)],
+) -> bool {
+    let mut between: BTreeMap<[u32; 2], (f64, f64)> = BTreeMap::new();
+    for p in &partition.portals {
+        let labels = p.cells.map(|c| partition.label_of_cell[c as usize]);
+        if p.kind == PortalKind::Crack || labels[0] == labels[1] || labels.contains(&u32::MAX) {
+            continue;
+        }
+        let pair = [labels[0].min(labels[1]), labels[0].max(labels[1])];
+        let (leak, screen) = between.entry(pair).or_default();
+        *if p.is_leak { leak } else { screen } += p.area;
+    }
+    // The lesser label stands for both; pairs ascend, so chains end in the least of all.
+    let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
+    for (pair, (leak, screen)) in between {
+        // A model full of holes must not lose its rooms to the outdoors.
+        if pair[0] != OUTDOORS && leak > MAX_LEAK && leak > screen {
+            let [a, b] = pair.map(|l| root(&stands_for, l));
+            if a != b {
+                stands_for.insert(a.max(b), a.min(b));
+            }
+        }
+    }
+    for v in votes.iter_mut() {
+        v.label = root(&stands_for, v.label);
+    }
+    for (_, region) in voids.iter_mut() {
+        *region = root(&stands_for, *region);
+    }
+    !stands_for.is_empty()
+}
+
+fn root(stands_for: &BTreeMap<u32, u32>, mut label: u32) -> u32 {
+    while let Some(&next) = stands_for.get(&label) {
+        label = next;
+    }
+    label
 }

@@ -13,13 +13,13 @@ use rayon::prelude::*;
 
 use crate::assemble::{Parts, assemble};
 use crate::complex::{ComplexInput, LabelSettings, Leak, Partition, Vote, build_complex};
-use crate::join::{VOID, join_voids};
+use crate::join::{VOID, join_unparted, join_voids};
 use crate::voxel::{
     BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
 };
 use crate::watershed::{
-    Flooded, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
-    find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
+    Flooded, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
+    find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
     shallow_voids, slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
@@ -73,7 +73,12 @@ pub fn bake(
     };
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
-    let closures = voxelize(&grid, &closure_triangles(scene));
+    let mut closures = voxelize(&grid, &closure_triangles(scene));
+    // Where a building has no roof, a lid takes its place.
+    let lids = find_lids(&grid, &occupied);
+    if let Some(voxels) = &lids.voxels {
+        closures.union_with(voxels);
+    }
 
     // 2. How far every voxel of air is from a surface; door leaves count as surfaces here.
     context.stage(1)?;
@@ -130,7 +135,7 @@ pub fn bake(
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
-    let screens = fit_screens(&grid, &labels, &regions, &closures, &walls);
+    let screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
     let mut votes = votes(
         &grid,
         &labels,
@@ -138,14 +143,14 @@ pub fn bake(
         &hollow,
         &inside_of(&stairs, &grid, &bvh),
     );
-    let voids = shallow_voids(&walls, &bvh, &|p| {
+    let mut voids = shallow_voids(&walls, &bvh, &|p| {
         grid.voxel_at(p).map_or(0, |[x, y, z]| {
             regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
         })
     });
     drop(walls);
     drop(labels);
-    drop(closures);
+    drop((closures, lids));
 
     // 6. Screens and triangles cut space into convex pieces, exactly.
     context.stage(5)?;
@@ -159,6 +164,9 @@ pub fn bake(
     // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
     context.stage(6)?;
     let mut partition = complex.partition(&votes, &LabelSettings::default());
+    while join_unparted(&partition, &mut votes, &mut voids) {
+        partition = complex.partition(&votes, &LabelSettings::default());
+    }
     // What rays found above ceilings and no room's votes reached.
     let unreached: Vec<Vote> = voids
         .into_iter()
@@ -278,6 +286,7 @@ fn fit_screens(
     labels: &Labels,
     regions: &Regions,
     closures: &BitVolume,
+    lids: &Lids,
     triangles: &[Triangle],
 ) -> Vec<Screen> {
     let bvh = Bvh::build(triangles);
@@ -294,6 +303,9 @@ fn fit_screens(
     openings
         .into_par_iter()
         .map(|(pair, faces)| {
+            if let Some(lid) = lids.screen_of(grid, &faces, pair) {
+                return lid;
+            }
             let is_lesser = |i: usize| regions.region_of_basin[labels.get(i) as usize] == pair[0];
             let opening = opening_of(grid, faces, &is_lesser, Some(closures));
             let near = |bounds: &Aabb| {

@@ -296,7 +296,11 @@ impl<'a> Subject<'a> {
         let Some(first) = rest.first().copied() else {
             return;
         };
-        let leaves = |c: &Crossing| self.portals[c.portal.0 as usize].cells.contains(&cell);
+        // The direction counts: two portals between the same cells, a hair apart, may be met in the
+        // wrong order too.
+        let leaves = |c: &Crossing| {
+            self.portals[c.portal.0 as usize].cells[usize::from(!c.is_forward)] == cell
+        };
         if leaves(&first) {
             return;
         }

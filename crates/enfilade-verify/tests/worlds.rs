@@ -125,6 +125,32 @@ fn a_portal_that_faces_the_wrong_way_is_seen() {
 }
 
 #[test]
+fn a_sliver_thinner_than_rounding_may_have_its_portals_in_any_order() {
+    // A wedge of B in A right at the door, a micrometer thin: in, out, and in again. Rounding has
+    // put the way out before the first way in.
+    let mut world = house();
+    let door = world.graph.portals[DOOR].clone();
+    let shifted = |by: f32| {
+        let mut p = door.clone();
+        for v in p.outline.iter_mut().chain(p.pieces.iter_mut().flatten()) {
+            v[0] += by;
+        }
+        p
+    };
+    let mut back = shifted(-1e-6);
+    back.cells.reverse();
+    for portal in [back, shifted(1e-6)] {
+        let id = enfilade_cpg::PortalId(world.graph.portals.len() as u32);
+        for c in [A, B] {
+            world.graph.cells[c.0 as usize].portals.push(id);
+        }
+        world.graph.portals.push(portal);
+    }
+    let report = verify(&world);
+    assert!(report.failures.is_empty(), "{report}");
+}
+
+#[test]
 fn a_portal_between_other_cells_is_seen() {
     let mut world = house();
     world.graph.portals[DOOR].cells = [A, OUTDOORS];

@@ -4,7 +4,8 @@
 //! 2. A component in which one label rules belongs to it. One with several strong labels has a
 //!    leak: it is grown together along its openings, widest first, unless that would join two
 //!    labels (Kruskal's forest), so that cells meet at the narrowest places.
-//! 3. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
+//! 3. Parts of one label that open to each other are one again, screen or not.
+//! 4. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
 //!    most, through a screen if need be. What opens nowhere and nobody votes for is solid.
 //!
 //! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
@@ -14,6 +15,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 use rayon::prelude::*;
 
+use super::cut::move_borders;
 use super::graph::{LeafGraph, NO_SCREEN};
 use super::{LabelSettings, Vote};
 
@@ -57,7 +59,7 @@ impl Sets {
 }
 
 /// Votes of one leaf or component for one label.
-type Tally = BTreeMap<(u32, u32), f64>;
+pub(super) type Tally = BTreeMap<(u32, u32), f64>;
 
 fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
     let mut out = Tally::new();
@@ -75,6 +77,8 @@ struct Group {
     volume: f64,
     /// Open area to other groups.
     neighbors: BTreeMap<u32, f64>,
+    /// How much of that lies on no screen.
+    leak: f64,
 }
 
 /// Divides the leaves among cells. `leaf_of` locates votes.
@@ -140,8 +144,12 @@ pub(super) fn label_leaves(
     }
     grow_together(graph, &mut sets, &mut label_of_set, leaked);
 
+    rejoin(graph, &mut sets, &mut label_of_set);
+
     let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
-    number_cells(graph, &mut sets, &groups)
+    let mut cells = number_cells(graph, &mut sets, &groups);
+    move_borders(graph, &mut cells, &tally);
+    cells
 }
 
 /// The labels that stand for a region in each component; components without any are left out.
@@ -204,6 +212,18 @@ fn grow_together(
     }
 }
 
+/// Joins parts of one region that only a screen parts: a screen reaches beyond its opening, and two
+/// screens of one opening have a slice of a room between them.
+fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
+    for f in &graph.facets {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        let label = label_of_set[a as usize];
+        if a != b && label != SOLID && label == label_of_set[b as usize] {
+            label_of_set[sets.join(a, b) as usize] = label;
+        }
+    }
+}
+
 /// Lets groups without a label, and small doubles of a label, join their neighbors.
 fn merge_groups(
     graph: &LeafGraph,
@@ -220,6 +240,7 @@ fn merge_groups(
             keeps: false,
             volume: 0.0,
             neighbors: BTreeMap::new(),
+            leak: 0.0,
         });
         group.volume += graph.volumes[leaf as usize];
     }
@@ -229,6 +250,9 @@ fn merge_groups(
             for (from, to) in [(a, b), (b, a)] {
                 if let Some(group) = groups.get_mut(&from) {
                     *group.neighbors.entry(to).or_default() += f64::from(f.area);
+                    if f.screen == NO_SCREEN {
+                        group.leak += f64::from(f.area);
+                    }
                 }
             }
         }
@@ -245,9 +269,13 @@ fn merge_groups(
         }
     }
     for (&id, group) in &mut groups {
-        group.keeps = group
-            .label
-            .is_some_and(|l| main[&l].1.0 == id || group.volume >= settings.min_volume);
+        // A closet has a door, a shaft nothing; a hollow in furniture leaks all over.
+        let open: f64 = group.neighbors.values().sum();
+        let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * open;
+        group.keeps = !is_cavity
+            && group
+                .label
+                .is_some_and(|l| main[&l].1.0 == id || group.volume >= settings.min_volume);
     }
     // Smallest first; volumes are not negative, so their bits compare like the numbers.
     let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), id));

@@ -13,6 +13,7 @@
 //! | a tree of planes, leaves convex | `tree` | ibid., §2 step 1, under boxes as the notes suggest |
 //! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., notes after §3.0.2 |
 //! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
+//! | borders without a screen, made small | `cut` | minimum cuts, Boykov, Veksler & Zabih 2001 |
 //! | portals, what each cell sees, the locator | `partition` | ours |
 //!
 //! Where it departs from Lefebvre & Hornus: their cells are grown by choosing among separators that
@@ -32,6 +33,7 @@
 //! **What can go wrong:** many crossing surfaces in a knot below 2 cm, and scenes so large that
 //! `f32` steps reach the width of real cracks (beyond about 1 km).
 
+mod cut;
 mod facet;
 mod graph;
 mod label;
@@ -80,6 +82,9 @@ pub struct Vote {
 pub struct LabelSettings {
     /// A smaller part of a region, apart from its main part, joins what it opens to. [Units: wu³]
     pub min_volume: f64,
+    /// A smaller region that opens to others beside its screens, too, is a cavity and joins them.
+    /// [Units: wu³]
+    pub min_room: f64,
     /// A label with this share of a component's votes has it alone, unless another is strong there.
     pub dominance: f64,
     /// A label is strong where this share of all its votes is.
@@ -90,6 +95,7 @@ impl Default for LabelSettings {
     fn default() -> Self {
         Self {
             min_volume: 0.5,
+            min_room: 1.5,
             dominance: 0.9,
             strong_share: 0.2,
         }

@@ -8,6 +8,7 @@
 mod closures;
 mod fit;
 mod hollow;
+mod lids;
 mod regions;
 mod slabs;
 mod stairs;
@@ -16,6 +17,7 @@ mod voids;
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen};
 pub use hollow::hollow_regions;
+pub use lids::{Lids, find_lids};
 pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,

@@ -311,21 +311,22 @@ impl Merger<'_> {
             if self.parent[c as usize] != c {
                 continue;
             }
+            // What only closures shut off (the space under a table top) is no room either.
             let open_faces = |n: u32| {
                 let faces = &self.contacts[&(c.min(n), c.max(n))];
-                match self.flooded.closures {
+                let open = match self.flooded.closures {
                     Some(bits) => faces
                         .iter()
                         .filter(|&&f| !bits.get_index((f / 4) as usize))
                         .count(),
                     None => faces.len(),
-                }
+                };
+                (open, faces.len())
             };
             let home = self.neighbors[c as usize]
                 .iter()
                 .map(|&n| (open_faces(n), std::cmp::Reverse(n)))
-                .max()
-                .filter(|&(faces, _)| faces > 0);
+                .max();
             if let Some((_, std::cmp::Reverse(n))) = home {
                 merges.push((c.min(n), c.max(n), 1.0));
                 self.merge(c.min(n), c.max(n));
@@ -475,17 +476,40 @@ impl Merger<'_> {
         let (mut in_a, mut in_b) = (vec![false; seeds.len()], vec![false; seeds.len()]);
         let (mut beside_a, mut beside_b) = (in_a.clone(), in_b.clone());
         let mut stack = Vec::new();
-        for s in -slices..=slices {
+        let end = DVec3::from(grid.dims.map(|n| n as f64));
+        // Once both are this large, the opening is a pinch whatever else there is.
+        let enough = opening.area / (self.settings.threshold * step * step);
+        // From the opening outward, as far sections are the large ones.
+        let outward = (0..=slices).flat_map(|s| [s, -s]).skip(1);
+        for s in outward {
             let base = opening.center + n * (s as f64 * step) + u * start[0] + v * start[1];
+            // In voxels, so that a lattice point costs an addition and a look-up.
+            let (base, du, dv) = (
+                grid.to_voxel(base),
+                u * (step / grid.voxel),
+                v * (step / grid.voxel),
+            );
+            let mut last = (0, 0);
             for j in 0..side[1] {
+                let row = base + dv * j as f64;
                 for i in 0..side[0] {
-                    let p = base + v * (j as f64 * step) + u * (i as f64 * step);
-                    let label = grid
-                        .voxel_at(p)
-                        .map_or(0, |[i, j, k]| self.flooded.labels.get(grid.index(i, j, k)));
-                    let cell = if label == 0 { 0 } else { self.find(label) };
-                    in_a[j * side[0] + i] = cell == a;
-                    in_b[j * side[0] + i] = cell == b;
+                    let p = row + du * i as f64;
+                    let is_in = p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
+                    let label = if is_in {
+                        // Positive, so the cast rounds down.
+                        self.flooded.labels.get(grid.index(
+                            p.x as usize,
+                            p.y as usize,
+                            p.z as usize,
+                        ))
+                    } else {
+                        0
+                    };
+                    if label != last.0 {
+                        last = (label, if label == 0 { 0 } else { self.find(label) });
+                    }
+                    in_a[j * side[0] + i] = last.1 == a;
+                    in_b[j * side[0] + i] = last.1 == b;
                 }
             }
             let mut section = |inside: &mut [bool], beside: &mut [bool], this_side: bool| {
@@ -493,6 +517,14 @@ impl Merger<'_> {
             };
             best_a = best_a.max(section(&mut in_a, &mut beside_a, s <= 0));
             best_b = best_b.max(section(&mut in_b, &mut beside_b, s >= 0));
+            let smaller = if a == OUTDOORS {
+                best_b
+            } else {
+                best_a.min(best_b)
+            };
+            if smaller as f64 > enough {
+                return (opening.area / (smaller as f64 * step * step), 0.0);
+            }
         }
         let wall = rim_share(&seeds, side, |k| beside_a[k] && beside_b[k]);
         let smaller = if a == OUTDOORS {
