@@ -31,6 +31,9 @@ pub(crate) struct Pvs {
     /// Nothing farther than this is seen.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     far: Option<f64>,
+    /// Write down why each pair counts as visible or hidden, for `enfilade verify --evidence`.
+    #[arg(long, value_name = "FILE")]
+    evidence: Option<PathBuf>,
     /// Threads to use; as many as there are cores if not given. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -69,28 +72,35 @@ struct Report {
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
-    let bytes =
-        fs::read(&args.input).with_context(|| format!("cannot read {}", args.input.display()))?;
-    let text = std::str::from_utf8(&bytes)
-        .ok()
-        .with_context(|| format!("{}: no text, so no portal file", args.input.display()))?;
-    let file = read_prt(text).with_context(|| args.input.display().to_string())?;
-    let graph = sight_graph(&file);
+    let graph = read_portal_file(&args.input)?;
+    let output = output_path(args)?;
     let start = Instant::now();
     let vis = compute(args, &graph)?;
     let report = report(&graph, &vis, start.elapsed());
-    let output = output_path(args)?;
     let rows = vis.cells.iter().map(CellSet::ranges).collect();
     let text = write_pvs_text(&PvsText {
         notes: notes(&report, args.mode),
         rows,
     });
     write_atomically(&output, text.as_bytes())?;
+    if let (Some(path), Some(evidence)) = (&args.evidence, &vis.evidence) {
+        write_atomically(path, evidence)?;
+    }
     print(&report, args.json)
 }
 
+/// Reads a portal file as a graph to look through.
+pub(crate) fn read_portal_file(path: &Path) -> anyhow::Result<SightGraph> {
+    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = std::str::from_utf8(&bytes)
+        .ok()
+        .with_context(|| format!("{}: no text, so no portal file", path.display()))?;
+    let file = read_prt(text).with_context(|| path.display().to_string())?;
+    Ok(sight_graph(&file))
+}
+
 /// The portals of a file that light can pass: those with fewer than three corners have no area.
-pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
+fn sight_graph(file: &PrtFile) -> SightGraph {
     SightGraph {
         n_cells: file.n_clusters,
         portals: file
@@ -135,6 +145,7 @@ fn compute(args: &Pvs, graph: &SightGraph) -> anyhow::Result<VisOutput> {
             Mode::Exact => VisMode::Exact,
         },
         far: args.far,
+        has_evidence: args.evidence.is_some(),
         ..VisConfig::default()
     };
     let bar = StageBar::new();
