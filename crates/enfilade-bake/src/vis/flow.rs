@@ -21,6 +21,9 @@ use super::dirs::Dirs;
 use super::narrow::reaches;
 use super::rays::{self, Blocker, Line};
 
+/// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
+const MAX_CHAIN: usize = 512;
+
 /// What stays the same during a round.
 pub(super) struct Shared<'a> {
     pub(super) dirs: &'a Dirs,
@@ -145,6 +148,9 @@ impl Flow {
             }
         }
         self.found.effort.steps += 1;
+        if depth >= MAX_CHAIN {
+            return self.give_up(shared, depth);
+        }
         if self.reach.len() <= depth + 1 {
             self.reach.push(vec![0; self.wanted.len()]);
         }
@@ -170,6 +176,18 @@ impl Flow {
             self.arena.release(mark);
         }
         self.planes.truncate(first_plane);
+    }
+
+    /// Counts all that might lie beyond the chain as seen.
+    fn give_up(&mut self, shared: &Shared<'_>, depth: usize) {
+        let both = self.reach[depth].iter().zip(&self.wanted);
+        let beyond: Vec<u64> = both.map(|(a, b)| a & b).collect();
+        for q in bits::ones(&beyond) {
+            let cell = shared.dirs.all[q].to;
+            self.found.undecided.push(cell);
+            let range = shared.dirs.entries(cell);
+            bits::clear_range(&mut self.wanted, range.start, range.end);
+        }
     }
 
     /// Settles the chain's end where it is wanted, then goes on behind it while that can matter.

@@ -16,7 +16,7 @@ const CLOSED: u8 = 6;
 const HALVES: u8 = 7;
 
 /// Longest chain, and deepest split: what recursion can take.
-const MAX_DEPTH: usize = 1000;
+const MAX_DEPTH: usize = 600;
 
 /// Splits, each within the one before, tried where a chain is said to be closed and planes leave a rest.
 const MAX_TRIES: u32 = 5;
