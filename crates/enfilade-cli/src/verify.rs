@@ -6,26 +6,27 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::World;
-use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
+use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_verify::{
-    VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
+    Blocks, VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
     verify_world_with_progress,
 };
 
 use crate::progress::StageBar;
-use crate::pvs::read_portal_file;
+use crate::pvs::read_graph;
 use crate::see::Answers;
 use crate::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
 #[derive(clap::Args)]
 pub(crate) struct Verify {
-    /// World written by `enfilade bake`; with --evidence, a Quake portal file.
+    /// World written by `enfilade bake`; with --evidence, a Quake portal file too.
     world: PathBuf,
-    /// Check this evidence, which `enfilade pvs --evidence` wrote about the portal file.
+    /// Check this evidence, which `enfilade pvs --evidence` wrote, instead of the
+    /// promises.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
     /// The scene that it was baked from, read with default settings: its structural triangles
@@ -56,7 +57,7 @@ pub(crate) struct Verify {
 
 pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(evidence) = &args.evidence {
-        return verify_portal_file(args, evidence);
+        return verify_visibility(args, evidence);
     }
     let world = read_world(&args.world)?;
     let source = if args.source.is_empty() {
@@ -132,12 +133,14 @@ fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
     Ok(report)
 }
 
-/// Checks every claim of the evidence about a portal file.
-fn verify_portal_file(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
-    let graph = read_portal_file(&args.world)?;
+/// Checks every claim of the evidence about what can be seen.
+fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
+    let (graph, walls) = read_graph(&args.world)?;
     let bytes =
         fs::read(evidence).with_context(|| format!("cannot read {}", evidence.display()))?;
-    let report = verify_evidence(&graph, &bytes, None)
+    let is_blocked = walls.map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
+    let blocks = is_blocked.as_ref().map(|f| f as Blocks<'_>);
+    let report = verify_evidence(&graph, &bytes, blocks)
         .with_context(|| format!("{} is not accepted", evidence.display()))?;
     let mut out = io::stdout().lock();
     if args.json {
