@@ -166,7 +166,7 @@ impl Fnv {
 
     fn winding(&mut self, winding: &[DVec3]) {
         self.count(winding.len());
-        for x in winding.iter().flat_map(|p| p.to_array()) {
+        for x in winding.iter().flat_map(DVec3::to_array) {
             self.bytes(&x.to_le_bytes());
         }
     }

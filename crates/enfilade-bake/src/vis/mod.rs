@@ -173,7 +173,7 @@ pub fn see_all(
         .transpose()?;
     Ok(VisOutput {
         evidence,
-        ..output(search, n_base, is_complete)
+        ..output(&search, n_base, is_complete)
     })
 }
 
@@ -184,7 +184,7 @@ fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
     }
 }
 
-fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
+fn output(search: &Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
     let n = search.dirs.n_cells;
     let visible = search.visible();
     let mut cells = vec![CellSet::new(n); n];

@@ -59,7 +59,7 @@ impl<'a> Search<'a> {
     /// Random lines from every opening, some aimed at what is not yet seen.
     pub(super) fn cast(&mut self, n_rays: usize) {
         let openings: Vec<usize> = (0..self.dirs.len())
-            .filter(|&d| self.dirs.all[d].id % 2 == 0)
+            .filter(|&d| self.dirs.all[d].id.is_multiple_of(2))
             .collect();
         for round in openings.chunks(ROUND * 4) {
             let lines: Vec<Vec<Line>> = round

@@ -153,7 +153,7 @@ impl Reader<'_> {
         let mut table = Table::new(n);
         for row in 0..n {
             let bytes = self.take(n_bytes)?;
-            if n % 8 != 0 && bytes[n_bytes - 1] >> (n % 8) != 0 {
+            if !n.is_multiple_of(8) && bytes[n_bytes - 1] >> (n % 8) != 0 {
                 return Err(EvidenceError::Damaged("a table has bits beyond its rows"));
             }
             table.fill_row(row, bytes);

@@ -42,7 +42,7 @@ pub(super) fn check_trace(openings: &Openings, evidence: &Evidence) -> Result<()
             corners: openings.all[start].corners.clone(),
         };
         walk.chain.push((start, Some(whole.clone())));
-        walk.step(Some(whole), vec![u64::MAX; claims.len()])?;
+        walk.step(Some(&whole), vec![u64::MAX; claims.len()])?;
     }
     if walk.at != evidence.trace.len() {
         return Err(walk.error("there is more of it than openings"));
@@ -79,7 +79,7 @@ impl Walk<'_> {
 
     /// Follows the trace behind the last opening of the chain. `reach` holds what all openings of the chain
     /// but the first might see.
-    fn step(&mut self, source: Option<Part>, mut reach: Vec<u64>) -> Checked<()> {
+    fn step(&mut self, source: Option<&Part>, mut reach: Vec<u64>) -> Checked<()> {
         let (openings, evidence) = (self.openings, self.evidence);
         let depth = self.chain.len() - 1;
         if depth > MAX_DEPTH {
@@ -88,7 +88,7 @@ impl Walk<'_> {
         let last = self.chain[depth].0;
         let pass = self.chain[depth].1.clone();
         let mut planes = Vec::new();
-        if let (Some(source), Some(pass)) = (&source, &pass)
+        if let (Some(source), Some(pass)) = (source, &pass)
             && depth > 0
         {
             planes = openings.between(source, pass);
@@ -126,7 +126,7 @@ impl Walk<'_> {
             if q == last ^ 1 {
                 return Err(self.error("it goes back through an opening"));
             }
-            let narrowed = match (&source, &pass) {
+            let narrowed = match (source, &pass) {
                 (Some(source), Some(pass)) => self.narrow(source, pass, q, &planes),
                 _ => None,
             };
@@ -140,7 +140,7 @@ impl Walk<'_> {
                     }
                     self.chain.push((q, target));
                     let done = if symbol == ENTER {
-                        self.step(source, behind)
+                        self.step(source.as_ref(), behind)
                     } else {
                         self.split(source, 0)
                     };
