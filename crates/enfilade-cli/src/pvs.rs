@@ -6,18 +6,22 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{VisConfig, VisContext, VisMode, VisOutput, see_all};
+use enfilade::bake::vis::{Blocker, VisConfig, VisContext, VisMode, VisOutput, see_all};
+use enfilade::cpg::wire::decode_glb;
 use enfilade::cpg::{CellSet, SightGraph, SightPortal};
-use enfilade::geom::DVec3;
+use enfilade::geom::{Bvh, DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
+
+use enfilade_verify::structural_triangles;
 
 use crate::output::write_atomically;
 use crate::progress::StageBar;
 
-/// Computes the potentially visible set of a Quake portal file: for each cell, what can be seen from it.
+/// Computes the potentially visible set of a world or a Quake portal file: for each cell, what can be seen
+/// from it. Writes it as text.
 #[derive(clap::Args)]
 pub(crate) struct Pvs {
-    /// Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3).
+    /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3).
     input: PathBuf,
     /// Where to write the answer, as text.
     #[arg(short, long, value_name = "OUT")]
@@ -31,6 +35,9 @@ pub(crate) struct Pvs {
     /// Nothing farther than this is seen.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     far: Option<f64>,
+    /// Write down why each pair counts as visible or hidden, for `enfilade verify --evidence`.
+    #[arg(long, value_name = "FILE")]
+    evidence: Option<PathBuf>,
     /// Threads to use; as many as there are cores if not given. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -66,31 +73,51 @@ struct Report {
     lines: usize,
     steps: u64,
     seconds: f64,
+    /// By cell, how many cells can be seen from it.
+    visible_cells: Vec<usize>,
+    /// The ten cells from which most can be seen, the worst first.
+    worst: Vec<usize>,
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
-    let bytes =
-        fs::read(&args.input).with_context(|| format!("cannot read {}", args.input.display()))?;
-    let text = std::str::from_utf8(&bytes)
-        .ok()
-        .with_context(|| format!("{}: no text, so no portal file", args.input.display()))?;
-    let file = read_prt(text).with_context(|| args.input.display().to_string())?;
-    let graph = sight_graph(&file);
-    let start = Instant::now();
-    let vis = compute(args, &graph)?;
-    let report = report(&graph, &vis, start.elapsed());
+    let (graph, walls) = read_graph(&args.input)?;
     let output = output_path(args)?;
+    let start = Instant::now();
+    let vis = compute(args, &graph, walls.as_ref())?;
+    let report = report(&graph, &vis, start.elapsed());
     let rows = vis.cells.iter().map(CellSet::ranges).collect();
     let text = write_pvs_text(&PvsText {
         notes: notes(&report, args.mode),
         rows,
     });
     write_atomically(&output, text.as_bytes())?;
+    if let (Some(path), Some(evidence)) = (&args.evidence, &vis.evidence) {
+        write_atomically(path, evidence)?;
+    }
     print(&report, args.json)
 }
 
+/// Reads a portal file or a world as a graph to look through; with a world, what stands in the way.
+pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Bvh>)> {
+    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if bytes.starts_with(b"glTF") {
+        let world = decode_glb(&bytes).with_context(|| path.display().to_string())?;
+        let walls: Vec<Triangle> = structural_triangles(&world)
+            .into_iter()
+            .map(|(triangle, _)| triangle)
+            .collect();
+        let walls = Bvh::build(&walls);
+        return Ok((SightGraph::of_graph(&world.graph), Some(walls)));
+    }
+    let text = std::str::from_utf8(&bytes)
+        .ok()
+        .with_context(|| format!("{}: no text, so no portal file", path.display()))?;
+    let file = read_prt(text).with_context(|| path.display().to_string())?;
+    Ok((sight_graph(&file), None))
+}
+
 /// The portals of a file that light can pass: those with fewer than three corners have no area.
-pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
+fn sight_graph(file: &PrtFile) -> SightGraph {
     SightGraph {
         n_cells: file.n_clusters,
         portals: file
@@ -128,13 +155,14 @@ fn same_file(a: &Path, b: &Path) -> bool {
     a == b || matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-fn compute(args: &Pvs, graph: &SightGraph) -> anyhow::Result<VisOutput> {
+fn compute(args: &Pvs, graph: &SightGraph, walls: Option<&Bvh>) -> anyhow::Result<VisOutput> {
     let config = VisConfig {
         mode: match args.mode {
             Mode::Fast => VisMode::Fast,
             Mode::Exact => VisMode::Exact,
         },
         far: args.far,
+        has_evidence: args.evidence.is_some(),
         ..VisConfig::default()
     };
     let bar = StageBar::new();
@@ -148,9 +176,10 @@ fn compute(args: &Pvs, graph: &SightGraph) -> anyhow::Result<VisOutput> {
         bar.set(done);
         args.budget.is_none_or(|budget| start.elapsed() < budget)
     };
+    let is_blocked = walls.map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
     let mut context = VisContext {
         on_round: &mut on_round,
-        blocker: None,
+        blocker: is_blocked.as_ref().map(|f| f as Blocker<'_>),
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.unwrap_or(0))
@@ -165,6 +194,10 @@ fn report(graph: &SightGraph, vis: &VisOutput, took: Duration) -> Report {
     let cells = vis.cells.len();
     let pairs: usize = vis.cells.iter().map(CellSet::len).sum();
     let undecided: usize = vis.undecided.iter().map(CellSet::len).sum();
+    let visible_cells: Vec<usize> = vis.cells.iter().map(CellSet::len).collect();
+    let mut worst: Vec<usize> = (0..cells).collect();
+    worst.sort_by_key(|&c| (std::cmp::Reverse(visible_cells[c]), c));
+    worst.truncate(10);
     let mean = pairs as f64 / cells.max(1) as f64;
     Report {
         cells,
@@ -179,6 +212,8 @@ fn report(graph: &SightGraph, vis: &VisOutput, took: Duration) -> Report {
         lines: vis.witnesses.len(),
         steps: vis.n_steps,
         seconds: took.as_secs_f64(),
+        visible_cells,
+        worst,
     }
 }
 
@@ -227,6 +262,12 @@ fn print(report: &Report, is_json: bool) -> anyhow::Result<()> {
                 "stopped by --budget: the answer is larger than need be"
             )?;
         }
+        let worst: Vec<String> = r
+            .worst
+            .iter()
+            .map(|&c| format!("{c} ({})", r.visible_cells[c]))
+            .collect();
+        writeln!(out, "cells that see most: {}", worst.join(", "))?;
         writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;
     }
     out.flush().context("cannot write to standard output")

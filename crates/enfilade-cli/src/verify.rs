@@ -1,27 +1,34 @@
 //! `enfilade verify`: does a world keep its promises?
 
+use std::fs;
 use std::io::{self, BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::World;
-use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
+use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_verify::{
-    VerifyOptions, ViewOptions, ViewReport, verify_views, verify_world_with_progress,
+    Blocks, VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
+    verify_world_with_progress,
 };
 
 use crate::progress::StageBar;
+use crate::pvs::read_graph;
 use crate::see::Answers;
 use crate::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
 #[derive(clap::Args)]
 pub(crate) struct Verify {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`; with --evidence, a Quake portal file too.
     world: PathBuf,
+    /// Check this evidence, which `enfilade pvs --evidence` wrote, instead of the
+    /// promises.
+    #[arg(long, value_name = "FILE")]
+    evidence: Option<PathBuf>,
     /// The scene that it was baked from, read with default settings: its structural triangles
     /// decide what blocks, instead of those that the world holds.
     #[arg(long, num_args = 1.., value_name = "IN")]
@@ -49,6 +56,9 @@ pub(crate) struct Verify {
 }
 
 pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
+    if let Some(evidence) = &args.evidence {
+        return verify_visibility(args, evidence);
+    }
     let world = read_world(&args.world)?;
     let source = if args.source.is_empty() {
         None
@@ -121,6 +131,42 @@ fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
     let report = verify_views(world, &options, &seer, &|done, _| bar.set(done));
     bar.finish();
     Ok(report)
+}
+
+/// Checks every claim of the evidence about what can be seen.
+fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
+    let (graph, walls) = read_graph(&args.world)?;
+    let bytes =
+        fs::read(evidence).with_context(|| format!("cannot read {}", evidence.display()))?;
+    let is_blocked = walls.map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
+    let blocks = is_blocked.as_ref().map(|f| f as Blocks<'_>);
+    let report = verify_evidence(&graph, &bytes, blocks)
+        .with_context(|| format!("{} is not accepted", evidence.display()))?;
+    let mut out = io::stdout().lock();
+    if args.json {
+        let value = serde_json::json!({
+            "visible_pairs": report.n_visible,
+            "proved_pairs": report.n_proved,
+            "undecided_pairs": report.n_visible - report.n_proved,
+            "hidden_pairs": report.n_hidden,
+            "lines": report.n_lines,
+            "trace_bytes": report.n_trace,
+            "clearance": report.clearance,
+        });
+        writeln!(out, "{value}")?;
+    } else {
+        let share = 100.0 * report.n_proved as f64 / report.n_visible.max(1) as f64;
+        writeln!(
+            out,
+            "every claim holds: {} pairs proved visible by {} lines ({share:.2} % of those called visible), \
+             {} proved hidden, {} undecided and called visible",
+            report.n_proved,
+            report.n_lines,
+            report.n_hidden,
+            report.n_visible - report.n_proved
+        )?;
+    }
+    Ok(())
 }
 
 /// The structural triangles of a scene, as the builder saw them.

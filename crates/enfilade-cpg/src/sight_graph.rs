@@ -107,6 +107,26 @@ impl SightGraph {
         }
     }
 
+    /// A number that changes with the graph: FNV-1a, 64 bits, over the numbers of cells and portals, then for
+    /// each portal its cells, and for its winding and each of its pieces the number of corners and the
+    /// corners, all little-endian, counts as 32 bits and coordinates as `f64`.
+    #[must_use]
+    pub fn content_hash(&self) -> u64 {
+        let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+        hash.count(self.n_cells as usize);
+        hash.count(self.portals.len());
+        for portal in &self.portals {
+            hash.count(portal.cells[0] as usize);
+            hash.count(portal.cells[1] as usize);
+            hash.winding(&portal.winding);
+            hash.count(portal.pieces.len());
+            for piece in &portal.pieces {
+                hash.winding(piece);
+            }
+        }
+        hash.0
+    }
+
     /// Checks ids, numbers and limits.
     ///
     /// Windings with area zero are allowed: nothing is seen through them but by touching.
@@ -128,6 +148,27 @@ impl SightGraph {
             check_portal(i, portal, self.n_cells)?;
         }
         Ok(())
+    }
+}
+
+struct Fnv(u64);
+
+impl Fnv {
+    fn bytes(&mut self, bytes: &[u8]) {
+        for &b in bytes {
+            self.0 = (self.0 ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+
+    fn count(&mut self, n: usize) {
+        self.bytes(&(n as u32).to_le_bytes());
+    }
+
+    fn winding(&mut self, winding: &[DVec3]) {
+        self.count(winding.len());
+        for x in winding.iter().flat_map(DVec3::to_array) {
+            self.bytes(&x.to_le_bytes());
+        }
     }
 }
 

@@ -41,6 +41,17 @@ struct Hole {
     up: [f64; 2],
     kind: OpeningKind,
     rooms: [Side; 2],
+    /// How far a door's leaf stands open towards its second side; 0 is shut. [Units: degrees]
+    swing: f64,
+}
+
+/// A leaf pushed to, and not shut. [Units: degrees]
+const AJAR: f64 = 8.0;
+
+impl Hole {
+    fn swung(self, swing: f64) -> Self {
+        Self { swing, ..self }
+    }
 }
 
 fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> Hole {
@@ -49,6 +60,7 @@ fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> Hole {
         up: [floor, floor + 2.05],
         kind: OpeningKind::Door,
         rooms,
+        swing: 80.0,
     }
 }
 
@@ -58,6 +70,7 @@ fn window(along: [f64; 2], up: [f64; 2], rooms: [Side; 2]) -> Hole {
         up,
         kind: OpeningKind::Window,
         rooms,
+        swing: 0.0,
     }
 }
 
@@ -86,12 +99,7 @@ impl House {
             self.site.opening(hole.kind, *void, axis, hole.rooms);
             match hole.kind {
                 OpeningKind::Door => {
-                    let swing = if hole.rooms[1] == Side::Outside {
-                        -80.0
-                    } else {
-                        80.0
-                    };
-                    hang_door(&mut self.site, &self.palette, void, axis, swing);
+                    hang_door(&mut self.site, &self.palette, void, axis, hole.swing);
                 }
                 OpeningKind::Window => glaze(&mut self.site, &self.palette, void, axis),
                 OpeningKind::Opening | OpeningKind::Virtual => {}
@@ -112,7 +120,7 @@ impl House {
 ///
 /// Entrance hall with stairs to a landing, living room, kitchen, dining room, toilet; three
 /// bedrooms, study and bath; an attic under a pitched roof, reached through a hatch. 12 rooms,
-/// 9 doors, a passage, 17 windows; colored and textured materials; furniture,
+/// 9 doors (the front door and two more shut, two ajar), a passage, 17 windows; colored and textured materials; furniture,
 /// door leaves and glass as detail.
 #[must_use]
 pub fn furnished_house() -> Generated {
@@ -216,7 +224,7 @@ pub fn furnished_house() -> Generated {
         GROUND,
         &[
             window([1.0, 3.6], [0.3, 2.2], [living, out]),
-            door([4.75, 5.75], 0.0, [hall, out]),
+            door([4.75, 5.75], 0.0, [hall, out]).swung(0.0),
             window([8.2, 9.8], sill, [kitchen, out]),
         ],
     );
@@ -252,6 +260,7 @@ pub fn furnished_house() -> Generated {
         up: [0.0, 2.1],
         kind: OpeningKind::Opening,
         rooms: [dining, kitchen],
+        swing: 0.0,
     };
     house.wall(
         0,
@@ -265,7 +274,7 @@ pub fn furnished_house() -> Generated {
         [2.3, 2.45],
         mid,
         GROUND,
-        &[door([4.75, 5.55], 0.0, [toilet, hall])],
+        &[door([4.75, 5.55], 0.0, [toilet, hall]).swung(0.0)],
     );
     house.wall(2, [4.25, 4.4], east, GROUND, &[passage]);
 
@@ -302,7 +311,7 @@ pub fn furnished_house() -> Generated {
         UPPER,
         &[
             door([2.8, 3.65], f, [bedroom_2, landing]),
-            door([6.3, 7.15], f, [bedroom_1, landing]),
+            door([6.3, 7.15], f, [bedroom_1, landing]).swung(0.0),
         ],
     );
     house.wall(
@@ -311,7 +320,7 @@ pub fn furnished_house() -> Generated {
         inner,
         UPPER,
         &[
-            door([2.55, 3.35], f, [landing, bedroom_3]),
+            door([2.55, 3.35], f, [landing, bedroom_3]).swung(AJAR),
             door([6.7, 7.5], f, [landing, study]),
         ],
     );
@@ -322,7 +331,7 @@ pub fn furnished_house() -> Generated {
         [2.3, 2.45],
         mid,
         UPPER,
-        &[door([4.8, 5.6], f, [bath, landing])],
+        &[door([4.8, 5.6], f, [bath, landing]).swung(-AJAR)],
     );
 
     roof(&mut house, loft);

@@ -206,12 +206,17 @@ fn through_edges(
         let p = own[i];
         let edge = own[if i + 1 == n { 0 } else { i + 1 }] - p;
         let inward = turn.cross(edge);
+        // A corner on the edge's line lies in every plane through it, and says nothing about which to take.
+        let near = 1e4 * tolerance.rounding * tolerance.rounding;
         let (mut x, mut y, mut best) = (f64::NEG_INFINITY, 0.0, DVec3::ZERO);
         for &corner in other {
             let to = corner - p;
             // The inward axis is longer than a unit by the edge's length; angles are compared only
             // among themselves, so that does not matter.
             let (cx, cy) = (inward.dot(to), ahead.dot(to).max(0.0));
+            if cx * cx + cy * cy * edge.length_squared() <= near * edge.length_squared() {
+                continue;
+            }
             if x == f64::NEG_INFINITY || cx * y - cy * x > 0.0 {
                 (x, y, best) = (cx, cy, to);
             }

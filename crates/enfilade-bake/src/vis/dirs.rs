@@ -240,7 +240,10 @@ impl Dirs {
         stack.push(first as u32);
         while let Some(at) = stack.pop() {
             for &next in self.exits(self.all[at as usize].to) {
+                // A line crosses a plane once, so never an opening twice.
                 if next != self.reverse[at as usize]
+                    && next as usize != first
+                    && next != self.reverse[first]
                     && !super::bits::get(row, next as usize)
                     && self.is_near(first, next as usize, far)
                     && self.may_follow(first, next as usize, clearance)

@@ -21,6 +21,9 @@ use super::dirs::Dirs;
 use super::narrow::reaches;
 use super::rays::{self, Blocker, Line};
 
+/// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
+const MAX_CHAIN: usize = 512;
+
 /// What stays the same during a round.
 pub(super) struct Shared<'a> {
     pub(super) dirs: &'a Dirs,
@@ -68,14 +71,14 @@ impl Effort {
 /// What a search needs besides, kept between searches.
 #[derive(Default)]
 pub(super) struct Flow {
-    arena: Arena,
+    pub(super) arena: Arena,
     /// By depth: what all openings of the chain might see.
-    reach: Vec<Vec<u64>>,
+    pub(super) reach: Vec<Vec<u64>>,
     /// The openings still to be settled from this source.
-    wanted: Vec<u64>,
+    pub(super) wanted: Vec<u64>,
     /// By depth: the chain's openings as clipped.
-    chain: Vec<Poly>,
-    planes: Vec<Separator>,
+    pub(super) chain: Vec<Poly>,
+    pub(super) planes: Vec<Separator>,
     walked: Vec<u32>,
     found: Found,
 }
@@ -103,11 +106,7 @@ impl Flow {
         for (w, &m) in self.wanted.iter_mut().zip(shared.might.row(source)) {
             *w = m & !*w;
         }
-        self.arena.release(0);
-        self.planes.clear();
-        self.chain.clear();
-        let poly = self.arena.push(dirs.winding(source), source as u32);
-        self.chain.push(poly);
+        let poly = self.begin(shared, source);
         self.set_reach(0, shared.might.row(source));
         if bits::count(&self.wanted) > 0 {
             self.visit(shared, poly);
@@ -116,7 +115,17 @@ impl Flow {
         std::mem::take(&mut self.found)
     }
 
-    fn set_reach(&mut self, depth: usize, row: &[u64]) {
+    /// Starts a chain with the whole of an opening.
+    pub(super) fn begin(&mut self, shared: &Shared<'_>, source: usize) -> Poly {
+        self.arena.release(0);
+        self.planes.clear();
+        self.chain.clear();
+        let poly = self.arena.push(shared.dirs.winding(source), source as u32);
+        self.chain.push(poly);
+        poly
+    }
+
+    pub(super) fn set_reach(&mut self, depth: usize, row: &[u64]) {
         if self.reach.len() <= depth {
             self.reach.resize(depth + 1, Vec::new());
         }
@@ -139,6 +148,9 @@ impl Flow {
             }
         }
         self.found.effort.steps += 1;
+        if depth >= MAX_CHAIN {
+            return self.give_up(shared, depth);
+        }
         if self.reach.len() <= depth + 1 {
             self.reach.push(vec![0; self.wanted.len()]);
         }
@@ -164,6 +176,18 @@ impl Flow {
             self.arena.release(mark);
         }
         self.planes.truncate(first_plane);
+    }
+
+    /// Counts all that might lie beyond the chain as seen.
+    fn give_up(&mut self, shared: &Shared<'_>, depth: usize) {
+        let both = self.reach[depth].iter().zip(&self.wanted);
+        let beyond: Vec<u64> = both.map(|(a, b)| a & b).collect();
+        for q in bits::ones(&beyond) {
+            let cell = shared.dirs.all[q].to;
+            self.found.undecided.push(cell);
+            let range = shared.dirs.entries(cell);
+            bits::clear_range(&mut self.wanted, range.start, range.end);
+        }
     }
 
     /// Settles the chain's end where it is wanted, then goes on behind it while that can matter.
@@ -217,33 +241,11 @@ impl Flow {
     }
 
     fn halve(&mut self, shared: &Shared<'_>, source: Poly, pieces: &mut u32) -> Stab {
-        let dirs = shared.dirs;
-        let points = self.arena.get(source);
-        let low = points.iter().copied().fold(DVec3::MAX, DVec3::min);
-        let high = points.iter().copied().fold(DVec3::MIN, DVec3::max);
-        let size = high - low;
-        let axis = [DVec3::X, DVec3::Y, DVec3::Z]
-            .into_iter()
-            .max_by(|a, b| a.dot(size).total_cmp(&b.dot(size)))
-            .unwrap_or(DVec3::X);
-        if axis.dot(size) < 1e3 * shared.tolerance.outward {
+        let Some(halves) = self.halves(shared, source) else {
             return Stab::Unknown;
-        }
-        let middle = axis.dot(low + high) * 0.5;
-        let turn = dirs.all[source.dir as usize].turn;
-        let whole = Tolerance {
-            clearance: 0.0,
-            ..shared.tolerance
         };
         let mut answer = Stab::None;
-        for sign in [1.0, -1.0] {
-            let half = HalfSpace {
-                normal: axis * sign,
-                offset: middle * sign,
-            };
-            let Some(half) = self.arena.clip(source, half, turn, &whole) else {
-                continue;
-            };
+        for half in halves.into_iter().flatten() {
             match self.settle(shared, half, pieces) {
                 Stab::None => {}
                 Stab::Unknown => answer = Stab::Unknown,
@@ -253,8 +255,44 @@ impl Flow {
         answer
     }
 
+    /// The source in two, across its longest side; `None` where it is too small to split.
+    pub(super) fn halves(
+        &mut self,
+        shared: &Shared<'_>,
+        source: Poly,
+    ) -> Option<[Option<Poly>; 2]> {
+        let points = self.arena.get(source);
+        let low = points.iter().copied().fold(DVec3::MAX, DVec3::min);
+        let high = points.iter().copied().fold(DVec3::MIN, DVec3::max);
+        let size = high - low;
+        let axis = if size.x >= size.y && size.x >= size.z {
+            DVec3::X
+        } else if size.y >= size.z {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        if axis.dot(size) < 1e3 * shared.tolerance.outward {
+            return None;
+        }
+        let middle = axis.dot(low + high) * 0.5;
+        let turn = shared.dirs.all[source.dir as usize].turn;
+        // The halves together must be the whole, so nothing is dropped for being thin.
+        let whole = Tolerance {
+            clearance: 0.0,
+            ..shared.tolerance
+        };
+        Some([1.0, -1.0].map(|sign| {
+            let half = HalfSpace {
+                normal: axis * sign,
+                offset: middle * sign,
+            };
+            self.arena.clip(source, half, turn, &whole)
+        }))
+    }
+
     /// Clips the whole chain by all planes between the source and it; `None` where nothing is left.
-    fn tighten(&mut self, shared: &Shared<'_>, mut source: Poly) -> Option<Poly> {
+    pub(super) fn tighten(&mut self, shared: &Shared<'_>, mut source: Poly) -> Option<Poly> {
         let dirs = shared.dirs;
         let tolerance = &shared.tolerance;
         let first_plane = self.planes.len();
@@ -301,7 +339,12 @@ impl Flow {
     }
 
     /// Drops what is wanted and lies behind a plane; says whether anything is left.
-    fn check_wanted(&mut self, shared: &Shared<'_>, first_plane: usize, depth: usize) -> bool {
+    pub(super) fn check_wanted(
+        &mut self,
+        shared: &Shared<'_>,
+        first_plane: usize,
+        depth: usize,
+    ) -> bool {
         let planes = &self.planes[first_plane..];
         let mut is_left = false;
         for (i, (word, wanted)) in self.reach[depth].iter_mut().zip(&self.wanted).enumerate() {
@@ -322,7 +365,7 @@ impl Flow {
         is_left
     }
 
-    fn add_planes(&mut self, shared: &Shared<'_>, source: Poly, pass: Poly) {
+    pub(super) fn add_planes(&mut self, shared: &Shared<'_>, source: Poly, pass: Poly) {
         separators(
             (self.arena.get(source), facing(shared.dirs, source.dir)),
             (self.arena.get(pass), facing(shared.dirs, pass.dir)),
@@ -332,7 +375,7 @@ impl Flow {
     }
 
     /// What is left of the source and of the opening `q` when the chain goes on through it.
-    fn narrow(
+    pub(super) fn narrow(
         &mut self,
         shared: &Shared<'_>,
         source: Poly,
@@ -437,12 +480,13 @@ impl Flow {
         answer
     }
 
-    /// Whether the line crosses all openings between the first and the last of the chain.
+    /// Whether the line crosses all openings of the chain.
     fn passes(&self, shared: &Shared<'_>, from: DVec3, to: DVec3) -> bool {
         let dirs = shared.dirs;
         let margin = shared.tolerance.rounding * 16.0;
         let direction = to - from;
-        self.chain[1..self.chain.len() - 1].iter().all(|poly| {
+        // The ends too: a clip keeps a hair more than the opening.
+        self.chain.iter().all(|poly| {
             let dir = &dirs.all[poly.dir as usize];
             let speed = dir.normal.dot(direction);
             let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(from)) / speed;

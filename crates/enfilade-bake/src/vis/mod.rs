@@ -18,8 +18,10 @@
 mod bits;
 mod clip;
 mod dirs;
+mod evidence;
 mod flow;
 mod narrow;
+mod prove;
 mod rays;
 mod search;
 
@@ -31,6 +33,9 @@ pub use rays::Blocker;
 use bits::BitTable;
 use dirs::Dirs;
 use search::Search;
+
+/// Share of the clearance that the search itself uses; a checker's sums may differ in the last digits.
+const KEPT: f64 = 0.9;
 
 /// How thoroughly to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -56,6 +61,8 @@ pub struct VisConfig {
     pub n_rays: usize,
     /// Pieces that an opening may be split into to settle one chain.
     pub max_pieces: u32,
+    /// Write down proofs: [`VisOutput::evidence`]. Costs about as much again.
+    pub has_evidence: bool,
 }
 
 impl Default for VisConfig {
@@ -66,6 +73,7 @@ impl Default for VisConfig {
             far: None,
             n_rays: 64,
             max_pieces: 64,
+            has_evidence: false,
         }
     }
 }
@@ -84,6 +92,9 @@ pub enum VisError {
         /// What it is.
         value: f64,
     },
+    /// What was found could not be shown again: a bug, and no evidence is written.
+    #[error("the search could not repeat its proof (a bug); leave the evidence out")]
+    Evidence,
 }
 
 /// A line that proves cells to see each other.
@@ -112,6 +123,8 @@ pub struct VisOutput {
     pub n_base: u64,
     /// Chains searched.
     pub n_steps: u64,
+    /// Proofs of all this, for `enfilade-verify`, where asked for; see `docs/evidence.md`.
+    pub evidence: Option<Vec<u8>>,
 }
 
 /// What surrounds a computation: threads come from the current rayon pool.
@@ -140,15 +153,28 @@ pub fn see_all(
     check("the far plane", config.far)?;
     let dirs = Dirs::new(graph);
     let clearance = config.clearance.unwrap_or(1e-8 * dirs.scale);
-    let mut search = Search::new(&dirs, clearance, config.far, context.blocker);
+    // The search keeps more than it promises, so that a checker that rounds otherwise still closes every chain.
+    let mut search = Search::new(&dirs, KEPT * clearance, config.far, context.blocker);
     let n_base = count_all(&search.visible());
-    narrow::narrow_might(&dirs, &mut search.might, &search.tolerance);
+    narrow::narrow_might(
+        &dirs,
+        &mut search.might,
+        &mut search.settled,
+        &search.tolerance,
+    );
     search.cast(config.n_rays);
     let mut is_complete = true;
     if config.mode == VisMode::Exact {
         is_complete = search.run(config.max_pieces, &mut *context.on_round);
     }
-    Ok(output(search, n_base, is_complete))
+    let evidence = config
+        .has_evidence
+        .then(|| evidence::encode(graph, &search, config))
+        .transpose()?;
+    Ok(VisOutput {
+        evidence,
+        ..output(&search, n_base, is_complete)
+    })
 }
 
 fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
@@ -158,7 +184,7 @@ fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
     }
 }
 
-fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
+fn output(search: &Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
     let n = search.dirs.n_cells;
     let visible = search.visible();
     let mut cells = vec![CellSet::new(n); n];
@@ -189,6 +215,7 @@ fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
         is_complete,
         n_base,
         n_steps: search.effort.steps,
+        evidence: None,
     }
 }
 

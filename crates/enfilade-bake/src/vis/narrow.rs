@@ -18,7 +18,12 @@ const ROUND: usize = 128;
 ///
 /// Goes from the openings that might see least to the others, and what is cleared for one serves the rest.
 /// Time: openings, times their next ones, times what those might see.
-pub(super) fn narrow_might(dirs: &Dirs, might: &mut BitTable, tolerance: &Tolerance) {
+pub(super) fn narrow_might(
+    dirs: &Dirs,
+    might: &mut BitTable,
+    settled: &mut BitTable,
+    tolerance: &Tolerance,
+) {
     let mut order: Vec<(usize, usize)> = (0..dirs.len())
         .map(|d| (bits::count(might.row(d)), d))
         .collect();
@@ -39,6 +44,7 @@ pub(super) fn narrow_might(dirs: &Dirs, might: &mut BitTable, tolerance: &Tolera
                 while gone != 0 {
                     let q = word * 64 + gone.trailing_zeros() as usize;
                     might.clear(dirs.reverse[q] as usize, back);
+                    settled.set(source, q);
                     gone &= gone - 1;
                 }
             }

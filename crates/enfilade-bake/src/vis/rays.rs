@@ -80,6 +80,19 @@ impl Dirs {
             })
     }
 
+    /// Whether a line crosses all openings of its chain in order, each this far inside.
+    pub(super) fn is_crossed(&self, line: &Line, margin: f64) -> bool {
+        let mut before = f64::NEG_INFINITY;
+        line.chain.iter().all(|&d| {
+            let dir = &self.all[d as usize];
+            let speed = dir.normal.dot(line.direction);
+            let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(line.origin)) / speed;
+            let is_next = speed > 0.0 && t >= before;
+            before = t;
+            is_next && self.is_inside(d as usize, line.origin + line.direction * t, margin)
+        })
+    }
+
     /// A random point of an opening, uniform over a random triangle of its fan.
     pub(super) fn random_point(&self, dir: usize, rng: &mut Rng) -> DVec3 {
         let pieces = &self.all[dir].pieces;
@@ -117,6 +130,6 @@ impl Rng {
     }
 
     pub(super) fn below(&mut self, n: usize) -> usize {
-        ((self.next() >> 32) * n as u64 >> 32) as usize
+        (((self.next() >> 32) * n as u64) >> 32) as usize
     }
 }

@@ -23,6 +23,8 @@ pub(super) struct Search<'a> {
     pub(super) seen: BitTable,
     /// Pairs of cells given up on, in `seen` as well.
     pub(super) undecided: BitTable,
+    /// By opening, what was settled as hidden from it beyond the sides of planes.
+    pub(super) settled: BitTable,
     pub(super) lines: Vec<Line>,
     pub(super) tolerance: Tolerance,
     pub(super) blocker: Option<Blocker<'a>>,
@@ -46,6 +48,7 @@ impl<'a> Search<'a> {
             might: dirs.might_see(clearance, far),
             seen,
             undecided: BitTable::new(n, n),
+            settled: BitTable::new(dirs.len(), dirs.len()),
             lines: Vec::new(),
             tolerance: Tolerance::new(dirs.scale, clearance),
             blocker,
@@ -56,7 +59,7 @@ impl<'a> Search<'a> {
     /// Random lines from every opening, some aimed at what is not yet seen.
     pub(super) fn cast(&mut self, n_rays: usize) {
         let openings: Vec<usize> = (0..self.dirs.len())
-            .filter(|&d| self.dirs.all[d].id % 2 == 0)
+            .filter(|&d| self.dirs.all[d].id.is_multiple_of(2))
             .collect();
         for round in openings.chunks(ROUND * 4) {
             let lines: Vec<Vec<Line>> = round
@@ -140,6 +143,10 @@ impl<'a> Search<'a> {
 
     /// Marks what a line proves, and keeps it where that is new.
     fn keep(&mut self, line: Line) {
+        // Lines that graze an opening may have slipped through on other sums than a checker's.
+        if !self.dirs.is_crossed(&line, self.tolerance.rounding * 8.0) {
+            return;
+        }
         let all = &self.dirs.all;
         let mut is_new = false;
         for i in 0..line.chain.len() {
@@ -203,6 +210,7 @@ impl<'a> Search<'a> {
     fn merge(&mut self, found: Found) {
         let back = self.dirs.reverse[found.source] as usize;
         for t in bits::ones(&found.hidden) {
+            self.settled.set(found.source, t);
             self.might.clear(found.source, t);
             self.might.clear(self.dirs.reverse[t] as usize, back);
         }
