@@ -5,12 +5,14 @@
 //! ([`complex`]), so that the promises hold whatever the voxels missed.
 
 mod assemble;
+pub mod bsp;
 pub mod complex;
 mod config;
 mod context;
 mod error;
 mod join;
 pub mod pipeline;
+pub mod simplify;
 pub mod vis;
 pub mod voxel;
 pub mod watershed;

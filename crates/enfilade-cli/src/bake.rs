@@ -6,6 +6,7 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use enfilade::bake::bsp::{bake_bsp, find_leak};
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
@@ -42,17 +43,31 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
             input.display()
         );
     }
-    let (import_options, config) = settings::resolve(options)?;
+    let settings = settings::resolve(options)?;
+    let config = &settings.watershed;
     check_target(&args.output)?;
     let bar = StageBar::new();
     bar.start("reading", 0);
-    let imported = import(&args.inputs, &options.detail, &import_options)?;
+    let imported = import(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
-    let baked = bake_scene(&imported.scene, &config, options.threads.map(usize::from))?;
+    let scene = &imported.scene;
+    refuse_leak(scene, options)?;
+    let (method, reason) = method_for(scene, options.method);
+    writeln!(io::stderr(), "method {method}: {reason}")?;
+    let threads = options.threads.map(usize::from);
+    let baked = if method == "bsp" {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.unwrap_or(0))
+            .build()?;
+        let bar = BakeBar::new(scene, config);
+        pool.install(|| bake_bsp(scene, &settings.bsp, &BakeContext::new(&bar, None)))?
+    } else {
+        bake_scene(scene, config, threads)?
+    };
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
-    report_bake(&baked, &config, options.verbose)?;
+    report_bake(&baked, config, options.verbose)?;
     let mut out = io::stdout().lock();
     print_summary(&mut out, &baked.world)?;
     writeln!(
@@ -62,6 +77,66 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         bytes.len() as f64 / 1e6
     )?;
     Ok(())
+}
+
+/// The method that is asked for or fits the input, and why.
+fn method_for(scene: &Scene, asked: settings::Method) -> (&'static str, String) {
+    match asked {
+        settings::Method::Watershed => ("watershed", "asked for".to_owned()),
+        settings::Method::Bsp => ("bsp", "asked for".to_owned()),
+        settings::Method::Auto if scene.solids.is_empty() => (
+            "watershed",
+            "the structure is triangles, which may have cracks".to_owned(),
+        ),
+        settings::Method::Auto => (
+            "bsp",
+            format!("the structure is made of {} brushes", scene.solids.len()),
+        ),
+    }
+}
+
+/// Ends the bake of a map whose inside is open to the void, with the way out.
+fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result<()> {
+    let Some(leak) = find_leak(scene) else {
+        return Ok(());
+    };
+    let lines: String = leak
+        .points
+        .iter()
+        .map(|p| format!("{} {} {}\n", p.x, p.y, p.z))
+        .collect();
+    let mut way = String::new();
+    if let Some(path) = &options.leak {
+        write_atomically(path, lines.as_bytes())?;
+        way = format!("; the way is in {}", path.display());
+    }
+    let shown: Vec<String> = leak
+        .points
+        .iter()
+        .take(8)
+        .map(|p| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z))
+        .collect();
+    let entities: Vec<_> = scene
+        .entities
+        .iter()
+        .filter(|e| e.object.is_none() && e.position.is_some())
+        .collect();
+    let class = entities.get(leak.from).map_or("an entity", |e| &e.class);
+    let text = format!(
+        "the map leaks: {class} reaches the void in {} steps, by {}{}{way}",
+        leak.points.len(),
+        shown.join(", "),
+        if leak.points.len() > shown.len() {
+            ", …"
+        } else {
+            ""
+        },
+    );
+    if options.allow_leak {
+        writeln!(io::stderr(), "{text}")?;
+        return Ok(());
+    }
+    bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
@@ -108,7 +183,9 @@ const LEAKS_SHOWN: usize = 10;
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
     let mut err = io::stderr().lock();
     let [nx, ny, nz] = baked.dims;
-    writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
+    if nx > 0 {
+        writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
+    }
     let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
     // The grid grows its voxels by tenths, if at all.
     if baked.voxel > wanted * 1.05 {

@@ -13,6 +13,7 @@ use enfilade::runtime::{
 use enfilade_testkit::{GridParams, Rng, courtyard, room_grid};
 use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 
+use crate::bench_bsp::{bench_bsp, bench_simplify};
 use crate::see::Answers;
 use crate::world::read_world;
 
@@ -25,6 +26,22 @@ pub(crate) struct Bench {
 
 #[derive(clap::Subcommand)]
 enum What {
+    /// Binary space partition: tree, portals, separators, cells.
+    Bsp {
+        /// Scenes: Quake maps and any others.
+        scenes: Vec<PathBuf>,
+        /// All heuristics, not only the default.
+        #[arg(long)]
+        heuristics: bool,
+        /// Bake to the end, cells merged up to 50 triangles.
+        #[arg(long)]
+        bake: bool,
+    },
+    /// Simplifier: expected triangles by either metric at the same number of portals.
+    Simplify {
+        /// Worlds.
+        worlds: Vec<PathBuf>,
+    },
     /// Time of a view: in worlds, in portal files, in offices of so many rooms, in a courtyard.
     See {
         /// Worlds (`.glb`) and Quake portal files (`.prt`).
@@ -77,6 +94,12 @@ enum What {
 pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
     let mut table = Vec::new();
     match &args.what {
+        What::Bsp {
+            scenes,
+            heuristics,
+            bake,
+        } => bench_bsp(&mut table, scenes, *heuristics, *bake)?,
+        What::Simplify { worlds } => bench_simplify(&mut table, worlds)?,
         What::See {
             scenes,
             rooms,

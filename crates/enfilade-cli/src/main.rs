@@ -5,6 +5,7 @@
 
 mod bake;
 mod bench;
+mod bench_bsp;
 mod demo;
 mod inspect;
 mod locate;
@@ -13,6 +14,7 @@ mod plan;
 mod progress;
 mod pvs;
 mod see;
+mod simplify;
 mod verify;
 mod world;
 
@@ -34,11 +36,13 @@ enum Command {
     Bake(bake::Bake),
     Bench(bench::Bench),
     Demo(demo::Demo),
+    Edit(simplify::Edit),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
     See(see::See),
+    Simplify(simplify::Simplify),
     Verify(verify::Verify),
 }
 
@@ -47,11 +51,13 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Bake(args) => bake::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Edit(args) => simplify::run_edit(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::See(args) => see::run(&args),
+        Command::Simplify(args) => simplify::run(&args),
         Command::Verify(args) => verify::run(&args),
     }
 }

@@ -39,7 +39,7 @@ mod graph;
 mod label;
 mod partition;
 mod pieces;
-mod poly;
+pub(crate) mod poly;
 mod seen;
 mod surface;
 mod tree;
