@@ -192,7 +192,7 @@ fn screens_of(bsp: &Bsp, cells: &Cells) -> Vec<Screen> {
         out.extend(
             windings
                 .into_iter()
-                .map(|w| screen(&grown(w, &plane, 4.0 * bsp.tolerance.plane), regions)),
+                .map(|w| screen(&grown(&w, &plane, 4.0 * bsp.tolerance.plane), regions)),
         );
     }
     out
@@ -209,7 +209,7 @@ pub(super) fn screen(winding: &Winding, regions: [u32; 2]) -> Screen {
 }
 
 /// The polygon with each corner moved out: a screen must reach past the rim of its opening.
-fn grown(w: Winding, plane: &Plane, by: f64) -> Winding {
+fn grown(w: &Winding, plane: &Plane, by: f64) -> Winding {
     let n = w.points.len();
     let moved = (0..n).map(|i| {
         let (a, p, b) = (

@@ -290,8 +290,8 @@ impl Builder {
                     let is_flipped = f.is_flipped == along;
                     looks += poly::area(&f.points) * if is_flipped { -1.0 } else { 1.0 };
                     self.tree.on_plane.push(Fragment {
-                        is_flipped,
                         plane,
+                        is_flipped,
                         ..f
                     });
                 }
