@@ -4,6 +4,7 @@
 //! quality, neither correctness. Only see-through surfaces *must* be detail: a cell seen through
 //! glass may not be called hidden. The first rule that fits decides; `docs/import.md` lists them.
 
+use crate::auto_roles::DEFAULT;
 use enfilade_geom::scene::Role;
 
 /// The user's own rules, before all others.
@@ -16,6 +17,8 @@ pub struct RoleRules {
     pub detail: Vec<String>,
     /// Judge by the user's rules and detail files only; see-through surfaces stay detail.
     pub is_manual: bool,
+    /// Judge what no rule fits by its size and by what it hides.
+    pub is_automatic: bool,
 }
 
 /// What is known of an object.
@@ -193,7 +196,7 @@ impl RoleRules {
                 return detail(format!("below '{name}': '{word}'"));
             }
         }
-        structural("default".into())
+        structural(DEFAULT.into())
     }
 }
 
@@ -454,6 +457,7 @@ mod tests {
             structural: vec!["*keep*".into()],
             detail: vec!["Wall*".into(), "Plaster".into()],
             is_manual: false,
+            ..RoleRules::default()
         };
         let reason = |verdict| match verdict {
             Verdict::Keep(role, reason) => (role, reason),

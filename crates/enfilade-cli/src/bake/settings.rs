@@ -23,6 +23,9 @@ pub(crate) struct BakeOptions {
     /// Objects whose name fits this pattern are structural, whatever else says they are detail.
     #[arg(long, value_name = "PATTERN")]
     structural_name: Vec<String>,
+    /// Whether small things that hide little are detail where nothing else says what they are.
+    #[arg(long, value_enum, value_name = "WHETHER")]
+    auto_roles: Option<Switch>,
     /// The input's unit: m, cm, mm, in, ft, or a number of meters.
     #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
     unit: Option<f64>,
@@ -57,6 +60,12 @@ pub(crate) struct BakeOptions {
 enum UpAxis {
     Y,
     Z,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Switch {
+    On,
+    Off,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -200,6 +209,7 @@ struct ConfigFile {
     unit: Option<Unit>,
     up: Option<UpAxis>,
     origin: Option<[f64; 3]>,
+    auto_roles: Option<bool>,
     #[serde(default)]
     detail_names: Vec<String>,
     #[serde(default)]
@@ -282,6 +292,11 @@ pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, B
         roles: RoleRules {
             structural: [options.structural_name.clone(), file.structural_names].concat(),
             detail: [options.detail_name.clone(), file.detail_names].concat(),
+            is_automatic: options
+                .auto_roles
+                .map(|s| s == Switch::On)
+                .or(file.auto_roles)
+                .unwrap_or(true),
             ..RoleRules::default()
         },
         ..ImportOptions::default()
