@@ -1,6 +1,6 @@
 //! `enfilade bake`: a scene becomes a world.
 
-mod settings;
+pub(crate) mod settings;
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         .inputs
         .iter()
         .chain(&options.detail)
-        .chain(&options.config);
+        .chain(&options.scene.config);
     if let Some(input) = all_inputs.into_iter().find(|p| same_file(p, &args.output)) {
         bail!(
             "{} is the input {}; choose another name with -o",

@@ -38,8 +38,8 @@ const SPARSE: f64 = 0.15;
 const FLAT: f64 = 0.3;
 /// Each connected part of a rail is a bar, and no wider than this. [Units: wu]
 const BAR: f64 = 0.12;
-/// Where more than this share of the surface that nothing is said about would be detail, the scene is
-/// built of small pieces and nothing in it is furniture.
+/// Where more than this share of the structural surface would be detail, the scene is built of small
+/// pieces and nothing in it is furniture.
 const MOST: f64 = 0.3;
 /// So many small objects are no furniture, either; and looking at each takes time.
 const MOST_OBJECTS: usize = 50_000;
@@ -85,9 +85,8 @@ pub(crate) fn judge(scene: &mut Scene) {
         None
     };
     let mut found: Vec<(usize, String)> = Vec::new();
-    let (mut open_area, mut detail_area) = (0.0, 0.0);
+    let mut detail_area = 0.0;
     for shape in shapes.iter().filter(|s| s.is_open) {
-        open_area += shape.area;
         let size = shape.bounds.size();
         let reason = if size.max_element() <= small {
             bvh.as_ref().and_then(|bvh| {
@@ -114,18 +113,16 @@ pub(crate) fn judge(scene: &mut Scene) {
             })
         };
         if let Some(reason) = reason {
-            detail_area += shape.area;
+            // The leaves of a plant are more surface than it hides.
+            detail_area += shape.area.min(shape.bounds.surface_area());
             found.push((shape.object, reason));
         }
     }
-    let share = detail_area / open_area.max(f64::MIN_POSITIVE);
     let structural_area: f64 = shapes.iter().map(|s| s.area).sum();
     if detail_area > MOST * structural_area || found.len() == n_structural {
-        for (object, _) in found {
-            scene.objects[object].reason = format!(
-                "default: {:.0} % of the scene is such small pieces, so they are what it is built of",
-                share * 100.0
-            );
+        for (object, reason) in found {
+            scene.objects[object].reason =
+                format!("default: {reason}, but so is too much of the scene");
         }
         return;
     }
@@ -307,173 +304,4 @@ fn n_goes_on(bounds: &Aabb, axis: usize, high: bool, touches: &dyn Fn(&Aabb) -> 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use enfilade_geom::DMat4;
-    use enfilade_geom::scene::{Mesh, Object, Primitive};
-
-    #[derive(Default)]
-    struct Build(Scene);
-
-    impl Build {
-        fn block(&mut self, name: &str, min: [f64; 3], max: [f64; 3]) -> &mut Self {
-            self.blocks(name, &[(min, max)])
-        }
-
-        /// Boxes as one object that nothing is said about.
-        fn blocks(&mut self, name: &str, boxes: &[([f64; 3], [f64; 3])]) -> &mut Self {
-            let mut p = Primitive::default();
-            for (min, max) in boxes {
-                let first = p.positions.len() as u32;
-                for i in 0..8 {
-                    let c = |k: usize| if i >> k & 1 == 1 { max[k] } else { min[k] } as f32;
-                    p.positions.push([c(0), c(1), c(2)]);
-                }
-                for f in [
-                    [0, 2, 3, 1],
-                    [4, 5, 7, 6],
-                    [0, 1, 5, 4],
-                    [2, 6, 7, 3],
-                    [0, 4, 6, 2],
-                    [1, 3, 7, 5],
-                ] {
-                    let quad = [f[0], f[1], f[2], f[0], f[2], f[3]];
-                    p.indices.extend(quad.map(|i: u32| first + i));
-                }
-            }
-            self.0.objects.push(Object {
-                name: name.into(),
-                mesh: self.0.meshes.len() as u32,
-                transform: DMat4::IDENTITY,
-                role: Role::Structural,
-                reason: DEFAULT.into(),
-            });
-            self.0.meshes.push(Mesh {
-                name: String::new(),
-                primitives: vec![p],
-            });
-            self
-        }
-
-        /// A room of 5 x 4 x 2.6 m, its east wall with a doorway made of three pieces.
-        fn room() -> Self {
-            let mut b = Self::default();
-            b.block("floor", [0.0, -0.2, 0.0], [5.0, 0.0, 4.0])
-                .block("ceiling", [0.0, 2.6, 0.0], [5.0, 2.8, 4.0])
-                .block("west", [-0.2, 0.0, 0.0], [0.0, 2.6, 4.0])
-                .block("north", [0.0, 0.0, -0.2], [5.0, 2.6, 0.0])
-                .block("south", [0.0, 0.0, 4.0], [5.0, 2.6, 4.2])
-                .block("east, short", [5.0, 0.0, 0.0], [5.2, 2.6, 0.6])
-                .block("east, long", [5.0, 0.0, 1.5], [5.2, 2.6, 4.0])
-                .block("lintel", [5.0, 2.1, 0.6], [5.2, 2.6, 1.5])
-                .block("threshold", [5.0, -0.2, 0.6], [5.2, 0.0, 1.5])
-                .block("post", [2.0, 0.0, 2.0], [2.15, 2.6, 2.15]);
-            b
-        }
-
-        fn details(mut self) -> Vec<String> {
-            judge(&mut self.0);
-            let is_detail = |o: &&Object| o.role == Role::Detail;
-            self.0
-                .objects
-                .iter()
-                .filter(is_detail)
-                .map(|o| o.name.clone())
-                .collect()
-        }
-    }
-
-    #[test]
-    fn what_a_room_is_built_of_stays() {
-        assert_eq!(Build::room().details(), [""; 0]);
-    }
-
-    #[test]
-    fn what_stands_in_a_room_is_detail() {
-        let mut b = Build::room();
-        b.blocks(
-            "chair",
-            &[
-                ([3.0, 0.4, 3.0], [3.4, 0.45, 3.4]),
-                ([3.0, 0.0, 3.0], [3.05, 0.4, 3.05]),
-                ([3.35, 0.0, 3.35], [3.4, 0.4, 3.4]),
-                ([3.0, 0.45, 3.0], [3.05, 0.9, 3.4]),
-            ],
-        )
-        .block("lamp", [1.0, 2.3, 1.0], [1.3, 2.6, 1.3])
-        .block("picture", [0.0, 1.2, 1.0], [0.03, 1.8, 1.8])
-        .block("rug", [0.8, 0.0, 2.2], [1.6, 0.01, 3.2])
-        .block("ball", [4.0, 1.0, 1.0], [4.2, 1.2, 1.2])
-        // To the ceiling, between floor and ceiling: it may be a pier.
-        .block("wardrobe", [3.0, 0.0, 0.0], [4.2, 2.6, 0.6]);
-        assert_eq!(b.details(), ["chair", "lamp", "picture", "rug", "ball"]);
-    }
-
-    #[test]
-    fn the_reason_is_told() {
-        let mut b = Build::room();
-        b.block("stool", [3.0, 0.0, 3.0], [3.4, 0.5, 3.4]);
-        judge(&mut b.0);
-        let stool = b.0.objects.last().unwrap();
-        assert_eq!(
-            stool.reason,
-            "small, hides little: 0.4 x 0.5 x 0.4 m, touches its bottom only"
-        );
-    }
-
-    #[test]
-    fn a_railing_hides_little_and_a_wall_with_windows_does_not() {
-        let mut b = Build::room();
-        let bars: Vec<_> = (0..16)
-            .map(|i| 0.3 * f64::from(i))
-            .map(|x| ([x, 0.0, 8.0], [x + 0.012, 1.0, 8.012]))
-            .collect();
-        b.blocks("railing", &bars).blocks(
-            "facade",
-            &[
-                ([0.0, 0.0, 9.0], [8.0, 0.4, 9.2]),
-                ([0.0, 2.4, 9.0], [8.0, 2.6, 9.2]),
-                ([0.0, 0.4, 9.0], [0.2, 2.4, 9.2]),
-                ([7.8, 0.4, 9.0], [8.0, 2.4, 9.2]),
-            ],
-        );
-        assert_eq!(b.details(), ["railing"]);
-    }
-
-    #[test]
-    fn walls_and_floors_of_small_tiles_stay() {
-        let mut b = Build::default();
-        for i in 0..6 {
-            for k in 0..6 {
-                let (x, z) = (f64::from(i), f64::from(k));
-                b.block("tile", [x, -0.1, z], [x + 1.0, 0.0, z + 1.0]);
-                b.block("roof", [x, 2.0, z], [x + 1.0, 2.1, z + 1.0]);
-            }
-            for y in [0.0, 1.0] {
-                let x = f64::from(i);
-                b.block("brick", [x, y, -0.2], [x + 1.0, y + 1.0, 0.0]);
-            }
-        }
-        assert_eq!(b.details(), [""; 0]);
-    }
-
-    #[test]
-    fn a_heap_of_loose_blocks_is_no_furniture() {
-        let mut b = Build::default();
-        for i in 0..5 {
-            let x = 2.0 * f64::from(i);
-            b.block("block", [x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]);
-        }
-        judge(&mut b.0);
-        assert!(b.0.objects.iter().all(|o| o.role == Role::Structural));
-        assert!(b.0.objects[0].reason.contains("what it is built of"));
-    }
-
-    #[test]
-    fn what_somebody_said_is_kept() {
-        let mut b = Build::room();
-        b.block("stool", [3.0, 0.0, 3.0], [3.4, 0.5, 3.4]);
-        b.0.objects.last_mut().unwrap().reason = "name: 'wall'".into();
-        assert_eq!(b.details(), [""; 0]);
-    }
-}
+mod tests;

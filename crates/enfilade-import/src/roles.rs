@@ -8,7 +8,7 @@ use crate::auto_roles::DEFAULT;
 use enfilade_geom::scene::Role;
 
 /// The user's own rules, before all others.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RoleRules {
     /// Globs (`*`, `?`, case-insensitive) of object, mesh or material names that are structural;
     /// these win over `detail`. A material counts if all of an object's materials fit.
@@ -17,8 +17,19 @@ pub struct RoleRules {
     pub detail: Vec<String>,
     /// Judge by the user's rules and detail files only; see-through surfaces stay detail.
     pub is_manual: bool,
-    /// Judge what no rule fits by its size and by what it hides.
+    /// Judge what no rule fits by its size and by what it hides, unless `is_manual`.
     pub is_automatic: bool,
+}
+
+impl Default for RoleRules {
+    fn default() -> Self {
+        Self {
+            structural: Vec::new(),
+            detail: Vec::new(),
+            is_manual: false,
+            is_automatic: true,
+        }
+    }
 }
 
 /// What is known of an object.
