@@ -26,7 +26,7 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_enum)]
     auto_roles: Option<Switch>,
     /// The input's unit: m, cm, mm, in, ft, or a number of meters.
-    #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
+    #[arg(long, visible_alias = "scale", value_name = "UNIT", value_parser = parse_unit)]
     unit: Option<f64>,
     /// The input's up axis.
     #[arg(long, value_enum)]
