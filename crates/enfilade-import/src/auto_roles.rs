@@ -38,6 +38,12 @@ const SPARSE: f64 = 0.15;
 const FLAT: f64 = 0.3;
 /// Each connected part of a rail is a bar, and no wider than this. [Units: wu]
 const BAR: f64 = 0.12;
+/// A surface whose open rim lies on others is a piece of a shell, as the reveal of a doorway is that
+/// was split from its wall; unless so little of it does, in edges of its box, that it may be the
+/// open ends of a chair's legs.
+const RIM_SHARE: f64 = 0.25;
+/// The rim lies on what is nearer than this. [Units: wu]
+const ON: f64 = 1e-3;
 /// Where more than this share of the structural surface would be detail, the scene is built of small
 /// pieces and nothing in it is furniture.
 const MOST: f64 = 0.3;
@@ -97,7 +103,9 @@ pub(crate) fn judge(scene: &mut Scene) {
                     });
                     is_touched
                 };
-                seen_around(&shape.bounds, &touches)
+                let reason = seen_around(&shape.bounds, &touches)?;
+                let own = &triangles[shape.triangles.clone()];
+                (!goes_on_at_its_rim(own, &shape.bounds, &touches)).then_some(reason)
             })
         } else {
             let is_rail = size.min_element() <= FLAT
@@ -178,6 +186,38 @@ fn fill(shape: &Shape) -> f64 {
     0.5 * shape.shadow.max_element() / sides.max_element().max(f64::MIN_POSITIVE)
 }
 
+/// Whether others begin where the surface ends.
+fn goes_on_at_its_rim(
+    triangles: &[Triangle],
+    bounds: &Aabb,
+    touches: &dyn Fn(&Aabb) -> bool,
+) -> bool {
+    let mut edges: Vec<[[u64; 3]; 2]> = triangles
+        .iter()
+        .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
+        .map(|e| {
+            let mut key = e.map(key);
+            key.sort_unstable();
+            key
+        })
+        .collect();
+    edges.sort_unstable();
+    let on_others: f64 = edges
+        .chunk_by(|a, b| a == b)
+        .filter(|same| same.len() == 1)
+        .map(|same| same[0].map(|p| DVec3::from_array(p.map(f64::from_bits))))
+        .filter(|[a, b]| touches(&Aabb::of_points(&[(*a + *b) * 0.5]).expanded(ON)))
+        .map(|[a, b]| a.distance(b))
+        .sum();
+    on_others > RIM_SHARE * 4.0 * bounds.size().element_sum()
+}
+
+/// A corner as what can be compared.
+fn key(p: DVec3) -> [u64; 3] {
+    // + 0.0 makes one zero of two.
+    (p + 0.0).to_array().map(f64::to_bits)
+}
+
 /// Boxes of the connected parts: triangles that share a corner hang together.
 fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
     fn root(parent: &mut [usize], mut i: usize) -> usize {
@@ -191,9 +231,7 @@ fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
     let mut parent: Vec<usize> = (0..triangles.len()).collect();
     for (i, t) in triangles.iter().enumerate() {
         for p in t {
-            // + 0.0 makes one zero of two.
-            let key = (*p + 0.0).to_array().map(f64::to_bits);
-            let other = *first_at.entry(key).or_insert(i);
+            let other = *first_at.entry(key(*p)).or_insert(i);
             let (a, b) = (root(&mut parent, i), root(&mut parent, other));
             parent[a.max(b)] = a.min(b);
         }

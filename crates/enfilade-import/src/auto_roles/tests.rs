@@ -133,6 +133,43 @@ fn a_railing_hides_little_and_a_wall_with_windows_does_not() {
     assert_eq!(b.details(), ["railing"]);
 }
 
+/// Walls split by material: the faces of a wall are one object, the reveals of its window another.
+#[test]
+fn the_reveals_of_a_window_stay() {
+    let mut b = Build::room();
+    let (x, y, z) = ([1.0, 2.2], [0.9, 2.1], [8.0, 8.2]);
+    let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, k)| [x[i], y[k]]);
+    let mut p = Primitive::default();
+    for [x, y] in corners {
+        p.positions
+            .extend(z.map(|z| [x as f32, y as f32, z as f32]));
+    }
+    for i in 0..4 {
+        let [a, b, c, d] = [2 * i, 2 * i + 1, (2 * i + 3) % 8, (2 * i + 2) % 8];
+        p.indices.extend([a, b, c, a, c, d]);
+    }
+    // The wall's faces around the window, each a sheet.
+    let sides = z.into_iter().flat_map(|z| {
+        [
+            ([0.0, 0.0, z], [1.0, 2.6, z]),
+            ([2.2, 0.0, z], [4.0, 2.6, z]),
+            ([1.0, 0.0, z], [2.2, 0.9, z]),
+            ([1.0, 2.1, z], [2.2, 2.6, z]),
+        ]
+    });
+    b.blocks("wall", &sides.collect::<Vec<_>>());
+    b.0.objects.push(Object {
+        name: "reveals".into(),
+        mesh: b.0.meshes.len() as u32,
+        ..b.0.objects[0].clone()
+    });
+    b.0.meshes.push(Mesh {
+        name: String::new(),
+        primitives: vec![p],
+    });
+    assert_eq!(b.details(), [""; 0]);
+}
+
 #[test]
 fn walls_and_floors_of_small_tiles_stay() {
     let mut b = Build::default();
