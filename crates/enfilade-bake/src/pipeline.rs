@@ -42,10 +42,11 @@ pub struct BakeOutput {
 /// Finds the rooms and doorways of a scene.
 ///
 /// Deterministic: equal input and settings give an equal world on any number of threads. Time is
-/// linear in voxels and about linear in triangles; memory about 2.5 bytes a voxel plus the scene.
+/// linear in voxels and about linear in triangles; memory about 3 bytes a voxel plus the scene.
 ///
 /// # Errors
-/// When there is nothing structural, a setting is out of limits, or the caller cancels.
+/// When there is nothing structural, a setting is out of limits, the scene is too large for the
+/// budget of voxels, or the caller cancels.
 pub fn bake(
     scene: &Scene,
     config: &BakeConfig,

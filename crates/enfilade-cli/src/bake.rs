@@ -12,6 +12,7 @@ use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
 
+use crate::inspect::write_holes;
 use crate::output::{check_target, write_atomically};
 use crate::progress::{BakeBar, StageBar};
 
@@ -149,6 +150,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
         }
     }
+    write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
     Ok(())
 }
 
