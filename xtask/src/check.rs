@@ -180,21 +180,11 @@ fn demo() -> anyhow::Result<()> {
     verify(&world)
 }
 
-/// Scenes whose promises are known to break, with the reason in `docs/benchmarks/rooms.md`. What breaks
-/// there is printed; anywhere else it fails the run.
-const KNOWN_BROKEN: [&str; 1] = ["recast-dungeon"];
-
 fn check_scene(scene: &std::path::Path, name: &str) -> anyhow::Result<()> {
     let dir = target_dir().join("scenes");
     std::fs::create_dir_all(&dir)?;
     let world = dir.join(name).with_extension("glb");
     print!("{}", output_of(&mut bake_command(scene, &world), None)?);
     validate(&world)?;
-    match verify(&world) {
-        Err(why) if KNOWN_BROKEN.contains(&name) => {
-            println!("KNOWN TO BREAK: {why:#}");
-            Ok(())
-        }
-        other => other,
-    }
+    verify(&world)
 }
