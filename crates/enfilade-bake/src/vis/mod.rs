@@ -5,7 +5,7 @@
 //!
 //! 1. `dirs`: each portal as two directions; what lies on the right sides of planes *might* be seen.
 //! 2. `narrow`: planes between two openings in a row cut most of that.
-//! 3. `rays`: random lines prove most of what is visible.
+//! 3. `rays`, `grow`: random lines, and lines turned from those, prove most of what is visible.
 //! 4. `flow`: a search over portal chains settles the rest, chain by chain, by planes, lines and
 //!    splitting. This is the heart; start reading there.
 //!
@@ -20,6 +20,7 @@ mod clip;
 mod dirs;
 mod evidence;
 mod flow;
+mod grow;
 mod narrow;
 mod prove;
 mod rays;
@@ -57,7 +58,7 @@ pub struct VisConfig {
     pub clearance: Option<f64>,
     /// Nothing farther than this is seen. [Units: wu] [Limit: >= 0]
     pub far: Option<f64>,
-    /// Random lines cast from each portal before the search.
+    /// Random lines cast from each portal; more are grown from those that find something.
     pub n_rays: usize,
     /// Pieces that an opening may be split into to settle one chain.
     pub max_pieces: u32,
@@ -71,7 +72,7 @@ impl Default for VisConfig {
             mode: VisMode::Exact,
             clearance: None,
             far: None,
-            n_rays: 64,
+            n_rays: 12,
             max_pieces: 64,
             has_evidence: false,
         }
@@ -163,6 +164,7 @@ pub fn see_all(
         &search.tolerance,
     );
     search.cast(config.n_rays);
+    search.grow();
     let mut is_complete = true;
     if config.mode == VisMode::Exact {
         is_complete = search.run(config.max_pieces, &mut *context.on_round);

@@ -29,6 +29,8 @@ pub(super) struct Search<'a> {
     pub(super) tolerance: Tolerance,
     pub(super) blocker: Option<Blocker<'a>>,
     pub(super) effort: Effort,
+    /// How many of `lines` have been grown.
+    pub(super) n_grown: usize,
 }
 
 impl<'a> Search<'a> {
@@ -53,6 +55,7 @@ impl<'a> Search<'a> {
             tolerance: Tolerance::new(dirs.scale, clearance),
             blocker,
             effort: Effort::default(),
+            n_grown: 0,
         }
     }
 
@@ -131,7 +134,7 @@ impl<'a> Search<'a> {
         lines
     }
 
-    fn proves_new(&self, chain: &[u32]) -> bool {
+    pub(super) fn proves_new(&self, chain: &[u32]) -> bool {
         let dirs = self.dirs;
         (0..chain.len()).any(|i| {
             let row = self.seen.row(dirs.all[chain[i] as usize].from as usize);
@@ -142,7 +145,7 @@ impl<'a> Search<'a> {
     }
 
     /// Marks what a line proves, and keeps it where that is new.
-    fn keep(&mut self, line: Line) {
+    pub(super) fn keep(&mut self, line: Line) {
         // Lines that graze an opening may have slipped through on other sums than a checker's.
         if !self.dirs.is_crossed(&line, self.tolerance.rounding * 8.0) {
             return;
@@ -203,6 +206,7 @@ impl<'a> Search<'a> {
             for found in found {
                 self.merge(found);
             }
+            self.grow();
         }
         true
     }

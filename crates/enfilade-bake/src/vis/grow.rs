@@ -1,0 +1,156 @@
+//! Lines grown from lines: what one just misses, its neighbor may hit.
+//!
+//! A random line rarely slips through five doorways. One that did is turned a little, about a point where it
+//! crosses an opening, towards an exit beside the place where it ends. After Wonka and others, *Guided
+//! Visibility Sampling* (SIGGRAPH 2006), section 4, whose borders of triangles are our exits of cells.
+
+use enfilade_geom::DVec3;
+use rayon::prelude::*;
+
+use super::bits;
+use super::dirs::Dirs;
+use super::rays::{Line, walk};
+use super::search::Search;
+
+/// Lines a round. Those of one round know nothing of each other.
+const ROUND: usize = 512;
+
+impl Search<'_> {
+    /// Grows all lines, and those grown from them, until nothing new comes of it.
+    pub(super) fn grow(&mut self) {
+        let mut first = self.n_grown;
+        while first < self.lines.len() {
+            let end = self.lines.len().min(first + ROUND);
+            let grown: Vec<Vec<Line>> = self.lines[first..end]
+                .par_iter()
+                .with_max_len(8)
+                .map(|line| self.grown_from(line))
+                .collect();
+            for line in grown.into_iter().flatten() {
+                if self.proves_new(&line.chain) {
+                    self.keep(line);
+                }
+            }
+            first = end;
+        }
+        self.n_grown = first;
+    }
+
+    fn grown_from(&self, line: &Line) -> Vec<Line> {
+        let mut out = Vec::new();
+        self.grow_end(line, &mut out);
+        let chain = line.chain.iter().rev();
+        let reversed = Line {
+            origin: line.origin,
+            direction: -line.direction,
+            chain: chain.map(|&d| self.dirs.reverse[d as usize]).collect(),
+        };
+        self.grow_end(&reversed, &mut out);
+        out
+    }
+
+    /// Turns a line towards the exits of the cell where it ends.
+    fn grow_end(&self, line: &Line, out: &mut Vec<Line>) {
+        let dirs = self.dirs;
+        let Some(&last) = line.chain.last() else {
+            return;
+        };
+        for &exit in dirs.exits(dirs.all[last as usize].to) {
+            if exit == dirs.reverse[last as usize] {
+                continue;
+            }
+            let to = dirs.all[exit as usize].to as usize;
+            let is_wanted = |&d: &u32| {
+                self.might.get(d as usize, exit as usize)
+                    && !bits::get(self.seen.row(dirs.all[d as usize].from as usize), to)
+            };
+            let Some(first) = line.chain.iter().position(is_wanted) else {
+                continue;
+            };
+            self.turn(line, first, exit, out);
+        }
+    }
+
+    fn turn(&self, line: &Line, first: usize, exit: u32, out: &mut Vec<Line>) {
+        let dirs = self.dirs;
+        let margin = self.tolerance.rounding * 16.0;
+        let last = line.chain.len() - 1;
+        for at in [first, last, (first + last) / 2] {
+            let pivot = dirs.crossing(line.chain[at] as usize, line.origin, line.direction);
+            for share in [0.05, 0.5] {
+                let aim = dirs.toward(exit as usize, line, share);
+                let direction = aim - pivot;
+                let d = line.chain[at] as usize;
+                if direction.dot(dirs.all[d].normal) <= 0.0 {
+                    continue;
+                }
+                let mut ahead = Vec::new();
+                walk(dirs, d, pivot, direction, margin, self.blocker, &mut ahead);
+                if !ahead.contains(&exit) {
+                    continue;
+                }
+                let mut behind = Vec::new();
+                let back = dirs.reverse[d] as usize;
+                walk(
+                    dirs,
+                    back,
+                    pivot,
+                    -direction,
+                    margin,
+                    self.blocker,
+                    &mut behind,
+                );
+                let chain: Vec<u32> = behind
+                    .iter()
+                    .rev()
+                    .map(|&b| dirs.reverse[b as usize])
+                    .chain([d as u32])
+                    .chain(ahead)
+                    .collect();
+                if self.proves_new(&chain) {
+                    let found = chain.contains(&line.chain[first]);
+                    out.push(Line {
+                        origin: pivot,
+                        direction,
+                        chain,
+                    });
+                    if found {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Dirs {
+    /// Where a line meets the plane of an opening.
+    fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> DVec3 {
+        let dir = &self.all[d];
+        let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / dir.normal.dot(direction);
+        origin + direction * t
+    }
+
+    /// A point of an opening that a line misses: `share` of the way from its nearest one to its middle.
+    fn toward(&self, d: usize, line: &Line, share: f64) -> DVec3 {
+        let dir = &self.all[d];
+        let winding = self.winding(d);
+        if dir.normal.dot(line.direction) <= 1e-9 * line.direction.length() {
+            return dir.center;
+        }
+        let p = self.crossing(d, line.origin, line.direction);
+        let n = winding.len();
+        let mut best = (f64::INFINITY, dir.center);
+        for i in 0..n {
+            let (a, b) = (winding[i], winding[if i + 1 == n { 0 } else { i + 1 }]);
+            let edge = b - a;
+            let t = ((p - a).dot(edge) / edge.length_squared().max(1e-300)).clamp(0.0, 1.0);
+            let q = a + edge * t;
+            let distance = q.distance_squared(p);
+            if distance < best.0 {
+                best = (distance, q);
+            }
+        }
+        best.1 + (dir.center - best.1) * share
+    }
+}
