@@ -187,30 +187,23 @@ pub(super) struct Facing {
 ///
 /// Around each edge the polygon lies on a half-line of the perpendicular cross-section, and the first corner
 /// of the other met when turning from there gives the only such plane. Dirkse, section 7.4, and the Quake
-/// tools try all corners; time here is the product of the corner counts. A plane that holds an edge of each
-/// is given once.
+/// tools try all corners; time here is the product of the corner counts.
+///
+/// A plane that holds an edge of each comes twice. Giving it once would spare a little, but then a checker that
+/// cuts by both keeps polygons that differ by rounding, and finds planes that differ by more.
 pub(super) fn separators(
     a: (&[DVec3], Facing),
     b: (&[DVec3], Facing),
     tolerance: &Tolerance,
     out: &mut Vec<Separator>,
 ) {
-    let mut shared_edges = 0;
     let heights = Heights::new(b.0, a.1.normal);
     for i in 0..a.0.len() {
-        if let Some((plane, edges)) = through_edge::<true>(a.0, i, b.0, &heights, a.1, tolerance) {
-            shared_edges |= edges;
-            out.push(plane);
-        }
+        out.extend(through_edge::<true>(a.0, i, b.0, &heights, a.1, tolerance));
     }
     let heights = Heights::new(a.0, -b.1.normal);
     for i in 0..b.0.len() {
-        if i < 64 && shared_edges >> i & 1 != 0 {
-            continue;
-        }
-        if let Some((plane, _)) = through_edge::<false>(b.0, i, a.0, &heights, b.1, tolerance) {
-            out.push(plane);
-        }
+        out.extend(through_edge::<false>(b.0, i, a.0, &heights, b.1, tolerance));
     }
 }
 
@@ -240,7 +233,7 @@ impl Heights {
 }
 
 /// The plane through edge `i` of `own` and a corner of `other`, of which `heights` are those ahead of `own`;
-/// `FIRST` where `own` is to be behind the plane. With it, as bits, the edges of `other` that lie in it.
+/// `FIRST` where `own` is to be behind the plane.
 #[inline]
 fn through_edge<const FIRST: bool>(
     own: &[DVec3],
@@ -249,7 +242,7 @@ fn through_edge<const FIRST: bool>(
     heights: &Heights,
     facing: Facing,
     tolerance: &Tolerance,
-) -> Option<(Separator, u64)> {
+) -> Option<Separator> {
     let p = own[i];
     let edge = own[if i + 1 == own.len() { 0 } else { i + 1 }] - p;
     let inward = facing.turn.cross(edge);
@@ -258,7 +251,6 @@ fn through_edge<const FIRST: bool>(
     let near = 1e2 * rounding;
     let (base, across) = (heights.ahead.dot(p), inward.dot(p));
     let (mut x, mut y, mut best) = (f64::NEG_INFINITY, 0.0, DVec3::ZERO);
-    let mut meets = false;
     for (j, &corner) in other.iter().enumerate() {
         // The inward axis is longer than a unit by the edge's length; angles are compared only
         // among themselves, so that does not matter.
@@ -267,7 +259,6 @@ fn through_edge<const FIRST: bool>(
             (heights.of(j, corner) - base).max(0.0),
         );
         if cy <= near && cx * cx <= (near * near - cy * cy) * edge.length_squared() {
-            meets = true;
             continue;
         }
         if x == f64::NEG_INFINITY || cx * y - cy * x > 0.0 {
@@ -297,22 +288,7 @@ fn through_edge<const FIRST: bool>(
     if lowest < highest - rounding {
         return None;
     }
-    let mut edges = 0;
-    // An edge on the same line lies in the plane too, but has another of its own.
-    if FIRST && !meets {
-        let limit = lowest + rounding;
-        let last = other[other.len() - 1];
-        let mut was_in = toward.dot(last) <= limit;
-        for (k, &q) in other.iter().enumerate() {
-            let is_in = toward.dot(q) <= limit;
-            if was_in && is_in {
-                let k = if k == 0 { other.len() - 1 } else { k - 1 };
-                edges |= 1u64.checked_shl(k as u32).unwrap_or(0);
-            }
-            was_in = is_in;
-        }
-    }
-    let separator = if FIRST {
+    Some(if FIRST {
         Separator {
             normal: toward,
             behind: highest,
@@ -324,6 +300,5 @@ fn through_edge<const FIRST: bool>(
             behind: -lowest,
             front: -highest,
         }
-    };
-    Some((separator, edges))
+    })
 }

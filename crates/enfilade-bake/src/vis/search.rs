@@ -16,6 +16,15 @@ use super::rays::{self, Blocker, Line, Rng};
 /// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
 const ROUND: usize = 64;
 
+/// What is left to search.
+pub(super) struct Rest {
+    /// Openings, and before each how many it might see.
+    pub(super) order: Vec<(usize, usize)>,
+    /// Work done and work in all.
+    pub(super) done: u64,
+    pub(super) total: u64,
+}
+
 pub(super) struct Search<'a> {
     pub(super) dirs: &'a Dirs,
     pub(super) might: BitTable,
@@ -170,26 +179,37 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Searches from every opening. `on_round` hears the work done and the work in all, and says whether to
-    /// go on; work is counted in what openings might see at the start.
-    ///
-    /// Returns whether all was searched.
-    pub(super) fn run(
-        &mut self,
-        max_pieces: u32,
-        mut on_round: impl FnMut(u64, u64) -> bool,
-    ) -> bool {
+    /// All openings, those that might see least first.
+    pub(super) fn all_openings(&self) -> Rest {
         let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
             .map(|d| (bits::count(self.might.row(d)), d))
             .collect();
         order.sort_unstable();
         let total = order.iter().map(|&(n, _)| n as u64).sum();
-        let mut done = 0;
-        for round in order.chunks(ROUND) {
-            if !on_round(done, total) {
+        Rest {
+            order,
+            done: 0,
+            total,
+        }
+    }
+
+    /// Searches from the openings that are left. `on_round` hears of each round before it starts and says
+    /// whether to go on; work is counted in what openings might see at the start.
+    ///
+    /// Returns whether all was searched.
+    pub(super) fn run(
+        &mut self,
+        max_pieces: u32,
+        mut rest: Rest,
+        mut on_round: impl FnMut(&Self, &Rest) -> bool,
+    ) -> bool {
+        while !rest.order.is_empty() {
+            if !on_round(self, &rest) {
                 return false;
             }
-            done += round.iter().map(|&(n, _)| n as u64).sum::<u64>();
+            let left = rest.order.split_off(rest.order.len().min(ROUND));
+            let round = std::mem::replace(&mut rest.order, left);
+            rest.done += round.iter().map(|&(n, _)| n as u64).sum::<u64>();
             let shared = Shared {
                 dirs: self.dirs,
                 might: &self.might,
@@ -209,6 +229,19 @@ impl<'a> Search<'a> {
             self.grow();
         }
         true
+    }
+
+    /// All that a search finds out beside lines.
+    pub(super) fn tables(&self) -> [&BitTable; 4] {
+        [&self.might, &self.settled, &self.seen, &self.undecided]
+    }
+
+    /// Takes up where another search left off.
+    pub(super) fn restore(&mut self, tables: [BitTable; 4], lines: Vec<Line>, steps: u64) {
+        [self.might, self.settled, self.seen, self.undecided] = tables;
+        self.n_grown = lines.len();
+        self.lines = lines;
+        self.effort.steps = steps;
     }
 
     fn merge(&mut self, found: Found) {
