@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::bits;
 use super::dirs::Dirs;
-use super::rays::{Line, walk};
+use super::rays::{Line, Rng, walk};
 use super::search::Search;
 
 /// Lines a round. Those of one round know nothing of each other.
@@ -34,6 +34,73 @@ impl Search<'_> {
             first = end;
         }
         self.n_grown = first;
+    }
+
+    /// Tries more lines, so many in a round, between cells that count as seen only because nothing was proved.
+    ///
+    /// Among openings alone few such pairs are left. Walls inside cells leave more: no plane speaks of
+    /// those, but lines that pass between them can still be found.
+    pub(super) fn insist(&mut self, n_lines: usize, n_rounds: u64) {
+        let n = self.dirs.n_cells;
+        for a in 0..n {
+            let undecided: Vec<usize> = bits::ones(self.undecided.row(a)).collect();
+            for b in undecided {
+                self.seen.clear(a, b);
+                self.undecided.clear(a, b);
+            }
+        }
+        for round in 0..n_rounds {
+            let visible = self.visible();
+            let found: Vec<Vec<Line>> = (0..n)
+                .into_par_iter()
+                .with_max_len(1)
+                .map(|a| {
+                    let unseen = bits::ones(visible.row(a)).filter(|&b| b > a);
+                    let unseen = unseen.filter(|&b| !self.seen.get(a, b));
+                    let mut rng = Rng::new(round * n as u64 + a as u64);
+                    unseen
+                        .filter_map(|b| self.line_between(a, b, n_lines, &mut rng))
+                        .collect()
+                })
+                .collect();
+            for line in found.into_iter().flatten() {
+                self.keep(line);
+            }
+            self.grow();
+        }
+    }
+
+    /// The first of some random lines that leads from one cell into another.
+    fn line_between(&self, a: usize, b: usize, n_lines: usize, rng: &mut Rng) -> Option<Line> {
+        let dirs = self.dirs;
+        let entries = dirs.entries(b as u32);
+        let pairs: Vec<(usize, usize)> = dirs
+            .exits(a as u32)
+            .iter()
+            .flat_map(|&s| entries.clone().map(move |t| (s as usize, t)))
+            .filter(|&(s, t)| s == t || self.might.get(s, t))
+            .collect();
+        let margin = self.tolerance.rounding * 16.0;
+        let mut chain = Vec::new();
+        for _ in 0..if pairs.is_empty() { 0 } else { n_lines } {
+            let (s, t) = pairs[rng.below(pairs.len())];
+            let origin = dirs.random_point(s, rng);
+            let direction = dirs.random_point(t, rng) - origin;
+            if direction.dot(dirs.all[s].normal) <= 0.0 || !dirs.is_inside(s, origin, margin) {
+                continue;
+            }
+            chain.clear();
+            chain.push(s as u32);
+            walk(dirs, s, origin, direction, margin, self.blocker, &mut chain);
+            if chain.contains(&(t as u32)) {
+                return Some(Line {
+                    origin,
+                    direction,
+                    chain,
+                });
+            }
+        }
+        None
     }
 
     fn grown_from(&self, line: &Line) -> Vec<Line> {
@@ -76,7 +143,8 @@ impl Search<'_> {
         let margin = self.tolerance.rounding * 16.0;
         let last = line.chain.len() - 1;
         for at in [first, last, (first + last) / 2] {
-            let pivot = dirs.crossing(line.chain[at] as usize, line.origin, line.direction);
+            let t = dirs.crossing(line.chain[at] as usize, line.origin, line.direction);
+            let pivot = line.origin + line.direction * t;
             for share in [0.05, 0.5] {
                 let aim = dirs.toward(exit as usize, line, share);
                 let direction = aim - pivot;
@@ -124,11 +192,10 @@ impl Search<'_> {
 }
 
 impl Dirs {
-    /// Where a line meets the plane of an opening.
-    fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> DVec3 {
+    /// Where a line meets the plane of an opening, in lengths of `direction`.
+    pub(super) fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> f64 {
         let dir = &self.all[d];
-        let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / dir.normal.dot(direction);
-        origin + direction * t
+        ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / dir.normal.dot(direction)
     }
 
     /// A point of an opening that a line misses: `share` of the way from its nearest one to its middle.
@@ -138,7 +205,7 @@ impl Dirs {
         if dir.normal.dot(line.direction) <= 1e-9 * line.direction.length() {
             return dir.center;
         }
-        let p = self.crossing(d, line.origin, line.direction);
+        let p = line.origin + line.direction * self.crossing(d, line.origin, line.direction);
         let n = winding.len();
         let mut best = (f64::INFINITY, dir.center);
         for i in 0..n {

@@ -41,6 +41,10 @@ use search::{Rest, Search};
 /// Share of the clearance that the search itself uses; a checker's sums may differ in the last digits.
 const KEPT: f64 = 0.9;
 
+/// Lines tried in the end between cells that walls may hide from each other, and how often.
+const INSIST_LINES: usize = 500;
+const INSIST_ROUNDS: u64 = 4;
+
 /// How thoroughly to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum VisMode {
@@ -211,6 +215,9 @@ pub fn see_all(
             run(&mut search, config, context, rest, key)
         }
     };
+    if config.mode == VisMode::Exact && is_complete && search.blocker.is_some() {
+        search.insist(INSIST_LINES, INSIST_ROUNDS);
+    }
     let evidence = config
         .has_evidence
         .then(|| evidence::encode(graph, &search, config))

@@ -16,6 +16,9 @@ use super::rays::{self, Blocker, Line, Rng};
 /// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
 const ROUND: usize = 64;
 
+/// Share of the far plane that lines keep to; a checker's sums may differ in the last digits.
+const FAR_KEPT: f64 = 1.0 - 1e-9;
+
 /// What is left to search.
 pub(super) struct Rest {
     /// Openings, and before each how many it might see.
@@ -37,6 +40,7 @@ pub(super) struct Search<'a> {
     pub(super) lines: Vec<Line>,
     pub(super) tolerance: Tolerance,
     pub(super) blocker: Option<Blocker<'a>>,
+    far: Option<f64>,
     pub(super) effort: Effort,
     /// How many of `lines` have been grown.
     pub(super) n_grown: usize,
@@ -63,6 +67,7 @@ impl<'a> Search<'a> {
             lines: Vec::new(),
             tolerance: Tolerance::new(dirs.scale, clearance),
             blocker,
+            far,
             effort: Effort::default(),
             n_grown: 0,
         }
@@ -159,6 +164,42 @@ impl<'a> Search<'a> {
         if !self.dirs.is_crossed(&line, self.tolerance.rounding * 8.0) {
             return;
         }
+        if self.far.is_none() && self.blocker.is_none() {
+            return self.keep_piece(line);
+        }
+        // What is solid and what is far, judged as a checker does: between crossings as computed from the
+        // line's origin.
+        let dirs = self.dirs;
+        let ts: Vec<f64> = line
+            .chain
+            .iter()
+            .map(|&d| dirs.crossing(d as usize, line.origin, line.direction))
+            .collect();
+        let is_free: Vec<bool> = ts
+            .windows(2)
+            .map(|t| {
+                let [a, b] = [t[0], t[1]].map(|t| line.origin + line.direction * t);
+                self.blocker.is_none_or(|is_blocked| !is_blocked(a, b))
+            })
+            .collect();
+        let most = self.far.unwrap_or(f64::INFINITY) * FAR_KEPT / line.direction.length();
+        let mut covered = 0;
+        for first in 0..ts.len() {
+            let mut end = first + 1;
+            while end < ts.len() && is_free[end - 1] && ts[end] - ts[first] <= most {
+                end += 1;
+            }
+            if end > covered {
+                covered = end;
+                self.keep_piece(Line {
+                    chain: line.chain[first..end].to_vec(),
+                    ..line.clone()
+                });
+            }
+        }
+    }
+
+    fn keep_piece(&mut self, line: Line) {
         let all = &self.dirs.all;
         let mut is_new = false;
         for i in 0..line.chain.len() {
