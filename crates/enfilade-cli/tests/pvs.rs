@@ -145,3 +145,43 @@ fn a_world_has_statistics_and_mutual_lists() {
         "{text}"
     );
 }
+
+#[test]
+fn evidence_of_real_portal_files_is_accepted() {
+    let scenes = std::env::var_os("ENFILADE_SCENES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
+        PathBuf::from,
+    );
+    // Random grids are too regular: planes that hold edges of two openings, which maps are full of, once
+    // were cut by twice here and once there.
+    for map in ["id_e1m7", "lq_e0m1"] {
+        let prt = scenes.join("quake").join(map).with_extension("prt");
+        if !prt.exists() {
+            println!("skipped: {} is not there", prt.display());
+            continue;
+        }
+        let (pvs, evidence) = (place(map), place(map).with_extension("evidence"));
+        let [o, e, v] = ["-o", "--evidence", "verify"].map(Path::new);
+        let done = enfilade(&[Path::new("pvs"), &prt, o, &pvs, e, &evidence]);
+        assert!(done.status.success(), "{done:?}");
+        let done = enfilade(&[v, &prt, e, &evidence]);
+        assert!(done.status.success(), "{done:?}");
+    }
+}
+
+#[test]
+fn far_planes_and_walls_leave_evidence_that_is_accepted() {
+    let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(40, 3));
+    let (glb, pvs, evidence) = (place("far.glb"), place("far.pvs"), place("far.evidence"));
+    fs::write(&glb, enfilade::cpg::wire::encode_glb(&world).unwrap()).unwrap();
+    let prt = place("far.prt");
+    fs::write(&prt, PRT).unwrap();
+    let [o, e, v, f] = ["-o", "--evidence", "verify", "--far"].map(Path::new);
+    for (input, far) in [(&glb, "9"), (&glb, "1e6"), (&prt, "1.5"), (&prt, "0")] {
+        let far = Path::new(far);
+        let done = enfilade(&[Path::new("pvs"), input, o, &pvs, e, &evidence, f, far]);
+        assert!(done.status.success(), "{done:?}");
+        let done = enfilade(&[v, input, e, &evidence]);
+        assert!(done.status.success(), "{far:?} {done:?}");
+    }
+}

@@ -38,9 +38,15 @@ impl Search<'_> {
 
     /// Tries more lines, so many in a round, between cells that count as seen only because nothing was proved.
     ///
-    /// Among openings alone few such pairs are left. Walls inside cells leave more: no plane speaks of
-    /// those, but lines that pass between them can still be found.
-    pub(super) fn insist(&mut self, n_lines: usize, n_rounds: u64) {
+    /// Among openings alone few such pairs are left. Walls inside cells leave more: no plane between openings
+    /// speaks of those, but lines that pass between them can still be found.
+    /// Goes on while `on_round` says so.
+    pub(super) fn insist(
+        &mut self,
+        n_lines: usize,
+        n_rounds: u64,
+        on_round: &mut dyn FnMut(u64, u64) -> bool,
+    ) {
         let n = self.dirs.n_cells;
         for a in 0..n {
             let undecided: Vec<usize> = bits::ones(self.undecided.row(a)).collect();
@@ -50,6 +56,9 @@ impl Search<'_> {
             }
         }
         for round in 0..n_rounds {
+            if !on_round(1, 1) {
+                return;
+            }
             let visible = self.visible();
             let found: Vec<Vec<Line>> = (0..n)
                 .into_par_iter()
