@@ -37,7 +37,8 @@ pub(super) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
     fnv(&bytes)
 }
 
-fn fnv(bytes: &[u8]) -> u64 {
+/// FNV-1a, 64 bits.
+pub(super) fn fnv(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     })
