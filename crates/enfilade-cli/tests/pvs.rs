@@ -157,7 +157,7 @@ fn evidence_of_real_portal_files_is_accepted() {
     for map in ["id_e1m7", "lq_e0m1"] {
         let prt = scenes.join("quake").join(map).with_extension("prt");
         if !prt.exists() {
-            println!("skipped: {} is not there", prt.display());
+            eprintln!("skipped: {} is not there", prt.display());
             continue;
         }
         let (pvs, evidence) = (place(map), place(map).with_extension("evidence"));
