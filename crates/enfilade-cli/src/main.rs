@@ -5,6 +5,7 @@
 
 mod bake;
 mod bench;
+mod cameras;
 mod demo;
 mod inspect;
 mod locate;
@@ -12,6 +13,7 @@ mod output;
 mod plan;
 mod progress;
 mod pvs;
+mod render;
 mod see;
 mod verify;
 mod world;
@@ -38,6 +40,7 @@ enum Command {
     Locate(locate::Locate),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
+    Render(render::Render),
     See(see::See),
     Verify(verify::Verify),
 }
@@ -51,6 +54,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
+        Command::Render(args) => render::run(&args),
         Command::See(args) => see::run(&args),
         Command::Verify(args) => verify::run(&args),
     }
