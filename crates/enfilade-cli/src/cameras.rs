@@ -89,9 +89,9 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
             }
             Shown::Detail { detail, .. } => things.push((1, Some(detail))),
         }
-        // Depth is 0.02 m / distance.
-        near += u32::from(depth > 0.02);
-        far += u32::from(depth > 0.0 && depth < 0.02 / 6.0);
+        let distance = Camera::distance_of(depth);
+        near += u32::from(distance < 1.0);
+        far += u32::from(depth > 0.0 && distance > 6.0);
     }
     things.sort_unstable();
     things.dedup();

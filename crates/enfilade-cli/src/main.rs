@@ -7,6 +7,7 @@ mod bake;
 mod bench;
 mod cameras;
 mod demo;
+mod exact;
 mod inspect;
 mod locate;
 mod output;

@@ -8,9 +8,6 @@
 use enfilade_runtime::{View, ViewError};
 use glam::{Mat4, Vec3, Vec4};
 
-/// What a camera does not see because it is too near. [Units: wu]
-const NEAR: f32 = 0.02;
-
 /// Where the eye is, which way it looks, how wide. Upright: +Y is up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -23,6 +20,19 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// What is nearer than this is not drawn. [Units: wu]
+    ///
+    /// Depths are floats that are finest at zero, which is infinitely far away: so that this can be as
+    /// little as the smallest gap between an eye and a wall that matters.
+    pub const NEAR: f32 = 1e-4;
+
+    /// How far away a depth of an [`IdPicture`](crate::IdPicture) is along the view direction.
+    /// [Units: wu]
+    #[must_use]
+    pub fn distance_of(depth: f32) -> f32 {
+        Self::NEAR / depth
+    }
+
     /// A camera at `eye` that looks at the point `at`, 60 degrees high.
     #[must_use]
     pub fn looking_at(eye: [f32; 3], at: [f32; 3]) -> Self {
@@ -54,14 +64,13 @@ impl Camera {
         let rows = [
             (right * (focal / aspect)).extend(0.0),
             (up * focal).extend(0.0),
-            Vec4::new(0.0, 0.0, 0.0, NEAR),
+            Vec4::new(0.0, 0.0, 0.0, Self::NEAR),
             forward.extend(0.0),
         ];
         Ok(Projection {
             clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
             origin: Vec3::from(self.eye),
             eye: Vec3::from(self.eye),
-            forward,
             is_parallel: false,
         })
     }
@@ -98,7 +107,6 @@ pub struct Projection {
     pub(crate) origin: Vec3,
     /// Where lines of sight come from; of a parallel projection, far away.
     pub(crate) eye: Vec3,
-    pub(crate) forward: Vec3,
     pub(crate) is_parallel: bool,
 }
 
@@ -132,7 +140,6 @@ impl Projection {
             clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
             origin,
             eye: origin - forward * depth,
-            forward,
             is_parallel: true,
         }
     }
