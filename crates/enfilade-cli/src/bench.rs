@@ -15,6 +15,7 @@ use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 
 use crate::cameras::walk;
 use crate::see::Answers;
+use crate::walkthrough::{self, Walkthrough};
 use crate::world::read_world;
 
 /// Measures what can be seen and prints the tables of the documentation.
@@ -62,6 +63,8 @@ enum What {
         #[arg(long, default_value_t = SightOptions::default().chunk_triangles)]
         chunk: usize,
     },
+    /// A walk through rooms, drawn whole, with frustum culling and by portals.
+    Walkthrough(Walkthrough),
     /// Lines of sight by cells against the tree of the whole world.
     Los {
         /// Worlds.
@@ -94,6 +97,7 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             fov,
             chunk,
         } => bench_maze(&mut table, world, *views, *fov, *chunk)?,
+        What::Walkthrough(args) => walkthrough::bench(&mut table, args)?,
         What::Los {
             scenes,
             rooms,

@@ -17,6 +17,7 @@ mod pvs;
 mod render;
 mod see;
 mod verify;
+mod walkthrough;
 mod world;
 
 use std::io;

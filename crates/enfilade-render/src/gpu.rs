@@ -93,6 +93,10 @@ impl fmt::Display for AdapterChoice {
     }
 }
 
+/// A point in what was submitted.
+#[derive(Clone, Debug)]
+pub struct Submitted(wgpu::SubmissionIndex);
+
 /// An adapter, opened.
 pub struct Gpu {
     /// Its instance, which windows make surfaces with.
@@ -231,6 +235,28 @@ impl Gpu {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
             .map(|_| ())
+            .map_err(|why| RenderError::Lost(why.to_string()))
+    }
+
+    /// A mark after all that was submitted, for [`Gpu::wait_for`].
+    #[must_use]
+    pub fn mark(&self) -> Submitted {
+        Submitted(self.queue.submit([]))
+    }
+
+    /// Waits until what was submitted before the mark is done.
+    ///
+    /// # Errors
+    ///
+    /// A device that was lost.
+    pub fn wait_for(&self, mark: Submitted) -> Result<(), RenderError> {
+        let submission_index = Some(mark.0);
+        let wait = wgpu::PollType::Wait {
+            submission_index,
+            timeout: None,
+        };
+        let done = self.device.poll(wait);
+        done.map(|_| ())
             .map_err(|why| RenderError::Lost(why.to_string()))
     }
 

@@ -29,4 +29,4 @@ pub use marks::{Mark, Shape};
 pub use picture::Picture;
 pub use renderer::{Frame, Paint, Renderer, Stage, Style};
 pub use scene::{GpuWorld, cell_color};
-pub use studio::{Culling, Studio};
+pub use studio::{Culling, Studio, Target};

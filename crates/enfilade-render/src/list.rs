@@ -10,7 +10,7 @@ use enfilade_cpg::CellId;
 use enfilade_runtime::{ChunkId, DetailId, Seen, Sight};
 use glam::Vec3;
 
-use crate::scene::GpuWorld;
+use crate::scene::{Finish, GpuWorld};
 
 /// Why something is drawn though it is not seen, for pictures that explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,7 @@ pub(crate) struct Run {
     pub(crate) first: u32,
     pub(crate) n: u32,
     pub(crate) texture: u32,
+    pub(crate) finish: Finish,
     /// Into [`DrawList::instances`].
     pub(crate) instances: Range<u32>,
     /// `None` for the whole picture.
@@ -105,6 +106,7 @@ fn push_run(runs: &mut Vec<Run>, run: Run) {
     if let Some(last) = runs.last_mut()
         && last.first + last.n == run.first
         && last.texture == run.texture
+        && last.finish == run.finish
         && last.instances == run.instances
         && last.scissor == run.scissor
     {
@@ -119,6 +121,15 @@ impl Lister {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The last list; its buffers are missed until it is given back.
+    pub(crate) fn take(&mut self) -> DrawList {
+        std::mem::take(&mut self.list)
+    }
+
+    pub(crate) fn give(&mut self, list: DrawList) {
+        self.list = list;
     }
 
     /// All that there is, whatever the view.
@@ -255,6 +266,7 @@ impl Lister {
                 first: span.first,
                 n: span.n,
                 texture: span.texture,
+                finish: span.finish,
                 instances: 0..1,
                 scissor,
             };
@@ -284,6 +296,7 @@ impl Lister {
                     first: span.first,
                     n: span.n,
                     texture: span.texture,
+                finish: span.finish,
                     instances,
                     scissor: None,
                 };

@@ -23,7 +23,8 @@ pub(crate) struct Layouts {
 }
 
 pub(crate) struct Pipelines {
-    pub(crate) surface: wgpu::RenderPipeline,
+    /// By [`Finish`](crate::scene::Finish).
+    pub(crate) surfaces: [wgpu::RenderPipeline; 3],
     pub(crate) count: wgpu::RenderPipeline,
     pub(crate) glass: wgpu::RenderPipeline,
     pub(crate) id: wgpu::RenderPipeline,
@@ -33,8 +34,6 @@ pub(crate) struct Pipelines {
     pub(crate) marks: wgpu::RenderPipeline,
     /// Marks that nothing hides.
     pub(crate) marks_on_top: wgpu::RenderPipeline,
-    /// Boxes and polygons that are only counted.
-    pub(crate) query: wgpu::RenderPipeline,
 }
 
 fn entry(
@@ -135,7 +134,6 @@ struct Kind<'a> {
     buffers: &'a [wgpu::VertexBufferLayout<'a>],
     target: Option<(wgpu::TextureFormat, Option<wgpu::BlendState>)>,
     depth: Option<(bool, wgpu::CompareFunction)>,
-    writes_color: bool,
 }
 
 fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
@@ -151,11 +149,7 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
     let targets = [kind.target.map(|(format, blend)| wgpu::ColorTargetState {
         format,
         blend,
-        write_mask: if kind.writes_color {
-            wgpu::ColorWrites::ALL
-        } else {
-            wgpu::ColorWrites::empty()
-        },
+        write_mask: wgpu::ColorWrites::ALL,
     })];
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -224,12 +218,11 @@ impl Pipelines {
             label: "surface",
             module: &surface,
             vertex: "corner",
-            fragment: Some("surface"),
+            fragment: Some("plain"),
             layouts: &[&layouts.world, &texture],
             buffers: &drawn,
             target: Some((COLOR, None)),
             depth: Some((true, nearer)),
-            writes_color: true,
         };
         let marks = Kind {
             label: "marks",
@@ -285,19 +278,19 @@ impl Pipelines {
                 depth: None,
                 ..base
             }),
-            query: make(Kind {
-                label: "query",
-                target: Some((COLOR, None)),
-                writes_color: false,
-                ..marks
-            }),
             marks_on_top: make(Kind {
                 label: "marks on top",
                 depth: Some((false, wgpu::CompareFunction::Always)),
                 ..marks
             }),
             marks: make(marks),
-            surface: make(base),
+            surfaces: ["plain", "textured", "masked"].map(|fragment| {
+                make(Kind {
+                    label: fragment,
+                    fragment: Some(fragment),
+                    ..base
+                })
+            }),
         }
     }
 }

@@ -178,6 +178,10 @@ impl Renderer {
         }
     }
 
+    pub(crate) fn format(&self) -> wgpu::TextureFormat {
+        self.format
+    }
+
     /// Makes a world ready to be drawn by this renderer: bind groups, and what the sun sees.
     /// `everything` is the list of all. One world at a time: the sun's picture is of the last.
     pub fn set_stage(&mut self, gpu: &Gpu, world: &GpuWorld, everything: &DrawList) -> Stage {
@@ -371,16 +375,21 @@ impl Renderer {
                 depth_stencil_attachment: Some(depth_attachment(&targets.depth, Some(0.0))),
                 ..wgpu::RenderPassDescriptor::default()
             });
-            pass.set_pipeline(if is_count {
-                &self.pipelines.count
-            } else {
-                &self.pipelines.surface
-            });
             pass.set_bind_group(0, &stage.world, &[]);
             set_buffers(&mut pass, world, &self.instances);
-            draw_runs(&mut pass, world, &list.opaque, size);
             if is_count {
-                draw_runs(&mut pass, world, &list.transparent, size);
+                pass.set_pipeline(&self.pipelines.count);
+                draw_runs(&mut pass, world, &list.opaque, size, None);
+                draw_runs(&mut pass, world, &list.transparent, size, None);
+            } else {
+                // A cut makes holes in everything.
+                let [plain, textured, masked] = &self.pipelines.surfaces;
+                let surfaces = if frame.style.cut_above < f32::INFINITY {
+                    [masked; 3]
+                } else {
+                    [plain, textured, masked]
+                };
+                draw_runs(&mut pass, world, &list.opaque, size, Some(surfaces));
             }
         }
         {
@@ -406,7 +415,7 @@ impl Renderer {
                 pass.set_pipeline(&self.pipelines.glass);
                 pass.set_bind_group(0, &stage.world, &[]);
                 set_buffers(&mut pass, world, &self.instances);
-                draw_runs(&mut pass, world, &list.transparent, size);
+                draw_runs(&mut pass, world, &list.transparent, size, None);
                 pass.set_scissor_rect(0, 0, size[0], size[1]);
             }
             if !marks.is_empty() {
@@ -519,11 +528,24 @@ fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Gr
     pass.set_vertex_buffer(1, instances.buffer.slice(..));
 }
 
-/// Draws runs, changing textures and scissors only where they differ.
-fn draw_runs(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, runs: &[Run], size: [u32; 2]) {
-    let (mut texture, mut scissor) = (u32::MAX, None);
+/// Draws runs, changing pipelines, textures and scissors only where they differ. `surfaces` by
+/// finish; `None` for what the pass draws with already.
+fn draw_runs(
+    pass: &mut wgpu::RenderPass<'_>,
+    world: &GpuWorld,
+    runs: &[Run],
+    size: [u32; 2],
+    surfaces: Option<[&wgpu::RenderPipeline; 3]>,
+) {
+    let (mut texture, mut scissor, mut finish) = (u32::MAX, None, None);
     pass.set_scissor_rect(0, 0, size[0], size[1]);
     for run in runs {
+        if let Some(surfaces) = surfaces
+            && finish != Some(run.finish)
+        {
+            finish = Some(run.finish);
+            pass.set_pipeline(surfaces[run.finish as usize]);
+        }
         if run.texture != texture {
             texture = run.texture;
             pass.set_bind_group(1, &world.textures[texture as usize], &[]);

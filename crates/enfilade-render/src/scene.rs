@@ -60,7 +60,17 @@ pub(crate) struct Span {
     pub(crate) n: u32,
     /// Index into [`GpuWorld::textures`].
     pub(crate) texture: u32,
+    pub(crate) finish: Finish,
     pub(crate) is_transparent: bool,
+}
+
+/// What it takes to shade a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Finish {
+    Plain = 0,
+    Textured = 1,
+    /// With holes.
+    Masked = 2,
 }
 
 /// A placed detail object, as drawn.
@@ -70,7 +80,6 @@ pub(crate) struct Placed {
     pub(crate) center: Vec3,
     /// Of a sphere that holds it. [Units: wu]
     pub(crate) radius: f32,
-    pub(crate) n_triangles: u32,
 }
 
 /// A world on the adapter, ready to be drawn.
@@ -91,8 +100,6 @@ pub struct GpuWorld {
     /// By detail mesh: its parts.
     pub(crate) meshes: Vec<Vec<Span>>,
     pub(crate) details: Vec<Placed>,
-    /// By detail: the cells it stands in.
-    pub(crate) detail_cells: Vec<Vec<CellId>>,
     /// Least and greatest corner of all that is drawn. [Units: wu]
     pub(crate) bounds: [Vec3; 2],
     pub(crate) n_triangles: u64,
@@ -166,10 +173,18 @@ impl Filling<'_> {
             .and_then(|t| self.texture_of.get(t as usize))
             .copied()
             .filter(|_| uvs.is_some());
+        let texture = texture.unwrap_or(0);
         Span {
             first,
             n: order.len() as u32,
-            texture: texture.unwrap_or(0),
+            texture,
+            finish: if look.cutoff > 0.0 {
+                Finish::Masked
+            } else if texture > 0 {
+                Finish::Textured
+            } else {
+                Finish::Plain
+            },
             is_transparent: look.is_transparent,
         }
     }
@@ -197,7 +212,7 @@ impl GpuWorld {
         };
         let batches = filling.add_batches(sight);
         let meshes = filling.add_meshes();
-        let (instances, details) = placed(world, &meshes);
+        let (instances, details) = placed(world);
         let chunks: Vec<Span> = sight
             .chunks()
             .iter()
@@ -236,7 +251,6 @@ impl GpuWorld {
             batch_cells: world.batches.iter().map(|b| b.cells.clone()).collect(),
             meshes,
             details,
-            detail_cells: world.details.iter().map(|d| d.cells.clone()).collect(),
             bounds,
             n_triangles: sight.n_triangles(),
             n_missing_pictures,
@@ -303,7 +317,7 @@ impl Filling<'_> {
     }
 }
 
-fn placed(world: &World, meshes: &[Vec<Span>]) -> (Vec<Instance>, Vec<Placed>) {
+fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
     // The first is where structure stands: where it is.
     let mut instances = vec![Instance {
         rows: [
@@ -330,12 +344,10 @@ fn placed(world: &World, meshes: &[Vec<Span>]) -> (Vec<Instance>, Vec<Placed>) {
             }
         }
         let is_empty = low.x > high.x;
-        let parts = meshes.get(detail.mesh as usize);
         details.push(Placed {
             mesh: detail.mesh,
             center: if is_empty { m.w_axis.truncate() } else { (low + high) * 0.5 },
             radius: if is_empty { 0.0 } else { (high - low).length() * 0.5 },
-            n_triangles: parts.iter().flat_map(|p| p.iter()).map(|s| s.n / 3).sum(),
         });
     }
     (instances, details)

@@ -24,6 +24,12 @@ pub enum Culling {
     Portals,
 }
 
+/// What frames that nobody looks at are drawn to.
+pub struct Target {
+    view: wgpu::TextureView,
+    size: [u32; 2],
+}
+
 /// An adapter, a world on it, and what answers what is seen of it.
 pub struct Studio {
     /// The adapter.
@@ -99,6 +105,53 @@ impl Studio {
                 self.lister.seen(world, sight, &seen, eye, Some(size))
             }
         }
+    }
+
+    /// The same, to keep: until it is [given back](Studio::give_list), so that nothing is allocated.
+    pub fn take_list(
+        &mut self,
+        view: &View,
+        eye: [f32; 3],
+        culling: Culling,
+        size: [u32; 2],
+    ) -> DrawList {
+        self.list(view, eye, culling, size);
+        self.lister.take()
+    }
+
+    /// Gives the buffers of a list back.
+    pub fn give_list(&mut self, list: DrawList) {
+        self.lister.give(list);
+    }
+
+    /// A target of the studio's format, for frames that nobody looks at.
+    ///
+    /// # Errors
+    ///
+    /// A size beyond the adapter's limit.
+    pub fn target(&self, size: [u32; 2]) -> Result<Target, RenderError> {
+        let limit = self.gpu.device.limits().max_texture_dimension_2d;
+        Gpu::check("a side of the picture", size[0].max(size[1]).into(), limit)?;
+        let texture = crate::renderer::texture(
+            &self.gpu,
+            "target",
+            size,
+            self.renderer.format(),
+            wgpu::TextureUsages::COPY_SRC,
+        );
+        Ok(Target {
+            view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            size,
+        })
+    }
+
+    /// Draws a frame to a target.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::draw`].
+    pub fn draw_to(&mut self, frame: &Frame<'_>, target: &Target) -> Result<(), RenderError> {
+        self.draw(frame, &target.view, target.size)
     }
 
     /// A picture from a camera, with marks over it.

@@ -74,10 +74,7 @@ fn sunlit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     return lit / 9.0;
 }
 
-fn shaded(in: Surface) -> vec4<f32> {
-    if in.world.y > globals.origin.w {
-        discard;
-    }
+fn shaded(in: Surface, texel: vec4<f32>) -> vec4<f32> {
     let eye = select(globals.eye.xyz - in.world, globals.eye.xyz - globals.origin.xyz, globals.eye.w > 0.5);
     let toward_eye = normalize(eye);
     let relative = in.world - globals.origin.xyz;
@@ -89,10 +86,7 @@ fn shaded(in: Surface) -> vec4<f32> {
     normal = select(normal, -normal, dot(normal, toward_eye) < 0.0);
 
     let material = materials[parts[in.part].material];
-    var base = material.base_color * in.color * textureSample(base_texture, base_sampler, in.uv);
-    if base.a < material.emissive.w {
-        discard;
-    }
+    var base = material.base_color * in.color * texel;
     var emissive = material.emissive.rgb;
     let i = in.instance & INSTANCE_MASK;
     let reason = in.instance >> 28u;
@@ -126,15 +120,40 @@ fn toned(c: vec3<f32>) -> vec3<f32> {
     return c / (1.0 + 0.28 * c);
 }
 
+fn cut(in: Surface, texel: vec4<f32>) {
+    let material = materials[parts[in.part].material];
+    let alpha = material.base_color.a * in.color.a * texel.a;
+    if in.world.y > globals.origin.w || alpha < material.emissive.w {
+        discard;
+    }
+}
+
+// Three ways, from cheap to dear: what may discard a pixel is shaded before its depth is known, and a
+// texture costs software as much as all else.
+
 @fragment
-fn surface(in: Surface) -> @location(0) vec4<f32> {
-    let c = shaded(in);
-    return vec4(toned(c.rgb), 1.0);
+fn plain(in: Surface) -> @location(0) vec4<f32> {
+    return vec4(toned(shaded(in, vec4(1.0)).rgb), 1.0);
+}
+
+@fragment
+fn textured(in: Surface) -> @location(0) vec4<f32> {
+    let texel = textureSample(base_texture, base_sampler, in.uv);
+    return vec4(toned(shaded(in, texel).rgb), 1.0);
+}
+
+@fragment
+fn masked(in: Surface) -> @location(0) vec4<f32> {
+    let texel = textureSample(base_texture, base_sampler, in.uv);
+    cut(in, texel);
+    return vec4(toned(shaded(in, texel).rgb), 1.0);
 }
 
 @fragment
 fn glass(in: Surface) -> @location(0) vec4<f32> {
-    let c = shaded(in);
+    let texel = textureSample(base_texture, base_sampler, in.uv);
+    cut(in, texel);
+    let c = shaded(in, texel);
     return vec4(toned(c.rgb), c.a);
 }
 
