@@ -173,11 +173,10 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
             out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
             out.tied += difference.n_tied;
             difference.lost.retain(|l| {
-                let is_right = |(_, depth)| {
-                    let distance = f64::from(Camera::distance_of(depth));
-                    oracle.is_right(&camera, l.at, asked.size, distance, layer == 1)
-                };
-                let (on_edge, in_crack) = (is_right(l.found), !is_right(l.expected));
+                let distance = |(_, depth)| f64::from(Camera::distance_of(depth));
+                let (shown, drawn) = (distance(l.expected), distance(l.found));
+                let on_edge = oracle.is_right(&camera, l.at, asked.size, drawn, layer == 1);
+                let in_crack = !oracle.is_met(&camera, l.at, asked.size, shown, layer == 1);
                 out.edges += u64::from(on_edge);
                 out.cracks += u64::from(in_crack && !on_edge);
                 !on_edge && !in_crack

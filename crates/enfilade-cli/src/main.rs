@@ -15,6 +15,7 @@ mod plan;
 mod progress;
 mod pvs;
 mod render;
+mod report;
 mod see;
 mod verify;
 mod walkthrough;
@@ -43,6 +44,7 @@ enum Command {
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
     Render(render::Render),
+    Report(report::Report),
     See(see::See),
     Verify(verify::Verify),
 }
@@ -57,6 +59,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
         Command::Verify(args) => verify::run(&args),
     }
