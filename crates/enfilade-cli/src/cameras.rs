@@ -175,12 +175,13 @@ pub(crate) fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> 
         if line.is_empty() {
             continue;
         }
-        let numbers: Result<Vec<f32>, _> = line.split_whitespace().map(str::parse).collect();
+        let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse).collect();
         match numbers.as_deref() {
             Ok(&[x, y, z, a, b, c]) if [x, y, z, a, b, c].iter().all(|v| v.is_finite()) => {
                 out.push(Camera {
+                    eye: [x, y, z].map(|v| v as f32),
+                    toward: [a - x, b - y, c - z].map(|v| v as f32),
                     fov_y,
-                    ..Camera::looking_at([x, y, z], [a, b, c])
                 });
             }
             _ => bail!(
@@ -201,7 +202,8 @@ pub(crate) fn path_text(cameras: &[Camera]) -> String {
     let mut out = String::from("# eye x y z, point looked at x y z; meters\n");
     for c in cameras {
         let [x, y, z] = c.eye;
-        let [a, b, d] = [0, 1, 2].map(|k| c.eye[k] + c.toward[k]);
+        // Summed with more digits than either has, so that what is read back is what was written.
+        let [a, b, d] = [0, 1, 2].map(|k| f64::from(c.eye[k]) + f64::from(c.toward[k]));
         out += &format!("{x} {y} {z} {a} {b} {d}\n");
     }
     out
@@ -209,7 +211,12 @@ pub(crate) fn path_text(cameras: &[Camera]) -> String {
 
 /// A random camera of `verify --views`: mostly in a cell, now and then in an opening, or anywhere,
 /// walls and the outside included.
-pub(crate) fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds: [[f32; 3]; 2]) -> Camera {
+pub(crate) fn random_camera(
+    rng: &mut Rng,
+    world: &World,
+    sight: &Sight,
+    bounds: [[f32; 3]; 2],
+) -> Camera {
     let in_box = |rng: &mut Rng, [low, high]: [[f32; 3]; 2]| {
         [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32)
     };
@@ -244,12 +251,18 @@ pub(crate) fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds:
 }
 
 /// What opens nearest to where a camera looks, and how far away it is. [Units: wu]
-pub(crate) fn portal_looked_at(world: &World, lines: &Sightlines, camera: &Camera) -> Option<(PortalId, f32)> {
+pub(crate) fn portal_looked_at(
+    world: &World,
+    lines: &Sightlines,
+    camera: &Camera,
+) -> Option<(PortalId, f32)> {
     let length = camera.toward.iter().map(|x| x * x).sum::<f32>().sqrt();
     let forward = camera.toward.map(|x| x / length.max(1e-9));
     let far = 30.0;
     let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * far);
-    let wall = lines.first_hit(camera.eye, end).map_or(far, |h| h.t as f32 * far);
+    let wall = lines
+        .first_hit(camera.eye, end)
+        .map_or(far, |h| h.t as f32 * far);
     let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|k| a[k] - b[k]);
     let cross = |a: [f32; 3], b: [f32; 3]| {

@@ -135,10 +135,7 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
     let mut studio = Studio::new(Gpu::open(asked.adapter)?, world)?;
     let bounds = studio.world.bounds();
     let margin = 0.05;
-    let bounds = [
-        bounds[0].map(|x| x - margin),
-        bounds[1].map(|x| x + margin),
-    ];
+    let bounds = [bounds[0].map(|x| x - margin), bounds[1].map(|x| x + margin)];
     let mut rng = Rng::new(asked.seed);
     let mut out = Exactness {
         views: asked.views,
@@ -149,7 +146,7 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
         std::fs::create_dir_all(dir)
             .with_context(|| format!("cannot make folder {}", dir.display()))?;
     }
-    let oracle = Oracle::new(world, studio.sight.tolerance());
+    let oracle = Oracle::new(world, &studio.sight);
     let bar = StageBar::new();
     bar.start("comparing pictures", asked.views);
     let aspect = asked.size[0] as f32 / asked.size[1] as f32;
@@ -173,10 +170,9 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
             out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
             out.tied += difference.n_tied;
             difference.lost.retain(|l| {
-                let distance = |(_, depth)| f64::from(Camera::distance_of(depth));
-                let (shown, drawn) = (distance(l.expected), distance(l.found));
+                let drawn = f64::from(Camera::distance_of(l.found.1));
                 let on_edge = oracle.is_right(&camera, l.at, asked.size, drawn, layer == 1);
-                let in_crack = !oracle.is_met(&camera, l.at, asked.size, shown, layer == 1);
+                let in_crack = !oracle.is_met(&camera, l.at, asked.size, l.expected.0, layer == 1);
                 out.edges += u64::from(on_edge);
                 out.cracks += u64::from(in_crack && !on_edge);
                 !on_edge && !in_crack
@@ -187,7 +183,8 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
             out.differing += lost.len() as u64;
             out.differing_views += 1;
             if out.lost.len() < asked.max_listed {
-                out.lost.push(describe(&studio, world, &camera, view, &lost));
+                out.lost
+                    .push(describe(&studio, world, &camera, view, &lost));
                 if let Some(dir) = asked.pictures {
                     let picture = picture_of_loss(&mut studio, &camera, &lost, asked.size)?;
                     write_atomically(&dir.join(format!("view-{view}.png")), &picture.to_png()?)?;
@@ -200,7 +197,13 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
     Ok(out)
 }
 
-fn describe(studio: &Studio, world: &World, camera: &Camera, view: u64, lost: &[LostPixel]) -> Lost {
+fn describe(
+    studio: &Studio,
+    world: &World,
+    camera: &Camera,
+    view: u64,
+    lost: &[LostPixel],
+) -> Lost {
     let first = lost[0];
     let (expected, cells) = named(studio, world, first.expected.0);
     let (found, _) = named(studio, world, first.found.0);

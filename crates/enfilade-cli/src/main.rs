@@ -18,6 +18,8 @@ mod render;
 mod report;
 mod see;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
 mod walkthrough;
 mod world;
 
@@ -47,6 +49,8 @@ enum Command {
     Report(report::Report),
     See(see::See),
     Verify(verify::Verify),
+    #[cfg(feature = "view")]
+    View(view::View),
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
@@ -62,6 +66,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
         Command::Verify(args) => verify::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
     }
 }
 

@@ -111,8 +111,8 @@ fn angle(text: &str) -> Result<f32, String> {
 /// Reads a world and puts it on an adapter.
 pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
     let world = read_world(path)?;
-    let studio = Studio::new(Gpu::open(adapter)?, &world)
-        .with_context(|| path.display().to_string())?;
+    let studio =
+        Studio::new(Gpu::open(adapter)?, &world).with_context(|| path.display().to_string())?;
     let n = studio.world.n_missing_pictures();
     if n > 0 {
         eprintln!("enfilade: {n} pictures of textures are missing or damaged; drawn without");
@@ -138,7 +138,11 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     if !is_path {
         check_target(&args.output)?;
     }
-    let given = args.path.as_deref().map(|p| read_path(p, fov)).transpose()?;
+    let given = args
+        .path
+        .as_deref()
+        .map(|p| read_path(p, fov))
+        .transpose()?;
     let (world, mut studio) = open(&args.world, &args.adapter)?;
     for &p in &args.close {
         if p as usize >= world.graph.portals.len() {
@@ -266,7 +270,11 @@ pub(crate) fn portal_marks(
         marks.push(mark(line.clone(), [1.0, 0.45, 0.02, 0.22], width, true));
         marks.push(mark(line, [1.0, 0.45, 0.02, 1.0], width, false));
     }
-    for v in seen.visits().iter().filter(|v| v.via.is_some() && v.face == 0) {
+    for v in seen
+        .visits()
+        .iter()
+        .filter(|v| v.via.is_some() && v.face == 0)
+    {
         marks.push(Mark {
             shape: Shape::Rectangle(v.rectangle),
             color: [0.05, 0.55, 0.9, 0.8],
@@ -331,7 +339,11 @@ pub(crate) fn above(
         .map(|i| {
             let a = i as f32 / 24.0 * std::f32::consts::TAU;
             let r = reach * 0.008;
-            [camera.eye[0] + a.cos() * r, camera.eye[1], camera.eye[2] + a.sin() * r]
+            [
+                camera.eye[0] + a.cos() * r,
+                camera.eye[1],
+                camera.eye[2] + a.sin() * r,
+            ]
         })
         .collect();
     marks.push(line(Shape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));

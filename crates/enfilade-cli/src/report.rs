@@ -49,7 +49,9 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     parts.visible = visible(&world, &mut parts.notes)?;
     let sight = Sight::build(&world).with_context(|| args.world.display().to_string())?;
     let steps = measured(&world, &sight, args.views);
-    parts.tables.push(in_numbers(&world, &sight, &parts.visible));
+    parts
+        .tables
+        .push(in_numbers(&world, &sight, &parts.visible));
     if !steps.is_empty() {
         parts.tables.push(on_a_walk(&sight, &steps));
     }
@@ -128,8 +130,17 @@ fn row(cells: &[&str]) -> Vec<String> {
 fn in_numbers(world: &World, sight: &Sight, visible: &[CellSet]) -> Table {
     let graph = &world.graph;
     let (n_cells, n_portals) = (graph.cells.len(), graph.portals.len());
-    let structure: usize = world.batches.iter().map(|b| b.primitive.indices.len() / 3).sum();
-    let most = graph.cells.iter().map(|c| c.portals.len()).max().unwrap_or(0);
+    let structure: usize = world
+        .batches
+        .iter()
+        .map(|b| b.primitive.indices.len() / 3)
+        .sum();
+    let most = graph
+        .cells
+        .iter()
+        .map(|c| c.portals.len())
+        .max()
+        .unwrap_or(0);
     let mean = |sum: usize| format!("{:.2}", sum as f64 / n_cells.max(1) as f64);
     let seen: usize = visible.iter().map(CellSet::len).sum();
     let most_seen = visible.iter().map(CellSet::len).max().unwrap_or(0);
@@ -139,8 +150,18 @@ fn in_numbers(world: &World, sight: &Sight, visible: &[CellSet]) -> Table {
         rows: vec![
             row(&["", "all", "mean of a room", "most of a room"]),
             row(&["rooms (outdoors included)", &n_cells.to_string(), "", ""]),
-            row(&["doorways", &n_portals.to_string(), &mean(2 * n_portals), &most.to_string()]),
-            row(&["triangles of structure", &structure.to_string(), &mean(structure), ""]),
+            row(&[
+                "doorways",
+                &n_portals.to_string(),
+                &mean(2 * n_portals),
+                &most.to_string(),
+            ]),
+            row(&[
+                "triangles of structure",
+                &structure.to_string(),
+                &mean(structure),
+                "",
+            ]),
             row(&[
                 "triangles with objects",
                 &sight.n_triangles().to_string(),
@@ -165,11 +186,18 @@ fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
     };
     Table {
         title: "On a walk".into(),
-        note: format!("{} views at eye height, a meter apart, through the doorways.", steps.len()),
+        note: format!(
+            "{} views at eye height, a meter apart, through the doorways.",
+            steps.len()
+        ),
         rows: vec![
             row(&["", "least", "mean", "most"]),
-            line("triangles in the view frustum, %", 2, &|s| s.frustum as f64 / all * 100.0),
-            line("triangles seen through doorways, %", 2, &|s| s.portals as f64 / all * 100.0),
+            line("triangles in the view frustum, %", 2, &|s| {
+                s.frustum as f64 / all * 100.0
+            }),
+            line("triangles seen through doorways, %", 2, &|s| {
+                s.portals as f64 / all * 100.0
+            }),
             line("rooms seen", 1, &|s| s.cells as f64),
             line("time to find out, µs", 1, &|s| s.micros),
         ],
@@ -181,7 +209,9 @@ fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figur
     let mut out = Vec::new();
     let style = Style::default();
     let camera = good_camera(&mut studio, world)?;
-    let picture = smooth(SIZE, |size| Ok(studio.picture(&camera, Culling::Portals, style, &[], size)?))?;
+    let picture = smooth(SIZE, |size| {
+        Ok(studio.picture(&camera, Culling::Portals, style, &[], size)?)
+    })?;
     out.push(Figure {
         caption: "A view inside.".into(),
         png: picture.to_png()?,

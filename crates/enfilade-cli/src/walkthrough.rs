@@ -66,16 +66,14 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
         bail!("a world is needed, or --tower ROOMS");
     }
     table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | triangles drawn | draws | ms on the processor |".into());
-    table.push(
-        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |".into(),
-    );
+    table.push("| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |".into());
     let mut adapter = String::new();
     for (name, mut world) in worlds {
         if let Some(total) = args.total {
             furnish(&mut world, total)?;
         }
-        let mut studio = Studio::new(Gpu::open(&args.adapter)?, &world)
-            .with_context(|| name.clone())?;
+        let mut studio =
+            Studio::new(Gpu::open(&args.adapter)?, &world).with_context(|| name.clone())?;
         adapter = studio.gpu.name();
         let cameras = walk_cameras(&world, &studio.sight, args.frames, FOV);
         if cameras.is_empty() {
@@ -90,7 +88,11 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
         ];
         let mut lines = Vec::new();
         for (label, culling) in modes {
-            let step = if culling == Culling::Everything { args.sparse.max(1) } else { 1 };
+            let step = if culling == Culling::Everything {
+                args.sparse.max(1)
+            } else {
+                1
+            };
             let cameras: Vec<Camera> = cameras.iter().copied().step_by(step).collect();
             let run = walk(&mut studio, &cameras, culling, args, &target)?;
             if culling == Culling::Frustum {
@@ -202,15 +204,26 @@ fn furnish(world: &mut World, total: u64) -> anyhow::Result<()> {
     for (i, cell) in (0..).zip(&world.graph.cells) {
         let [low, high] = cell.aabb;
         let at = |t: [f32; 3]| [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * t[k]);
-        let spots = [[0.5, 0.35, 0.5], [0.3, 0.35, 0.3], [0.7, 0.35, 0.7], [0.3, 0.4, 0.7]];
-        let spot = spots.iter().map(|&t| at(t)).find(|&p| sight.locate(p) == Some(CellId(i)));
+        let spots = [
+            [0.5, 0.35, 0.5],
+            [0.3, 0.35, 0.3],
+            [0.7, 0.35, 0.7],
+            [0.3, 0.4, 0.7],
+        ];
+        let spot = spots
+            .iter()
+            .map(|&t| at(t))
+            .find(|&p| sight.locate(p) == Some(CellId(i)));
         if let Some(p) = spot.filter(|_| !cell.outdoor) {
             places.push(p);
         }
     }
     let missing = total.saturating_sub(sight.n_triangles());
     if places.is_empty() || missing == 0 {
-        bail!("it has {} triangles already, or no rooms", sight.n_triangles());
+        bail!(
+            "it has {} triangles already, or no rooms",
+            sight.n_triangles()
+        );
     }
     let each = missing.div_ceil(places.len() as u64);
     // A ring, wound about itself: 4 by 1 quads.
@@ -266,7 +279,8 @@ fn ring(along: u32, around: u32) -> Primitive {
             let r = 0.09 * (1.0 + 0.25 * (a * 12.0 + b * 3.0).sin());
             let (x, y) = (0.28 + r * b.cos(), r * b.sin());
             out.positions.push([x * a.cos(), y, x * a.sin()]);
-            out.normals.push([b.cos() * a.cos(), b.sin(), b.cos() * a.sin()]);
+            out.normals
+                .push([b.cos() * a.cos(), b.sin(), b.cos() * a.sin()]);
             let at = |i: u32, j: u32| (i % along) * around + j % around;
             let q = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
             out.indices.extend([q[0], q[1], q[2], q[0], q[2], q[3]]);

@@ -176,7 +176,10 @@ mod tests {
             .iter()
             .map(|c| p.place((*c * 7.0).to_array()).unwrap())
             .collect();
-        for (got, want) in at.iter().zip([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) {
+        for (got, want) in at
+            .iter()
+            .zip([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
+        {
             assert!((got[0] - want[0]).abs() < 1e-5 && (got[1] - want[1]).abs() < 1e-5);
         }
     }
@@ -184,7 +187,11 @@ mod tests {
     #[test]
     fn a_camera_that_looks_nowhere_is_an_error() {
         for toward in [[0.0; 3], [f32::NAN, 0.0, 0.0]] {
-            let camera = Camera { eye: [0.0; 3], toward, fov_y: 1.0 };
+            let camera = Camera {
+                eye: [0.0; 3],
+                toward,
+                fov_y: 1.0,
+            };
             assert!(camera.projection(1.0).is_err());
         }
     }

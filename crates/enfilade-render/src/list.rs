@@ -154,11 +154,11 @@ impl Lister {
         size: Option<[u32; 2]>,
     ) -> &DrawList {
         let is_flat = seen.visits().iter().all(|v| v.face == 0);
-        let size = size.filter(|_| is_flat && !seen.counts().is_eye_lost && !seen.counts().is_capped);
+        let size =
+            size.filter(|_| is_flat && !seen.counts().is_eye_lost && !seen.counts().is_capped);
         self.begin(Reason::Seen);
         if size.is_some() {
-            self.rectangles
-                .resize(sight.n_cells(), (0, [0.0; 4]));
+            self.rectangles.resize(sight.n_cells(), (0, [0.0; 4]));
             for v in seen.visits() {
                 let r = &mut self.rectangles[v.cell.0 as usize];
                 let [left, bottom, right, top] = v.rectangle;
@@ -225,7 +225,12 @@ impl Lister {
             if let Some(&(stamp, [left, bottom, right, top])) = self.rectangles.get(c.0 as usize)
                 && stamp == self.stamp
             {
-                r = [r[0].min(left), r[1].min(bottom), r[2].max(right), r[3].max(top)];
+                r = [
+                    r[0].min(left),
+                    r[1].min(bottom),
+                    r[2].max(right),
+                    r[3].max(top),
+                ];
             }
         }
         let [w, h] = size.map(|n| n as f32);
@@ -296,7 +301,7 @@ impl Lister {
                     first: span.first,
                     n: span.n,
                     texture: span.texture,
-                finish: span.finish,
+                    finish: span.finish,
                     instances,
                     scissor: None,
                 };

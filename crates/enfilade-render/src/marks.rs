@@ -44,7 +44,9 @@ pub(crate) fn corners(
     size: [u32; 2],
 ) -> [Vec<MarkCorner>; 2] {
     let mut out = [Vec::new(), Vec::new()];
-    let clip = |p: [f32; 3]| projection.clip_from_relative * (Vec3::from(p) - projection.origin).extend(1.0);
+    let clip = |p: [f32; 3]| {
+        projection.clip_from_relative * (Vec3::from(p) - projection.origin).extend(1.0)
+    };
     for mark in marks {
         let out = &mut out[usize::from(mark.on_top)];
         let mut line = |a, b| add_line(out, mark, [a, b], size);
@@ -57,7 +59,8 @@ pub(crate) fn corners(
                 }
             }
             Shape::Rectangle([l, b, r, t]) => {
-                let points = [[l, b], [r, b], [r, t], [l, t]].map(|[x, y]| Vec4::new(*x, *y, 1.0, 1.0));
+                let points =
+                    [[l, b], [r, b], [r, t], [l, t]].map(|[x, y]| Vec4::new(*x, *y, 1.0, 1.0));
                 for i in 0..4 {
                     line(points[i], points[(i + 1) % 4]);
                 }
@@ -101,7 +104,10 @@ fn add_line(out: &mut Vec<MarkCorner>, mark: &Mark, [a, b]: [Vec4; 2], size: [u3
         return;
     }
     // A little longer than it is, so that corners close.
-    let (ux, uy) = (dx / length * mark.width * 0.5, dy / length * mark.width * 0.5);
+    let (ux, uy) = (
+        dx / length * mark.width * 0.5,
+        dy / length * mark.width * 0.5,
+    );
     let at = |p: Vec4, along: f32, across: f32| {
         let x = (ux * along - uy * across) / half[0] * p.w;
         let y = (uy * along + ux * across) / half[1] * p.w;

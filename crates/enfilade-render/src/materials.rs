@@ -52,14 +52,15 @@ impl Look {
         for (k, e) in look.emissive.iter_mut().enumerate() {
             *e = number(&value["emissiveFactor"][k], 0.0);
         }
-        let transmission =
-            &value["extensions"]["KHR_materials_transmission"]["transmissionFactor"];
+        let transmission = &value["extensions"]["KHR_materials_transmission"]["transmissionFactor"];
         if let Some(t) = transmission.as_f64() {
             // Glass that says it transmits all is seen by what it reflects: a tenth.
             look.base_color[3] = look.base_color[3].min(1.0 - 0.85 * t as f32);
         }
         let texture = &value["pbrMetallicRoughness"]["baseColorTexture"];
-        look.texture = texture["index"].as_u64().and_then(|i| u32::try_from(i).ok());
+        look.texture = texture["index"]
+            .as_u64()
+            .and_then(|i| u32::try_from(i).ok());
         look.uv_set = texture["texCoord"].as_u64().unwrap_or(0) as usize;
         for c in look.base_color.iter_mut().chain(&mut look.emissive) {
             if !c.is_finite() {
@@ -149,13 +150,22 @@ mod tests {
     #[test]
     fn missing_and_damaged_pictures_are_drawn_without() {
         let mut world = World {
-            textures: vec![Texture::default(), Texture { image: Some(0), ..Texture::default() }],
+            textures: vec![
+                Texture::default(),
+                Texture {
+                    image: Some(0),
+                    ..Texture::default()
+                },
+            ],
             ..World::default()
         };
         assert!(decode(&world, 0).is_none(), "no image");
         assert!(decode(&world, 1).is_none(), "no such image");
         assert!(decode(&world, 9).is_none(), "no such texture");
-        world.images.push(Image { bytes: b"\x89PNG\r\n\x1a\n and nothing".to_vec(), ..Image::default() });
+        world.images.push(Image {
+            bytes: b"\x89PNG\r\n\x1a\n and nothing".to_vec(),
+            ..Image::default()
+        });
         assert!(decode(&world, 1).is_none(), "cut off");
     }
 
@@ -166,11 +176,22 @@ mod tests {
             .write_to(&mut bytes, image::ImageFormat::Png)
             .unwrap();
         let world = World {
-            textures: vec![Texture { image: Some(0), ..Texture::default() }],
-            images: vec![Image { bytes: bytes.into_inner(), ..Image::default() }],
+            textures: vec![Texture {
+                image: Some(0),
+                ..Texture::default()
+            }],
+            images: vec![Image {
+                bytes: bytes.into_inner(),
+                ..Image::default()
+            }],
             ..World::default()
         };
-        let sizes: Vec<_> = decode(&world, 0).unwrap().levels.iter().map(image::RgbaImage::dimensions).collect();
+        let sizes: Vec<_> = decode(&world, 0)
+            .unwrap()
+            .levels
+            .iter()
+            .map(image::RgbaImage::dimensions)
+            .collect();
         assert_eq!(sizes, [(5, 3), (2, 1), (1, 1)]);
     }
 }

@@ -50,7 +50,11 @@ impl Picture {
                 rgba.push(255);
             }
         }
-        Self { width, height, rgba }
+        Self {
+            width,
+            height,
+            rgba,
+        }
     }
 
     /// The color of a pixel.
@@ -83,19 +87,35 @@ mod tests {
     #[test]
     fn a_picture_comes_back_from_its_png() {
         let rgba = [9, 8, 7, 255, 1, 2, 3, 255].to_vec();
-        let picture = Picture { width: 2, height: 1, rgba };
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            rgba,
+        };
         let png = picture.to_png().unwrap();
         let back = image::load_from_memory(&png).unwrap().into_rgba8();
         assert_eq!((back.dimensions(), back.as_raw()), ((2, 1), &picture.rgba));
-        let short = Picture { rgba: vec![0; 3], ..picture };
+        let short = Picture {
+            rgba: vec![0; 3],
+            ..picture
+        };
         assert!(short.to_png().is_err());
     }
 
     #[test]
     fn half_black_half_white_is_half_the_light() {
         let rgba = [[0, 0, 0, 255], [255; 4], [255; 4], [0, 0, 0, 255]].concat();
-        let half = Picture { width: 2, height: 2, rgba }.halved();
+        let half = Picture {
+            width: 2,
+            height: 2,
+            rgba,
+        }
+        .halved();
         assert_eq!((half.width, half.height), (1, 1));
-        assert!((185..190).contains(&half.pixel(0, 0)[0]), "{:?}", half.pixel(0, 0));
+        assert!(
+            (185..190).contains(&half.pixel(0, 0)[0]),
+            "{:?}",
+            half.pixel(0, 0)
+        );
     }
 }

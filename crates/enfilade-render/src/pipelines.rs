@@ -211,7 +211,10 @@ impl Pipelines {
             dst_factor: wgpu::BlendFactor::One,
             operation: wgpu::BlendOperation::Add,
         };
-        let add = wgpu::BlendState { color: add, alpha: add };
+        let add = wgpu::BlendState {
+            color: add,
+            alpha: add,
+        };
         let over = wgpu::BlendState::ALPHA_BLENDING;
         let nearer = wgpu::CompareFunction::Greater;
         let base = Kind {

@@ -152,7 +152,13 @@ impl Renderer {
         let layouts = Layouts::new(gpu);
         let pipelines = Pipelines::new(gpu, &layouts, format);
         let side = SHADOW_SIDE.min(gpu.device.limits().max_texture_dimension_2d);
-        let shadow_map = texture(gpu, "shadow", [side, side], DEPTH, wgpu::TextureUsages::TEXTURE_BINDING);
+        let shadow_map = texture(
+            gpu,
+            "shadow",
+            [side, side],
+            DEPTH,
+            wgpu::TextureUsages::TEXTURE_BINDING,
+        );
         let shadow_sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
@@ -267,10 +273,7 @@ impl Renderer {
         };
         let globals = Globals {
             clip_from_relative: projection.clip_from_relative.to_cols_array_2d(),
-            relative_from_clip: projection
-                .clip_from_relative
-                .inverse()
-                .to_cols_array_2d(),
+            relative_from_clip: projection.clip_from_relative.inverse().to_cols_array_2d(),
             shadow_from_world: stage.shadow_from_world.to_cols_array_2d(),
             origin: projection.origin.extend(style.cut_above).to_array(),
             eye: projection

@@ -240,11 +240,7 @@ impl GpuWorld {
             indices: buffer("the world's indices", indices, wgpu::BufferUsages::INDEX)?,
             parts: buffer("parts", bytemuck::cast_slice(&filling.parts), storage)?,
             materials: buffer("materials", bytemuck::cast_slice(&materials), storage)?,
-            instances: buffer(
-                "placed objects",
-                bytemuck::cast_slice(&instances),
-                storage,
-            )?,
+            instances: buffer("placed objects", bytemuck::cast_slice(&instances), storage)?,
             textures,
             chunks,
             batch_of: sight.chunks().iter().map(|c| c.batch).collect(),
@@ -280,7 +276,9 @@ impl GpuWorld {
     #[must_use]
     pub fn chunk_of_triangle(&self, triangle: u32) -> Option<u32> {
         // Chunks come in ascending order of their ranges.
-        let at = self.chunks.partition_point(|c| c.first + c.n <= triangle * 3);
+        let at = self
+            .chunks
+            .partition_point(|c| c.first + c.n <= triangle * 3);
         let chunk = self.chunks.get(at)?;
         (chunk.first <= triangle * 3).then_some(at as u32)
     }
@@ -346,8 +344,16 @@ fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
         let is_empty = low.x > high.x;
         details.push(Placed {
             mesh: detail.mesh,
-            center: if is_empty { m.w_axis.truncate() } else { (low + high) * 0.5 },
-            radius: if is_empty { 0.0 } else { (high - low).length() * 0.5 },
+            center: if is_empty {
+                m.w_axis.truncate()
+            } else {
+                (low + high) * 0.5
+            },
+            radius: if is_empty {
+                0.0
+            } else {
+                (high - low).length() * 0.5
+            },
         });
     }
     (instances, details)
@@ -377,7 +383,11 @@ fn make_buffer(
 ) -> Result<wgpu::Buffer, RenderError> {
     let limits = gpu.device.limits();
     Gpu::check(what, bytes.len() as u64, limits.max_buffer_size)?;
-    Gpu::check(what, bytes.len() as u64, limits.max_storage_buffer_binding_size)?;
+    Gpu::check(
+        what,
+        bytes.len() as u64,
+        limits.max_storage_buffer_binding_size,
+    )?;
     // A buffer must not be empty; 64 bytes are as large as the largest element.
     let empty = [0; 64];
     let contents = if bytes.is_empty() { &empty } else { bytes };
@@ -462,7 +472,10 @@ fn texture_group(
         height,
         depth_or_array_layers: 1,
     };
-    let texels: Vec<u8> = levels.iter().flat_map(|l| l.as_raw().iter().copied()).collect();
+    let texels: Vec<u8> = levels
+        .iter()
+        .flat_map(|l| l.as_raw().iter().copied())
+        .collect();
     let texture = gpu.device.create_texture_with_data(
         &gpu.queue,
         &wgpu::TextureDescriptor {

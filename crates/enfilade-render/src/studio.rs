@@ -170,12 +170,15 @@ impl Studio {
         let aspect = size[0] as f32 / size[1] as f32;
         let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
         let list = self.list(&view, camera.eye, culling, size).clone();
-        self.picture_of(&Frame {
-            projection,
-            list: &list,
-            style,
-            marks,
-        }, size)
+        self.picture_of(
+            &Frame {
+                projection,
+                list: &list,
+                style,
+                marks,
+            },
+            size,
+        )
     }
 
     /// A picture of a frame of one's own.
@@ -183,7 +186,11 @@ impl Studio {
     /// # Errors
     ///
     /// A size beyond the adapter's limit; a device that was lost.
-    pub fn picture_of(&mut self, frame: &Frame<'_>, size: [u32; 2]) -> Result<Picture, RenderError> {
+    pub fn picture_of(
+        &mut self,
+        frame: &Frame<'_>,
+        size: [u32; 2],
+    ) -> Result<Picture, RenderError> {
         self.renderer
             .picture(&self.gpu, &self.world, &self.stage, frame, size)
     }
@@ -217,8 +224,14 @@ impl Studio {
         let aspect = size[0] as f32 / size[1] as f32;
         let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
         let list = self.list(&view, camera.eye, culling, size).clone();
-        self.renderer
-            .ids(&self.gpu, &self.world, &self.stage, &projection, &list, size)
+        self.renderer.ids(
+            &self.gpu,
+            &self.world,
+            &self.stage,
+            &projection,
+            &list,
+            size,
+        )
     }
 
     /// Chunks and details colored by why they are drawn, for pictures that explain what is culled.

@@ -89,7 +89,11 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         out.push_str("</section>\n");
     }
     let p = &world.graph.provenance;
-    let settings: Vec<String> = p.settings.iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    let settings: Vec<String> = p
+        .settings
+        .iter()
+        .map(|(k, v)| format!("{k} = {v}"))
+        .collect();
     let _ = write!(
         out,
         "<footer>Baked by {} ({}), input {}. {}</footer>\n</body></html>\n",
@@ -166,10 +170,20 @@ fn table(out: &mut String, t: &Table) {
 }
 
 fn rooms(world: &World) -> Table {
-    let mut cells: Vec<_> = (0..).zip(&world.graph.cells).filter(|c| !c.1.outdoor).collect();
+    let mut cells: Vec<_> = (0..)
+        .zip(&world.graph.cells)
+        .filter(|c| !c.1.outdoor)
+        .collect();
     cells.sort_by(|a: &(u32, _), b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     let n = cells.len();
-    let head = ["room", "volume m³", "size m", "doorways", "triangles", "of objects"];
+    let head = [
+        "room",
+        "volume m³",
+        "size m",
+        "doorways",
+        "triangles",
+        "of objects",
+    ];
     let mut rows = vec![head.map(String::from).to_vec()];
     rows.extend(cells.into_iter().take(MAX_ROWS).map(|(_, c)| {
         let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
@@ -201,7 +215,11 @@ fn graph_svg(world: &World) -> String {
     let mut high = DVec2::NEG_INFINITY;
     let middle = |i: usize| {
         let [a, b] = cells[i].aabb.map(|p| p.map(f64::from));
-        ((a[0] + b[0]) * 0.5, (a[1] + b[1]) * 0.5, (a[2] + b[2]) * 0.5)
+        (
+            (a[0] + b[0]) * 0.5,
+            (a[1] + b[1]) * 0.5,
+            (a[2] + b[2]) * 0.5,
+        )
     };
     for c in cells.iter().filter(|c| !c.outdoor) {
         let [a, b] = c.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
@@ -243,7 +261,10 @@ fn graph_svg(world: &World) -> String {
                 let at = |k: usize| p.outline.iter().map(|c| f64::from(c[k])).sum::<f64>() / n;
                 let (x, _, z) = middle(room);
                 let from = place(room);
-                [from, from + (DVec2::new(at(0), at(2)) - DVec2::new(x, z)) * 1.08]
+                [
+                    from,
+                    from + (DVec2::new(at(0), at(2)) - DVec2::new(x, z)) * 1.08,
+                ]
             }
             _ => [place(a), place(b)],
         };
@@ -251,17 +272,29 @@ fn graph_svg(world: &World) -> String {
         let _ = write!(
             out,
             "<line x1=\"{:.2}\" y1=\"{:.2}\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{stroke}\" stroke-width=\"{:.2}\" stroke-opacity=\".75\"/>",
-            u.x, u.y, v.x, v.y, unit * 0.5
+            u.x,
+            u.y,
+            v.x,
+            v.y,
+            unit * 0.5
         );
     }
     for (i, c) in cells.iter().enumerate().filter(|(_, c)| !c.outdoor) {
         let p = place(i);
-        let r = (f64::from(c.volume.max(0.0)).cbrt() * 0.22).clamp(unit * 1.2, size.max_element() * 0.08);
+        let r = (f64::from(c.volume.max(0.0)).cbrt() * 0.22)
+            .clamp(unit * 1.2, size.max_element() * 0.08);
         let _ = write!(
             out,
             "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\"{r:.2}\" fill=\"{}\" stroke=\"#444\" stroke-width=\"{:.2}\"><title>{}</title></circle>\
              <text x=\"{:.2}\" y=\"{:.2}\" font-size=\"{:.2}\" text-anchor=\"middle\" fill=\"#222\">{i}</text>",
-            p.x, p.y, color(i as u32), unit * 0.2, escaped(&c.name), p.x, p.y + unit * 0.8, unit * 2.2
+            p.x,
+            p.y,
+            color(i as u32),
+            unit * 0.2,
+            escaped(&c.name),
+            p.x,
+            p.y + unit * 0.8,
+            unit * 2.2
         );
     }
     out.push_str("</svg>");
@@ -289,7 +322,11 @@ fn matrix(out: &mut String, world: &World, visible: &[CellSet]) {
          viewBox=\"-1 -1 {} {}\" style=\"max-width:520px\" role=\"img\" aria-label=\"visibility matrix\">\
          <rect width=\"{n}\" height=\"{n}\" fill=\"#f1f1ee\"/><path fill=\"#1c3d5a\" d=\"",
         100.0 * pairs as f64 / all.max(1) as f64,
-        if n < visible.len() { format!("; the {n} largest of {} rooms", visible.len()) } else { String::new() },
+        if n < visible.len() {
+            format!("; the {n} largest of {} rooms", visible.len())
+        } else {
+            String::new()
+        },
         n + 2,
         n + 2
     );
@@ -315,7 +352,8 @@ fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
-        let word = chunk.iter().fold(0_u32, |w, &b| w << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
+        let word =
+            chunk.iter().fold(0_u32, |w, &b| w << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
         for i in 0..4 {
             if i <= chunk.len() {
                 out.push(char::from(DIGITS[(word >> (18 - 6 * i) & 63) as usize]));
@@ -335,7 +373,14 @@ mod tests {
     #[test]
     fn base64_is_that_of_the_standard() {
         // RFC 4648, section 10.
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")] {
+        for (plain, coded) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
             assert_eq!(base64(plain.as_bytes()), coded);
         }
     }
@@ -354,14 +399,20 @@ mod tests {
         let parts = ReportParts {
             title: "a \"house\" & <b>".into(),
             visible: vec![seen],
-            figures: vec![Figure { caption: "'\">".into(), png: vec![1, 2, 3] }],
+            figures: vec![Figure {
+                caption: "'\">".into(),
+                png: vec![1, 2, 3],
+            }],
             ..ReportParts::default()
         };
         let page = report_html(&world, &parts);
         assert!(!page.contains("<script"), "{page}");
         // Names of name spaces are no addresses to load from.
         let outside = page.replace("http://www.w3.org/2000/svg", "");
-        assert!(!outside.contains("http") && !outside.contains("src=\"/"), "{outside}");
+        assert!(
+            !outside.contains("http") && !outside.contains("src=\"/"),
+            "{outside}"
+        );
         assert!(page.contains("M0 0h1v1h-1z"), "a room sees itself");
         assert!(page.contains("data:image/png;base64,AQID"));
         assert_eq!(page, report_html(&world, &parts));
