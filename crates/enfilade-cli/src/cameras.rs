@@ -180,7 +180,9 @@ pub(crate) fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> 
             Ok(&[x, y, z, a, b, c]) if [x, y, z, a, b, c].iter().all(|v| v.is_finite()) => {
                 out.push(Camera {
                     eye: [x, y, z].map(|v| v as f32),
-                    toward: [a - x, b - y, c - z].map(|v| v as f32),
+                    // From the eye as it was before it was written in few digits.
+                    toward: [[a, x], [b, y], [c, z]]
+                        .map(|[to, from]| (to - f64::from(from as f32)) as f32),
                     fov_y,
                 });
             }
