@@ -15,11 +15,7 @@ draw() {
 # The sitting room, through its doors.
 inside="--eye 1.1,1.6,7.4 --look 6.5,1.25,3.2"
 # shellcheck disable=SC2086
-draw inside $inside --size 1200x675
-# shellcheck disable=SC2086
 draw portals $inside --portals --size 1200x675
-# shellcheck disable=SC2086
-draw overdraw $inside --paint overdraw --size 600x338
 # shellcheck disable=SC2086
 draw above $inside --above --size 1200x675
 draw house --eye 19,8.5,17 --look 5.5,2.6,4 --size 1200x675
