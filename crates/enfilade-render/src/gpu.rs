@@ -147,7 +147,7 @@ impl Gpu {
     /// When there is none as asked for, or it gives no device.
     pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        Self::open_with(instance, choice, None)
+        Self::open_with(&instance, choice, None)
     }
 
     /// Opens an adapter of `instance` that can draw to `surface`.
@@ -156,7 +156,7 @@ impl Gpu {
     ///
     /// As [`Gpu::open`].
     pub fn open_with(
-        instance: wgpu::Instance,
+        instance: &wgpu::Instance,
         choice: &AdapterChoice,
         surface: Option<&wgpu::Surface<'_>>,
     ) -> Result<Self, RenderError> {

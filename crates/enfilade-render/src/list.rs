@@ -291,7 +291,7 @@ impl Lister {
             while let Some(&(m, detail)) = self.details.get(i)
                 && m == mesh
             {
-                self.list.instances.push(detail + 1 | reason);
+                self.list.instances.push((detail + 1) | reason);
                 i += 1;
             }
             let last = self.list.instances.len() as u32;

@@ -279,7 +279,6 @@ impl Pipelines {
                 buffers: &[],
                 target: Some((output, None)),
                 depth: None,
-                ..base
             }),
             marks_on_top: make(Kind {
                 label: "marks on top",

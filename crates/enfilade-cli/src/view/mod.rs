@@ -185,7 +185,7 @@ impl App<'_> {
         let window = Arc::new(events.create_window(attributes)?);
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let surface = instance.create_surface(window.clone())?;
-        let gpu = Gpu::open_with(instance, &self.args.adapter, Some(&surface))?;
+        let gpu = Gpu::open_with(&instance, &self.args.adapter, Some(&surface))?;
         let size = window.inner_size();
         let mut config = surface
             .get_default_config(&gpu.adapter, size.width.max(1), size.height.max(1))
