@@ -25,7 +25,7 @@ pub(super) struct Shown {
     pub(super) is_recording: bool,
     pub(super) flies: bool,
     pub(super) message: String,
-    times: VecDeque<f32>,
+    pub(super) times: VecDeque<f32>,
 }
 
 impl Shown {
