@@ -74,6 +74,7 @@ fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Vec<CellSet
     let mut context = VisContext {
         on_round: &mut on_round,
         blocker: None,
+        checkpoint: None,
     };
     let graph = SightGraph::of_graph(&world.graph);
     let out = see_all(&graph, &VisConfig::default(), &mut context)?;
