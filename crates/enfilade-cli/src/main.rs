@@ -6,16 +6,23 @@
 mod bake;
 mod bench;
 mod bench_bsp;
+mod cameras;
 mod demo;
+mod exact;
 mod inspect;
 mod locate;
 mod output;
 mod plan;
 mod progress;
 mod pvs;
+mod render;
+mod report;
 mod see;
 mod simplify;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
+mod walkthrough;
 mod world;
 
 use std::io;
@@ -41,9 +48,13 @@ enum Command {
     Locate(locate::Locate),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
+    Render(render::Render),
+    Report(report::Report),
     See(see::See),
     Simplify(simplify::Simplify),
     Verify(verify::Verify),
+    #[cfg(feature = "view")]
+    View(view::View),
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
@@ -56,9 +67,13 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
+        Command::Render(args) => render::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
         Command::Simplify(args) => simplify::run(&args),
         Command::Verify(args) => verify::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
     }
 }
 
