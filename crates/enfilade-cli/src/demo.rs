@@ -42,6 +42,7 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
          enfilade inspect {world}\n  \
          echo '2 1 2' | enfilade locate {world}\n  \
          enfilade verify {world} --source {house}\n  \
+         enfilade view {world}\n  \
          enfilade bake YOUR.glb -o your-world.glb\n\
          and open {plan} in a browser, {world} in any glTF viewer."
     )?;

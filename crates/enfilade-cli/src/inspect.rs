@@ -36,6 +36,7 @@ pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
 struct Report<'a> {
     cells: Vec<CellReport<'a>>,
     portals: Vec<PortalReport<'a>>,
+    suspected_holes: Vec<HoleReport>,
     stats: Stats<'a>,
 }
 
@@ -62,6 +63,14 @@ struct PortalReport<'a> {
     pieces: usize,
     normal: [f32; 3],
     outline: &'a [[f32; 3]],
+}
+
+/// An opening to outdoors that may be a hole of the model.
+#[derive(Serialize)]
+struct HoleReport {
+    portal: u32,
+    position: [f32; 3],
+    reason: String,
 }
 
 /// Times and peaks differ from run to run and are not in the file, which is the same every time.
@@ -103,9 +112,15 @@ fn report(world: &World) -> Report<'_> {
             outline: &p.outline,
         }
     });
+    let holes = graph.suspected_holes().into_iter().map(|h| HoleReport {
+        portal: h.portal.0,
+        position: h.position,
+        reason: h.reason.to_string(),
+    });
     Report {
         cells: cells.collect(),
         portals: portals.collect(),
+        suspected_holes: holes.collect(),
         stats: Stats {
             input_triangles: input_triangles(world),
             seconds: BTreeMap::new(),

@@ -72,6 +72,59 @@ fn inspect_prints_the_agreed_json() {
 }
 
 #[test]
+fn inspect_tells_machines_of_suspected_holes() {
+    let mut world = two_rooms();
+    world.graph.portals[1].kind = enfilade_cpg::PortalKind::Open;
+    let [a, b, c, _] = world.graph.portals[1].outline[..] else {
+        panic!("the window is no rectangle")
+    };
+    // Half a rectangle is what a missing triangle leaves.
+    world.graph.portals[1].outline = vec![a, b, c];
+    world.graph.portals[1].pieces = vec![vec![a, b, c]];
+    world.graph.portals[1].area /= 2.0;
+    let path = file("holes.glb", &encode_glb(&world).unwrap());
+    let done = enfilade(&["inspect", path.to_str().unwrap(), "--json"], "");
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let hole = &report["suspected_holes"][0];
+    assert_eq!(hole["portal"], json!(1));
+    assert_eq!(hole["reason"], json!("of no regular shape"));
+    assert_eq!(hole["position"].as_array().unwrap().len(), 3);
+}
+
+/// What the demo says to try next is tried, but for the window and the user's own file.
+#[test]
+fn the_demo_makes_a_house_and_its_hints_work() {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("demo");
+    let done = enfilade(&["demo", "-o", dir.to_str().unwrap()], "");
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    for name in ["house.glb", "world.glb", "plan.svg"] {
+        assert!(dir.join(name).metadata().unwrap().len() > 1000, "{name}");
+    }
+    let bin = PathBuf::from(env!("CARGO_BIN_EXE_enfilade"));
+    let said = text(&done.stdout);
+    let hints: Vec<&str> = said
+        .lines()
+        .map(str::trim)
+        .filter(|l| l.contains("enfilade ") && !l.contains("YOUR") && !l.contains("enfilade view"))
+        .filter(|l| l.starts_with("enfilade") || l.starts_with("echo"))
+        .collect();
+    assert!(hints.len() >= 3, "{said}");
+    for hint in hints {
+        let tried = Command::new("sh")
+            .args(["-c", &hint.replace("enfilade ", "\"$ENFILADE\" ")])
+            .env("ENFILADE", &bin)
+            .output()
+            .unwrap();
+        assert!(
+            tried.status.success() && !tried.stdout.is_empty(),
+            "{hint}: {}",
+            text(&tried.stderr)
+        );
+    }
+}
+
+#[test]
 fn inspect_prints_a_table_for_people() {
     let path = two_rooms_file("table.glb");
     let done = enfilade(&["inspect", path.to_str().unwrap()], "");
