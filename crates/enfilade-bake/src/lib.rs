@@ -8,6 +8,7 @@ mod assemble;
 pub mod complex;
 mod config;
 mod context;
+pub mod delaunay;
 mod error;
 mod join;
 pub mod pipeline;
