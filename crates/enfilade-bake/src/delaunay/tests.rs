@@ -264,6 +264,9 @@ fn what_has_no_volume_or_no_place_is_an_error() {
         let mut p = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         p[2].y = bad;
         let e = tetrahedralize(&p).unwrap_err();
-        assert!(e.to_string().starts_with("point 2 has the coordinate"), "{e}");
+        assert!(
+            e.to_string().starts_with("point 2 has the coordinate"),
+            "{e}"
+        );
     }
 }

@@ -174,7 +174,8 @@ fn first_four(vertices: &[DVec3], predicates: Predicates) -> Option<[u32; 4]> {
             .all(|axis| predicates.orient(a, b, p, a + axis * reach) == 0)
     };
     let c = (2..vertices.len()).find(|&i| !on_line(vertices[i]))?;
-    let d = (2..vertices.len()).find(|&i| predicates.orient(a, b, vertices[c], vertices[i]) != 0)?;
+    let d =
+        (2..vertices.len()).find(|&i| predicates.orient(a, b, vertices[c], vertices[i]) != 0)?;
     let (c, d) = (c as u32, d as u32);
     if predicates.orient(a, b, vertices[c as usize], vertices[d as usize]) > 0 {
         Some([0, 1, c, d])
