@@ -34,6 +34,9 @@ pub enum BakeError {
         /// Voxel size that fits into the budget. [Units: wu]
         voxel: f64,
     },
+    /// The scene has no tetrahedra.
+    #[error(transparent)]
+    Tetrahedra(#[from] crate::delaunay::DelaunayError),
     /// The caller asked to stop.
     #[error("cancelled")]
     Cancelled,

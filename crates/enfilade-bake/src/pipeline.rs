@@ -259,7 +259,7 @@ fn portalled_cells(partition: &Partition) -> Vec<bool> {
 }
 
 /// Structural triangles that have an area, with where they came from.
-fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<Triangle>) {
+pub(crate) fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<Triangle>) {
     scene
         .triangle_sources(Role::Structural)
         .map(|s| (s, scene.world_triangle(s)))
@@ -437,7 +437,7 @@ fn inside_of(stairs: &[Triangle], grid: &Grid, bvh: &Bvh) -> BitVolume {
 }
 
 /// FNV-1a over the triangles and settings, as 16 hexadecimal digits.
-fn input_hash(triangles: &[Triangle], settings: &BTreeMap<String, String>) -> String {
+pub(crate) fn input_hash(triangles: &[Triangle], settings: &BTreeMap<String, String>) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut add = |bytes: &[u8]| {
         for &b in bytes {

@@ -1,11 +1,13 @@
 //! `enfilade bake`: a scene becomes a world.
 
-mod settings;
+pub(crate) mod delaunay;
+pub(crate) mod settings;
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use enfilade::bake::delaunay::bake_delaunay;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
@@ -49,7 +51,18 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let imported = import(&args.inputs, &options.detail, &import_options)?;
     bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
-    let baked = bake_scene(&imported.scene, &config, options.threads.map(usize::from))?;
+    let scene = &imported.scene;
+    let threads = options.threads.map(usize::from);
+    let baked = if options.method == settings::Method::Delaunay {
+        let bar = BakeBar::new(scene, &config);
+        let config = options.delaunay.resolve(&config)?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.unwrap_or(0))
+            .build()?;
+        pool.install(|| bake_delaunay(scene, &config, &BakeContext::new(&bar, None)))?
+    } else {
+        bake_scene(scene, &config, threads)?
+    };
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
     report_bake(&baked, &config, options.verbose)?;
@@ -108,8 +121,13 @@ const LEAKS_SHOWN: usize = 10;
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
     let mut err = io::stderr().lock();
     let [nx, ny, nz] = baked.dims;
-    writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
-    let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
+    let wanted = if nx > 0 {
+        writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
+        config.voxel.unwrap_or(config.min_opening / 6.0)
+    } else {
+        writeln!(err, "surface points {:.3} m apart", baked.voxel)?;
+        f64::INFINITY
+    };
     // The grid grows its voxels by tenths, if at all.
     if baked.voxel > wanted * 1.05 {
         writeln!(

@@ -5,6 +5,7 @@
 
 mod bake;
 mod bench;
+mod decimate;
 mod demo;
 mod inspect;
 mod locate;
@@ -33,6 +34,7 @@ struct Cli {
 enum Command {
     Bake(bake::Bake),
     Bench(bench::Bench),
+    Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
@@ -46,6 +48,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(args) => bake::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),

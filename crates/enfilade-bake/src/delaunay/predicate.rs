@@ -37,7 +37,7 @@ impl Predicates {
     pub(super) fn of(points: &[DVec3]) -> Self {
         let unit = points
             .iter()
-            .flat_map(|p| p.to_array())
+            .flat_map(DVec3::to_array)
             .filter(|&x| x != 0.0)
             .map(last_bit)
             .min();

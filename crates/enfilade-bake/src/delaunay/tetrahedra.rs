@@ -371,8 +371,8 @@ impl<'a> Builder<'a> {
 
     /// Makes neighbors of the new tetrahedra that share an edge of the cavity's boundary.
     fn join_fan(&mut self) {
-        // A closed surface of triangles has 2n - 4 of them on n corners.
-        if self.fans.len() > 2 * TABLE - 4 {
+        // A closed surface of triangles has 2n - 4 of them on n corners; the new point is one more.
+        if self.fans.len() > 2 * (TABLE - 1) - 4 {
             return self.join_large_fan();
         }
         self.local_vertices.clear();
@@ -388,14 +388,11 @@ impl<'a> Builder<'a> {
         for fan in &self.fans {
             let slot = fan.slot as usize;
             let mut places = [0; 4];
-            for k in 0..4 {
-                if k != slot {
-                    places[k] = local(fan.vertices[k]);
-                }
+            for (place, v) in places.iter_mut().zip(fan.vertices) {
+                *place = local(v);
             }
-            for j in 0..4 {
+            for (j, &[k, l]) in EDGES[slot].iter().enumerate() {
                 if j != slot {
-                    let [k, l] = EDGES[slot][j];
                     self.table[places[k] * TABLE + places[l]] = fan.tet << 2 | j as u32;
                 }
             }
@@ -403,14 +400,11 @@ impl<'a> Builder<'a> {
         for fan in &self.fans {
             let slot = fan.slot as usize;
             let mut places = [0; 4];
-            for k in 0..4 {
-                if k != slot {
-                    places[k] = self.place[(fan.vertices[k] as usize).min(n_vertices)] as usize;
-                }
+            for (place, v) in places.iter_mut().zip(fan.vertices) {
+                *place = self.place[(v as usize).min(n_vertices)] as usize;
             }
-            for j in 0..4 {
+            for (j, &[k, l]) in EDGES[slot].iter().enumerate() {
                 if j != slot {
-                    let [k, l] = EDGES[slot][j];
                     self.tets[fan.tet as usize].neighbors[j] =
                         self.table[places[l] * TABLE + places[k]];
                 }

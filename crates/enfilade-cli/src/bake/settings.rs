@@ -16,7 +16,7 @@ use serde::de::{Deserialize, Deserializer, Error};
 pub(crate) struct BakeOptions {
     /// Files whose objects are all detail: furniture, door leaves, plants.
     #[arg(long, value_name = "FILE")]
-    pub(super) detail: Vec<PathBuf>,
+    pub(crate) detail: Vec<PathBuf>,
     /// Objects whose object, mesh or material name fits this pattern (`*`, `?`) are detail.
     #[arg(long, value_name = "PATTERN")]
     detail_name: Vec<String>,
@@ -34,7 +34,9 @@ pub(crate) struct BakeOptions {
     origin: Option<DVec3>,
     /// How cells are found.
     #[arg(long, value_enum, default_value_t = Method::Auto)]
-    method: Method,
+    pub(super) method: Method,
+    #[command(flatten)]
+    pub(crate) delaunay: super::delaunay::DelaunayOptions,
     /// Settings file in TOML; what is given on the command line wins.
     #[arg(long, value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
@@ -60,11 +62,13 @@ enum UpAxis {
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Method {
+pub(super) enum Method {
     /// Choose by what the input is; the watershed so far.
     Auto,
     /// Voxels, distances, watershed.
     Watershed,
+    /// Tetrahedra between the surfaces, decimated; for caves and other irregular scenes.
+    Delaunay,
 }
 
 /// The longest voxel and the widest "narrowest opening": past it no room is left to find.
@@ -237,7 +241,7 @@ impl ConfigFile {
 }
 
 /// Command line and settings file, resolved.
-pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, BakeConfig)> {
+pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, BakeConfig)> {
     let file = match &options.config {
         None => ConfigFile::default(),
         Some(path) => ConfigFile::read(path)?,
