@@ -149,21 +149,33 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
             .and_then(DVec3::try_normalize)
             .unwrap_or_else(|| plane.basis().0)
     };
-    let mut moved_in = 0.0_f64;
     let mut i = 0;
     while points.len() > 3 && i < points.len() {
         let n = points.len();
         let (a, p, b) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
         let off = (b - a).cross(p - a).length() / (b - a).length().max(1e-12);
         if off < STRAIGHT {
-            moved_in = moved_in.max(off);
             points.remove(i);
             i = i.saturating_sub(1);
         } else {
             i += 1;
         }
     }
-    let by = by + moved_in;
+    // Each corner was near the edge that took its place when it went, but of a round outline one
+    // after the other goes, and the edges that are left pass the first ones further off.
+    let n = points.len();
+    let cut_off = (0..n)
+        .filter_map(|i| {
+            let (a, b) = (points[i], points[(i + 1) % n]);
+            let out = (b - a).try_normalize()?.cross(plane.normal);
+            outline
+                .points
+                .iter()
+                .map(|p| out.dot(*p - a))
+                .max_by(f64::total_cmp)
+        })
+        .fold(0.0_f64, f64::max);
+    let by = by + cut_off;
     let u = along(&points);
     let v = plane.normal.cross(u);
     let range = |d: DVec3| {
@@ -175,7 +187,6 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
             })
     };
     let ((u0, u1), (v0, v1)) = (range(u), range(v));
-    let n = points.len();
     // Each edge moves out along its own normal; corners go to where the moved edges meet.
     let moved: Option<Vec<DVec3>> = (0..n)
         .map(|i| {
@@ -393,4 +404,40 @@ fn cells_of_object(scene: &Scene, object: usize, locator: &Locator) -> Vec<CellI
         }
     }
     cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Corners on an arc lie near the lines between their neighbors, all of them.
+        #[test]
+        fn a_grown_outline_goes_around_the_outline(
+            n in 3..200_usize,
+            size in (0.001..5.0, 0.001..5.0_f64),
+            arc in 0.01..std::f64::consts::TAU,
+            by in 0.0..1e-3,
+        ) {
+            let plane = Plane::through(DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.6, 0.0, 0.8));
+            let (u, v) = plane.basis();
+            let origin = plane.normal * -plane.d;
+            let outline = Winding::new(
+                (0..n)
+                    .map(|i| (i as f64 * arc / n as f64).sin_cos())
+                    .map(|(sin, cos)| origin + u * (size.0 * cos) + v * (size.1 * sin))
+                    .collect(),
+            );
+            let grown = grown(&outline, &plane, by).points;
+            for i in 0..grown.len() {
+                let (a, b) = (grown[i], grown[(i + 1) % grown.len()]);
+                let out = (b - a).normalize().cross(plane.normal);
+                for p in &outline.points {
+                    // Rounding of coordinates up to 10 in `f64`.
+                    prop_assert!(out.dot(*p - a) <= 1e-12 - by, "{} at {p}", out.dot(*p - a) + by);
+                }
+            }
+        }
+    }
 }

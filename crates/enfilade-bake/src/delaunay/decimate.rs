@@ -256,6 +256,10 @@ struct Live {
     vector: DVec3,
     center: DVec3,
     n: f64,
+    /// A person wants it to stay; two cells with such a portal among theirs never join.
+    stays: bool,
+    /// A person wants it to go.
+    goes: bool,
     version: u32,
 }
 
@@ -281,23 +285,29 @@ pub fn decimate(
         neighbors[a as usize].insert(b);
         neighbors[b as usize].insert(a);
         let middle = |&l: &u32| space.facet(&space.links[l as usize]).iter().sum::<DVec3>() / 3.0;
+        let center = portal.links.iter().map(middle).sum::<DVec3>();
+        let choice = choices.at(center / portal.links.len() as f64);
         portals.insert(
             (a, b),
             Live {
                 radius: portal.radius,
                 vector: portal.vector,
-                center: portal.links.iter().map(middle).sum::<DVec3>(),
+                center,
                 n: portal.links.len() as f64,
+                stays: choice == Some(true),
+                goes: choice == Some(false),
                 version: 0,
             },
         );
     }
     let weigh = |portal: &Live, pair: (u32, u32), radius: &[f64], boxes: &[Aabb]| -> f64 {
         let (a, b) = (pair.0 as usize, pair.1 as usize);
-        match choices.at(portal.center / portal.n) {
-            Some(true) => return f64::INFINITY,
-            Some(false) => return -2.0,
-            None => {}
+        if portal.stays || choices.at(portal.center / portal.n) == Some(true) {
+            return f64::INFINITY;
+        }
+        // The middle of a portal moves as others join it: what was shown is what was meant.
+        if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
+            return -2.0;
         }
         let least = radius[a].min(radius[b]);
         if least < min_radius {
@@ -370,12 +380,16 @@ pub fn decimate(
                 vector: DVec3::ZERO,
                 center: DVec3::ZERO,
                 n: 0.0,
+                stays: false,
+                goes: false,
                 version: 0,
             });
             live.radius = live.radius.max(old.radius);
             live.vector += old.vector * sign;
             live.center += old.center;
             live.n += old.n;
+            live.stays |= old.stays;
+            live.goes |= old.goes;
         }
         for &other in &neighbors[into as usize] {
             let pair = (into.min(other), into.max(other));
