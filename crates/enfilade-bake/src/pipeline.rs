@@ -20,7 +20,7 @@ use crate::voxel::{
 use crate::watershed::{
     Flooded, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
     find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
-    shallow_voids, slab_heights,
+    rim_caps, shallow_voids, slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -73,17 +73,19 @@ pub fn bake(
     };
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
-    let mut closures = voxelize(&grid, &closure_triangles(scene));
-    // Where a building has no roof, a lid takes its place.
+    let closures = voxelize(&grid, &closure_triangles(scene));
+    // Where a building has no roof or a tube just ends, a lid or a cap takes its place.
     let lids = find_lids(&grid, &occupied);
+    let mut shut = voxelize(&grid, &rim_caps(&walls, config.min_opening.powi(2)));
+    shut.union_with(&closures);
     if let Some(voxels) = &lids.voxels {
-        closures.union_with(voxels);
+        shut.union_with(voxels);
     }
 
     // 2. How far every voxel of air is from a surface; door leaves count as surfaces here.
     context.stage(1)?;
     let mut blocked = occupied.clone();
-    blocked.union_with(&closures);
+    blocked.union_with(&shut);
     let distances = distance_squared(&blocked);
     drop(blocked);
 
@@ -120,7 +122,7 @@ pub fn bake(
         grid: &grid,
         labels: &labels,
         peaks: &peaks,
-        closures: Some(&closures),
+        closures: Some(&shut),
         slabs: &slabs,
     };
     let regions = merge_basins(flooded, &saddles, &config.merge);
@@ -150,7 +152,7 @@ pub fn bake(
     });
     drop(walls);
     drop(labels);
-    drop((closures, lids));
+    drop((closures, shut, lids));
 
     // 6. Screens and triangles cut space into convex pieces, exactly.
     context.stage(5)?;

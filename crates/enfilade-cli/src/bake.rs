@@ -20,7 +20,7 @@ use crate::progress::{BakeBar, StageBar};
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
 pub(crate) struct Bake {
-    /// Scene files: GLB, glTF, OBJ, PLY or STL. Several become one scene.
+    /// Scene files: GLB, glTF, OBJ, PLY, STL or Quake MAP. Several become one scene.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
     /// World to write, one GLB.

@@ -9,6 +9,7 @@ mod bvh;
 mod plane;
 pub mod ray;
 pub mod scene;
+pub mod solid;
 mod winding;
 
 pub use aabb::Aabb;
@@ -16,6 +17,7 @@ pub use bvh::{Bvh, Nearest};
 pub use glam::{DMat3, DMat4, DVec2, DVec3};
 pub use plane::Plane;
 pub use ray::{Hit, Ray};
+pub use solid::{BoxTree, ConvexSolid, SolidError};
 pub use winding::Winding;
 
 /// A triangle in world space. [Units: wu]

@@ -3,7 +3,7 @@
 //! Importers fill it, the builders read its structural triangles, and the writer carries its
 //! materials and textures through to the output unchanged.
 
-use crate::{Aabb, DMat4, DVec3, Triangle};
+use crate::{Aabb, ConvexSolid, DMat4, DVec3, Triangle};
 
 /// Everything that an input file, or several of them, held.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +18,24 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Pictures that textures refer to.
     pub images: Vec<Image>,
+    /// The convex solids that structural objects are made of, where the input says so (brushes), in
+    /// world space.
+    pub solids: Vec<ConvexSolid>,
+    /// Named things that are no meshes, as the input had them.
+    pub entities: Vec<Entity>,
+}
+
+/// Something that an input names and places without giving it a shape here: a light, a start.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Entity {
+    /// What it is, e.g. `info_player_start`.
+    pub class: String,
+    /// Where it is, if it says so. [Units: wu]
+    pub position: Option<DVec3>,
+    /// Everything it says, in its order, as text.
+    pub properties: Vec<(String, String)>,
+    /// The object made of its shapes. Index into [`Scene::objects`].
+    pub object: Option<u32>,
 }
 
 /// A mesh in its own space.

@@ -2,8 +2,10 @@
 
 use crate::roles::{Facts, Verdict};
 use crate::{ImportError, ImportOptions, ImportReport, Limits};
-use enfilade_geom::scene::{Image, Material, Mesh, Object, Primitive, Role, Scene, Texture};
-use enfilade_geom::{DMat4, DVec3, Triangle};
+use enfilade_geom::scene::{
+    Entity, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
+};
+use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +19,7 @@ pub(crate) struct Builder<'a> {
     pub(crate) folder: Option<PathBuf>,
     pub(crate) base: DMat4,
     scene: Scene,
-    is_detail_file: bool,
+    pub(crate) is_detail_file: bool,
     n_triangles: u64,
     n_placements: u64,
     n_vertices: u64,
@@ -115,6 +117,48 @@ impl<'a> Builder<'a> {
             n,
             limit,
         }
+    }
+
+    /// Places a mesh whose role its format tells; the transform must not mirror. Its index.
+    pub(crate) fn place_as(
+        &mut self,
+        mesh: u32,
+        transform: DMat4,
+        name: &str,
+        role: Role,
+        reason: &str,
+    ) -> Result<u32, ImportError> {
+        self.check_objects(name, 1)?;
+        self.n_placements += 1;
+        let primitives = &self.scene.meshes[mesh as usize].primitives;
+        let n_triangles: usize = primitives.iter().map(|p| p.indices.len() / 3).sum();
+        self.n_triangles = self.n_triangles.saturating_add(n_triangles as u64);
+        self.check_triangles(name, self.n_triangles)?;
+        let n_bytes = OBJECT_BYTES + (name.len() + reason.len()) as u64;
+        self.charge_memory(name, 1, n_bytes)?;
+        self.charge_memory(name, n_triangles as u64, TRIANGLE_BYTES)?;
+        self.scene.objects.push(Object {
+            name: name.to_owned(),
+            mesh,
+            transform,
+            role,
+            reason: reason.to_owned(),
+        });
+        if let Some(file) = self.report.files.last_mut() {
+            file.n_objects += 1;
+            file.n_triangles += n_triangles as u64;
+        }
+        Ok(self.scene.objects.len() as u32 - 1)
+    }
+
+    /// Keeps the solids that structural objects are made of.
+    pub(crate) fn add_solids(&mut self, solids: impl Iterator<Item = ConvexSolid>) {
+        self.scene.solids.extend(solids);
+    }
+
+    /// Keeps an entity.
+    pub(crate) fn add_entity(&mut self, entity: Entity) {
+        self.scene.entities.push(entity);
     }
 
     /// Counts vertices before they are allocated.

@@ -1,4 +1,4 @@
-//! Reads glTF, GLB, OBJ, PLY and STL into one [`Scene`].
+//! Reads glTF, GLB, OBJ, PLY, STL and Quake maps into one [`Scene`].
 //!
 //! [`import`] takes any number of files and gives one scene, in meters and +Y up, with a role for
 //! each object and a report of everything skipped or repaired. Input is not trusted: each count,
@@ -27,6 +27,7 @@ mod error;
 mod export;
 mod files;
 mod gltf;
+mod map;
 mod mtl;
 mod obj;
 mod options;
@@ -105,12 +106,16 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         ply::read(bytes, builder)
     } else if ending == "obj" {
         obj::read(bytes, builder)
+    } else if ending == "map" {
+        map::read(bytes, builder)
     } else if ending == "stl" {
         stl::read(bytes, builder)
     } else if gltf::is_gltf(bytes) {
         gltf::read(bytes, builder)
     } else if stl::is_stl(bytes) {
         stl::read(bytes, builder)
+    } else if map::is_map(bytes) {
+        map::read(bytes, builder)
     } else if obj::is_obj(bytes) {
         obj::read(bytes, builder)
     } else {
@@ -136,6 +141,15 @@ pub fn decode_gltf(bytes: &[u8], options: &ImportOptions) -> Result<Imported, Im
 /// As [`import`].
 pub fn decode_obj(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.obj", options, obj::read)
+}
+
+/// Reads a Quake map from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_map(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.map", options, map::read)
 }
 
 /// Reads a PLY file from memory.

@@ -153,6 +153,15 @@ impl RoleRules {
                 .any(|w| has_word(&CLEAR_MATERIAL_WORDS, w))
     }
 
+    /// The role that the caller's rules give an object of this name, whatever its format tells.
+    pub(crate) fn forced(&self, name: &str) -> Option<(Role, String)> {
+        let fits = |globs: &[String]| globs.iter().find(|g| is_match(g, name)).cloned();
+        let structural =
+            fits(&self.structural).map(|g| (Role::Structural, format!("rule: structural '{g}'")));
+        structural
+            .or_else(|| fits(&self.detail).map(|g| (Role::Detail, format!("rule: detail '{g}'"))))
+    }
+
     /// The object's role; the first rule that fits decides.
     pub(crate) fn judge(&self, facts: &Facts<'_>) -> Verdict {
         let structural = |reason: String| Verdict::Keep(Role::Structural, reason);

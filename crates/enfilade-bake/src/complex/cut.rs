@@ -202,7 +202,13 @@ fn cut(
                 f.leaves[0]
             };
             let cost = units(if f.screen == NO_SCREEN {
-                f64::from(f.area) + PER_FACET
+                // A hairline makes no portal: a border of many is better than one that shows.
+                let each = if f.width < graph.hairline {
+                    0.0
+                } else {
+                    PER_FACET
+                };
+                f64::from(f.area) + each
             } else {
                 f64::from(f.area) * SCREEN
             });

@@ -123,7 +123,7 @@ impl Visitor<'_> {
                 let bounds = Aabb::of_points(&points);
                 let screen = match surface.source {
                     Source::Screen(id) => Some(id),
-                    Source::Triangle(_) => None,
+                    Source::Triangle(_) | Source::Seam => None,
                 };
                 bounds.overlaps(&reach).then_some(Cover {
                     screen,

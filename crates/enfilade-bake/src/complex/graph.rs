@@ -32,6 +32,8 @@ pub(super) struct LeafGraph {
     pub(super) volumes: Vec<f64>,
     /// Whether each leaf touches the border of the box.
     pub(super) at_border: Vec<bool>,
+    /// Openings narrower than this make no portal.
+    pub(super) hairline: f32,
 }
 
 impl LeafGraph {
@@ -73,6 +75,7 @@ impl LeafGraph {
             facets,
             volumes,
             at_border,
+            hairline: visitor.tolerance.width as f32,
         }
     }
 }

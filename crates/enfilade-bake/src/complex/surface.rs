@@ -1,8 +1,9 @@
 //! Surfaces (triangles and screens) and the one list of planes that they share.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use enfilade_geom::{Aabb, DVec3, Plane};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle};
+use rayon::prelude::*;
 
 use super::poly::{self, Poly};
 
@@ -13,6 +14,8 @@ pub(super) enum Source {
     Triangle(u32),
     /// A screen, by its index in the input.
     Screen(u32),
+    /// A seam, see [`seams`]: it blocks and is no part of the scene.
+    Seam,
 }
 
 /// A triangle or a screen.
@@ -48,6 +51,10 @@ pub(super) const MIN_AREA: f64 = 1e-8;
 
 /// Planes whose normals differ by less than this (radians) may hold each other's surfaces.
 pub(super) const PARALLEL: f64 = 0.02;
+
+/// Sine of the largest angle at which edges come apart, see [`seams`]; beyond it, the wedges are
+/// hardly wider than what counts as closed.
+const SHALLOW: f64 = 0.35;
 
 impl Tolerance {
     /// For coordinates up to `extent` from the origin.
@@ -131,29 +138,59 @@ fn own_plane(points: &[DVec3]) -> Option<Plane> {
 ///
 /// Planes are looked up by rounded normal and offset, both neighbors tried where the value is
 /// near a step. A pair missed by that (tiny triangle, far from the origin) still meets in the tree,
-/// where a fragment that lies in a splitter within tolerance is taken to be in it.
+/// where a surface that lies in a splitter within tolerance is taken to be in it.
 pub(super) fn gather(
     mut surfaces: Vec<Surface>,
     bounds: &Aabb,
     tolerance: &Tolerance,
 ) -> SurfaceSet {
     canonical_order(&mut surfaces);
-    let center = bounds.center();
-    let mut planes: Vec<Plane> = Vec::new();
-    let mut buckets: HashMap<[i32; 4], Vec<u32>> = HashMap::new();
+    let mut planes = PlaneList::new(bounds.center(), tolerance.plane);
     for s in &mut surfaces {
-        s.plane = NO_PLANE;
-        if poly::width(&s.points) < tolerance.plane {
-            continue;
+        s.plane = planes.plane_of(&s.points);
+    }
+    for mut seam in seams(&surfaces, &planes.planes, tolerance) {
+        seam.plane = planes.plane_of(&seam.points);
+        surfaces.push(seam);
+    }
+    SurfaceSet {
+        surfaces,
+        planes: planes.planes,
+    }
+}
+
+/// The planes so far, found again by rounded normal and offset.
+struct PlaneList {
+    planes: Vec<Plane>,
+    buckets: HashMap<[i32; 4], Vec<u32>>,
+    center: DVec3,
+    /// What lies this near to a plane lies in it.
+    tolerance: f64,
+}
+
+impl PlaneList {
+    fn new(center: DVec3, tolerance: f64) -> Self {
+        Self {
+            planes: Vec::new(),
+            buckets: HashMap::new(),
+            center,
+            tolerance,
         }
-        let Some(plane) = own_plane(&s.points) else {
-            continue;
+    }
+
+    /// The plane that holds all corners best, a new one if there is none.
+    fn plane_of(&mut self, points: &[DVec3]) -> u32 {
+        if poly::width(points) < self.tolerance {
+            return NO_PLANE;
+        }
+        let Some(plane) = own_plane(points) else {
+            return NO_PLANE;
         };
         let at = [
             plane.normal.x * 256.0,
             plane.normal.y * 256.0,
             plane.normal.z * 256.0,
-            plane.signed_distance(center) * 100.0,
+            plane.signed_distance(self.center) * 100.0,
         ];
         let mut best: Option<(f64, u32)> = None;
         for choice in 0..16u32 {
@@ -161,35 +198,127 @@ pub(super) fn gather(
                 let low = (at[i] - 0.5).floor() as i32;
                 low + (choice >> i & 1) as i32
             });
-            for &id in buckets.get(&key).into_iter().flatten() {
-                let p = &planes[id as usize];
-                let stray = s
-                    .points
+            for &id in self.buckets.get(&key).into_iter().flatten() {
+                let p = &self.planes[id as usize];
+                let stray = points
                     .iter()
                     .map(|&q| p.signed_distance(q).abs())
                     .fold(0.0, f64::max);
-                if stray <= tolerance.plane && best.is_none_or(|b| (stray, id) < b) {
+                if stray <= self.tolerance && best.is_none_or(|b| (stray, id) < b) {
                     best = Some((stray, id));
                 }
             }
         }
-        s.plane = match best {
+        match best {
             Some((_, id)) => id,
             None => {
-                let id = planes.len() as u32;
-                planes.push(plane);
-                buckets
+                let id = self.planes.len() as u32;
+                self.planes.push(plane);
+                self.buckets
                     .entry(at.map(|x| x.floor() as i32))
                     .or_default()
                     .push(id);
                 id
             }
-        };
+        }
     }
-    SurfaceSet { surfaces, planes }
 }
 
-/// Whether a fragment of a surface lies in `plane`, whose id is `plane_id`.
+/// Seams along the edges that come apart as their triangles move into planes.
+///
+/// A triangle's corners are moved by up to a tolerance into its plane. Where another triangle begins
+/// at an edge so moved, in a plane at a shallow angle, the two planes cross not at the edge but far
+/// beside it, and between them is a wedge: at the edge thinner than any opening, yet open to one side
+/// before it and to the other behind it. A strip across the edge, a little higher than the
+/// wedge, closes it where the scene is closed. One query of a box tree for each edge moved.
+fn seams(surfaces: &[Surface], planes: &[Plane], tolerance: &Tolerance) -> Vec<Surface> {
+    let flat: Vec<&Surface> = surfaces
+        .iter()
+        .filter(|s| s.plane != NO_PLANE && matches!(s.source, Source::Triangle(_)))
+        .collect();
+    let is_moved = |s: &Surface| {
+        let plane = &planes[s.plane as usize];
+        s.points
+            .iter()
+            .any(|&p| plane.signed_distance(p).abs() > tolerance.cut)
+    };
+    if !flat.iter().any(|s| is_moved(s)) {
+        return Vec::new();
+    }
+    let triangles: Vec<Triangle> = flat
+        .iter()
+        .map(|s| [s.points[0], s.points[1], s.points[2]])
+        .collect();
+    let bvh = Bvh::build(&triangles);
+    let seams: Vec<(EdgeKey, Surface)> = flat
+        .par_iter()
+        .with_min_len(64)
+        .filter(|s| is_moved(s))
+        .flat_map_iter(|s| {
+            let normal = planes[s.plane as usize].normal;
+            let bvh = &bvh;
+            let flat = &flat;
+            (0..3).filter_map(move |i| {
+                let (a, b) = (s.points[i], s.points[(i + 1) % 3]);
+                let reach = Aabb::of_points(&[a, b]).expanded(tolerance.width);
+                let mut is_apart = false;
+                bvh.for_each_in_box(&reach, |t| {
+                    let other = flat[t as usize];
+                    is_apart |= other.plane != s.plane
+                        && planes[other.plane as usize]
+                            .normal
+                            .cross(normal)
+                            .length_squared()
+                            < SHALLOW * SHALLOW
+                        && run_along(&other.points, a, b, tolerance.width);
+                });
+                is_apart.then(|| {
+                    let up = normal * (1.5 * tolerance.width);
+                    let seam = Surface {
+                        source: Source::Seam,
+                        plane: NO_PLANE,
+                        points: [a - up, b - up, b + up, a + up].into_iter().collect(),
+                    };
+                    (edge_key(a, b), seam)
+                })
+            })
+        })
+        .collect();
+    // Both triangles at an edge may want one. The order is that of the surfaces, whatever the threads.
+    let mut seen: HashSet<EdgeKey> = HashSet::new();
+    seams
+        .into_iter()
+        .filter(|(key, _)| seen.insert(*key))
+        .map(|(_, seam)| seam)
+        .collect()
+}
+
+/// Whether a polygon has an edge on the segment from `a` to `b`, at least in part.
+fn run_along(points: &[DVec3], a: DVec3, b: DVec3, width: f64) -> bool {
+    let length = a.distance(b);
+    let along = (b - a) / length;
+    let mut last: Option<f64> = None;
+    points.iter().chain(&points[..1]).any(|&p| {
+        let at = along.dot(p - a);
+        let is_on_line = (p - a - along * at).length() <= width;
+        let before = std::mem::replace(&mut last, is_on_line.then_some(at));
+        let (Some(from), true) = (before, is_on_line) else {
+            return false;
+        };
+        at.max(from).min(length) - at.min(from).max(0.0) > width
+    })
+}
+
+type EdgeKey = [[u64; 3]; 2];
+
+fn edge_key(a: DVec3, b: DVec3) -> EdgeKey {
+    let mut key = [a, b].map(|p| p.to_array().map(ordered_bits));
+    key.sort_unstable();
+    key
+}
+
+/// Whether a surface lies in the plane of id `plane_id`, all of it: were fragments moved one by one,
+/// they would come apart where their regions meet.
 pub(super) fn lies_in(
     surface_plane: u32,
     points: &[DVec3],

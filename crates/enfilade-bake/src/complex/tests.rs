@@ -418,6 +418,62 @@ fn the_hollow_of_a_wall_is_solid() {
     assert!(p.locator.locate(DVec3::new(3.05, 1.0, 1.5)).is_some());
 }
 
+/// A closed box of 4 x 4 x 2 m whose top is a pyramid of 1 cm, all of it in small triangles, turned
+/// about `axis`; its corners are rounded to `f32` after that.
+fn turned_box(axis: DVec3, angle: f64) -> Vec<Triangle> {
+    const N: usize = 6;
+    let turn = DMat3::from_axis_angle(axis.normalize(), angle);
+    let mut out = Vec::new();
+    for face in 0..6 {
+        let (axis, is_high) = (face % 3, face >= 3);
+        let at = |i: usize, j: usize| {
+            let mut p = DVec3::ZERO;
+            p[axis] = [0.0, 1.0][usize::from(is_high)];
+            p[(axis + 1) % 3] = i as f64 / N as f64;
+            p[(axis + 2) % 3] = j as f64 / N as f64;
+            let rise = 0.01 * [i, j, N - i, N - j].into_iter().min().unwrap_or(0) as f64 / 3.0;
+            let lift = if face == 5 { rise } else { 0.0 };
+            let p = turn * (p * DVec3::new(4.0, 4.0, 2.0) + DVec3::Z * lift);
+            v(p.x, p.y, p.z)
+        };
+        for i in 0..N {
+            for j in 0..N {
+                quad(
+                    &mut out,
+                    [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)],
+                );
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn a_closed_surface_of_nearly_flat_triangles_lets_nothing_through() {
+    let mut random = Random(77);
+    for _ in 0..12 {
+        let axis = DVec3::new(random.next(), random.next(), random.next()) - 0.4;
+        let angle = 3.0 * random.next();
+        let triangles = turned_box(axis, angle);
+        let back = DMat3::from_axis_angle(axis.normalize(), -angle);
+        let b = Aabb::of_points(triangles.iter().flatten()).expanded(0.5);
+        let ballots = votes(&b, 0.25, |p| {
+            let q = back * p;
+            let near = (q - q.clamp(DVec3::ZERO, DVec3::new(4.0, 4.0, 2.0))).length();
+            let is_in = near == 0.0;
+            (is_in || near > 0.1).then_some(u32::from(is_in))
+        });
+        let partition = build(&triangles, &[]).partition(&ballots, &LabelSettings::default());
+        assert_eq!(partition.label_of_cell.len(), 2, "{axis} {angle}");
+        // Slopes that differ by 0.5 % and corners moved by a tolerance: wedges 0.4 mm wide.
+        for p in &partition.portals {
+            assert!(p.width < 1e-4, "{axis} {angle}: {p:?}");
+        }
+        assert!(partition.portals.len() <= 1, "{axis} {angle}");
+        assert_promises(&triangles, &partition, &b, 100);
+    }
+}
+
 #[test]
 fn no_input_at_all_is_one_leaf() {
     let c = build_complex(&ComplexInput {

@@ -289,7 +289,13 @@ impl Builder<'_> {
         for f in fragments {
             let own = self.plane_of(&f);
             if let Some(id) = plane_id
-                && lies_in(own, &f.points, id, &self.set.planes, &self.tolerance)
+                && lies_in(
+                    own,
+                    &self.set.surfaces[f.surface as usize].points,
+                    id,
+                    &self.set.planes,
+                    &self.tolerance,
+                )
             {
                 on_plane.push(f.surface);
                 continue;

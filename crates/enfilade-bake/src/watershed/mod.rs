@@ -10,6 +10,7 @@ mod fit;
 mod hollow;
 mod lids;
 mod regions;
+mod rims;
 mod slabs;
 mod stairs;
 mod voids;
@@ -22,6 +23,7 @@ pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,
 };
+pub use rims::rim_caps;
 pub use slabs::{cut_at_slabs, slab_heights};
 pub use stairs::find_stairs;
 pub use voids::shallow_voids;

@@ -19,6 +19,10 @@ const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.25;
 const GOING: std::ops::RangeInclusive<f64> = 0.12..=1.2;
 /// Area of a step. [Units: wu²]
 const STEP_AREA: std::ops::RangeInclusive<f64> = 0.03..=4.0;
+/// Cosine of the most that a tread leans.
+const LEVEL: f64 = 0.99;
+/// Treads are at least this share of the area that faces up.
+const MIN_LEVEL_SHARE: f64 = 0.5;
 /// Steps in a row that make a flight.
 const MIN_STEPS: usize = 4;
 /// Objects with a larger plan are looked at shell by shell: a whole building may be one. [Units: wu²]
@@ -110,17 +114,26 @@ struct Level {
 }
 
 fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
+    let mut upward = 0.0;
     let mut flat: Vec<(f64, DVec3, f64)> = members
         .iter()
         .filter_map(|&t| {
             let n = triangle_area_normal(&triangles[t]);
             let area = n.length() * 0.5;
-            (n.y * side > 0.95 * n.length() && area > 1e-6).then(|| {
+            let slope = n.y * side;
+            if slope > 0.5 * n.length() {
+                upward += area;
+            }
+            (slope > LEVEL * n.length() && area > 1e-6).then(|| {
                 let middle = (triangles[t][0] + triangles[t][1] + triangles[t][2]) / 3.0;
                 (middle.y, middle, area)
             })
         })
         .collect();
+    // Anything round has level spots at all heights; treads are most of what faces up.
+    if flat.iter().map(|f| f.2).sum::<f64>() < MIN_LEVEL_SHARE * upward {
+        return Vec::new();
+    }
     flat.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<Level> = Vec::new();
     for (y, middle, area) in flat {

@@ -24,7 +24,7 @@ pub(crate) struct BakeOptions {
     #[arg(long, value_name = "PATTERN")]
     structural_name: Vec<String>,
     /// The input's unit: m, cm, mm, in, ft, or a number of meters.
-    #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
+    #[arg(long, visible_alias = "scale", value_name = "UNIT", value_parser = parse_unit)]
     unit: Option<f64>,
     /// The input's up axis.
     #[arg(long, value_enum)]

@@ -1,0 +1,393 @@
+//! Quake `.map` files, Standard and Valve 220: brushes become solids and their faces, entities are kept.
+//!
+//! A brush is the space behind all of its planes, so no brush is ever not convex; what cannot be right
+//! (planes that face inwards or leave a way to infinity) ends in an error with line and column. World
+//! and `func_group` brushes are structural; `func_detail*` and all other brush entities are detail;
+//! liquids are detail that one sees through; triggers, clips and hints are no matter. A structural face
+//! that other structural brushes hide altogether is left out.
+//!
+//! A unit is 1/32 m if nothing else is said: a player of 56 units is 1.75 m tall, and coordinates stay
+//! exact. Up is z. Sizes of textures are in WAD files, which are not read, so no texture coordinates
+//! come out of a map.
+
+mod parse;
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use enfilade_geom::scene::{Entity, Material, Mesh, Primitive, Role};
+use enfilade_geom::solid::exposed_faces;
+use enfilade_geom::{ConvexSolid, DMat3, DVec3, Plane, SolidError};
+use serde_json::json;
+
+use crate::builder::Builder;
+use crate::{ImportError, Up};
+use parse::{Brush, MAX_COORDINATE, RawEntity};
+
+/// Meters in a unit of a map, if nothing else is said.
+const UNIT: f64 = 1.0 / 32.0;
+/// Corners nearer than this are one. [Units: those of the map]
+const WELD: f64 = 1e-3;
+/// Most sides of a brush; clipping is quadratic in them. Editors make up to some dozens.
+const MAX_SIDES: usize = 256;
+
+/// A place in the text, both from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    line: u32,
+    column: u32,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}:{}", self.line, self.column)
+    }
+}
+
+/// Whether the text looks like a map: it begins, comments aside, with a brace and a quote.
+pub(crate) fn is_map(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(1 << 16)];
+    let mut lines = head
+        .split(|&b| b == b'\n')
+        .map(<[u8]>::trim_ascii)
+        .filter(|l| !l.is_empty() && !l.starts_with(b"//"));
+    let second = |rest: &[u8]| rest.trim_ascii().starts_with(b"\"");
+    match lines.next() {
+        Some(b"{") => lines.next().is_some_and(second),
+        _ => false,
+    }
+}
+
+/// What a brush entity is to the decomposition.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Structural,
+    Detail,
+    Nothing,
+}
+
+fn kind_of_class(class: &str) -> Kind {
+    match class {
+        "worldspawn" | "func_group" => Kind::Structural,
+        _ if class.starts_with("trigger_") || class.starts_with("info_") => Kind::Nothing,
+        _ => Kind::Detail,
+    }
+}
+
+/// What a brush is by its sides' textures, whatever entity it is of.
+#[derive(Clone, Copy, PartialEq)]
+enum Matter {
+    Solid,
+    Liquid,
+    /// Steers games and compilers and is no matter.
+    Tool,
+}
+
+fn matter_of(brush: &Brush<'_>) -> Matter {
+    const TOOLS: [&str; 6] = [
+        "clip",
+        "hint",
+        "hintskip",
+        "trigger",
+        "origin",
+        "areaportal",
+    ];
+    let is = |s: &str| TOOLS.iter().any(|t| s.eq_ignore_ascii_case(t));
+    fn name(texture: &str) -> &str {
+        texture.rsplit('/').next().unwrap_or(texture)
+    }
+    if brush.sides.iter().any(|s| is(name(s.texture))) {
+        Matter::Tool
+    } else if brush
+        .sides
+        .iter()
+        .any(|s| name(s.texture).starts_with(['*', '!']))
+    {
+        Matter::Liquid
+    } else {
+        Matter::Solid
+    }
+}
+
+/// A brush that has a shape.
+struct Shaped<'t> {
+    solid: ConvexSolid,
+    textures: Vec<&'t str>,
+    entity: usize,
+    matter: Matter,
+}
+
+/// Reads one file into the builder.
+pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    builder.set_format("Quake map");
+    // Maps are Latin-1 or UTF-8; only names and texts can hold either.
+    let text = String::from_utf8_lossy(bytes);
+    let failed =
+        |builder: &Builder<'_>, p: parse::Problem| builder.malformed(p.place.to_string(), p.text);
+    let entities = parse::parse(&text).map_err(|p| failed(builder, p))?;
+    if !entities
+        .iter()
+        .any(|e| e.get("classname") == Some("worldspawn"))
+    {
+        let place = entities
+            .first()
+            .map_or(Place { line: 1, column: 1 }, |e| e.place);
+        return Err(builder.malformed(
+            place.to_string(),
+            "no entity is the world (\"classname\" \"worldspawn\"); save the map again",
+        ));
+    }
+    let n_brushes: usize = entities.iter().map(|e| e.brushes.len()).sum();
+    // A box brush has 6 faces of 4 corners and 2 triangles; what has more is charged when it is placed.
+    builder.charge_memory("brushes", n_brushes as u64, 1024)?;
+    let mut shaped: Vec<Shaped<'_>> = Vec::new();
+    for (i, entity) in entities.iter().enumerate() {
+        if entity.brushes.is_empty()
+            || kind_of_class(entity.get("classname").unwrap_or("")) == Kind::Nothing
+        {
+            continue;
+        }
+        for brush in &entity.brushes {
+            let matter = matter_of(brush);
+            if matter == Matter::Tool {
+                continue;
+            }
+            let solid = solid_of(brush).map_err(|p| failed(builder, p))?;
+            if solid.planes.len() < brush.sides.len() {
+                builder.note(
+                    brush.place.to_string(),
+                    "sides that bound nothing of their brush; left out",
+                );
+            }
+            let textures = solid
+                .sources
+                .iter()
+                .map(|&s| brush.sides[s as usize].texture)
+                .collect();
+            shaped.push(Shaped {
+                solid,
+                textures,
+                entity: i,
+                matter,
+            });
+        }
+    }
+    build(&entities, &shaped, builder)
+}
+
+/// The brush as a solid.
+fn solid_of(brush: &Brush<'_>) -> Result<ConvexSolid, parse::Problem> {
+    let problem = |place: Place, text: String| parse::Problem { place, text };
+    if brush.sides.len() < 4 || brush.sides.len() > MAX_SIDES {
+        let n = brush.sides.len();
+        return Err(problem(
+            brush.place,
+            format!(
+                "a brush with {n} sides; it takes 4 to enclose anything, and at most {MAX_SIDES} are read"
+            ),
+        ));
+    }
+    let mut planes = Vec::with_capacity(brush.sides.len());
+    for side in &brush.sides {
+        let [a, b, c] = side.points.map(DVec3::from_array);
+        let normal = (a - b).cross(c - b).try_normalize();
+        let Some(normal) = normal.filter(|_| (a - b).cross(c - b).length() > 1e-6) else {
+            return Err(problem(
+                side.place,
+                "the three points of this side lie on a line and make no plane; move one of them"
+                    .into(),
+            ));
+        };
+        planes.push(Plane::through(b, exact(normal)));
+    }
+    let reach = 2.0 * MAX_COORDINATE;
+    ConvexSolid::from_planes(&planes, reach, WELD).map(snapped).map_err(|e| {
+        let inward: Vec<Plane> = planes.iter().map(|p| p.flipped()).collect();
+        let is_inverted = ConvexSolid::from_planes(&inward, reach, WELD).is_ok();
+        problem(
+            brush.place,
+            match e {
+                _ if is_inverted => {
+                    "the brush is inside out: its sides face inwards; swap two points of each side".into()
+                }
+                SolidError::Empty => {
+                    "the sides of this brush enclose nothing: they contradict each other, as when a solid that \
+                     is not convex is written as one brush; split it into convex ones or delete it"
+                        .into()
+                }
+                SolidError::Unbounded => {
+                    "the sides of this brush leave a way to infinity; a side is missing".into()
+                }
+            },
+        )
+    })
+}
+
+/// Axis-aligned normals without the dust of normalizing.
+fn exact(normal: DVec3) -> DVec3 {
+    let axis = [DVec3::X, DVec3::Y, DVec3::Z]
+        .into_iter()
+        .find(|a| normal.dot(*a).abs() > 1.0 - 1e-14);
+    axis.map_or(normal, |a| a * normal.dot(a).signum())
+}
+
+/// Corners that are whole numbers but for the dust of solving are whole numbers.
+fn snapped(mut solid: ConvexSolid) -> ConvexSolid {
+    for c in solid.faces.iter_mut().flat_map(|f| &mut f.points) {
+        let whole = c.round();
+        *c = DVec3::select((*c - whole).abs().cmplt(DVec3::splat(1e-6)), whole, *c);
+    }
+    solid
+}
+
+fn build(
+    entities: &[RawEntity<'_>],
+    shaped: &[Shaped<'_>],
+    builder: &mut Builder<'_>,
+) -> Result<(), ImportError> {
+    let mut options = builder.options.clone();
+    options.unit = options.unit.or(Some(UNIT));
+    options.up = options.up.or(Some(Up::Z));
+    let base = options.base_transform()?;
+    let scale = options.unit.unwrap_or(UNIT);
+    let rotation = DMat3::from_mat4(base) * (1.0 / scale);
+    let offset = base.w_axis.truncate();
+    let class_of = |e: usize| entities[e].get("classname").unwrap_or("brushes");
+    let roles: Vec<(Role, String)> = (0..entities.len())
+        .map(|e| {
+            let class = class_of(e);
+            let told = || match kind_of_class(class) {
+                _ if builder.is_detail_file => (Role::Detail, "from a detail file".to_owned()),
+                Kind::Structural => (Role::Structural, format!("map: brushes of {class}")),
+                _ => (Role::Detail, format!("map: brushes of {class}")),
+            };
+            builder
+                .options
+                .roles
+                .forced(&format!("{class} {e}"))
+                .unwrap_or_else(told)
+        })
+        .collect();
+    let is_structural =
+        |s: &Shaped<'_>| s.matter == Matter::Solid && roles[s.entity].0 == Role::Structural;
+    let structural: Vec<&ConvexSolid> = shaped
+        .iter()
+        .filter(|s| is_structural(s))
+        .map(|s| &s.solid)
+        .collect();
+    let exposed = exposed_faces(&structural, WELD);
+    let mut exposed = exposed.iter();
+    // One object for each entity and kind of matter, so that each keeps its identity.
+    let mut meshes: BTreeMap<(usize, bool), BTreeMap<&str, Primitive>> = BTreeMap::new();
+    for s in shaped {
+        let visible = is_structural(s).then(|| exposed.next()).flatten();
+        let parts = meshes
+            .entry((s.entity, s.matter == Matter::Liquid))
+            .or_default();
+        for (f, face) in s.solid.faces.iter().enumerate() {
+            if visible.is_some_and(|v| v[f].is_empty()) {
+                continue;
+            }
+            let to = parts.entry(s.textures[f]).or_default();
+            let first = to.positions.len() as u32;
+            let n = face.points.len() as u32;
+            builder.charge_vertices("faces", u64::from(n))?;
+            let normal = s.solid.planes[f].normal.as_vec3().to_array();
+            to.positions
+                .extend(face.points.iter().map(|p| p.as_vec3().to_array()));
+            to.normals.extend(face.points.iter().map(|_| normal));
+            to.indices
+                .extend((1..n - 1).flat_map(|k| [first, first + k, first + k + 1]));
+        }
+    }
+    let mut material_of: BTreeMap<(&str, bool), u32> = BTreeMap::new();
+    let mut object_of: BTreeMap<usize, u32> = BTreeMap::new();
+    for ((e, is_liquid), parts) in meshes {
+        if parts.is_empty() {
+            continue;
+        }
+        let class = class_of(e);
+        let name = if is_liquid {
+            format!("{class} {e} liquid")
+        } else {
+            format!("{class} {e}")
+        };
+        let mut primitives = Vec::new();
+        for (texture, mut primitive) in parts {
+            let material = *material_of
+                .entry((texture, is_liquid))
+                .or_insert_with(|| builder.push_material(material(texture, is_liquid)));
+            primitive.material = Some(material);
+            primitives.push(primitive);
+        }
+        let (role, reason) = if is_liquid {
+            (Role::Detail, "map: a liquid")
+        } else {
+            (roles[e].0, roles[e].1.as_str())
+        };
+        let mesh = builder.push_mesh(Mesh {
+            name: name.clone(),
+            primitives,
+        });
+        let object = builder.place_as(mesh, base, &name, role, reason)?;
+        object_of.entry(e).or_insert(object);
+    }
+    builder.add_solids(
+        structural
+            .iter()
+            .map(|s| s.placed(scale, &rotation, offset)),
+    );
+    for (i, e) in entities.iter().enumerate() {
+        let position = e.get("origin").and_then(|text| {
+            let mut numbers = text.split_ascii_whitespace().map(str::parse::<f64>);
+            let mut next = || numbers.next()?.ok().filter(|v| v.is_finite());
+            Some(base.transform_point3(DVec3::new(next()?, next()?, next()?)))
+        });
+        builder.add_entity(Entity {
+            class: e.get("classname").unwrap_or("").to_owned(),
+            position,
+            properties: e
+                .properties
+                .iter()
+                .map(|&(k, v)| (k.to_owned(), v.to_owned()))
+                .collect(),
+            object: object_of.get(&i).copied(),
+        });
+    }
+    if structural.is_empty() {
+        builder.note("world", "no structural brush");
+    }
+    Ok(())
+}
+
+/// A plain material of a texture's name, in a color of its own.
+fn material(texture: &str, is_liquid: bool) -> Material {
+    // FNV-1a, for a color that is the same every time.
+    let hash = texture.bytes().fold(0x811c_9dc5_u32, |h, b| {
+        (h ^ u32::from(b.to_ascii_lowercase())).wrapping_mul(0x0100_0193)
+    });
+    let channel = |shift: u32| 0.25 + 0.5 * ((hash >> shift) & 255) as f32 / 255.0;
+    let base_color = [
+        channel(0),
+        channel(8),
+        channel(16),
+        if is_liquid { 0.5 } else { 1.0 },
+    ];
+    let mut fields = json!({
+        "name": texture,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": base_color, "metallicFactor": 0.0, "roughnessFactor": 1.0
+        }
+    });
+    if is_liquid {
+        fields["alphaMode"] = json!("BLEND");
+        fields["doubleSided"] = json!(true);
+    }
+    Material {
+        name: texture.to_owned(),
+        gltf: fields.to_string(),
+        double_sided: is_liquid,
+        transparent: is_liquid,
+        base_color,
+    }
+}

@@ -1,0 +1,313 @@
+//! The text of a `.map` file: entities, their properties and their brushes' planes.
+
+use super::Place;
+
+/// Numbers beyond this are taken for damage.
+pub(super) const MAX_COORDINATE: f64 = 1e6;
+
+/// Something wrong at a place in the text.
+#[derive(Debug)]
+pub(super) struct Problem {
+    pub(super) place: Place,
+    pub(super) text: String,
+}
+
+/// A side of a brush.
+pub(super) struct Side<'t> {
+    pub(super) points: [[f64; 3]; 3],
+    pub(super) texture: &'t str,
+    pub(super) place: Place,
+}
+
+/// A convex solid, as the planes around it.
+pub(super) struct Brush<'t> {
+    pub(super) sides: Vec<Side<'t>>,
+    pub(super) place: Place,
+}
+
+/// A thing of the map.
+pub(super) struct RawEntity<'t> {
+    pub(super) properties: Vec<(&'t str, &'t str)>,
+    pub(super) brushes: Vec<Brush<'t>>,
+    pub(super) place: Place,
+}
+
+impl<'t> RawEntity<'t> {
+    /// The last value of a property; what repeats overrides.
+    pub(super) fn get(&self, key: &str) -> Option<&'t str> {
+        let found = self.properties.iter().rev().find(|p| p.0 == key);
+        found.map(|p| p.1)
+    }
+}
+
+/// Reads all entities. Time and memory are linear in the text.
+pub(super) fn parse(text: &str) -> Result<Vec<RawEntity<'_>>, Problem> {
+    let mut words = Words {
+        text,
+        at: 0,
+        line: 1,
+        line_start: 0,
+    };
+    let mut entities = Vec::new();
+    while let Some((place, word)) = words.next()? {
+        if word != "{" {
+            return Err(problem(
+                place,
+                format!("'{}' where an entity's '{{' is due", shown(word)),
+            ));
+        }
+        entities.push(entity(&mut words, place)?);
+    }
+    Ok(entities)
+}
+
+fn entity<'t>(words: &mut Words<'t>, place: Place) -> Result<RawEntity<'t>, Problem> {
+    let mut out = RawEntity {
+        properties: Vec::new(),
+        brushes: Vec::new(),
+        place,
+    };
+    loop {
+        let Some((at, word)) = words.next()? else {
+            return Err(problem(
+                place,
+                "this entity has no '}'; the file may be cut off".into(),
+            ));
+        };
+        if let Some(key) = word.strip_prefix('"') {
+            let value = match words.next()? {
+                Some((_, v)) if v.starts_with('"') => &v[1..],
+                _ => {
+                    return Err(problem(
+                        at,
+                        format!("the property \"{}\" has no quoted value", shown(key)),
+                    ));
+                }
+            };
+            out.properties.push((key, value));
+            continue;
+        }
+        match word {
+            "{" => out.brushes.push(brush(words, at)?),
+            "}" => return Ok(out),
+            _ => {
+                return Err(problem(
+                    at,
+                    format!("'{}' where a property, a brush or '}}' is due", shown(word)),
+                ));
+            }
+        }
+    }
+}
+
+fn brush<'t>(words: &mut Words<'t>, place: Place) -> Result<Brush<'t>, Problem> {
+    let mut sides = Vec::new();
+    loop {
+        let Some((at, word)) = words.next()? else {
+            return Err(problem(
+                place,
+                "this brush has no '}'; the file may be cut off".into(),
+            ));
+        };
+        match word {
+            "(" => sides.push(side(words, at)?),
+            "}" => return Ok(Brush { sides, place }),
+            "brushDef" | "brushDef3" | "patchDef2" | "patchDef3" | "patchDefWS" => {
+                return Err(problem(
+                    at,
+                    format!(
+                        "'{word}' is of Quake 3 or Doom 3; save the map in the Standard or Valve 220 format"
+                    ),
+                ));
+            }
+            _ => {
+                return Err(problem(
+                    at,
+                    format!("'{}' where a side's '(' or '}}' is due", shown(word)),
+                ));
+            }
+        }
+    }
+}
+
+fn side<'t>(words: &mut Words<'t>, place: Place) -> Result<Side<'t>, Problem> {
+    let mut points = [[0.0; 3]; 3];
+    for (i, point) in points.iter_mut().enumerate() {
+        if i > 0 {
+            words.expect("(", "a point's")?;
+        }
+        for c in point.iter_mut() {
+            *c = words.number("a coordinate")?;
+        }
+        words.expect(")", "a point's")?;
+    }
+    let texture = words.raw("a texture's name")?;
+    // Standard: two shifts, an angle, two scales. Valve 220: two axes in brackets, then the last three.
+    // Numbers that Quake 2 adds to either follow on the same line and say nothing of the shape.
+    if words.peek()? == Some("[") {
+        for _ in 0..2 {
+            words.expect("[", "a texture axis'")?;
+            for _ in 0..4 {
+                words.number("a texture axis")?;
+            }
+            words.expect("]", "a texture axis'")?;
+        }
+        for _ in 0..3 {
+            words.number("a texture's angle or scale")?;
+        }
+    } else {
+        for _ in 0..5 {
+            words.number("a texture's shift, angle or scale")?;
+        }
+    }
+    while words.peek()?.is_some_and(|w| w.parse::<f64>().is_ok()) {
+        words.next()?;
+    }
+    Ok(Side {
+        points,
+        texture,
+        place,
+    })
+}
+
+fn problem(place: Place, text: String) -> Problem {
+    Problem { place, text }
+}
+
+/// Some of a word, however long it is.
+fn shown(word: &str) -> String {
+    word.trim_start_matches('"').chars().take(24).collect()
+}
+
+/// Words, brackets and quoted texts (with their first quote) of a text.
+struct Words<'t> {
+    text: &'t str,
+    at: usize,
+    line: u32,
+    line_start: usize,
+}
+
+impl<'t> Words<'t> {
+    fn place(&self) -> Place {
+        Place {
+            line: self.line,
+            column: (self.at - self.line_start) as u32 + 1,
+        }
+    }
+
+    /// Skips blanks and comments.
+    fn skip(&mut self) {
+        let bytes = self.text.as_bytes();
+        while let Some(&b) = bytes.get(self.at) {
+            if b == b'\n' {
+                self.line += 1;
+                self.line_start = self.at + 1;
+            } else if b == b'/' && bytes.get(self.at + 1) == Some(&b'/') {
+                while bytes.get(self.at).is_some_and(|&b| b != b'\n') {
+                    self.at += 1;
+                }
+                continue;
+            } else if !b.is_ascii_whitespace() && b != 0 {
+                return;
+            }
+            self.at += 1;
+        }
+    }
+
+    fn next(&mut self) -> Result<Option<(Place, &'t str)>, Problem> {
+        self.skip();
+        let place = self.place();
+        let rest = &self.text[self.at..];
+        let Some(first) = rest.bytes().next() else {
+            return Ok(None);
+        };
+        if first == b'"' {
+            let end = rest[1..]
+                .find(['"', '\n'])
+                .filter(|&i| rest.as_bytes()[i + 1] == b'"');
+            let Some(end) = end else {
+                return Err(problem(
+                    place,
+                    "a quote that does not end on its line".into(),
+                ));
+            };
+            self.at += end + 2;
+            return Ok(Some((place, &rest[..=end])));
+        }
+        if b"{}()[]".contains(&first) {
+            self.at += 1;
+            return Ok(Some((place, &rest[..1])));
+        }
+        let end = rest
+            .find(|c: char| c.is_ascii_whitespace() || "{}()[]\"".contains(c))
+            .unwrap_or(rest.len());
+        self.at += end;
+        Ok(Some((place, &rest[..end])))
+    }
+
+    /// A word up to the next blank, whatever it is made of: names of textures may begin with a brace.
+    fn raw(&mut self, what: &str) -> Result<&'t str, Problem> {
+        self.skip();
+        let rest = &self.text[self.at..];
+        if let Some(quoted) = rest.strip_prefix('"')
+            && let Some(end) = quoted.find(['"', '\n'])
+        {
+            self.at += end + 2;
+            return Ok(&quoted[..end]);
+        }
+        let end = rest
+            .find(|c: char| c.is_ascii_whitespace())
+            .unwrap_or(rest.len());
+        if end == 0 {
+            return Err(problem(
+                self.place(),
+                format!("the file ends where {what} is due"),
+            ));
+        }
+        self.at += end;
+        Ok(&rest[..end])
+    }
+
+    fn peek(&mut self) -> Result<Option<&'t str>, Problem> {
+        self.skip();
+        let at = self.at;
+        let word = self.next()?;
+        self.at = at;
+        Ok(word.map(|w| w.1))
+    }
+
+    fn expect(&mut self, bracket: &str, what: &str) -> Result<(), Problem> {
+        self.skip();
+        let end = self.place();
+        match self.next()? {
+            Some((_, word)) if word == bracket => Ok(()),
+            Some((place, word)) => Err(problem(
+                place,
+                format!("'{}' where {what} '{bracket}' is due", shown(word)),
+            )),
+            None => Err(problem(
+                end,
+                format!("the file ends where {what} '{bracket}' is due"),
+            )),
+        }
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64, Problem> {
+        self.skip();
+        let end = self.place();
+        let Some((place, word)) = self.next()? else {
+            return Err(problem(end, format!("the file ends where {what} is due")));
+        };
+        match word.parse::<f64>() {
+            Ok(v) if v.is_finite() && v.abs() <= MAX_COORDINATE => Ok(v),
+            Ok(v) => Err(problem(
+                place,
+                format!("{v} is no {} of a map", what.trim_start_matches("a ")),
+            )),
+            Err(_) => Err(problem(
+                place,
+                format!("'{}' where {what} is due", shown(word)),
+            )),
+        }
+    }
+}

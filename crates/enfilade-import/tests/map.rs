@@ -1,0 +1,209 @@
+//! Quake maps: what their brushes become, and where what is wrong with them is said to be.
+
+use enfilade_geom::scene::Role;
+use enfilade_import::{ImportOptions, decode_map};
+use std::fmt::Write;
+
+/// A box brush in the Standard format.
+fn boxed(min: [i32; 3], max: [i32; 3], texture: &str) -> String {
+    let mut out = "{\n".to_owned();
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for high in [false, true] {
+            let base = if high { max } else { min };
+            let (mut a, mut c) = (base, base);
+            // The cross product of a - b and c - b looks outwards.
+            a[if high { u } else { v }] += 16;
+            c[if high { v } else { u }] += 16;
+            for p in [a, base, c] {
+                write!(out, "( {} {} {} ) ", p[0], p[1], p[2]).unwrap();
+            }
+            writeln!(out, "{texture} 0 0 0 1 1").unwrap();
+        }
+    }
+    out + "}\n"
+}
+
+fn map(world: &str, others: &str) -> String {
+    format!("// made here\n{{\n\"classname\" \"worldspawn\"\n{world}}}\n{others}")
+}
+
+fn read(text: &str) -> enfilade_import::Imported {
+    decode_map(text.as_bytes(), &ImportOptions::default()).unwrap()
+}
+
+fn problem(text: &str) -> String {
+    decode_map(text.as_bytes(), &ImportOptions::default())
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn a_box_has_twelve_triangles_in_meters_with_y_up() {
+    let scene = read(&map(&boxed([0, 0, 0], [64, 32, 96], "stone"), "")).scene;
+    assert_eq!(scene.triangle_sources(Role::Structural).count(), 12);
+    let b = scene.object_aabb(0);
+    assert_eq!(
+        (b.min.to_array(), b.max.to_array()),
+        ([0.0, 0.0, -1.0], [2.0, 3.0, 0.0])
+    );
+    assert!((scene.solids[0].volume() - 6.0).abs() < 1e-9);
+    // Outward, and where the faces are.
+    for s in scene.triangle_sources(Role::Structural) {
+        let t = scene.world_triangle(s);
+        let outward = (t[0] + t[1] + t[2]) / 3.0 - b.center();
+        assert!(enfilade_geom::triangle_area_normal(&t).dot(outward) > 0.0);
+    }
+}
+
+#[test]
+fn the_scale_is_the_callers() {
+    let options = ImportOptions {
+        unit: Some(0.5),
+        ..ImportOptions::default()
+    };
+    let text = map(&boxed([0, 0, 0], [8, 8, 8], "stone"), "");
+    let scene = decode_map(text.as_bytes(), &options).unwrap().scene;
+    assert_eq!(scene.object_aabb(0).size().to_array(), [4.0; 3]);
+    assert!((scene.solids[0].volume() - 64.0).abs() < 1e-9);
+}
+
+#[test]
+fn both_formats_give_the_same_solid() {
+    let standard = boxed([0, 0, 0], [64, 32, 96], "stone");
+    let valve = standard.replace("stone 0 0 0 1 1", "stone [ 1 0 0 0 ] [ 0 -1 0 8.5 ] 0 1 1");
+    assert_eq!(
+        read(&map(&standard, "")).scene.solids,
+        read(&map(&valve, "")).scene.solids
+    );
+    // Quake 2's three numbers more.
+    let quake2 = standard.replace("0 0 0 1 1", "0 0 0 1 1 134217728 0 0");
+    assert_eq!(
+        read(&map(&standard, "")).scene.solids,
+        read(&map(&quake2, "")).scene.solids
+    );
+}
+
+#[test]
+fn entities_say_what_brushes_are() {
+    let b = |x: i32, t: &str| boxed([x, 0, 0], [x + 32, 32, 32], t);
+    let others = format!(
+        "{{\n\"classname\" \"func_detail_wall\"\n{}}}\n{{\n\"classname\" \"func_group\"\n{}}}\n\
+         {{\n\"classname\" \"trigger_once\"\n{}}}\n{{\n\"classname\" \"light\"\n\"origin\" \"32 64 96\"\n}}\n",
+        b(100, "wall"),
+        b(200, "wall"),
+        b(300, "trigger")
+    );
+    let scene = read(&map(
+        &(b(0, "*water0") + &b(400, "CLIP") + &b(500, "{fence")),
+        &others,
+    ))
+    .scene;
+    let found: Vec<(&str, Role)> = scene
+        .objects
+        .iter()
+        .map(|o| (o.name.as_str(), o.role))
+        .collect();
+    assert_eq!(
+        found,
+        [
+            ("worldspawn 0", Role::Structural),
+            ("worldspawn 0 liquid", Role::Detail),
+            ("func_detail_wall 1", Role::Detail),
+            ("func_group 2", Role::Structural),
+        ]
+    );
+    assert_eq!(scene.solids.len(), 2);
+    assert_eq!(scene.entities.len(), 5);
+    let light = &scene.entities[4];
+    assert_eq!(light.class, "light");
+    assert_eq!(light.position.unwrap().to_array(), [1.0, 3.0, -2.0]);
+    assert_eq!(
+        light.properties[1],
+        ("origin".to_owned(), "32 64 96".to_owned())
+    );
+    assert_eq!(scene.entities[1].object, Some(2));
+}
+
+#[test]
+fn what_other_brushes_hide_is_left_out_once() {
+    let (a, b) = (
+        boxed([0, 0, 0], [32, 32, 32], "a"),
+        boxed([32, 0, 0], [64, 32, 32], "b"),
+    );
+    let n = |text: &str| read(text).scene.triangle_sources(Role::Structural).count();
+    // Two boxes side by side: the two faces between them are gone.
+    assert_eq!(n(&map(&(a.clone() + &b), "")), 20);
+    // The same box twice shows once.
+    assert_eq!(n(&map(&(a.clone() + &a), "")), 12);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_line_and_column() {
+    let good = boxed([0, 0, 0], [32, 32, 32], "a");
+    let says = |text: &str, place: &str, what: &str| {
+        let p = problem(text);
+        assert!(p.contains(place) && p.contains(what), "{p}");
+    };
+    says(
+        &map(&good.replacen("( 0 ", "( zero ", 1), ""),
+        "line 5:3",
+        "'zero'",
+    );
+    says(&map(&good.replacen("1 1", "1", 1), ""), "line 6:1", "'('");
+    says(
+        &map(&good.replacen("a 0 0", "a [ 0 0", 1), ""),
+        "line 5:45",
+        "axis",
+    );
+    says(
+        "{\n\"classname\" \"worldspawn\"\n{\n( 0 0",
+        "line 4:",
+        "ends",
+    );
+    says("{\n\"classname\" \"worldspawn\n}", "line 2:13", "quote");
+    says("{\n\"classname\" \"worldspawn\"\n", "line 1:1", "no '}'");
+    says("{\n\"classname\" \"light\"\n}", "line 1:1", "worldspawn");
+    says(&map("{\nbrushDef\n{\n}\n}\n", ""), "line 5:1", "Valve 220");
+    // Inside out: two points of each side swapped.
+    let swap = |line: &str| {
+        let parts: Vec<&str> = line.split(" ) ").collect();
+        match parts[..] {
+            [a, b, c, rest] => format!("{c} ) {b} ) {a} ) {rest}"),
+            _ => line.to_owned(),
+        }
+    };
+    let inverted: String = good.lines().map(|l| swap(l) + "\n").collect();
+    says(&map(&inverted, ""), "line 4:1", "inside out");
+    let open: String = good
+        .lines()
+        .filter(|l| !l.contains("( 32 32 32 )"))
+        .map(|l| l.to_owned() + "\n")
+        .collect();
+    says(&map(&open, ""), "line 4:1", "sides");
+    let line: String = good.replacen("( 0 16 0 )", "( 0 0 0 )", 1);
+    says(&map(&line, ""), "line 5:1", "line");
+}
+
+#[test]
+fn every_prefix_of_a_map_is_an_error_or_a_scene() {
+    let text = map(
+        &boxed([0, 0, 0], [32, 32, 32], "a")
+            .replace("a 0 0 0 1 1", "a [ 1 0 0 0 ] [ 0 1 0 0 ] 0 1 1"),
+        "{\n\"classname\" \"light\"\n}\n",
+    );
+    for n in 0..text.len() {
+        let _ = decode_map(&text.as_bytes()[..n], &ImportOptions::default());
+    }
+}
+
+#[test]
+fn a_hundred_thousand_brushes_are_read_in_linear_memory() {
+    let mut world = String::new();
+    for i in 0..100_000 {
+        let (x, y) = (i % 320 * 40 - 6400, i / 320 * 40 - 6400);
+        world += &boxed([x, y, 0], [x + 32, y + 32, 32], "a");
+    }
+    let scene = read(&map(&world, "")).scene;
+    assert_eq!(scene.solids.len(), 100_000);
+}
