@@ -78,12 +78,16 @@ impl Session {
         }
         // Stairs stand in rooms and bound none.
         let is_stair = find_stairs(&sources, &triangles);
-        let walls: Vec<Triangle> = triangles
+        let mut walls: Vec<Triangle> = triangles
             .iter()
             .zip(&is_stair)
             .filter(|t| !t.1)
             .map(|t| *t.0)
             .collect();
+        // What is nothing but stairs has no others to stand in.
+        if walls.is_empty() {
+            walls.clone_from(&triangles);
+        }
         let closures = closure_triangles(scene);
         let bvh = Bvh::build(&walls);
         // Three points across the narrowest opening.

@@ -18,6 +18,8 @@ const UNSURE: f64 = 0.35;
 const AT_WALL: f64 = 0.01;
 /// Distance between the points that stand for an opening. [Units: wu]
 const STEP: f64 = 0.1;
+/// About as many points stand for an opening at most.
+const MAX_CENTERS: f64 = 4000.0;
 /// How far from an opening's point a door leaf or pane may be to close it there. [Units: wu]
 const CLOSE_BY: f64 = 0.15;
 /// Openings smaller than this are left to the complex, which finds them as cracks. [Units: wu²]
@@ -218,6 +220,14 @@ fn opening_of(
     leaves: &Bvh,
 ) -> (Vec<DVec3>, Opening) {
     let mut centers = Vec::new();
+    let whole: f64 = patch
+        .iter()
+        .map(|&l| {
+            enfilade_geom::triangle_area_normal(&space.facet(&space.links[l as usize])).length()
+        })
+        .sum();
+    // A hillside's front needs no more points than a gate's.
+    let step = STEP.max((whole / MAX_CENTERS).sqrt());
     let (mut vector, mut moment, mut total) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for &l in patch {
         let link = &space.links[l as usize];
@@ -231,7 +241,7 @@ fn opening_of(
         let longest = (0..3)
             .map(|i| f[i].distance(f[(i + 1) % 3]))
             .fold(0.0, f64::max);
-        let n = (longest / STEP).ceil().clamp(1.0, 64.0) as usize;
+        let n = (longest / step).ceil().clamp(1.0, 64.0) as usize;
         for i in 0..n {
             for j in 0..n - i {
                 let (u, v) = (
