@@ -95,10 +95,10 @@ fn with_noise(mut g: Generated, reach: f32) -> Generated {
                 .wrapping_mul(0x85eb_ca6b)
                 .rotate_left(13)
         });
-        for x in p.iter_mut() {
+        *p = p.map(|x| {
             h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
-            *x += ((h >> 8) as f32 / (1 << 23) as f32 - 1.0) * reach;
-        }
+            x + ((h >> 8) as f32 / (1 << 23) as f32 - 1.0) * reach
+        });
     }
     g
 }

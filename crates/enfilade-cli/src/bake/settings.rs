@@ -63,7 +63,7 @@ enum UpAxis {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(super) enum Method {
-    /// Choose by what the input is; the watershed so far.
+    /// Choose by what the input is; the watershed for all scenes so far, since it knows buildings better.
     Auto,
     /// Voxels, distances, watershed.
     Watershed,
