@@ -16,7 +16,8 @@ pub struct BakeConfig {
     pub voxel: Option<f64>,
     /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: above 0]
     pub min_opening: f64,
-    /// Most voxels; a larger scene gets larger voxels. About 2.5 bytes each. [Limit: above 0]
+    /// Most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
+    /// beyond that an error. About 3 bytes each. [Limit: at least 1,000]
     pub max_voxels: usize,
     /// Basins shallower than this are noise. [Units: wu]
     pub noise: f64,
@@ -70,7 +71,7 @@ impl BakeConfig {
     /// The grid for a scene of these bounds. All checks of settings live here.
     ///
     /// # Errors
-    /// When a setting is out of its limits.
+    /// When a setting is out of its limits, or the budget leaves voxels that no opening fits.
     pub(crate) fn grid(&self, bounds: &Aabb) -> Result<Grid, BakeError> {
         let positive = |name: &'static str, value: f64| {
             if value > 0.0 && value.is_finite() {
@@ -97,9 +98,22 @@ impl BakeConfig {
         while n_voxels(bounds, voxel) > self.max_voxels as f64 {
             voxel *= 1.1;
         }
+        if voxel > wanted && voxel > self.min_opening {
+            return Err(BakeError::TooLarge {
+                size: bounds.size().to_array(),
+                voxel,
+                wanted,
+                bytes: BYTES_A_VOXEL * n_voxels(bounds, wanted),
+                max_voxels: self.max_voxels,
+                min_opening: self.min_opening,
+            });
+        }
         Ok(Grid::covering(bounds, voxel, PADDING))
     }
 }
+
+/// Peak memory of a bake, rounded from `docs/benchmarks/growth.md`.
+const BYTES_A_VOXEL: f64 = 3.0;
 
 fn n_voxels(bounds: &Aabb, voxel: f64) -> f64 {
     let n = (bounds.size() / voxel).ceil() + 2.0 * PADDING as f64;
@@ -114,15 +128,32 @@ mod tests {
     #[test]
     fn a_large_scene_gets_larger_voxels_and_stays_within_the_budget() {
         let config = BakeConfig {
-            max_voxels: 1_000_000,
+            max_voxels: 20_000_000,
             ..BakeConfig::default()
         };
         let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
         let grid = config.grid(&bounds).unwrap();
-        assert!(grid.n_voxels() <= 1_000_000);
+        assert!(grid.n_voxels() <= 20_000_000);
         assert!(grid.voxel > 0.1);
         let small = Aabb::new(DVec3::ZERO, DVec3::splat(5.0));
         assert!((config.grid(&small).unwrap().voxel - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_scene_whose_doors_would_be_lost_is_refused_unless_that_is_wanted() {
+        let mut config = BakeConfig {
+            max_voxels: 100_000,
+            ..BakeConfig::default()
+        };
+        let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
+        let error = config.grid(&bounds).unwrap_err();
+        assert!(matches!(error, BakeError::TooLarge { .. }), "{error}");
+        let said = error.to_string();
+        for word in ["200 x 30 x 200 m", "--unit", "max_voxels", "4 GB"] {
+            assert!(said.contains(word), "{word}: {said}");
+        }
+        config.min_opening = 10.0;
+        config.grid(&bounds).unwrap();
     }
 
     #[test]

@@ -23,16 +23,27 @@ pub enum BakeError {
         /// What is allowed.
         limit: &'static str,
     },
-    /// The scene cannot be divided finely enough to hold even the largest rooms.
+    /// Within the budget, voxels would be wider than the narrowest opening that must be found.
     #[error(
-        "the scene is {size:?} meters large, so voxels would be {voxel:.2} m wide and doors could not \
-         be found; give the right unit, raise max_voxels or set the voxel size"
+        "the scene is {:.0} x {:.0} x {:.0} m large: the {max_voxels} voxels that are allowed would be {voxel:.2} m \
+         wide, wider than the narrowest opening that must be found ({min_opening} m); if it is that large, \
+         ask for less with a wider --voxel or --min-opening, or raise max_voxels (the {wanted:.2} m wanted take about \
+         {:.0} GB of memory); if it is not, give the right --unit",
+        .size[0], .size[1], .size[2], .bytes / 1e9
     )]
     TooLarge {
         /// Edges of the scene's box. [Units: wu]
         size: [f64; 3],
         /// Voxel size that fits into the budget. [Units: wu]
         voxel: f64,
+        /// Voxel size that was wanted. [Units: wu]
+        wanted: f64,
+        /// Memory for voxels of that size.
+        bytes: f64,
+        /// The budget.
+        max_voxels: usize,
+        /// Width of the narrowest opening that must be found. [Units: wu]
+        min_opening: f64,
     },
     /// The scene has no tetrahedra.
     #[error(transparent)]

@@ -42,10 +42,11 @@ pub struct BakeOutput {
 /// Finds the rooms and doorways of a scene.
 ///
 /// Deterministic: equal input and settings give an equal world on any number of threads. Time is
-/// linear in voxels and about linear in triangles; memory about 2.5 bytes a voxel plus the scene.
+/// linear in voxels and about linear in triangles; memory about 3 bytes a voxel plus the scene.
 ///
 /// # Errors
-/// When there is nothing structural, a setting is out of limits, or the caller cancels.
+/// When there is nothing structural, a setting is out of limits, the scene is too large for the
+/// budget of voxels, or the caller cancels.
 pub fn bake(
     scene: &Scene,
     config: &BakeConfig,
@@ -126,6 +127,7 @@ pub fn bake(
         slabs: &slabs,
     };
     let regions = merge_basins(flooded, &saddles, &config.merge);
+    drop(shut);
     let hollow = hollow_regions(
         &grid,
         &labels,
@@ -138,7 +140,8 @@ pub fn bake(
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
     let screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
-    let mut votes = votes(
+    drop((closures, lids));
+    let ballots = Ballots::cast(
         &grid,
         &labels,
         &regions,
@@ -152,7 +155,6 @@ pub fn bake(
     });
     drop(walls);
     drop(labels);
-    drop((closures, shut, lids));
 
     // 6. Screens and triangles cut space into convex pieces, exactly.
     context.stage(5)?;
@@ -165,6 +167,7 @@ pub fn bake(
 
     // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
     context.stage(6)?;
+    let mut votes = ballots.count(&grid);
     let mut partition = complex.partition(&votes, &LabelSettings::default());
     while join_unparted(&partition, &mut votes, &mut voids) {
         partition = complex.partition(&votes, &LabelSettings::default());
@@ -327,73 +330,94 @@ const MAX_VOTES: usize = 1_000_000;
 /// them. [Units: wu]
 const UNSURE: f64 = 0.35;
 
-/// One voxel of each block of `n`³ speaks for its region.
-fn votes(
-    grid: &Grid,
-    labels: &Labels,
-    regions: &Regions,
-    hollow: &[u32],
-    solid: &BitVolume,
-) -> Vec<Vote> {
-    let mut unsure = BitVolume::new(grid.dims);
-    let reach = (UNSURE / grid.voxel).ceil() as usize;
-    for faces in regions.contacts.values() {
-        let mut last = u64::MAX;
-        for &face in faces {
-            if face / 4 == last {
-                continue;
-            }
-            last = face / 4;
-            let at = grid.coords(last as usize);
-            let range =
-                |k: usize| at[k].saturating_sub(reach)..(at[k] + reach + 1).min(grid.dims[k]);
-            for z in range(2) {
-                for y in range(1) {
-                    for x in range(0) {
-                        unsure.set(x, y, z, true);
+/// Votes as they are cast: as small as can be, for they are many, and the labels are still there.
+struct Ballots {
+    /// Voxels along each edge of a block.
+    block: usize,
+    /// Low and high half of the voxel's index, and its region.
+    cast: Vec<[u32; 3]>,
+}
+
+impl Ballots {
+    /// One voxel of each block of `block`³ speaks for its region.
+    fn cast(
+        grid: &Grid,
+        labels: &Labels,
+        regions: &Regions,
+        hollow: &[u32],
+        solid: &BitVolume,
+    ) -> Self {
+        let mut unsure = BitVolume::new(grid.dims);
+        let reach = (UNSURE / grid.voxel).ceil() as usize;
+        for faces in regions.contacts.values() {
+            let mut last = u64::MAX;
+            for &face in faces {
+                if face / 4 == last {
+                    continue;
+                }
+                last = face / 4;
+                let at = grid.coords(last as usize);
+                let range =
+                    |k: usize| at[k].saturating_sub(reach)..(at[k] + reach + 1).min(grid.dims[k]);
+                for z in range(2) {
+                    for y in range(1) {
+                        for x in range(0) {
+                            unsure.set(x, y, z, true);
+                        }
                     }
                 }
             }
         }
-    }
-    let mut block = 1;
-    while grid.n_voxels() / (block * block * block) > MAX_VOTES {
-        block += 1;
-    }
-    let weight = (grid.voxel * block as f64).powi(3) as f32;
-    let [nx, ny, nz] = grid.dims;
-    (0..nz.div_ceil(block))
-        .into_par_iter()
-        .flat_map_iter(|bz| {
-            let unsure = &unsure;
-            (0..ny.div_ceil(block)).flat_map(move |by| {
-                (0..nx.div_ceil(block)).filter_map(move |bx| {
-                    let range = |b: usize, n: usize| b * block..((b + 1) * block).min(n);
-                    for z in range(bz, nz) {
-                        for y in range(by, ny) {
-                            for x in range(bx, nx) {
-                                let i = grid.index(x, y, z);
-                                let region = regions.region_of_basin[labels.get(i) as usize];
-                                if region == 0
-                                    || unsure.get(x, y, z)
-                                    || solid.get(x, y, z)
-                                    || hollow.binary_search(&region).is_ok()
-                                {
-                                    continue;
+        let mut block = 1;
+        while grid.n_voxels() / (block * block * block) > MAX_VOTES {
+            block += 1;
+        }
+        let [nx, ny, nz] = grid.dims;
+        let cast = (0..nz.div_ceil(block))
+            .into_par_iter()
+            .flat_map_iter(|bz| {
+                let unsure = &unsure;
+                (0..ny.div_ceil(block)).flat_map(move |by| {
+                    (0..nx.div_ceil(block)).filter_map(move |bx| {
+                        let range = |b: usize, n: usize| b * block..((b + 1) * block).min(n);
+                        for z in range(bz, nz) {
+                            for y in range(by, ny) {
+                                for x in range(bx, nx) {
+                                    let i = grid.index(x, y, z);
+                                    let region = regions.region_of_basin[labels.get(i) as usize];
+                                    if region == 0
+                                        || unsure.get(x, y, z)
+                                        || solid.get(x, y, z)
+                                        || hollow.binary_search(&region).is_ok()
+                                    {
+                                        continue;
+                                    }
+                                    return Some([i as u32, (i as u64 >> 32) as u32, region]);
                                 }
-                                return Some(Vote {
-                                    point: grid.center(x, y, z),
-                                    label: region,
-                                    weight,
-                                });
                             }
                         }
-                    }
-                    None
+                        None
+                    })
                 })
             })
-        })
-        .collect()
+            .collect();
+        Self { block, cast }
+    }
+
+    fn count(self, grid: &Grid) -> Vec<Vote> {
+        let weight = (grid.voxel * self.block as f64).powi(3) as f32;
+        self.cast
+            .into_par_iter()
+            .map(|[low, high, label]| {
+                let [x, y, z] = grid.coords((u64::from(high) << 32 | u64::from(low)) as usize);
+                Vote {
+                    point: grid.center(x, y, z),
+                    label,
+                    weight,
+                }
+            })
+            .collect()
+    }
 }
 
 /// Voxels that stairs fill: those that they touch, and those between from which one sees backs.

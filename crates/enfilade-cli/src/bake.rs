@@ -14,6 +14,7 @@ use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
 
+use crate::inspect::write_holes;
 use crate::output::{check_target, write_atomically};
 use crate::progress::{BakeBar, StageBar};
 
@@ -36,7 +37,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         .inputs
         .iter()
         .chain(&options.detail)
-        .chain(&options.config);
+        .chain(&options.scene.config);
     if let Some(input) = all_inputs.into_iter().find(|p| same_file(p, &args.output)) {
         bail!(
             "{} is the input {}; choose another name with -o",
@@ -167,6 +168,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
         }
     }
+    write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
     Ok(())
 }
 

@@ -5,8 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
-use enfilade::cpg::{Cell, Portal, PortalKind, World};
-use enfilade::geom::DVec3;
+use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, World};
 use serde::Serialize;
 
 use crate::world::read_world;
@@ -91,7 +90,7 @@ fn report(world: &World) -> Report<'_> {
         outdoor: c.outdoor,
     });
     let portals = graph.portals.iter().enumerate().map(|(id, p)| {
-        let [width, height] = size(p);
+        let [width, height] = p.size();
         PortalReport {
             id,
             cells: p.cells.map(|c| c.0),
@@ -138,34 +137,6 @@ fn kind_name(kind: PortalKind) -> &'static str {
     }
 }
 
-/// Width and height of a portal's outline: across and up as one who stands before it would say;
-/// for a hole in a floor, along x and z. [Units: wu]
-fn size(portal: &Portal) -> [f32; 2] {
-    let normal = DVec3::from(portal.normal.map(f64::from));
-    // Steeper than 45° reads as a floor.
-    let up_hint = if normal.y.abs() < 0.7 {
-        DVec3::Y
-    } else {
-        DVec3::Z
-    };
-    let across = up_hint.cross(normal).normalize_or_zero();
-    let up = normal.cross(across);
-    [across, up].map(|axis| {
-        let along = |c: &[f32; 3]| axis.dot(DVec3::from(c.map(f64::from)));
-        let least = portal
-            .outline
-            .iter()
-            .map(along)
-            .fold(f64::INFINITY, f64::min);
-        let most = portal
-            .outline
-            .iter()
-            .map(along)
-            .fold(f64::NEG_INFINITY, f64::max);
-        (most - least) as f32
-    })
-}
-
 fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
     let mut by_volume: Vec<(usize, &Cell)> = graph.cells.iter().enumerate().collect();
@@ -194,12 +165,8 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
         "portal", "kind", "cells", "width m", "height m", "area m²", "pieces"
     )?;
     for (id, p) in graph.portals.iter().enumerate() {
-        let [width, height] = size(p);
-        let sum = p
-            .outline
-            .iter()
-            .fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
-        let [x, y, z] = sum.map(|s| s / p.outline.len() as f32);
+        let [width, height] = p.size();
+        let [x, y, z] = p.center();
         let cells = format!("{} – {}", p.cells[0].0, p.cells[1].0);
         writeln!(
             out,
@@ -209,12 +176,54 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
             p.pieces.len()
         )?;
     }
+    writeln!(out)?;
+    if write_holes(out, graph, usize::MAX)? {
+        writeln!(out)?;
+    }
     write_totals(out, world)
+}
+
+/// Openings to outdoors that may be holes of the model, if any.
+pub(crate) fn write_holes(
+    out: &mut impl Write,
+    graph: &CellPortalGraph,
+    most: usize,
+) -> io::Result<bool> {
+    let holes = graph.suspected_holes();
+    if holes.is_empty() {
+        return Ok(false);
+    }
+    writeln!(
+        out,
+        "{} openings to outdoors may be holes of the model, largest first:",
+        holes.len()
+    )?;
+    for h in holes.iter().take(most) {
+        let p = &graph.portals[h.portal.0 as usize];
+        let ([x, y, z], [width, height]) = (h.position, p.size());
+        let cell = p
+            .cells
+            .iter()
+            .find(|c| !graph.cells[c.0 as usize].outdoor)
+            .map_or(0, |c| c.0);
+        writeln!(
+            out,
+            "  at {x:.2} {y:.2} {z:.2}: {width:.2} × {height:.2} m, portal {} of cell {cell}, {}",
+            h.portal.0, h.reason
+        )?;
+    }
+    if holes.len() > most {
+        writeln!(
+            out,
+            "  and {} more; `enfilade inspect` lists all",
+            holes.len() - most
+        )?;
+    }
+    Ok(true)
 }
 
 fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
-    writeln!(out)?;
     let mut row = |name: &str, value: String| writeln!(out, "{name:<22} {value}");
     let indoor = graph.cells.iter().filter(|c| !c.outdoor).count();
     let outdoors = if indoor < graph.cells.len() {

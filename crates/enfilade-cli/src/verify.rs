@@ -8,13 +8,14 @@ use anyhow::{Context, bail};
 use enfilade::cpg::World;
 use enfilade::geom::scene::Role;
 use enfilade::geom::{DVec3, Triangle};
-use enfilade::import::{ImportOptions, import};
+use enfilade::import::import;
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_verify::{
     Blocks, VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
     verify_world_with_progress,
 };
 
+use crate::bake::settings::SceneOptions;
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
 use crate::see::Answers;
@@ -29,10 +30,12 @@ pub(crate) struct Verify {
     /// promises.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
-    /// The scene that it was baked from, read with default settings: its structural triangles
-    /// decide what blocks, instead of those that the world holds.
+    /// The scene that it was baked from: its structural triangles decide what blocks, instead of
+    /// those that the world holds. It is read by the settings below; give those of the bake.
     #[arg(long, num_args = 1.., value_name = "IN")]
     source: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneOptions,
     /// Segments for `sealed`, and as many rays for `complete`.
     #[arg(long, default_value_t = 1_000_000, value_name = "N")]
     rays: u64,
@@ -63,7 +66,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let source = if args.source.is_empty() {
         None
     } else {
-        Some(read_source(&args.source)?)
+        Some(read_source(&args.source, &args.scene)?)
     };
     let options = VerifyOptions {
         rays: args.rays,
@@ -170,8 +173,8 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
 }
 
 /// The structural triangles of a scene, as the builder saw them.
-fn read_source(paths: &[PathBuf]) -> anyhow::Result<Vec<Triangle>> {
-    let scene = import(paths, &[], &ImportOptions::default())?.scene;
+fn read_source(paths: &[PathBuf], options: &SceneOptions) -> anyhow::Result<Vec<Triangle>> {
+    let scene = import(paths, &[], &options.resolve()?)?.scene;
     Ok(scene
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))

@@ -509,6 +509,10 @@ fn a_settings_file_is_understood_or_its_line_is_shown() {
     wrong("voxel = ", &["line 1"]);
     wrong("max_voxels = 10", &["line 1", "at least 1000"]);
     wrong("max_voxels = -10", &["line 1"]);
+    // Too few for voxels that a door would fit.
+    folder.write("e.toml", "max_voxels = 10000");
+    let args = ["in.glb", "-o", "out.glb", "--config", "e.toml"];
+    folder.refused(1, &args, &["--unit", "--voxel", "raise max_voxels"]);
     folder.write("e.toml", [0xff, 0xfe, 0x00]);
     let args = ["in.glb", "-o", "out.glb", "--config", "e.toml"];
     folder.refused(1, &args, &["cannot read settings e.toml"]);
@@ -618,6 +622,77 @@ fn a_scene_with_holes_builds_and_says_where_it_leaks() {
     folder.write("open.obj", obj_cube(&[3]));
     let done = folder.bake(&["open.obj", "-o", "out.glb"]);
     assert_eq!(done.status.code(), Some(0), "{done:?}");
+}
+
+#[test]
+fn a_room_with_a_piece_of_wall_missing_builds_and_says_where() {
+    let folder = Folder::new("missing-piece");
+    // A box of 5 x 2.6 x 4 m. In the wall x = 0 a triangle is missing, in the ceiling a square, and
+    // the wall z = 4 has a window.
+    let (mut obj, mut n) = (String::new(), 0);
+    let mut face = |corners: &[[f64; 3]]| {
+        for [x, y, z] in corners {
+            obj += &format!("v {x} {y} {z}\n");
+        }
+        let ids: Vec<String> = (1..=corners.len()).map(|i| (n + i).to_string()).collect();
+        n += corners.len();
+        obj += &format!("f {}\n", ids.join(" "));
+    };
+    let x0 = |c: &[[f64; 2]]| c.iter().map(|&[y, z]| [0.0, y, z]).collect::<Vec<_>>();
+    face(&x0(&[[0.0, 0.0], [1.0, 0.0], [1.0, 4.0], [0.0, 4.0]]));
+    face(&x0(&[[1.8, 0.0], [2.6, 0.0], [2.6, 4.0], [1.8, 4.0]]));
+    face(&x0(&[[1.0, 0.0], [1.8, 0.0], [1.8, 1.5], [1.0, 1.0]]));
+    face(&x0(&[[1.0, 2.0], [1.8, 1.5], [1.8, 4.0], [1.0, 4.0]]));
+    // Frames around a square hole: the ceiling and the wall with the window.
+    let ceiling = |u: f64, v: f64| [u, 2.6, v];
+    let window = |u: f64, v: f64| [u, v, 4.0];
+    type At<'a> = &'a dyn Fn(f64, f64) -> [f64; 3];
+    let frames: [(At<'_>, f64, [f64; 4]); 2] = [
+        (&ceiling, 4.0, [3.0, 1.0, 4.0, 2.0]),
+        (&window, 2.6, [2.0, 0.9, 3.2, 2.1]),
+    ];
+    for (at, end, [u0, v0, u1, v1]) in frames {
+        for [a, b, c, d] in [
+            [0.0, 0.0, 5.0, v0],
+            [0.0, v1, 5.0, end],
+            [0.0, v0, u0, v1],
+            [u1, v0, 5.0, v1],
+        ] {
+            face(&[at(a, b), at(c, b), at(c, d), at(a, d)]);
+        }
+    }
+    face(&[[0.0; 3], [5.0, 0.0, 0.0], [5.0, 0.0, 4.0], [0.0, 0.0, 4.0]]);
+    face(&[[0.0; 3], [5.0, 0.0, 0.0], [5.0, 2.6, 0.0], [0.0, 2.6, 0.0]]);
+    face(&[
+        [5.0, 0.0, 0.0],
+        [5.0, 2.6, 0.0],
+        [5.0, 2.6, 4.0],
+        [5.0, 0.0, 4.0],
+    ]);
+    folder.write("in.obj", obj);
+    let done = folder.bake(&["in.obj", "-o", "out.glb"]);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(
+        said.contains("2 openings to outdoors may be holes"),
+        "{said}"
+    );
+    let inspected = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(["inspect", "out.glb"])
+        .current_dir(&folder.0)
+        .output()
+        .unwrap();
+    for said in [said, String::from_utf8_lossy(&inspected.stdout)] {
+        let near = |at: [f64; 3], why: &str| {
+            said.lines().filter(|l| l.ends_with(why)).any(|l| {
+                leak_places(l)
+                    .iter()
+                    .any(|p| (0..3).all(|k| (p[k] - at[k]).abs() < 0.2))
+            })
+        };
+        assert!(near([3.5, 2.6, 1.5], "without a pane"), "{said}");
+        assert!(near([0.0, 1.27, 1.5], "no regular shape"), "{said}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@
 
 mod cell_set;
 mod graph;
+mod holes;
 mod locator;
 mod look;
 mod sight_graph;
@@ -18,6 +19,7 @@ pub use graph::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Portal, PortalId, PortalKind, Provenance,
     Statistics, World,
 };
+pub use holes::{Hole, HoleReason};
 pub use locator::{Locator, LocatorNode};
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use validate::{GraphError, MAX_REPORTED};

@@ -21,6 +21,7 @@
 //! Not promised: animation, skins, morph targets, cameras, lights, curves, points and lines; they
 //! are left out with a note.
 
+mod auto_roles;
 mod builder;
 mod clean;
 mod error;
@@ -184,7 +185,7 @@ fn decode(
 }
 
 fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, ImportError> {
-    let (scene, report) = builder.finish();
+    let (mut scene, report) = builder.finish();
     if scene.objects.is_empty() {
         let advice = match report.notes.first() {
             Some(note) => format!("the first thing noticed: {note}"),
@@ -196,6 +197,9 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
         });
     }
     check_extent(&scene, &report, options)?;
+    if options.roles.is_automatic && !options.roles.is_manual {
+        auto_roles::judge(&mut scene);
+    }
     Ok(Imported { scene, report })
 }
 

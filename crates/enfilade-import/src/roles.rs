@@ -4,10 +4,11 @@
 //! quality, neither correctness. Only see-through surfaces *must* be detail: a cell seen through
 //! glass may not be called hidden. The first rule that fits decides; `docs/import.md` lists them.
 
+use crate::auto_roles::DEFAULT;
 use enfilade_geom::scene::Role;
 
 /// The user's own rules, before all others.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RoleRules {
     /// Globs (`*`, `?`, case-insensitive) of object, mesh or material names that are structural;
     /// these win over `detail`. A material counts if all of an object's materials fit.
@@ -16,6 +17,19 @@ pub struct RoleRules {
     pub detail: Vec<String>,
     /// Judge by the user's rules and detail files only; see-through surfaces stay detail.
     pub is_manual: bool,
+    /// Judge what no rule fits by its size and by what it hides, unless `is_manual`.
+    pub is_automatic: bool,
+}
+
+impl Default for RoleRules {
+    fn default() -> Self {
+        Self {
+            structural: Vec::new(),
+            detail: Vec::new(),
+            is_manual: false,
+            is_automatic: true,
+        }
+    }
 }
 
 /// What is known of an object.
@@ -202,7 +216,7 @@ impl RoleRules {
                 return detail(format!("below '{name}': '{word}'"));
             }
         }
-        structural("default".into())
+        structural(DEFAULT.into())
     }
 }
 
@@ -463,6 +477,7 @@ mod tests {
             structural: vec!["*keep*".into()],
             detail: vec!["Wall*".into(), "Plaster".into()],
             is_manual: false,
+            ..RoleRules::default()
         };
         let reason = |verdict| match verdict {
             Verdict::Keep(role, reason) => (role, reason),

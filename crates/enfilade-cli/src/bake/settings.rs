@@ -12,17 +12,19 @@ use enfilade::geom::DVec3;
 use enfilade::import::{ImportOptions, RoleRules, Up};
 use serde::de::{Deserialize, Deserializer, Error};
 
+/// How scenes are read: the same for what is baked and what it is compared with.
 #[derive(clap::Args)]
-pub(crate) struct BakeOptions {
-    /// Files whose objects are all detail: furniture, door leaves, plants.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) detail: Vec<PathBuf>,
+pub(crate) struct SceneOptions {
     /// Objects whose object, mesh or material name fits this pattern (`*`, `?`) are detail.
     #[arg(long, value_name = "PATTERN")]
     detail_name: Vec<String>,
     /// Objects whose name fits this pattern are structural, whatever else says they are detail.
     #[arg(long, value_name = "PATTERN")]
     structural_name: Vec<String>,
+    /// Whether small things that one sees around are detail where nothing else says what they are
+    /// [default: on].
+    #[arg(long, value_enum)]
+    auto_roles: Option<Switch>,
     /// The input's unit: m, cm, mm, in, ft, or a number of meters.
     #[arg(long, visible_alias = "scale", value_name = "UNIT", value_parser = parse_unit)]
     unit: Option<f64>,
@@ -32,14 +34,23 @@ pub(crate) struct BakeOptions {
     /// Point of the scene, in meters and with y up, that becomes the origin.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
+    /// Settings file in TOML; what is given on the command line wins.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct BakeOptions {
+    /// Files whose objects are all detail: furniture, door leaves, plants.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) detail: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) scene: SceneOptions,
     /// How cells are found.
     #[arg(long, value_enum, default_value_t = Method::Auto)]
     pub(super) method: Method,
     #[command(flatten)]
     pub(crate) delaunay: super::delaunay::DelaunayOptions,
-    /// Settings file in TOML; what is given on the command line wins.
-    #[arg(long, value_name = "FILE")]
-    pub(super) config: Option<PathBuf>,
     /// Edge of a voxel in meters; chosen from the narrowest opening and the scene's size if not given.
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     voxel: Option<f64>,
@@ -59,6 +70,12 @@ pub(crate) struct BakeOptions {
 enum UpAxis {
     Y,
     Z,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Switch {
+    On,
+    Off,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -204,6 +221,7 @@ struct ConfigFile {
     unit: Option<Unit>,
     up: Option<UpAxis>,
     origin: Option<[f64; 3]>,
+    auto_roles: Option<bool>,
     #[serde(default)]
     detail_names: Vec<String>,
     #[serde(default)]
@@ -242,10 +260,8 @@ impl ConfigFile {
 
 /// Command line and settings file, resolved.
 pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, BakeConfig)> {
-    let file = match &options.config {
-        None => ConfigFile::default(),
-        Some(path) => ConfigFile::read(path)?,
-    };
+    let file = options.scene.file()?;
+    let import_options = options.scene.resolve_with(&file);
     let mut config = BakeConfig {
         voxel: options.voxel.or(file.voxel.map(|v| v.0)),
         ..BakeConfig::default()
@@ -273,24 +289,46 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, B
             *field = value;
         }
     }
-    let import_options = ImportOptions {
-        unit: options.unit.or(file.unit.map(|u| u.0)),
-        up: options.up.or(file.up).map(|up| match up {
-            UpAxis::Y => Up::Y,
-            UpAxis::Z => Up::Z,
-        }),
-        origin: options
-            .origin
-            .or(file.origin.map(DVec3::from_array))
-            .unwrap_or(DVec3::ZERO),
-        roles: RoleRules {
-            structural: [options.structural_name.clone(), file.structural_names].concat(),
-            detail: [options.detail_name.clone(), file.detail_names].concat(),
-            ..RoleRules::default()
-        },
-        ..ImportOptions::default()
-    };
     Ok((import_options, config))
+}
+
+impl SceneOptions {
+    fn file(&self) -> anyhow::Result<ConfigFile> {
+        match &self.config {
+            None => Ok(ConfigFile::default()),
+            Some(path) => ConfigFile::read(path),
+        }
+    }
+
+    /// Command line and settings file, resolved.
+    pub(crate) fn resolve(&self) -> anyhow::Result<ImportOptions> {
+        Ok(self.resolve_with(&self.file()?))
+    }
+
+    fn resolve_with(&self, file: &ConfigFile) -> ImportOptions {
+        ImportOptions {
+            unit: self.unit.or(file.unit.as_ref().map(|u| u.0)),
+            up: self.up.or(file.up).map(|up| match up {
+                UpAxis::Y => Up::Y,
+                UpAxis::Z => Up::Z,
+            }),
+            origin: self
+                .origin
+                .or(file.origin.map(DVec3::from_array))
+                .unwrap_or(DVec3::ZERO),
+            roles: RoleRules {
+                structural: [self.structural_name.clone(), file.structural_names.clone()].concat(),
+                detail: [self.detail_name.clone(), file.detail_names.clone()].concat(),
+                is_automatic: self
+                    .auto_roles
+                    .map(|s| s == Switch::On)
+                    .or(file.auto_roles)
+                    .unwrap_or(true),
+                ..RoleRules::default()
+            },
+            ..ImportOptions::default()
+        }
+    }
 }
 
 #[cfg(test)]

@@ -31,13 +31,9 @@ impl Queue {
 
     #[inline(always)]
     pub(super) fn push(&mut self, level: u32, voxel: u32) {
-        let end = &mut self.ends[level as usize];
-        if end[3] == CHUNK as u32 {
-            let fresh = self.free.pop().unwrap_or_else(|| {
-                self.chunks.push([0; CHUNK]);
-                self.next.push(NONE);
-                self.chunks.len() as u32 - 1
-            });
+        if self.ends[level as usize][3] == CHUNK as u32 {
+            let fresh = self.free.pop().unwrap_or_else(|| self.grow());
+            let end = &mut self.ends[level as usize];
             if end[0] == NONE {
                 end[0] = fresh;
                 end[2] = 0;
@@ -47,8 +43,22 @@ impl Queue {
             end[1] = fresh;
             end[3] = 0;
         }
+        let end = &mut self.ends[level as usize];
         self.chunks[end[1] as usize][end[3] as usize] = voxel;
         end[3] += 1;
+    }
+
+    /// A new chunk. Room is made by eighths: twice as much, as vectors do by themselves, would be
+    /// half of all that a flood needs besides the volume.
+    #[cold]
+    fn grow(&mut self) -> u32 {
+        let n = self.chunks.len();
+        if n == self.chunks.capacity() {
+            self.chunks.reserve_exact(16.max(n / 8));
+        }
+        self.chunks.push([0; CHUNK]);
+        self.next.push(NONE);
+        n as u32
     }
 
     /// Takes the oldest entries of a level, [`BATCH`] at most; 0 when there is none.

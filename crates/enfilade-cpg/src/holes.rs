@@ -1,0 +1,224 @@
+//! Openings to outdoors that look as if nobody meant them.
+//!
+//! A graph cannot know what was meant. What is reported here are openings to outdoors that are
+//! neither shaped nor placed as doors and windows are; errs to saying nothing.
+
+use crate::{CellPortalGraph, Portal, PortalId, PortalKind};
+use enfilade_geom::DVec3;
+
+/// Nobody looks or climbs through less. [Units: wu]
+const NARROW: f32 = 0.3;
+/// What fills less of its rectangle is no rectangle, arch or circle (0.785), even behind a cross.
+const REGULAR: f32 = 0.6;
+/// Steeper than this (the sine of 45 degrees) reads as a floor or a ceiling.
+const LEVEL: f32 = 0.707;
+
+/// Why an opening may be a hole of the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum HoleReason {
+    /// It lies in a floor, ceiling or roof, and no pane closes it.
+    Overhead,
+    /// It is neither a rectangle nor round.
+    Irregular,
+    /// It is narrower than 0.3 m.
+    Narrow,
+}
+
+impl std::fmt::Display for HoleReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Overhead => "in a floor or roof, without a pane",
+            Self::Irregular => "of no regular shape",
+            Self::Narrow => "too narrow for a window",
+        })
+    }
+}
+
+/// An opening to outdoors that may be a hole of the model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hole {
+    /// Which opening.
+    pub portal: PortalId,
+    /// Middle of its outline. [Units: wu]
+    pub position: [f32; 3],
+    /// What looks wrong with it.
+    pub reason: HoleReason,
+}
+
+impl CellPortalGraph {
+    /// Openings to outdoors that may be holes of the model, the largest first.
+    ///
+    /// Cracks are left out: they are known by their kind. O(n log n) for n portal corners.
+    #[must_use]
+    pub fn suspected_holes(&self) -> Vec<Hole> {
+        let is_outdoor = |p: &Portal| {
+            p.cells
+                .iter()
+                .any(|c| self.cells.get(c.0 as usize).is_some_and(|c| c.outdoor))
+        };
+        let mut holes: Vec<Hole> = (0..)
+            .zip(&self.portals)
+            .filter(|(_, p)| is_outdoor(p))
+            .filter_map(|(id, p)| {
+                Some(Hole {
+                    portal: PortalId(id),
+                    position: p.center(),
+                    reason: reason(p)?,
+                })
+            })
+            .collect();
+        let area = |h: &Hole| self.portals[h.portal.0 as usize].area;
+        holes.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a.portal.cmp(&b.portal)));
+        holes
+    }
+}
+
+fn reason(p: &Portal) -> Option<HoleReason> {
+    if matches!(p.kind, PortalKind::Door | PortalKind::Crack) {
+        return None;
+    }
+    let [width, height] = p.size();
+    if p.kind == PortalKind::Open && p.normal[1].abs() > LEVEL {
+        Some(HoleReason::Overhead)
+    } else if width.min(height) < NARROW {
+        Some(HoleReason::Narrow)
+    } else if p.area < REGULAR * width * height {
+        Some(HoleReason::Irregular)
+    } else {
+        None
+    }
+}
+
+impl Portal {
+    /// Width and height of the outline: across and up as one who stands before it would say; for a
+    /// hole in a floor, along x and z. [Units: wu]
+    #[must_use]
+    pub fn size(&self) -> [f32; 2] {
+        let normal = DVec3::from(self.normal.map(f64::from));
+        let up_hint = if normal.y.abs() < f64::from(LEVEL) {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        let across = up_hint.cross(normal).normalize_or_zero();
+        let up = normal.cross(across);
+        [across, up].map(|axis| {
+            let along = self
+                .outline
+                .iter()
+                .map(|c| axis.dot(DVec3::from(c.map(f64::from))));
+            let (least, most) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), d| {
+                (lo.min(d), hi.max(d))
+            });
+            (most - least) as f32
+        })
+    }
+
+    /// Mean of the outline's corners. [Units: wu]
+    #[must_use]
+    pub fn center(&self) -> [f32; 3] {
+        let sum = self
+            .outline
+            .iter()
+            .fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
+        sum.map(|s| s / self.outline.len() as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Cell, CellId};
+
+    /// Area of a convex polygon.
+    fn area(outline: &[[f32; 3]]) -> f32 {
+        let at = |c: &[f32; 3]| DVec3::from(c.map(f64::from));
+        let twice: f64 = outline
+            .windows(2)
+            .map(|e| {
+                let o = at(&outline[0]);
+                (at(&e[0]) - o).cross(at(&e[1]) - o).length()
+            })
+            .sum();
+        (0.5 * twice) as f32
+    }
+
+    /// One room and outdoors, joined by these outlines.
+    fn graph(portals: Vec<(PortalKind, [f32; 3], Vec<[f32; 3]>)>) -> CellPortalGraph {
+        let cell = |outdoor| Cell {
+            outdoor,
+            ..Cell::default()
+        };
+        CellPortalGraph {
+            cells: vec![cell(true), cell(false), cell(false)],
+            portals: portals
+                .into_iter()
+                .map(|(kind, normal, outline)| Portal {
+                    cells: [CellId(0), CellId(1)],
+                    kind,
+                    normal,
+                    area: area(&outline),
+                    pieces: vec![outline.clone()],
+                    outline,
+                })
+                .collect(),
+            ..CellPortalGraph::default()
+        }
+    }
+
+    fn upright(corners: &[[f32; 2]]) -> Vec<[f32; 3]> {
+        corners.iter().map(|&[z, y]| [0.0, y, -z]).collect()
+    }
+
+    fn reasons(g: &CellPortalGraph) -> Vec<(u32, HoleReason)> {
+        let holes = g.suspected_holes();
+        holes.iter().map(|h| (h.portal.0, h.reason)).collect()
+    }
+
+    const X: [f32; 3] = [1.0, 0.0, 0.0];
+
+    #[test]
+    fn doors_windows_arches_and_portholes_are_no_holes() {
+        let round: Vec<[f32; 2]> = (0..24)
+            .map(|i| (i as f32 * std::f32::consts::TAU / 24.0).sin_cos())
+            .map(|(sin, cos)| [0.3 * cos, 1.5 + 0.3 * sin])
+            .collect();
+        let door = upright(&[[0.0, 0.0], [0.9, 0.0], [0.9, 2.1], [0.0, 2.1]]);
+        let g = graph(vec![
+            (PortalKind::Open, X, door),
+            (PortalKind::Window, X, upright(&round)),
+        ]);
+        assert_eq!(reasons(&g), []);
+    }
+
+    #[test]
+    fn holes_are_told_worst_first_with_what_is_wrong() {
+        let triangle = upright(&[[0.0, 1.0], [1.0, 1.0], [0.5, 2.0]]);
+        let slot = upright(&[[0.0, 0.5], [0.1, 0.5], [0.1, 2.0], [0.0, 2.0]]);
+        let roof: Vec<[f32; 3]> = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
+            .map(|[x, z]| [x, 3.0, z])
+            .to_vec();
+        let up = [0.0, -1.0, 0.0];
+        let mut g = graph(vec![
+            (PortalKind::Window, X, slot.clone()),
+            (PortalKind::Open, X, triangle.clone()),
+            (PortalKind::Open, up, roof.clone()),
+            // A skylight has a pane; a crack is known as one; a door has a leaf.
+            (PortalKind::Window, up, roof),
+            (PortalKind::Crack, X, slot),
+            (PortalKind::Door, X, triangle),
+        ]);
+        assert_eq!(
+            reasons(&g),
+            [
+                (2, HoleReason::Overhead),
+                (1, HoleReason::Irregular),
+                (0, HoleReason::Narrow)
+            ]
+        );
+        assert_eq!(g.suspected_holes()[0].position, [1.0, 3.0, 1.0]);
+        // Between rooms, stairs go through floors.
+        g.portals.iter_mut().for_each(|p| p.cells[0] = CellId(2));
+        assert_eq!(reasons(&g), []);
+    }
+}

@@ -1,0 +1,345 @@
+//! Roles of objects that nothing is said about, by size and by what they hide.
+//!
+//! Only small objects that one can see around, and large ones that one sees through, become detail.
+//! The judge errs to *structural*: a chair taken for a wall costs a portal or two, a piece of a wall
+//! taken for a chair opens a room. So whatever stands between two things stays: the piece of a wall
+//! between floor and ceiling, the lintel between two jambs, the tile between its neighbors.
+
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// The reason of objects that no rule fitted.
+pub(crate) const DEFAULT: &str = "default";
+
+/// Longest edge of what may stand in a room: a bed or a sofa, not a door. [Units: wu]
+const SMALL: f64 = 2.0;
+/// The same as a share of the scene's diagonal: chairs are not large in their room.
+const SMALL_SHARE: f64 = 0.25;
+/// A plate is thinner than this share of its middle edge.
+const PLATE: f64 = 0.2;
+/// What is nearer than this touches. [Units: wu]
+const NEAR: f64 = 0.05;
+/// How far into the object that is looked for, as kits let their pieces overlap. [Units: wu]
+const INTO: f64 = 0.02;
+/// Cells along each edge of a side; one in four of them touched, and the side is.
+const CELLS: usize = 3;
+const TOUCHED: usize = CELLS * CELLS / 4;
+/// A side that others touch must go on beyond the object in so many of four directions, as the floor
+/// around a chair does. The next brick of a wall ends where this one does.
+const GOES_ON: usize = 3;
+/// Where it is looked for beyond the object. [Units: wu]
+const BEYOND: [f64; 2] = [0.03, 0.12];
+/// Rails and grilles fill less than this share of their box. Piers beside a wide opening may, too,
+/// and so the following limits.
+const SPARSE: f64 = 0.15;
+/// Rails and grilles are no thicker than this. [Units: wu]
+const FLAT: f64 = 0.3;
+/// Each connected part of a rail is a bar, and no wider than this. [Units: wu]
+const BAR: f64 = 0.12;
+/// A surface whose open rim lies on others is a piece of a shell, as the reveal of a doorway is that
+/// was split from its wall; unless so little of it does, in edges of its box, that it may be the
+/// open ends of a chair's legs.
+const RIM_SHARE: f64 = 0.25;
+/// The rim lies on what is nearer than this. [Units: wu]
+const ON: f64 = 1e-3;
+/// Where more than this share of the structural surface would be detail, the scene is built of small
+/// pieces and nothing in it is furniture.
+const MOST: f64 = 0.3;
+/// So many small objects are no furniture, either; and looking at each takes time.
+const MOST_OBJECTS: usize = 50_000;
+
+/// What is known of one structural object.
+struct Shape {
+    object: usize,
+    /// Its own, in the list of all.
+    triangles: Range<usize>,
+    bounds: Aabb,
+    /// Surface, one side. [Units: wu²]
+    area: f64,
+    /// Surface as seen along each axis, front and back counted. [Units: wu²]
+    shadow: DVec3,
+    /// Nothing is said about it.
+    is_open: bool,
+}
+
+/// Gives objects that nothing is said about a role by size and occlusion, with the reason.
+///
+/// Leaves scenes of fewer than three structural objects as they are: there is nothing to compare
+/// with. O(t log t) for t structural triangles, and O(log t) a small object.
+pub(crate) fn judge(scene: &mut Scene) {
+    let n_open = scene.objects.iter().filter(|o| is_open(o)).count();
+    let n_structural = scene
+        .objects
+        .iter()
+        .filter(|o| o.role == Role::Structural)
+        .count();
+    if n_open == 0 || n_structural < 3 {
+        return;
+    }
+    let (shapes, triangles, owners) = shapes_of(scene);
+    let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
+    let small = SMALL.min(SMALL_SHARE * bounds.size().length());
+    let n_small = shapes
+        .iter()
+        .filter(|s| s.is_open && s.bounds.size().max_element() <= small)
+        .count();
+    let bvh = if n_small > 0 && n_small <= MOST_OBJECTS {
+        Some(Bvh::build(&triangles))
+    } else {
+        None
+    };
+    let mut found: Vec<(usize, String)> = Vec::new();
+    let mut detail_area = 0.0;
+    for shape in shapes.iter().filter(|s| s.is_open) {
+        let size = shape.bounds.size();
+        let reason = if size.max_element() <= small {
+            bvh.as_ref().and_then(|bvh| {
+                let touches = |b: &Aabb| {
+                    let mut is_touched = false;
+                    bvh.for_each_in_box(b, |t| {
+                        is_touched |= owners[t as usize] != shape.object as u32;
+                    });
+                    is_touched
+                };
+                let reason = seen_around(&shape.bounds, &touches)?;
+                let own = &triangles[shape.triangles.clone()];
+                (!goes_on_at_its_rim(own, &shape.bounds, &touches)).then_some(reason)
+            })
+        } else {
+            let is_rail = size.min_element() <= FLAT
+                && fill(shape) < SPARSE
+                && parts(&triangles[shape.triangles.clone()]).iter().all(|b| {
+                    let mut edges = b.size().to_array();
+                    edges.sort_by(f64::total_cmp);
+                    edges[1] <= BAR
+                });
+            is_rail.then(|| {
+                let percent = fill(shape) * 100.0;
+                format!("hides little: bars that fill {percent:.0} % of their box")
+            })
+        };
+        if let Some(reason) = reason {
+            // The leaves of a plant are more surface than it hides.
+            detail_area += shape.area.min(shape.bounds.surface_area());
+            found.push((shape.object, reason));
+        }
+    }
+    let structural_area: f64 = shapes.iter().map(|s| s.area).sum();
+    if detail_area > MOST * structural_area || found.len() == n_structural {
+        for (object, reason) in found {
+            scene.objects[object].reason =
+                format!("default: {reason}, but so is too much of the scene");
+        }
+        return;
+    }
+    for (object, reason) in found {
+        let object = &mut scene.objects[object];
+        object.role = Role::Detail;
+        object.reason = reason;
+    }
+}
+
+fn is_open(object: &enfilade_geom::scene::Object) -> bool {
+    object.role == Role::Structural && object.reason == DEFAULT
+}
+
+/// Each structural object's shape; all their triangles, and the object of each.
+fn shapes_of(scene: &Scene) -> (Vec<Shape>, Vec<Triangle>, Vec<u32>) {
+    let mut shapes: Vec<Shape> = Vec::new();
+    let mut triangles = Vec::new();
+    let mut owners = Vec::new();
+    for source in scene.triangle_sources(Role::Structural) {
+        let t = scene.world_triangle(source);
+        if shapes
+            .last()
+            .is_none_or(|s| s.object != source.object as usize)
+        {
+            shapes.push(Shape {
+                object: source.object as usize,
+                triangles: triangles.len()..triangles.len(),
+                bounds: Aabb::EMPTY,
+                area: 0.0,
+                shadow: DVec3::ZERO,
+                is_open: is_open(&scene.objects[source.object as usize]),
+            });
+        }
+        let normal = 0.5 * triangle_area_normal(&t);
+        if let Some(shape) = shapes.last_mut() {
+            shape.triangles.end += 1;
+            shape.bounds = shape.bounds.union(Aabb::of_points(&t));
+            shape.area += normal.length();
+            shape.shadow += normal.abs();
+        }
+        triangles.push(t);
+        owners.push(source.object);
+    }
+    (shapes, triangles, owners)
+}
+
+/// The largest surface that a shape shows along an axis, as a share of its box's largest side. Both
+/// sides of a closed shape count, as half each.
+fn fill(shape: &Shape) -> f64 {
+    let size = shape.bounds.size();
+    let sides = DVec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
+    0.5 * shape.shadow.max_element() / sides.max_element().max(f64::MIN_POSITIVE)
+}
+
+/// Whether others begin where the surface ends.
+fn goes_on_at_its_rim(
+    triangles: &[Triangle],
+    bounds: &Aabb,
+    touches: &dyn Fn(&Aabb) -> bool,
+) -> bool {
+    let mut edges: Vec<[[u64; 3]; 2]> = triangles
+        .iter()
+        .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
+        .map(|e| {
+            let mut key = e.map(key);
+            key.sort_unstable();
+            key
+        })
+        .collect();
+    edges.sort_unstable();
+    let on_others: f64 = edges
+        .chunk_by(|a, b| a == b)
+        .filter(|same| same.len() == 1)
+        .map(|same| same[0].map(|p| DVec3::from_array(p.map(f64::from_bits))))
+        .filter(|[a, b]| touches(&Aabb::of_points(&[(*a + *b) * 0.5]).expanded(ON)))
+        .map(|[a, b]| a.distance(b))
+        .sum();
+    on_others > RIM_SHARE * 4.0 * bounds.size().element_sum()
+}
+
+/// A corner as what can be compared.
+fn key(p: DVec3) -> [u64; 3] {
+    // + 0.0 makes one zero of two.
+    (p + 0.0).to_array().map(f64::to_bits)
+}
+
+/// Boxes of the connected parts: triangles that share a corner hang together.
+fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    let mut first_at: HashMap<[u64; 3], usize> = HashMap::new();
+    let mut parent: Vec<usize> = (0..triangles.len()).collect();
+    for (i, t) in triangles.iter().enumerate() {
+        for p in t {
+            let other = *first_at.entry(key(*p)).or_insert(i);
+            let (a, b) = (root(&mut parent, i), root(&mut parent, other));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut boxes = vec![Aabb::EMPTY; triangles.len()];
+    for (i, t) in triangles.iter().enumerate() {
+        let r = root(&mut parent, i);
+        boxes[r] = boxes[r].union(Aabb::of_points(t));
+    }
+    boxes.retain(|b| !b.is_empty());
+    boxes
+}
+
+/// Why one sees around a small object, if one does: it stands, hangs or leans, and stands between
+/// nothing.
+fn seen_around(bounds: &Aabb, touches: &dyn Fn(&Aabb) -> bool) -> Option<String> {
+    const SIDES: [[&str; 2]; 3] = [
+        ["a side", "a side"],
+        ["its bottom", "its top"],
+        ["a side", "a side"],
+    ];
+    let size = bounds.size();
+    let mut sorted = size.to_array();
+    sorted.sort_by(f64::total_cmp);
+    let is_plate = sorted[0] < PLATE * sorted[1];
+    let mut touched = Vec::new();
+    for axis in 0..3 {
+        let sides = [false, true].map(|high| is_side_touched(bounds, axis, high, touches));
+        // Between two things; or the rim of a plate, which goes on in what it touches.
+        let is_rim = is_plate && size[axis] > sorted[0];
+        if sides == [true, true] || is_rim && sides != [false, false] {
+            return None;
+        }
+        for side in (0..2).filter(|&side| sides[side]) {
+            if n_goes_on(bounds, axis, side == 1, touches) < GOES_ON {
+                return None;
+            }
+            touched.push(SIDES[axis][side]);
+        }
+    }
+    let at = if touched.is_empty() {
+        "nothing".to_owned()
+    } else {
+        format!("{} only", touched.join(" and "))
+    };
+    Some(format!(
+        "small, hides little: {:.1} x {:.1} x {:.1} m, touches {at}",
+        size.x, size.y, size.z
+    ))
+}
+
+/// Whether others touch a side of the box. Its margin is not looked at: the floor below touches that
+/// of every other side.
+fn is_side_touched(
+    bounds: &Aabb,
+    axis: usize,
+    high: bool,
+    touches: &dyn Fn(&Aabb) -> bool,
+) -> bool {
+    /// Rounding to `f32` moves what was flush. [Units: wu]
+    const FLUSH: f64 = 1e-4;
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let size = bounds.size();
+    let mut n = 0;
+    for cell in 0..CELLS * CELLS {
+        let mut b = *bounds;
+        for (k, at) in [(u, cell % CELLS), (v, cell / CELLS)] {
+            let step = 0.8 * size[k] / CELLS as f64;
+            b.min[k] = bounds.min[k] + 0.1 * size[k] + step * at as f64 - FLUSH;
+            b.max[k] = b.min[k] + step + 2.0 * FLUSH;
+        }
+        (b.min[axis], b.max[axis]) = skin(bounds, axis, high);
+        n += usize::from(touches(&b));
+    }
+    n >= TOUCHED.max(1)
+}
+
+/// Where contact is looked for at a side, across it.
+fn skin(bounds: &Aabb, axis: usize, high: bool) -> (f64, f64) {
+    let into = INTO.min(0.25 * bounds.size()[axis]);
+    if high {
+        (bounds.max[axis] - into, bounds.max[axis] + NEAR)
+    } else {
+        (bounds.min[axis] - NEAR, bounds.min[axis] + into)
+    }
+}
+
+/// In how many of four directions what touches a side goes on beyond it.
+fn n_goes_on(bounds: &Aabb, axis: usize, high: bool, touches: &dyn Fn(&Aabb) -> bool) -> usize {
+    let mut n = 0;
+    for k in [(axis + 1) % 3, (axis + 2) % 3] {
+        let other = 3 - axis - k;
+        for is_up in [false, true] {
+            let mut b = *bounds;
+            let margin = 0.1 * bounds.size()[other];
+            b.min[other] += margin;
+            b.max[other] -= margin;
+            (b.min[axis], b.max[axis]) = skin(bounds, axis, high);
+            (b.min[k], b.max[k]) = if is_up {
+                (bounds.max[k] + BEYOND[0], bounds.max[k] + BEYOND[1])
+            } else {
+                (bounds.min[k] - BEYOND[1], bounds.min[k] - BEYOND[0])
+            };
+            n += usize::from(touches(&b));
+        }
+    }
+    n
+}
+
+#[cfg(test)]
+mod tests;
