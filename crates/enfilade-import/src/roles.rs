@@ -109,10 +109,10 @@ const IFC_VOID: [&str; 4] = [
 
 /// Words for what bounds rooms.
 #[rustfmt::skip]
-const STRUCTURAL_WORDS: [&str; 18] = [
+const STRUCTURAL_WORDS: [&str; 19] = [
     "wall", "floor", "ceiling", "roof", "slab", "column", "pillar", "beam", "foundation",
     "facade", "partition", "building", "house", "stair", "staircase", "stairs", "ground",
-    "corridor",
+    "corridor", "chimney",
 ];
 
 /// Words for what fills an opening. Any structural word beside them wins: kits call a wall with
@@ -416,6 +416,7 @@ mod tests {
             "HouseWallB_01#0",
             "PlantRoom_Wall",
             "stable",
+            "chimney",
             "Floor.002",
             "IfcWall/1NlPq2Qy5FNPHd4Z_0$col",
             "IfcWallStandardCase/x-noimp",
