@@ -123,6 +123,7 @@ fn tools() -> anyhow::Result<()> {
     if !missing.is_empty() {
         bail!("{}", missing.join("\n"));
     }
+    driver()?;
     if !node_path().join("gltf-validator").is_dir() {
         std::fs::create_dir_all(tools_dir())?;
         println!("installing gltf-validator into {}", tools_dir().display());
@@ -135,6 +136,41 @@ fn tools() -> anyhow::Result<()> {
             "gltf-validator@2.0.0-dev.3.10",
         ];
         run_to_end(Command::new("npm").current_dir(tools_dir()).args(npm))?;
+    }
+    Ok(())
+}
+
+/// Pictures are drawn with software, the same on every machine: Mesa's Vulkan driver.
+fn driver() -> anyhow::Result<()> {
+    let has_it = || {
+        [
+            "/usr/share/vulkan/icd.d",
+            "/etc/vulkan/icd.d",
+            "/usr/local/share/vulkan/icd.d",
+        ]
+        .iter()
+        .filter_map(|dir| std::fs::read_dir(dir).ok())
+        .flat_map(|entries| entries.flatten())
+        .any(|e| e.file_name().to_string_lossy().contains("lvp"))
+    };
+    if !cfg!(target_os = "linux") || has_it() {
+        return Ok(());
+    }
+    println!("installing mesa-vulkan-drivers and libvulkan1: the tests draw with them");
+    let apt = |args: &[&str]| run_to_end(Command::new("apt-get").args(args));
+    let done = apt(&["update", "-qq"])
+        .and_then(|()| apt(&["install", "-y", "-qq", "mesa-vulkan-drivers", "libvulkan1"]));
+    if let Err(why) = done.and_then(|()| {
+        if has_it() {
+            Ok(())
+        } else {
+            bail!("still no driver")
+        }
+    }) {
+        bail!(
+            "missing: a software Vulkan driver, which draws the pictures of the tests; \
+             `apt-get install mesa-vulkan-drivers libvulkan1` or alike ({why:#})"
+        );
     }
     Ok(())
 }
@@ -180,21 +216,11 @@ fn demo() -> anyhow::Result<()> {
     verify(&world)
 }
 
-/// Scenes whose promises are known to break, with the reason in `docs/benchmarks/rooms.md`. What breaks
-/// there is printed; anywhere else it fails the run.
-const KNOWN_BROKEN: [&str; 1] = ["recast-dungeon"];
-
 fn check_scene(scene: &std::path::Path, name: &str) -> anyhow::Result<()> {
     let dir = target_dir().join("scenes");
     std::fs::create_dir_all(&dir)?;
     let world = dir.join(name).with_extension("glb");
     print!("{}", output_of(&mut bake_command(scene, &world), None)?);
     validate(&world)?;
-    match verify(&world) {
-        Err(why) if KNOWN_BROKEN.contains(&name) => {
-            println!("KNOWN TO BREAK: {why:#}");
-            Ok(())
-        }
-        other => other,
-    }
+    verify(&world)
 }

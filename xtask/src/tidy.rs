@@ -25,7 +25,7 @@ const PRINT: &[&str] = &["println!", "eprintln!", "print!(", "eprint!("];
 /// Readers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 11] = [
+const FENCES: [Fence; 12] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -63,6 +63,12 @@ const FENCES: [Fence; 11] = [
         words: &["std::fs", "std::thread"],
     },
     Fence {
+        name: "enfilade-render",
+        siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-runtime"],
+        not: &["rayon", "anyhow", "clap", "winit"],
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
         name: "enfilade-report",
         siblings: &["enfilade-geom", "enfilade-cpg"],
         not: &["rayon", "anyhow"],
@@ -91,6 +97,7 @@ const FENCES: [Fence; 11] = [
         // The test kit makes the house of `demo`.
         siblings: &[
             "enfilade",
+            "enfilade-render",
             "enfilade-report",
             "enfilade-verify",
             "enfilade-testkit",

@@ -5,6 +5,7 @@
 //! ([`complex`]), so that the promises hold whatever the voxels missed.
 
 mod assemble;
+pub mod bsp;
 pub mod complex;
 mod config;
 mod context;
@@ -12,6 +13,7 @@ pub mod delaunay;
 mod error;
 mod join;
 pub mod pipeline;
+pub mod simplify;
 pub mod vis;
 pub mod voxel;
 pub mod watershed;

@@ -1,8 +1,11 @@
 //! Visibility before run-time, on random grids of rooms, against lines followed by other means.
 
 use std::io::{Read, Write};
+use std::time::Duration;
 
-use enfilade_bake::vis::{VisConfig, VisContext, VisError, VisMode, VisOutput, see_all};
+use enfilade_bake::vis::{
+    VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, see_all,
+};
 use enfilade_cpg::{CellId, SightGraph, SightGraphError, SightPortal};
 use enfilade_geom::DVec3;
 use enfilade_testkit::Rng;
@@ -96,6 +99,7 @@ fn see(graph: &SightGraph, config: &VisConfig) -> VisOutput {
     let mut context = VisContext {
         on_round: &mut |_, _| true,
         blocker: None,
+        checkpoint: None,
     };
     see_all(graph, config, &mut context).unwrap()
 }
@@ -182,6 +186,7 @@ fn threads_and_an_early_stop_change_what_they_should() {
     let mut context = VisContext {
         on_round: &mut |_, _| false,
         blocker: None,
+        checkpoint: None,
     };
     let stopped = see_all(&graph, &with_evidence(), &mut context).unwrap();
     assert!(!stopped.is_complete && one.is_complete);
@@ -194,6 +199,74 @@ fn threads_and_an_early_stop_change_what_they_should() {
     verify_evidence(&graph, &stopped.evidence.unwrap(), None).unwrap();
 }
 
+/// Searches until `rounds` have passed; returns what was found and what was saved then.
+fn see_in_parts(
+    graph: &SightGraph,
+    config: &VisConfig,
+    resume: Option<Vec<u8>>,
+    rounds: usize,
+) -> (Result<VisOutput, VisError>, Vec<u8>) {
+    let mut saved = Vec::new();
+    let mut n = 0;
+    let mut context = VisContext {
+        on_round: &mut |_, _| {
+            n += 1;
+            n <= rounds
+        },
+        blocker: None,
+        checkpoint: Some(VisCheckpoint {
+            resume,
+            salt: 7,
+            every: Duration::from_secs(3600),
+            save: &mut |bytes| saved = bytes,
+        }),
+    };
+    let vis = see_all(graph, config, &mut context);
+    (vis, saved)
+}
+
+#[test]
+fn a_search_in_parts_finds_what_one_in_one_go_finds() {
+    let graph = Grid::new(8, 5).graph();
+    let config = with_evidence();
+    let whole = see(&graph, &config);
+    let (part, mut saved) = see_in_parts(&graph, &config, None, 1);
+    assert!(!part.unwrap().is_complete);
+    // A round at a time, to the end.
+    let done = (0..100).find_map(|_| {
+        let (part, next) = see_in_parts(&graph, &config, Some(saved.clone()), 1);
+        saved = next;
+        part.ok().filter(|vis| vis.is_complete)
+    });
+    assert_eq!(done, Some(whole));
+}
+
+#[test]
+fn checkpoints_that_do_not_fit_are_refused() {
+    let graph = Grid::new(6, 5).graph();
+    let config = VisConfig::default();
+    let (_, saved) = see_in_parts(&graph, &config, None, 1);
+    let refused = |graph: &SightGraph, config: &VisConfig, bytes: &[u8]| {
+        let (vis, _) = see_in_parts(graph, config, Some(bytes.to_vec()), 100);
+        matches!(vis, Err(VisError::Checkpoint { .. }))
+    };
+    assert!(!refused(&graph, &config, &saved));
+    let far = VisConfig {
+        far: Some(3.0),
+        ..config.clone()
+    };
+    assert!(refused(&graph, &far, &saved));
+    assert!(refused(&Grid::new(6, 6).graph(), &config, &saved));
+    for end in (0..saved.len()).step_by(7) {
+        assert!(refused(&graph, &config, &saved[..end]), "{end} bytes");
+    }
+    for at in (0..saved.len()).step_by(11) {
+        let mut bytes = saved.clone();
+        bytes[at] ^= 0x10;
+        assert!(refused(&graph, &config, &bytes), "byte {at}");
+    }
+}
+
 #[test]
 fn broken_graphs_are_named_and_odd_ones_are_answered() {
     let good = Grid::new(3, 1).graph();
@@ -203,6 +276,7 @@ fn broken_graphs_are_named_and_odd_ones_are_answered() {
         let mut context = VisContext {
             on_round: &mut |_, _| true,
             blocker: None,
+            checkpoint: None,
         };
         see_all(&graph, &VisConfig::default(), &mut context).unwrap_err()
     };
@@ -245,6 +319,21 @@ fn broken_graphs_are_named_and_odd_ones_are_answered() {
     );
 }
 
+/// A body of evidence as a file, with length and check sum as they should be.
+fn pack(body: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(body).unwrap();
+    let packed = encoder.finish().unwrap();
+    let sum = packed.iter().fold(0xcbf2_9ce4_8422_2325_u64, |sum, &b| {
+        (sum ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+    });
+    let mut file = b"ENFEVID2".to_vec();
+    file.extend((body.len() as u64).to_le_bytes());
+    file.extend(sum.to_le_bytes());
+    file.extend(packed);
+    file
+}
+
 #[test]
 fn a_thousand_tampered_files_are_rejected() {
     let graph = Grid::new(6, 11).graph();
@@ -261,7 +350,7 @@ fn a_thousand_tampered_files_are_rejected() {
 
     // Lies that are packed properly.
     let mut body = Vec::new();
-    flate2::read::ZlibDecoder::new(&bytes[16..])
+    flate2::read::ZlibDecoder::new(&bytes[24..])
         .read_to_end(&mut body)
         .unwrap();
     let n = 2 * graph.portals.len();
@@ -301,11 +390,8 @@ fn a_thousand_tampered_files_are_rejected() {
                 bad[at] = 8 + rng.below(240) as u8;
             }
         }
-        let mut packed = bytes[..8].to_vec();
-        packed.extend((bad.len() as u64).to_le_bytes());
-        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::fast());
-        encoder.write_all(&bad).unwrap();
-        let packed = encoder.finish().unwrap();
+        let packed = pack(&bad);
+        assert!(i > 0 || verify_evidence(&graph, &pack(&body), None).is_ok());
         let verdict = verify_evidence(&graph, &packed, None);
         // One opening of several between two cells may be called hidden without being seen to be wrong
         // by a line; then it still lacks a reason.

@@ -7,6 +7,7 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use enfilade::bake::bsp::{bake_bsp, find_leak};
 use enfilade::bake::delaunay::bake_delaunay;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
@@ -45,28 +46,35 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
             input.display()
         );
     }
-    let (import_options, config) = settings::resolve(options)?;
+    let settings = settings::resolve(options)?;
+    let config = &settings.watershed;
     check_target(&args.output)?;
     let bar = StageBar::new();
     bar.start("reading", 0);
-    let imported = import(&args.inputs, &options.detail, &import_options)?;
+    let imported = import(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
-    let threads = options.threads.map(usize::from);
-    let baked = if options.method == settings::Method::Delaunay {
-        let bar = BakeBar::new(scene, &config);
-        let config = options.delaunay.resolve(&config)?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.unwrap_or(0))
-            .build()?;
-        pool.install(|| bake_delaunay(scene, &config, &BakeContext::new(&bar, None)))?
-    } else {
-        bake_scene(scene, &config, threads)?
-    };
+    refuse_leak(scene, options)?;
+    let (method, reason) = method_for(scene, options.method);
+    writeln!(io::stderr(), "method {}: {reason}", method.name())?;
+    let bar = BakeBar::new(scene, config);
+    let ctx = BakeContext::new(&bar, None);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads.map_or(0, usize::from))
+        .build()?;
+    let baked = match method {
+        Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
+        Builder::Bsp => pool.install(|| bake_bsp(scene, &settings.bsp, &ctx)),
+        Builder::Delaunay => {
+            let config = options.delaunay.resolve(config)?;
+            pool.install(|| bake_delaunay(scene, &config, &ctx))
+        }
+    }?;
+    drop(bar);
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
-    report_bake(&baked, &config, options.verbose)?;
+    report_bake(&baked, config, options.verbose)?;
     let mut out = io::stdout().lock();
     print_summary(&mut out, &baked.world)?;
     writeln!(
@@ -76,6 +84,86 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         bytes.len() as f64 / 1e6
     )?;
     Ok(())
+}
+
+/// What finds the cells.
+#[derive(Clone, Copy, PartialEq)]
+enum Builder {
+    Watershed,
+    Bsp,
+    Delaunay,
+}
+
+impl Builder {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Watershed => "watershed",
+            Self::Bsp => "bsp",
+            Self::Delaunay => "delaunay",
+        }
+    }
+}
+
+/// The builder that is asked for or fits the input, and why.
+fn method_for(scene: &Scene, asked: settings::Method) -> (Builder, String) {
+    let asked_for = |builder| (builder, "asked for".to_owned());
+    match asked {
+        settings::Method::Watershed => asked_for(Builder::Watershed),
+        settings::Method::Bsp => asked_for(Builder::Bsp),
+        settings::Method::Delaunay => asked_for(Builder::Delaunay),
+        settings::Method::Auto if scene.solids.is_empty() => (
+            Builder::Watershed,
+            "the structure is triangles, which may have cracks".to_owned(),
+        ),
+        settings::Method::Auto => (
+            Builder::Bsp,
+            format!("the structure is made of {} brushes", scene.solids.len()),
+        ),
+    }
+}
+
+/// Ends the bake of a map whose inside is open to the void, with the way out.
+fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result<()> {
+    let Some(leak) = find_leak(scene) else {
+        return Ok(());
+    };
+    let lines: String = leak
+        .points
+        .iter()
+        .map(|p| format!("{} {} {}\n", p.x, p.y, p.z))
+        .collect();
+    let mut way = String::new();
+    if let Some(path) = &options.leak {
+        write_atomically(path, lines.as_bytes())?;
+        way = format!("; the way is in {}", path.display());
+    }
+    let shown: Vec<String> = leak
+        .points
+        .iter()
+        .take(8)
+        .map(|p| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z))
+        .collect();
+    let entities: Vec<_> = scene
+        .entities
+        .iter()
+        .filter(|e| e.object.is_none() && e.position.is_some())
+        .collect();
+    let class = entities.get(leak.from).map_or("an entity", |e| &e.class);
+    let text = format!(
+        "the map leaks: {class} reaches the void in {} steps, by {}{}{way}",
+        leak.points.len(),
+        shown.join(", "),
+        if leak.points.len() > shown.len() {
+            ", …"
+        } else {
+            ""
+        },
+    );
+    if options.allow_leak {
+        writeln!(io::stderr(), "{text}")?;
+        return Ok(());
+    }
+    bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

@@ -13,7 +13,10 @@ use enfilade::runtime::{
 use enfilade_testkit::{GridParams, Rng, courtyard, room_grid};
 use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 
+use crate::bench_bsp::{bench_bsp, bench_simplify};
+use crate::cameras::walk;
 use crate::see::Answers;
+use crate::walkthrough::{self, Walkthrough};
 use crate::world::read_world;
 
 /// Measures what can be seen and prints the tables of the documentation.
@@ -25,6 +28,22 @@ pub(crate) struct Bench {
 
 #[derive(clap::Subcommand)]
 enum What {
+    /// Binary space partition: tree, portals, separators, cells.
+    Bsp {
+        /// Scenes: Quake maps and any others.
+        scenes: Vec<PathBuf>,
+        /// All heuristics, not only the default.
+        #[arg(long)]
+        heuristics: bool,
+        /// Bake to the end, cells merged up to 50 triangles.
+        #[arg(long)]
+        bake: bool,
+    },
+    /// Simplifier: expected triangles by either metric at the same number of portals.
+    Simplify {
+        /// Worlds.
+        worlds: Vec<PathBuf>,
+    },
     /// Time of a view: in worlds, in portal files, in offices of so many rooms, in a courtyard.
     See {
         /// Worlds (`.glb`) and Quake portal files (`.prt`).
@@ -61,6 +80,8 @@ enum What {
         #[arg(long, default_value_t = SightOptions::default().chunk_triangles)]
         chunk: usize,
     },
+    /// A walk through rooms, drawn whole, with frustum culling and by portals.
+    Walkthrough(Walkthrough),
     /// Lines of sight by cells against the tree of the whole world.
     Los {
         /// Worlds.
@@ -77,6 +98,12 @@ enum What {
 pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
     let mut table = Vec::new();
     match &args.what {
+        What::Bsp {
+            scenes,
+            heuristics,
+            bake,
+        } => bench_bsp(&mut table, scenes, *heuristics, *bake)?,
+        What::Simplify { worlds } => bench_simplify(&mut table, worlds)?,
         What::See {
             scenes,
             rooms,
@@ -93,6 +120,7 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             fov,
             chunk,
         } => bench_maze(&mut table, world, *views, *fov, *chunk)?,
+        What::Walkthrough(args) => walkthrough::bench(&mut table, args)?,
         What::Los {
             scenes,
             rooms,
@@ -398,55 +426,6 @@ fn bench_tight(
         }
     }
     Ok(())
-}
-
-/// A walk through the doorways of a world: points at eye height, with the way onwards.
-fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
-    let middle = |p: &Portal| {
-        let n = p.outline.len().max(1) as f32;
-        [0, 1, 2].map(|k| p.outline.iter().map(|c| c[k]).sum::<f32>() / n)
-    };
-    let center = |c: &Cell| [0, 1, 2].map(|k| (c.aabb[0][k] + c.aabb[1][k]) * 0.5);
-    let mut stops = Vec::new();
-    let mut been = vec![0_u32; world.graph.cells.len()];
-    let Some(first) = world.graph.cells.iter().position(|c| !c.outdoor) else {
-        return Vec::new();
-    };
-    let (mut cell, mut came_by) = (first, None);
-    stops.push(center(&world.graph.cells[cell]));
-    // Always to the neighbor that was visited least, by the first such portal.
-    while stops.len() < 2 * views {
-        been[cell] += 1;
-        let next = world.graph.cells[cell]
-            .portals
-            .iter()
-            .map(|&id| {
-                let p = &world.graph.portals[id.0 as usize];
-                let to = p.cells[usize::from(p.cells[0].0 as usize == cell)].0 as usize;
-                (been[to], Some(id) == came_by, id, to)
-            })
-            .filter(|(.., to)| !world.graph.cells[*to].outdoor)
-            .min_by_key(|&(n, is_back, id, _)| (n, is_back, id));
-        let Some((_, _, id, to)) = next else { break };
-        stops.push(middle(&world.graph.portals[id.0 as usize]));
-        stops.push(center(&world.graph.cells[to]));
-        (cell, came_by) = (to, Some(id));
-    }
-    // A stretch of a meter a view.
-    let mut out = Vec::new();
-    for pair in stops.windows(2) {
-        let d = [0, 1, 2].map(|k| pair[1][k] - pair[0][k]);
-        let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-        let n = (length.ceil() as usize).max(1);
-        for i in 0..n {
-            let t = i as f32 / n as f32;
-            let at = [0, 1, 2].map(|k| pair[0][k] + d[k] * t);
-            if length > 0.0 && sight.locate(at).is_some() && out.len() < views {
-                out.push((at, [d[0], 0.0, d[2]]));
-            }
-        }
-    }
-    out
 }
 
 fn bench_maze(

@@ -43,9 +43,9 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         check_target(path)?;
     }
-    let (import_options, common) = settings::resolve(&args.options)?;
-    let config = args.options.delaunay.resolve(&common)?;
-    let imported = import(&args.inputs, &args.options.detail, &import_options)?;
+    let settings = settings::resolve(&args.options)?;
+    let config = args.options.delaunay.resolve(&settings.watershed)?;
+    let imported = import(&args.inputs, &args.options.detail, &settings.import)?;
     let scene = &imported.scene;
     let session = Session::begin(scene, &config, &BakeContext::new(&Silent, None))?;
     let n = session.decimation.steps.len();

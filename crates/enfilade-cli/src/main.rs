@@ -5,16 +5,25 @@
 
 mod bake;
 mod bench;
+mod bench_bsp;
+mod cameras;
 mod decimate;
 mod demo;
+mod exact;
 mod inspect;
 mod locate;
 mod output;
 mod plan;
 mod progress;
 mod pvs;
+mod render;
+mod report;
 mod see;
+mod simplify;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
+mod walkthrough;
 mod world;
 
 use std::io;
@@ -36,12 +45,18 @@ enum Command {
     Bench(bench::Bench),
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
+    Edit(simplify::Edit),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
+    Render(render::Render),
+    Report(report::Report),
     See(see::See),
+    Simplify(simplify::Simplify),
     Verify(verify::Verify),
+    #[cfg(feature = "view")]
+    View(view::View),
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
@@ -50,12 +65,18 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Bench(args) => bench::run(&args),
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Edit(args) => simplify::run_edit(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
+        Command::Render(args) => render::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
+        Command::Simplify(args) => simplify::run(&args),
         Command::Verify(args) => verify::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
     }
 }
 

@@ -6,16 +6,21 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{Blocker, VisConfig, VisContext, VisMode, VisOutput, see_all};
+use enfilade::bake::vis::{
+    Blocker, VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all,
+};
 use enfilade::cpg::wire::decode_glb;
-use enfilade::cpg::{CellSet, SightGraph, SightPortal};
+use enfilade::cpg::{CellSet, SightGraph, SightPortal, World};
 use enfilade::geom::{Bvh, DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
 
 use enfilade_verify::structural_triangles;
 
+use self::statistics::Statistics;
 use crate::output::write_atomically;
 use crate::progress::StageBar;
+
+mod statistics;
 
 /// Computes the potentially visible set of a world or a Quake portal file: for each cell, what can be seen
 /// from it. Writes it as text.
@@ -38,6 +43,18 @@ pub(crate) struct Pvs {
     /// Write down why each pair counts as visible or hidden, for `enfilade verify --evidence`.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
+    /// Save the search here every half a minute and when --budget ends it, and go on from there
+    /// next time; refused for another graph or other settings, removed when the search is done.
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Write what can be seen from each cell, for modellers: cells, objects and triangles, and the ten worst
+    /// viewpoints; as JSON.
+    #[arg(long, value_name = "FILE")]
+    statistics: Option<PathBuf>,
+    /// Write the pairs that see each other, each once, for radiosity and acoustics: of cells, and of
+    /// the surfaces of a world; as text.
+    #[arg(long, value_name = "FILE")]
+    mutual: Option<PathBuf>,
     /// Threads to use; as many as there are cores if not given. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -80,11 +97,12 @@ struct Report {
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
-    let (graph, walls) = read_graph(&args.input)?;
+    let input = read_input(&args.input)?;
+    let graph = &input.graph;
     let output = output_path(args)?;
     let start = Instant::now();
-    let vis = compute(args, &graph, walls.as_ref())?;
-    let report = report(&graph, &vis, start.elapsed());
+    let vis = compute(args, &input)?;
+    let report = report(graph, &vis, start.elapsed());
     let rows = vis.cells.iter().map(CellSet::ranges).collect();
     let text = write_pvs_text(&PvsText {
         notes: notes(&report, args.mode),
@@ -94,26 +112,62 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     if let (Some(path), Some(evidence)) = (&args.evidence, &vis.evidence) {
         write_atomically(path, evidence)?;
     }
+    if let Some(path) = &args.statistics {
+        let statistics = Statistics::new(&vis.cells, input.world.as_ref(), graph);
+        let text = serde_json::to_vec_pretty(&statistics)?;
+        write_atomically(path, &text)?;
+    }
+    if let Some(path) = &args.mutual {
+        let text = statistics::mutual(&vis.cells, input.world.as_ref());
+        write_atomically(path, text.as_bytes())?;
+    }
     print(&report, args.json)
+}
+
+/// What to look through.
+struct Input {
+    graph: SightGraph,
+    walls: Option<Bvh>,
+    world: Option<World>,
+    /// Changes with the file.
+    hash: u64,
 }
 
 /// Reads a portal file or a world as a graph to look through; with a world, what stands in the way.
 pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Bvh>)> {
+    let input = read_input(path)?;
+    Ok((input.graph, input.walls))
+}
+
+fn read_input(path: &Path) -> anyhow::Result<Input> {
     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    // FNV-1a: tells files apart, not forgers.
+    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
     if bytes.starts_with(b"glTF") {
         let world = decode_glb(&bytes).with_context(|| path.display().to_string())?;
         let walls: Vec<Triangle> = structural_triangles(&world)
             .into_iter()
             .map(|(triangle, _)| triangle)
             .collect();
-        let walls = Bvh::build(&walls);
-        return Ok((SightGraph::of_graph(&world.graph), Some(walls)));
+        return Ok(Input {
+            graph: SightGraph::of_graph(&world.graph),
+            walls: Some(Bvh::build(&walls)),
+            world: Some(world),
+            hash,
+        });
     }
     let text = std::str::from_utf8(&bytes)
         .ok()
         .with_context(|| format!("{}: no text, so no portal file", path.display()))?;
     let file = read_prt(text).with_context(|| path.display().to_string())?;
-    Ok((sight_graph(&file), None))
+    Ok(Input {
+        graph: sight_graph(&file),
+        walls: None,
+        world: None,
+        hash,
+    })
 }
 
 /// The portals of a file that light can pass: those with fewer than three corners have no area.
@@ -155,7 +209,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     a == b || matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-fn compute(args: &Pvs, graph: &SightGraph, walls: Option<&Bvh>) -> anyhow::Result<VisOutput> {
+fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
     let config = VisConfig {
         mode: match args.mode {
             Mode::Fast => VisMode::Fast,
@@ -176,18 +230,60 @@ fn compute(args: &Pvs, graph: &SightGraph, walls: Option<&Bvh>) -> anyhow::Resul
         bar.set(done);
         args.budget.is_none_or(|budget| start.elapsed() < budget)
     };
-    let is_blocked = walls.map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
+    let is_blocked = input
+        .walls
+        .as_ref()
+        .map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
+    // A search that cannot be saved goes on; what could not be written is said at its end.
+    let mut unsaved = None;
+    let mut save = |bytes: Vec<u8>| {
+        if let Some(path) = &args.checkpoint {
+            unsaved = write_atomically(path, &bytes).err();
+        }
+    };
+    let checkpoint = match &args.checkpoint {
+        Some(path) => Some(VisCheckpoint {
+            resume: read_checkpoint(path)?,
+            salt: input.hash,
+            every: Duration::from_secs(30),
+            save: &mut save,
+        }),
+        None => None,
+    };
     let mut context = VisContext {
         on_round: &mut on_round,
         blocker: is_blocked.as_ref().map(|f| f as Blocker<'_>),
+        checkpoint,
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.unwrap_or(0))
         .build()
         .context("cannot start threads; try --threads 1")?;
-    let answer = pool.install(|| see_all(graph, &config, &mut context));
+    let answer = pool.install(|| see_all(&input.graph, &config, &mut context));
     bar.finish();
-    answer.with_context(|| args.input.display().to_string())
+    let vis = answer.with_context(|| match &args.checkpoint {
+        Some(path) => format!("{}, {}", args.input.display(), path.display()),
+        None => args.input.display().to_string(),
+    })?;
+    if let Some(error) = unsaved {
+        return Err(error.context("cannot save the search"));
+    }
+    if let Some(path) = &args.checkpoint
+        && vis.is_complete
+        && path.exists()
+    {
+        fs::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
+    }
+    Ok(vis)
+}
+
+/// What was saved before, if anything was.
+fn read_checkpoint(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
+    }
 }
 
 fn report(graph: &SightGraph, vis: &VisOutput, took: Duration) -> Report {

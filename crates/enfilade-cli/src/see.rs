@@ -193,7 +193,7 @@ fn print_table(
     Ok(())
 }
 
-fn point(text: &str) -> Result<[f32; 3], String> {
+pub(crate) fn point(text: &str) -> Result<[f32; 3], String> {
     let numbers: Result<Vec<f32>, _> = text.split(',').map(|w| w.trim().parse()).collect();
     match numbers.as_deref() {
         Ok(&[x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => Ok([x, y, z]),
@@ -201,7 +201,7 @@ fn point(text: &str) -> Result<[f32; 3], String> {
     }
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
     let parse = || {
         let (w, h) = text.split_once('x')?;
         let (w, h) = (w.parse::<u32>().ok()?, h.parse::<u32>().ok()?);

@@ -10,15 +10,17 @@ use enfilade::geom::scene::Role;
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::import;
 use enfilade::runtime::{SeeOptions, Sight};
+use enfilade_render::AdapterChoice;
 use enfilade_verify::{
     Blocks, VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
     verify_world_with_progress,
 };
 
 use crate::bake::settings::SceneOptions;
+use crate::exact::{Asked, verify_pictures};
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
-use crate::see::Answers;
+use crate::see::{Answers, size};
 use crate::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
@@ -43,6 +45,18 @@ pub(crate) struct Verify {
     /// run-time's answer.
     #[arg(long, default_value_t = 0, value_name = "N")]
     sight: u64,
+    /// Views drawn with and without culling by portals, and compared pixel by pixel.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    views: u64,
+    /// Size of these pictures.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
+    view_size: [u32; 2],
+    /// Draw the views that differ, with and without culling, to PNG files in this folder.
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// What draws the views: `best`, `gpu`, `software`, or part of a name.
+    #[arg(long, default_value = "best", value_name = "NAME")]
+    adapter: AdapterChoice,
     /// Start of the random sequences; equal seeds give equal reports.
     #[arg(long, default_value_t = 1, value_name = "S")]
     seed: u64,
@@ -83,11 +97,27 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
         .transpose()?;
+    let exact = (args.views > 0)
+        .then(|| {
+            let asked = Asked {
+                views: args.views,
+                seed: args.seed,
+                size: args.view_size,
+                adapter: &args.adapter,
+                pictures: args.pictures.as_ref(),
+                max_listed: args.list,
+            };
+            verify_pictures(&world, &asked).with_context(|| args.world.display().to_string())
+        })
+        .transpose()?;
     let mut out = BufWriter::new(io::stdout().lock());
     if args.json {
         let mut value = serde_json::to_value(&report)?;
         if let Some(sight) = &sight {
             value["sight"] = serde_json::to_value(sight)?;
+        }
+        if let Some(exact) = &exact {
+            value["exact"] = serde_json::to_value(exact)?;
         }
         serde_json::to_writer(&mut out, &value).map_err(io::Error::from)?;
         writeln!(out)?;
@@ -95,6 +125,9 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         write!(out, "{report}")?;
         if let Some(sight) = &sight {
             write!(out, "{sight}")?;
+        }
+        if let Some(exact) = &exact {
+            write!(out, "{exact}")?;
         }
     }
     out.flush().context("cannot write to standard output")?;
@@ -113,6 +146,13 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             args.world.display(),
             sight.missed,
             sight.hits
+        );
+    }
+    if let Some(exact) = exact.filter(|e| e.differing > 0) {
+        bail!(
+            "{} is not drawn whole: {} pixels differ from pictures without culling",
+            args.world.display(),
+            exact.differing
         );
     }
     Ok(())

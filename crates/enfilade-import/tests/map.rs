@@ -126,6 +126,17 @@ fn entities_say_what_brushes_are() {
 }
 
 #[test]
+fn sky_closes_the_world_also_as_detail() {
+    let detail = boxed([0, 0, 0], [32, 32, 32], "sky1") + &boxed([64, 0, 0], [96, 32, 32], "wall");
+    let others = format!("{{\n\"classname\" \"func_detail_wall\"\n{detail}}}\n");
+    let scene = read(&map(&boxed([200, 0, 0], [232, 32, 32], "wall"), &others)).scene;
+    let role = |name: &str| scene.objects.iter().find(|o| o.name == name).unwrap().role;
+    assert_eq!(role("func_detail_wall 1 sky"), Role::Structural);
+    assert_eq!(role("func_detail_wall 1"), Role::Detail);
+    assert_eq!(scene.solids.len(), 2);
+}
+
+#[test]
 fn what_other_brushes_hide_is_left_out_once() {
     let (a, b) = (
         boxed([0, 0, 0], [32, 32, 32], "a"),

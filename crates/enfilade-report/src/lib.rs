@@ -1,4 +1,5 @@
-//! Reports on enfilade worlds for people: floor plans as SVG.
+//! Reports on enfilade worlds for people: floor plans as SVG, and a page with all there is to
+//! see.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -11,10 +12,12 @@
 //! Everything here reads a valid world (`World::validate`) and gives the same bytes every time. A
 //! plan is a drawing: shapes are accurate to about a pixel of its sampling grid, not evidence.
 
+mod html;
 mod plan;
 mod section;
 mod storeys;
 mod svg;
 
+pub use html::{Figure, ReportParts, Table, report_html};
 pub use plan::{PlanOptions, plan_svg};
 pub use storeys::{Storey, find_storeys};

@@ -40,7 +40,7 @@ mod graph;
 mod label;
 mod partition;
 mod pieces;
-mod poly;
+pub(crate) mod poly;
 mod seen;
 mod surface;
 mod tree;

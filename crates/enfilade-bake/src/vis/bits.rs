@@ -16,26 +16,32 @@ impl BitTable {
         }
     }
 
+    #[inline]
     pub(super) fn n_words(&self) -> usize {
         self.n_words
     }
 
+    #[inline]
     pub(super) fn row(&self, row: usize) -> &[u64] {
         &self.words[row * self.n_words..][..self.n_words]
     }
 
+    #[inline]
     pub(super) fn row_mut(&mut self, row: usize) -> &mut [u64] {
         &mut self.words[row * self.n_words..][..self.n_words]
     }
 
+    #[inline]
     pub(super) fn get(&self, row: usize, column: usize) -> bool {
         get(self.row(row), column)
     }
 
+    #[inline]
     pub(super) fn set(&mut self, row: usize, column: usize) {
         set(self.row_mut(row), column);
     }
 
+    #[inline]
     pub(super) fn clear(&mut self, row: usize, column: usize) {
         self.row_mut(row)[column / 64] &= !(1 << (column % 64));
     }
@@ -49,31 +55,42 @@ impl BitTable {
     }
 }
 
+#[inline]
 pub(super) fn get(row: &[u64], column: usize) -> bool {
     row[column / 64] >> (column % 64) & 1 != 0
 }
 
+#[inline]
 pub(super) fn set(row: &mut [u64], column: usize) {
     row[column / 64] |= 1 << (column % 64);
 }
 
+#[inline]
+pub(super) fn clear(row: &mut [u64], column: usize) {
+    row[column / 64] &= !(1 << (column % 64));
+}
+
 /// Sets the bits `from..to`.
+#[inline]
 pub(super) fn set_range(row: &mut [u64], from: usize, to: usize) {
     for_words(from, to, |word, mask| row[word] |= mask);
 }
 
 /// Clears the bits `from..to`.
+#[inline]
 pub(super) fn clear_range(row: &mut [u64], from: usize, to: usize) {
     for_words(from, to, |word, mask| row[word] &= !mask);
 }
 
 /// Whether any of the bits `from..to` is set.
+#[inline]
 pub(super) fn any_in_range(row: &[u64], from: usize, to: usize) -> bool {
     let mut any = false;
     for_words(from, to, |word, mask| any |= row[word] & mask != 0);
     any
 }
 
+#[inline]
 fn for_words(from: usize, to: usize, mut visit: impl FnMut(usize, u64)) {
     let mut at = from;
     while at < to {
@@ -87,6 +104,7 @@ fn for_words(from: usize, to: usize, mut visit: impl FnMut(usize, u64)) {
 }
 
 /// Positions of the bits that are set, ascending.
+#[inline]
 pub(super) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
     row.iter().enumerate().flat_map(|(i, &word)| {
         let mut rest = word;
@@ -100,11 +118,13 @@ pub(super) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
     })
 }
 
+#[inline]
 pub(super) fn count(row: &[u64]) -> usize {
     row.iter().map(|w| w.count_ones() as usize).sum()
 }
 
 /// Writes `a & b` and says whether it has a bit in common with `wanted`.
+#[inline]
 pub(super) fn and_into(out: &mut [u64], a: &[u64], b: &[u64], wanted: &[u64]) -> bool {
     let mut any = 0;
     for (((o, &x), &y), &w) in out.iter_mut().zip(a).zip(b).zip(wanted) {
@@ -114,6 +134,7 @@ pub(super) fn and_into(out: &mut [u64], a: &[u64], b: &[u64], wanted: &[u64]) ->
     any != 0
 }
 
+#[inline]
 pub(super) fn meets(a: &[u64], b: &[u64]) -> bool {
     a.iter().zip(b).any(|(x, y)| x & y != 0)
 }

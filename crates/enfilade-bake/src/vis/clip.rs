@@ -63,6 +63,7 @@ pub(super) struct Separator {
 
 impl Separator {
     /// Where a line that has crossed both polygons goes.
+    #[inline]
     pub(super) fn after(&self) -> HalfSpace {
         HalfSpace {
             normal: self.normal,
@@ -71,6 +72,7 @@ impl Separator {
     }
 
     /// Where a line that will cross both polygons comes from.
+    #[inline]
     pub(super) fn before(&self) -> HalfSpace {
         HalfSpace {
             normal: -self.normal,
@@ -80,14 +82,17 @@ impl Separator {
 }
 
 impl Arena {
+    #[inline]
     pub(super) fn mark(&self) -> usize {
         self.points.len()
     }
 
+    #[inline]
     pub(super) fn release(&mut self, mark: usize) {
         self.points.truncate(mark);
     }
 
+    #[inline]
     pub(super) fn push(&mut self, points: &[DVec3], dir: u32) -> Poly {
         let start = self.points.len() as u32;
         self.points.extend_from_slice(points);
@@ -98,10 +103,12 @@ impl Arena {
         }
     }
 
+    #[inline]
     pub(super) fn get(&self, poly: Poly) -> &[DVec3] {
         &self.points[poly.start as usize..][..poly.len as usize]
     }
 
+    #[inline]
     pub(super) fn mean(&self, poly: Poly) -> DVec3 {
         let points = self.get(poly);
         points.iter().sum::<DVec3>() / points.len() as f64
@@ -109,6 +116,7 @@ impl Arena {
 
     /// The part of `poly` in a half-space, and [`Tolerance::outward`] more; the same polygon where nothing
     /// is cut off. `None` where no line with clearance meets it. `turn` is the polygon's unit normal.
+    #[inline]
     pub(super) fn clip(
         &mut self,
         poly: Poly,
@@ -180,81 +188,117 @@ pub(super) struct Facing {
 /// Around each edge the polygon lies on a half-line of the perpendicular cross-section, and the first corner
 /// of the other met when turning from there gives the only such plane. Dirkse, section 7.4, and the Quake
 /// tools try all corners; time here is the product of the corner counts.
+///
+/// A plane that holds an edge of each comes twice. Giving it once would spare a little, but then a checker that
+/// cuts by both keeps polygons that differ by rounding, and finds planes that differ by more.
 pub(super) fn separators(
     a: (&[DVec3], Facing),
     b: (&[DVec3], Facing),
     tolerance: &Tolerance,
     out: &mut Vec<Separator>,
 ) {
-    through_edges(a.0, b.0, a.1.turn, a.1.normal, 1.0, tolerance, out);
-    through_edges(b.0, a.0, b.1.turn, -b.1.normal, -1.0, tolerance, out);
+    let heights = Heights::new(b.0, a.1.normal);
+    for i in 0..a.0.len() {
+        out.extend(through_edge::<true>(a.0, i, b.0, &heights, a.1, tolerance));
+    }
+    let heights = Heights::new(a.0, -b.1.normal);
+    for i in 0..b.0.len() {
+        out.extend(through_edge::<false>(b.0, i, a.0, &heights, b.1, tolerance));
+    }
 }
 
-/// Planes through edges of `own` and corners of `other`, which lies on the side of `ahead`; `sign` is 1 where
-/// `own` is to be behind the planes.
-fn through_edges(
-    own: &[DVec3],
-    other: &[DVec3],
-    turn: DVec3,
+/// Heights of corners along a direction; those of the first few are at hand.
+struct Heights {
     ahead: DVec3,
-    sign: f64,
-    tolerance: &Tolerance,
-    out: &mut Vec<Separator>,
-) {
-    let n = own.len();
-    for i in 0..n {
-        let p = own[i];
-        let edge = own[if i + 1 == n { 0 } else { i + 1 }] - p;
-        let inward = turn.cross(edge);
-        // A corner on the edge's line lies in every plane through it, and says nothing about which to take.
-        let near = 1e4 * tolerance.rounding * tolerance.rounding;
-        let (mut x, mut y, mut best) = (f64::NEG_INFINITY, 0.0, DVec3::ZERO);
-        for &corner in other {
-            let to = corner - p;
-            // The inward axis is longer than a unit by the edge's length; angles are compared only
-            // among themselves, so that does not matter.
-            let (cx, cy) = (inward.dot(to), ahead.dot(to).max(0.0));
-            if cx * cx + cy * cy * edge.length_squared() <= near * edge.length_squared() {
-                continue;
-            }
-            if x == f64::NEG_INFINITY || cx * y - cy * x > 0.0 {
-                (x, y, best) = (cx, cy, to);
-            }
+    first: [f64; 12],
+}
+
+impl Heights {
+    #[inline]
+    fn new(points: &[DVec3], ahead: DVec3) -> Self {
+        let mut first = [0.0; 12];
+        for (height, &p) in first.iter_mut().zip(points) {
+            *height = ahead.dot(p);
         }
-        if y <= tolerance.rounding {
-            continue;
-        }
-        let normal = edge.cross(best);
-        let length = normal.length();
-        // Shorter ones have no direction left.
-        if length <= tolerance.rounding * tolerance.rounding {
-            continue;
-        }
-        let normal = normal / length;
-        let normal = if normal.dot(inward) * sign > 0.0 {
-            -normal
-        } else {
-            normal
-        };
-        let (before, after) = if sign > 0.0 {
-            (own, other)
-        } else {
-            (other, own)
-        };
-        let behind = before
-            .iter()
-            .map(|&q| normal.dot(q))
-            .fold(f64::NEG_INFINITY, f64::max);
-        let front = after
-            .iter()
-            .map(|&q| normal.dot(q))
-            .fold(f64::INFINITY, f64::min);
-        if front >= behind - tolerance.rounding {
-            out.push(Separator {
-                normal,
-                behind,
-                front,
-            });
+        Self { ahead, first }
+    }
+
+    #[inline]
+    fn of(&self, i: usize, p: DVec3) -> f64 {
+        match self.first.get(i) {
+            Some(&height) => height,
+            None => self.ahead.dot(p),
         }
     }
+}
+
+/// The plane through edge `i` of `own` and a corner of `other`, of which `heights` are those ahead of `own`;
+/// `FIRST` where `own` is to be behind the plane.
+#[inline]
+fn through_edge<const FIRST: bool>(
+    own: &[DVec3],
+    i: usize,
+    other: &[DVec3],
+    heights: &Heights,
+    facing: Facing,
+    tolerance: &Tolerance,
+) -> Option<Separator> {
+    let p = own[i];
+    let edge = own[if i + 1 == own.len() { 0 } else { i + 1 }] - p;
+    let inward = facing.turn.cross(edge);
+    let rounding = tolerance.rounding;
+    // A corner on the edge's line lies in every plane through it, and says nothing about which to take.
+    let near = 1e2 * rounding;
+    let (base, across) = (heights.ahead.dot(p), inward.dot(p));
+    let (mut x, mut y, mut best) = (f64::NEG_INFINITY, 0.0, DVec3::ZERO);
+    for (j, &corner) in other.iter().enumerate() {
+        // The inward axis is longer than a unit by the edge's length; angles are compared only
+        // among themselves, so that does not matter.
+        let (cx, cy) = (
+            inward.dot(corner) - across,
+            (heights.of(j, corner) - base).max(0.0),
+        );
+        if cy <= near && cx * cx <= (near * near - cy * cy) * edge.length_squared() {
+            continue;
+        }
+        if x == f64::NEG_INFINITY || cx * y - cy * x > 0.0 {
+            (x, y, best) = (cx, cy, corner);
+        }
+    }
+    if y <= rounding {
+        return None;
+    }
+    let normal = edge.cross(best - p);
+    let length = normal.length();
+    // Shorter ones have no direction left.
+    if length <= rounding * rounding {
+        return None;
+    }
+    // The way that `own` has the least of.
+    let turned = if normal.dot(inward) > 0.0 { -1.0 } else { 1.0 };
+    let toward = normal * (turned / length);
+    let mut highest = f64::NEG_INFINITY;
+    for &q in own {
+        highest = highest.max(toward.dot(q));
+    }
+    let mut lowest = f64::INFINITY;
+    for &q in other {
+        lowest = lowest.min(toward.dot(q));
+    }
+    if lowest < highest - rounding {
+        return None;
+    }
+    Some(if FIRST {
+        Separator {
+            normal: toward,
+            behind: highest,
+            front: lowest,
+        }
+    } else {
+        Separator {
+            normal: -toward,
+            behind: -lowest,
+            front: -highest,
+        }
+    })
 }

@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use enfilade_cpg::SightGraph;
 use enfilade_geom::DVec3;
+use rayon::prelude::*;
 
-use super::bits::BitTable;
+use super::bits::{self, BitTable};
 
 /// A portal crossed one way.
 #[derive(Clone, Debug)]
@@ -37,6 +38,8 @@ pub(super) struct Dirs {
     pub(super) all: Vec<Dir>,
     /// The same portal the other way.
     pub(super) reverse: Vec<u32>,
+    /// By direction, the number of its portal.
+    portals: Vec<u32>,
     /// Directions into cell `c` are `into[c]..into[c + 1]`.
     pub(super) into: Vec<u32>,
     /// Corners of each piece, in `points`.
@@ -113,6 +116,7 @@ impl Dirs {
             place[dir.id as usize] = k as u32;
         }
         let reverse = all.iter().map(|dir| place[dir.id as usize ^ 1]).collect();
+        let portals = all.iter().map(|dir| dir.id / 2).collect();
         let scale = points
             .iter()
             .map(|p: &DVec3| p.abs().max_element())
@@ -121,6 +125,7 @@ impl Dirs {
             n_cells,
             all,
             reverse,
+            portals,
             into,
             pieces,
             points,
@@ -129,20 +134,24 @@ impl Dirs {
         }
     }
 
+    #[inline]
     pub(super) fn len(&self) -> usize {
         self.all.len()
     }
 
     /// The directions into a cell.
+    #[inline]
     pub(super) fn entries(&self, cell: u32) -> Range<usize> {
         self.into[cell as usize] as usize..self.into[cell as usize + 1] as usize
     }
 
     /// The directions out of a cell.
+    #[inline]
     pub(super) fn exits(&self, cell: u32) -> &[u32] {
         &self.reverse[self.entries(cell)]
     }
 
+    #[inline]
     pub(super) fn winding(&self, dir: usize) -> &[DVec3] {
         let corners = &self.all[dir].corners;
         &self.points[corners.start as usize..corners.end as usize]
@@ -157,45 +166,11 @@ impl Dirs {
         }
     }
 
-    /// Whether a line can cross `first` and, farther on, `then`, by the sides of their planes alone.
-    pub(super) fn may_follow(&self, first: usize, then: usize, clearance: f64) -> bool {
-        let (a, b) = (&self.all[first], &self.all[then]);
-        self.reaches_front(a, b, clearance) && self.reaches_back(b, a, clearance)
-    }
-
-    /// Whether `b` reaches in front of the plane of `a`.
-    fn reaches_front(&self, a: &Dir, b: &Dir, clearance: f64) -> bool {
-        let height = a.normal.dot(b.center) - a.low;
-        if height > b.radius || height < -b.radius {
-            return height > 0.0;
-        }
-        let reach = self.points[b.corners.start as usize..b.corners.end as usize]
-            .iter()
-            .map(|&p| a.normal.dot(p))
-            .fold(f64::NEG_INFINITY, f64::max)
-            - a.low;
-        is_past(reach, a, b, clearance)
-    }
-
-    /// Whether `b` reaches behind the plane of `a`.
-    fn reaches_back(&self, a: &Dir, b: &Dir, clearance: f64) -> bool {
-        let height = a.normal.dot(b.center) - a.high;
-        if height > b.radius || height < -b.radius {
-            return height < 0.0;
-        }
-        let reach = self.points[b.corners.start as usize..b.corners.end as usize]
-            .iter()
-            .map(|&p| a.normal.dot(p))
-            .fold(f64::INFINITY, f64::min);
-        is_past(a.high - reach, a, b, clearance)
-    }
-
-    /// For each direction, those that a line through it might cross farther on.
+    /// The directions that a line might cross after each direction, by sides of planes and the far plane alone.
     ///
-    /// A flood over neighbors that lie on the right sides, made symmetric: `a` then `b` is the same
-    /// question as `b` back then `a` back. Time: directions times directions reached.
+    /// Time: the square of the portals, a few nanoseconds each, plus what is reached times the exits of a cell.
     pub(super) fn might_see(&self, clearance: f64, far: Option<f64>) -> BitTable {
-        use rayon::prelude::*;
+        let past = self.past(clearance);
         let n = self.len();
         let mut might = BitTable::new(n, n);
         let n_words = might.n_words().max(1);
@@ -203,18 +178,107 @@ impl Dirs {
             .words_mut()
             .par_chunks_mut(n_words)
             .enumerate()
-            .for_each_init(Vec::new, |stack, (first, row)| {
-                self.flood(first, (clearance, far), row, stack);
+            .for_each_init(Flood::default, |flood, (first, row)| {
+                self.flood(first, &past, far, row, flood);
             });
         self.make_symmetric(&mut might);
         might
+    }
+
+    fn flood(
+        &self,
+        first: usize,
+        past: &BitTable,
+        far: Option<f64>,
+        row: &mut [u64],
+        Flood { tested, stack }: &mut Flood,
+    ) {
+        let in_front = past.row(first);
+        let portal = self.portals[first] as usize;
+        tested.clear();
+        tested.resize(row.len(), 0);
+        // A line crosses a plane once, so never an opening twice.
+        bits::set(tested, first);
+        bits::set(tested, self.reverse[first] as usize);
+        stack.push(first as u32);
+        while let Some(at) = stack.pop() {
+            let back = self.reverse[at as usize];
+            for &next in self.exits(self.all[at as usize].to) {
+                let q = next as usize;
+                if bits::get(tested, q) || next == back {
+                    continue;
+                }
+                bits::set(tested, q);
+                // It crosses the second from behind.
+                if bits::get(in_front, self.portals[q] as usize)
+                    && past.get(self.reverse[q] as usize, portal)
+                    && self.is_near(first, q, far)
+                {
+                    bits::set(row, q);
+                    stack.push(next);
+                }
+            }
+        }
+    }
+
+    /// By direction, the portals that reach far enough in front of its plane to let lines with clearance through.
+    fn past(&self, clearance: f64) -> BitTable {
+        let n_portals = self.len() / 2;
+        let mut of_id = vec![0u32; self.len()];
+        for (d, dir) in self.all.iter().enumerate() {
+            of_id[dir.id as usize] = d as u32;
+        }
+        // The balls around portals settle most pairs; a sweep over these is what takes the time.
+        let balls: Vec<[f64; 4]> = (0..n_portals)
+            .map(|i| {
+                let dir = &self.all[of_id[2 * i] as usize];
+                [dir.center.x, dir.center.y, dir.center.z, dir.radius]
+            })
+            .collect();
+        let mut past = BitTable::new(self.len(), n_portals);
+        let n_words = past.n_words().max(1);
+        past.words_mut()
+            .par_chunks_mut(n_words)
+            .enumerate()
+            .for_each(|(d, row)| {
+                let dir = &self.all[d];
+                let [nx, ny, nz] = dir.normal.to_array();
+                for (w, (word, balls)) in row.iter_mut().zip(balls.chunks(64)).enumerate() {
+                    let (mut sure, mut not) = (0, 0);
+                    for (k, [x, y, z, radius]) in balls.iter().enumerate() {
+                        let height = nx * x + ny * y + nz * z - dir.low;
+                        sure |= u64::from(height > *radius) << k;
+                        not |= u64::from(height < -radius) << k;
+                    }
+                    let mut rest = !(sure | not);
+                    if balls.len() < 64 {
+                        rest &= (1 << balls.len()) - 1;
+                    }
+                    while rest != 0 {
+                        let k = rest.trailing_zeros();
+                        rest &= rest - 1;
+                        let other = of_id[2 * (64 * w + k as usize)];
+                        sure |= u64::from(self.is_past(dir, other, clearance)) << k;
+                    }
+                    *word = sure;
+                }
+            });
+        past
+    }
+
+    /// A line that leaves the first cell and ends beyond `next` crosses both openings: where the balls around
+    /// them are farther apart than the far plane, no such line is short enough.
+    #[inline]
+    fn is_near(&self, first: usize, next: usize, far: Option<f64>) -> bool {
+        let (a, b) = (&self.all[first], &self.all[next]);
+        far.is_none_or(|far| a.center.distance(b.center) - a.radius - b.radius <= far)
     }
 
     /// Clears what is not seen both ways.
     pub(super) fn make_symmetric(&self, might: &mut BitTable) {
         for a in 0..self.len() {
             let back = self.reverse[a] as usize;
-            let gone: Vec<usize> = super::bits::ones(might.row(a))
+            let gone: Vec<usize> = bits::ones(might.row(a))
                 .filter(|&b| !might.get(self.reverse[b] as usize, back))
                 .collect();
             for b in gone {
@@ -223,47 +287,28 @@ impl Dirs {
         }
     }
 
-    /// A line that leaves the first cell and ends beyond `next` crosses both openings: where the balls around
-    /// them are farther apart than the far plane, no such line is short enough.
-    fn is_near(&self, first: usize, next: usize, far: Option<f64>) -> bool {
-        let (a, b) = (&self.all[first], &self.all[next]);
-        far.is_none_or(|far| a.center.distance(b.center) - a.radius - b.radius <= far)
-    }
-
-    fn flood(
-        &self,
-        first: usize,
-        (clearance, far): (f64, Option<f64>),
-        row: &mut [u64],
-        stack: &mut Vec<u32>,
-    ) {
-        stack.push(first as u32);
-        while let Some(at) = stack.pop() {
-            for &next in self.exits(self.all[at as usize].to) {
-                // A line crosses a plane once, so never an opening twice.
-                if next != self.reverse[at as usize]
-                    && next as usize != first
-                    && next != self.reverse[first]
-                    && !super::bits::get(row, next as usize)
-                    && self.is_near(first, next as usize, far)
-                    && self.may_follow(first, next as usize, clearance)
-                {
-                    super::bits::set(row, next as usize);
-                    stack.push(next);
-                }
-            }
-        }
+    /// Whether an opening reaches far enough past the plane of `a` to let lines with clearance through.
+    #[inline]
+    fn is_past(&self, a: &Dir, b: u32, clearance: f64) -> bool {
+        let b = &self.all[b as usize];
+        let corners = &self.points[b.corners.start as usize..b.corners.end as usize];
+        let highest = corners.iter().map(|&p| a.normal.dot(p));
+        let reach = highest.fold(f64::NEG_INFINITY, f64::max) - a.low;
+        reach > clearance
+            || (reach > 0.0 && reach > clearance * sine(a.normal, b.turn))
+            || a.normal == DVec3::ZERO
     }
 }
 
-/// Whether an opening that reaches this far past the plane of `a` lets lines with clearance through.
-fn is_past(reach: f64, a: &Dir, b: &Dir, clearance: f64) -> bool {
-    reach > clearance
-        || (reach > 0.0 && reach > clearance * sine(a.normal, b.turn))
-        || a.normal == DVec3::ZERO
+/// What a flood needs, kept between floods.
+#[derive(Default)]
+struct Flood {
+    tested: Vec<u64>,
+    stack: Vec<u32>,
 }
 
 /// Sine of the angle between two planes with unit normals.
+#[inline]
 pub(super) fn sine(a: DVec3, b: DVec3) -> f64 {
     let cosine = a.dot(b);
     (1.0 - cosine * cosine).max(0.0).sqrt()

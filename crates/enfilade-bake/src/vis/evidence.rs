@@ -9,9 +9,9 @@ use flate2::write::ZlibEncoder;
 use super::bits::{self, BitTable};
 use super::flow::Shared;
 use super::search::Search;
-use super::{VisConfig, VisError, prove};
+use super::{VisConfig, VisError, checkpoint, prove};
 
-const MAGIC: &[u8; 8] = b"ENFEVID1";
+const MAGIC: &[u8; 8] = b"ENFEVID2";
 
 /// Writes down what a search found and why.
 pub(super) fn encode(
@@ -59,12 +59,15 @@ pub(super) fn encode(
     }
     body.extend(&trace);
 
-    let mut out = MAGIC.to_vec();
-    out.extend((body.len() as u64).to_le_bytes());
-    let mut encoder = ZlibEncoder::new(out, Compression::default());
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
     // Writing to memory cannot fail.
     let written = encoder.write_all(&body).and_then(|()| encoder.finish());
-    written.map_err(|_| VisError::Evidence)
+    let packed = written.map_err(|_| VisError::Evidence)?;
+    let mut out = MAGIC.to_vec();
+    out.extend((body.len() as u64).to_le_bytes());
+    out.extend(checkpoint::fnv(&packed).to_le_bytes());
+    out.extend(packed);
+    Ok(out)
 }
 
 fn n_undecided(search: &Search<'_>, visible: &BitTable) -> u64 {

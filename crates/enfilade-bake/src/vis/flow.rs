@@ -409,7 +409,9 @@ impl Flow {
             .clip(source, back_of(dirs, q), source_turn, tolerance)?;
         for i in first_plane..self.planes.len() {
             let plane = self.planes[i].after();
-            target = self.arena.clip(target, plane, next.turn, tolerance)?;
+            if plane.normal.dot(next.center) - plane.offset < next.radius {
+                target = self.arena.clip(target, plane, next.turn, tolerance)?;
+            }
         }
         if pass.dir != source.dir {
             let end = self.planes.len();
@@ -419,9 +421,12 @@ impl Flow {
                 tolerance,
                 &mut self.planes,
             );
+            let ball = &dirs.all[source.dir as usize];
             for i in end..self.planes.len() {
                 let plane = self.planes[i].before();
-                source = self.arena.clip(source, plane, source_turn, tolerance)?;
+                if plane.normal.dot(ball.center) - plane.offset < ball.radius {
+                    source = self.arena.clip(source, plane, source_turn, tolerance)?;
+                }
             }
             self.planes.truncate(end);
         }
@@ -561,6 +566,7 @@ fn edge_plane(dirs: &Dirs, dir: usize, i: usize, eye: DVec3) -> Option<HalfSpace
     })
 }
 
+#[inline]
 pub(super) fn facing(dirs: &Dirs, dir: u32) -> Facing {
     let dir = &dirs.all[dir as usize];
     Facing {
@@ -570,6 +576,7 @@ pub(super) fn facing(dirs: &Dirs, dir: u32) -> Facing {
 }
 
 /// Where a line that has crossed an opening goes.
+#[inline]
 pub(super) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
     let dir = &dirs.all[dir as usize];
     HalfSpace {
@@ -579,6 +586,7 @@ pub(super) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
 }
 
 /// Where a line that will cross an opening comes from.
+#[inline]
 pub(super) fn back_of(dirs: &Dirs, dir: usize) -> HalfSpace {
     let dir = &dirs.all[dir];
     HalfSpace {

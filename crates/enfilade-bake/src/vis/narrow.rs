@@ -56,6 +56,7 @@ pub(super) fn narrow_might(
 struct Work {
     arena: Arena,
     planes: Vec<Separator>,
+    allowed: Vec<u64>,
     reached: Vec<u64>,
     stack: Vec<u32>,
 }
@@ -114,20 +115,19 @@ impl Work {
         self.reached.resize(might.n_words(), 0);
         bits::set(&mut self.reached, pass);
         self.stack.push(pass as u32);
-        let (from_source, from_pass) = (might.row(source), might.row(pass));
+        self.allowed.clear();
+        let rows = might.row(source).iter().zip(might.row(pass));
+        self.allowed.extend(rows.map(|(a, b)| a & b));
         while let Some(at) = self.stack.pop() {
             let from_here = might.row(at as usize);
             for &next in dirs.exits(dirs.all[at as usize].to) {
                 let q = next as usize;
-                if bits::get(from_source, q)
-                    && bits::get(from_pass, q)
-                    && bits::get(from_here, q)
-                    && !bits::get(&self.reached, q)
-                    && self
-                        .planes
-                        .iter()
-                        .all(|plane| reaches(dirs, q, plane, tolerance))
-                {
+                if !bits::get(&self.allowed, q) || !bits::get(from_here, q) {
+                    continue;
+                }
+                bits::clear(&mut self.allowed, q);
+                let mut planes = self.planes.iter();
+                if planes.all(|plane| reaches(dirs, q, plane, tolerance)) {
                     bits::set(&mut self.reached, q);
                     self.stack.push(next);
                 }
@@ -137,6 +137,7 @@ impl Work {
 }
 
 /// Whether an opening reaches in front of a plane.
+#[inline]
 pub(super) fn reaches(dirs: &Dirs, dir: usize, plane: &Separator, tolerance: &Tolerance) -> bool {
     let opening = &dirs.all[dir];
     let height = plane.normal.dot(opening.center) - plane.front;

@@ -69,6 +69,7 @@ pub(super) fn walk(
 
 impl Dirs {
     /// Whether a point of an opening's plane lies at least `margin` inside one of its pieces.
+    #[inline]
     pub(super) fn is_inside(&self, dir: usize, p: DVec3, margin: f64) -> bool {
         let pieces = &self.all[dir].pieces;
         self.pieces[pieces.start as usize..pieces.end as usize]
@@ -118,6 +119,7 @@ impl Rng {
         Self((x ^ (x >> 29)) | 1)
     }
 
+    #[inline]
     fn next(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -125,10 +127,12 @@ impl Rng {
         self.0
     }
 
+    #[inline]
     pub(super) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    #[inline]
     pub(super) fn below(&mut self, n: usize) -> usize {
         (((self.next() >> 32) * n as u64) >> 32) as usize
     }

@@ -16,6 +16,18 @@ use super::rays::{self, Blocker, Line, Rng};
 /// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
 const ROUND: usize = 64;
 
+/// Share of the far plane that lines keep to; a checker's sums may differ in the last digits.
+const FAR_KEPT: f64 = 1.0 - 1e-9;
+
+/// What is left to search.
+pub(super) struct Rest {
+    /// Openings, and before each how many it might see.
+    pub(super) order: Vec<(usize, usize)>,
+    /// Work done and work in all.
+    pub(super) done: u64,
+    pub(super) total: u64,
+}
+
 pub(super) struct Search<'a> {
     pub(super) dirs: &'a Dirs,
     pub(super) might: BitTable,
@@ -28,7 +40,10 @@ pub(super) struct Search<'a> {
     pub(super) lines: Vec<Line>,
     pub(super) tolerance: Tolerance,
     pub(super) blocker: Option<Blocker<'a>>,
+    far: Option<f64>,
     pub(super) effort: Effort,
+    /// How many of `lines` have been grown.
+    pub(super) n_grown: usize,
 }
 
 impl<'a> Search<'a> {
@@ -52,7 +67,9 @@ impl<'a> Search<'a> {
             lines: Vec::new(),
             tolerance: Tolerance::new(dirs.scale, clearance),
             blocker,
+            far,
             effort: Effort::default(),
+            n_grown: 0,
         }
     }
 
@@ -131,7 +148,7 @@ impl<'a> Search<'a> {
         lines
     }
 
-    fn proves_new(&self, chain: &[u32]) -> bool {
+    pub(super) fn proves_new(&self, chain: &[u32]) -> bool {
         let dirs = self.dirs;
         (0..chain.len()).any(|i| {
             let row = self.seen.row(dirs.all[chain[i] as usize].from as usize);
@@ -142,11 +159,47 @@ impl<'a> Search<'a> {
     }
 
     /// Marks what a line proves, and keeps it where that is new.
-    fn keep(&mut self, line: Line) {
+    pub(super) fn keep(&mut self, line: Line) {
         // Lines that graze an opening may have slipped through on other sums than a checker's.
         if !self.dirs.is_crossed(&line, self.tolerance.rounding * 8.0) {
             return;
         }
+        if self.far.is_none() && self.blocker.is_none() {
+            return self.keep_piece(line);
+        }
+        // What is solid and what is far, judged as a checker does: between crossings as computed from the
+        // line's origin.
+        let dirs = self.dirs;
+        let ts: Vec<f64> = line
+            .chain
+            .iter()
+            .map(|&d| dirs.crossing(d as usize, line.origin, line.direction))
+            .collect();
+        let is_free: Vec<bool> = ts
+            .windows(2)
+            .map(|t| {
+                let [a, b] = [t[0], t[1]].map(|t| line.origin + line.direction * t);
+                self.blocker.is_none_or(|is_blocked| !is_blocked(a, b))
+            })
+            .collect();
+        let most = self.far.unwrap_or(f64::INFINITY) * FAR_KEPT / line.direction.length();
+        let mut covered = 0;
+        for first in 0..ts.len() {
+            let mut end = first + 1;
+            while end < ts.len() && is_free[end - 1] && ts[end] - ts[first] <= most {
+                end += 1;
+            }
+            if end > covered {
+                covered = end;
+                self.keep_piece(Line {
+                    chain: line.chain[first..end].to_vec(),
+                    ..line.clone()
+                });
+            }
+        }
+    }
+
+    fn keep_piece(&mut self, line: Line) {
         let all = &self.dirs.all;
         let mut is_new = false;
         for i in 0..line.chain.len() {
@@ -167,26 +220,37 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Searches from every opening. `on_round` hears the work done and the work in all, and says whether to
-    /// go on; work is counted in what openings might see at the start.
-    ///
-    /// Returns whether all was searched.
-    pub(super) fn run(
-        &mut self,
-        max_pieces: u32,
-        mut on_round: impl FnMut(u64, u64) -> bool,
-    ) -> bool {
+    /// All openings, those that might see least first.
+    pub(super) fn all_openings(&self) -> Rest {
         let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
             .map(|d| (bits::count(self.might.row(d)), d))
             .collect();
         order.sort_unstable();
         let total = order.iter().map(|&(n, _)| n as u64).sum();
-        let mut done = 0;
-        for round in order.chunks(ROUND) {
-            if !on_round(done, total) {
+        Rest {
+            order,
+            done: 0,
+            total,
+        }
+    }
+
+    /// Searches from the openings that are left. `on_round` hears of each round before it starts and says
+    /// whether to go on; work is counted in what openings might see at the start.
+    ///
+    /// Returns whether all was searched.
+    pub(super) fn run(
+        &mut self,
+        max_pieces: u32,
+        mut rest: Rest,
+        mut on_round: impl FnMut(&Self, &Rest) -> bool,
+    ) -> bool {
+        while !rest.order.is_empty() {
+            if !on_round(self, &rest) {
                 return false;
             }
-            done += round.iter().map(|&(n, _)| n as u64).sum::<u64>();
+            let left = rest.order.split_off(rest.order.len().min(ROUND));
+            let round = std::mem::replace(&mut rest.order, left);
+            rest.done += round.iter().map(|&(n, _)| n as u64).sum::<u64>();
             let shared = Shared {
                 dirs: self.dirs,
                 might: &self.might,
@@ -203,8 +267,22 @@ impl<'a> Search<'a> {
             for found in found {
                 self.merge(found);
             }
+            self.grow();
         }
         true
+    }
+
+    /// All that a search finds out beside lines.
+    pub(super) fn tables(&self) -> [&BitTable; 4] {
+        [&self.might, &self.settled, &self.seen, &self.undecided]
+    }
+
+    /// Takes up where another search left off.
+    pub(super) fn restore(&mut self, tables: [BitTable; 4], lines: Vec<Line>, steps: u64) {
+        [self.might, self.settled, self.seen, self.undecided] = tables;
+        self.n_grown = lines.len();
+        self.lines = lines;
+        self.effort.steps = steps;
     }
 
     fn merge(&mut self, found: Found) {

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
-use enfilade::geom::DVec3;
+use enfilade::bake::bsp::{BspConfig, Guide, Heuristic};
+use enfilade::bake::simplify::{CostModel, SimplifySettings};
+use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{ImportOptions, RoleRules, Up};
 use serde::de::{Deserialize, Deserializer, Error};
 
@@ -51,6 +53,18 @@ pub(crate) struct BakeOptions {
     pub(super) method: Method,
     #[command(flatten)]
     pub(crate) delaunay: super::delaunay::DelaunayOptions,
+    /// Where to write the way out of a map that leaks, as lines of `x y z` in meters.
+    #[arg(long, value_name = "FILE.pts")]
+    pub(super) leak: Option<PathBuf>,
+    /// Go on although the map leaks.
+    #[arg(long)]
+    pub(super) allow_leak: bool,
+    /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50].
+    #[arg(long, value_name = "N")]
+    min_cost: Option<u32>,
+    /// With `--method bsp`: cells of more triangles are cut, and none is merged to more.
+    #[arg(long, value_name = "N")]
+    max_cost: Option<u32>,
     /// Edge of a voxel in meters; chosen from the narrowest opening and the scene's size if not given.
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     voxel: Option<f64>,
@@ -80,10 +94,12 @@ enum Switch {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(super) enum Method {
-    /// Choose by what the input is; the watershed for all scenes so far, since it knows buildings better.
+    /// The partition where all structure is made of brushes, the watershed for everything else.
     Auto,
     /// Voxels, distances, watershed.
     Watershed,
+    /// Binary space partition and separators, for brushes and clean architectural models.
+    Bsp,
     /// Tetrahedra between the surfaces, decimated; for caves and other irregular scenes.
     Delaunay,
 }
@@ -228,6 +244,35 @@ struct ConfigFile {
     structural_names: Vec<String>,
     #[serde(default)]
     merge: MergeTable,
+    #[serde(default)]
+    bsp: BspTable,
+}
+
+/// The table `[bsp]` of the settings file.
+#[derive(Default, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct BspTable {
+    heuristic: Option<HeuristicName>,
+    grid: Option<Length>,
+    tetrahedra: Option<Length>,
+    /// A point and a normal each.
+    planes: Vec<[f64; 6]>,
+    /// Two opposite corners each.
+    boxes: Vec<[f64; 6]>,
+    min_cost: Option<Amount>,
+    max_cost: Option<Amount>,
+    max_cells: Option<usize>,
+    triangle_cost: Option<Amount>,
+    area_cost: Option<Amount>,
+    material_costs: std::collections::BTreeMap<String, Amount>,
+}
+
+#[derive(Clone, Copy, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum HeuristicName {
+    MinCut,
+    MaxArea,
+    MaxOrtho,
 }
 
 /// The table `[merge]` of the settings file.
@@ -258,8 +303,82 @@ impl ConfigFile {
     }
 }
 
+/// What the partition is told, resolved.
+fn resolve_bsp(options: &BakeOptions, table: BspTable) -> anyhow::Result<BspConfig> {
+    let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
+        let normal = DVec3::new(nx, ny, nz).try_normalize();
+        let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
+        Ok(Plane::through(DVec3::new(x, y, z), normal))
+    };
+    let simplify = SimplifySettings {
+        min_cost: options
+            .min_cost
+            .map(f64::from)
+            .or(table.min_cost.map(|v| v.0))
+            .unwrap_or(MERGE_BELOW),
+        max_cost: options
+            .max_cost
+            .map(f64::from)
+            .or(table.max_cost.map(|v| v.0)),
+        max_cells: table.max_cells,
+        cost: CostModel {
+            triangle: table.triangle_cost.map_or(1.0, |v| v.0),
+            area: table.area_cost.map_or(0.0, |v| v.0),
+            materials: table
+                .material_costs
+                .into_iter()
+                .map(|(k, v)| (k, v.0))
+                .collect(),
+        },
+        ..SimplifySettings::default()
+    };
+    if let Some(max) = simplify.max_cost.filter(|m| *m < simplify.min_cost) {
+        anyhow::bail!(
+            "max_cost {max} is below min_cost {}; no cell can be within both",
+            simplify.min_cost
+        );
+    }
+    Ok(BspConfig {
+        heuristic: match table.heuristic {
+            None => Heuristic::Default,
+            Some(HeuristicName::MinCut) => Heuristic::MinCut,
+            Some(HeuristicName::MaxArea) => Heuristic::MaxArea,
+            Some(HeuristicName::MaxOrtho) => Heuristic::MaxOrtho,
+        },
+        guide: Guide {
+            grid: table.grid.map(|v| v.0),
+            tetrahedra: table.tetrahedra.map(|v| v.0),
+            planes: table
+                .planes
+                .into_iter()
+                .map(plane)
+                .collect::<anyhow::Result<_>>()?,
+            boxes: table
+                .boxes
+                .into_iter()
+                .map(|[a, b, c, x, y, z]| {
+                    let (p, q) = (DVec3::new(a, b, c), DVec3::new(x, y, z));
+                    Aabb::new(p.min(q), p.max(q))
+                })
+                .collect(),
+        },
+        simplify,
+    })
+}
+
+/// Cells of fewer triangles are merged with a neighbor if nothing else is said: the merging threshold
+/// of Lefebvre & Hornus 2003, table 2.
+const MERGE_BELOW: f64 = 50.0;
+
+/// Everything that a bake is told, resolved.
+pub(crate) struct Resolved {
+    pub(crate) import: ImportOptions,
+    pub(crate) watershed: BakeConfig,
+    pub(crate) bsp: BspConfig,
+}
+
 /// Command line and settings file, resolved.
-pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, BakeConfig)> {
+pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let file = options.scene.file()?;
     let import_options = options.scene.resolve_with(&file);
     let mut config = BakeConfig {
@@ -289,7 +408,11 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<(ImportOptions, B
             *field = value;
         }
     }
-    Ok((import_options, config))
+    Ok(Resolved {
+        import: import_options,
+        watershed: config,
+        bsp: resolve_bsp(options, file.bsp)?,
+    })
 }
 
 impl SceneOptions {

@@ -3,7 +3,7 @@
 //! A brush is the space behind all of its planes, so no brush is ever not convex; what cannot be right
 //! (planes that face inwards or leave a way to infinity) ends in an error with line and column. World
 //! and `func_group` brushes are structural; `func_detail*` and all other brush entities are detail;
-//! liquids are detail that one sees through; triggers, clips and hints are no matter. A structural face
+//! sky is structural also where it is detail; liquids are detail that one sees through; triggers, clips and hints are no matter. A structural face
 //! that other structural brushes hide altogether is left out.
 //!
 //! A unit is 1/32 m if nothing else is said: a player of 56 units is 1.75 m tall, and coordinates stay
@@ -78,6 +78,8 @@ fn kind_of_class(class: &str) -> Kind {
 #[derive(Clone, Copy, PartialEq)]
 enum Matter {
     Solid,
+    /// Closes the world wherever it is, as compilers have it: also as a detail brush.
+    Sky,
     Liquid,
     /// Steers games and compilers and is no matter.
     Tool,
@@ -104,9 +106,22 @@ fn matter_of(brush: &Brush<'_>) -> Matter {
         .any(|s| name(s.texture).starts_with(['*', '!']))
     {
         Matter::Liquid
+    } else if brush.sides.iter().any(|s| {
+        let head = name(s.texture).get(..3);
+        head.is_some_and(|h| h.eq_ignore_ascii_case("sky"))
+    }) {
+        Matter::Sky
     } else {
         Matter::Solid
     }
+}
+
+/// What of an entity is one object.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    Own,
+    Sky,
+    Liquid,
 }
 
 /// A brush that has a shape.
@@ -268,8 +283,11 @@ fn build(
                 .unwrap_or_else(told)
         })
         .collect();
-    let is_structural =
-        |s: &Shaped<'_>| s.matter == Matter::Solid && roles[s.entity].0 == Role::Structural;
+    let seals =
+        |s: &Shaped<'_>| s.matter == Matter::Sky && class_of(s.entity).starts_with("func_detail");
+    let is_structural = |s: &Shaped<'_>| {
+        s.matter != Matter::Liquid && (roles[s.entity].0 == Role::Structural || seals(s))
+    };
     let structural: Vec<&ConvexSolid> = shaped
         .iter()
         .filter(|s| is_structural(s))
@@ -278,12 +296,15 @@ fn build(
     let exposed = exposed_faces(&structural, WELD);
     let mut exposed = exposed.iter();
     // One object for each entity and kind of matter, so that each keeps its identity.
-    let mut meshes: BTreeMap<(usize, bool), BTreeMap<&str, Primitive>> = BTreeMap::new();
+    let mut meshes: BTreeMap<(usize, Part), BTreeMap<&str, Primitive>> = BTreeMap::new();
     for s in shaped {
         let visible = is_structural(s).then(|| exposed.next()).flatten();
-        let parts = meshes
-            .entry((s.entity, s.matter == Matter::Liquid))
-            .or_default();
+        let part = match s.matter {
+            Matter::Liquid => Part::Liquid,
+            Matter::Sky if seals(s) => Part::Sky,
+            _ => Part::Own,
+        };
+        let parts = meshes.entry((s.entity, part)).or_default();
         for (f, face) in s.solid.faces.iter().enumerate() {
             if visible.is_some_and(|v| v[f].is_empty()) {
                 continue;
@@ -302,15 +323,16 @@ fn build(
     }
     let mut material_of: BTreeMap<(&str, bool), u32> = BTreeMap::new();
     let mut object_of: BTreeMap<usize, u32> = BTreeMap::new();
-    for ((e, is_liquid), parts) in meshes {
+    for ((e, part), parts) in meshes {
         if parts.is_empty() {
             continue;
         }
         let class = class_of(e);
-        let name = if is_liquid {
-            format!("{class} {e} liquid")
-        } else {
-            format!("{class} {e}")
+        let is_liquid = part == Part::Liquid;
+        let name = match part {
+            Part::Own => format!("{class} {e}"),
+            Part::Sky => format!("{class} {e} sky"),
+            Part::Liquid => format!("{class} {e} liquid"),
         };
         let mut primitives = Vec::new();
         for (texture, mut primitive) in parts {
@@ -320,10 +342,10 @@ fn build(
             primitive.material = Some(material);
             primitives.push(primitive);
         }
-        let (role, reason) = if is_liquid {
-            (Role::Detail, "map: a liquid")
-        } else {
-            (roles[e].0, roles[e].1.as_str())
+        let (role, reason) = match part {
+            Part::Own => (roles[e].0, roles[e].1.as_str()),
+            Part::Sky => (Role::Structural, "map: sky closes the world"),
+            Part::Liquid => (Role::Detail, "map: a liquid"),
         };
         let mesh = builder.push_mesh(Mesh {
             name: name.clone(),

@@ -1,0 +1,122 @@
+//! Cells: leaves that no separator parts (Lefebvre & Hornus 2003, §2.1 step 3).
+
+use super::Bsp;
+use super::separator::Separator;
+
+/// No cell.
+pub(super) const NO_CELL: u32 = u32::MAX;
+
+/// Leaves by cell, and the separators that were kept.
+pub(super) struct Cells {
+    /// Cell of each leaf, or [`NO_CELL`].
+    pub(super) of_leaf: Vec<u32>,
+    pub(super) n_cells: usize,
+    pub(super) separators: Vec<Separator>,
+    /// How many separators crossed others and were taken away for it.
+    pub(super) n_crossing: usize,
+    /// How many had the same cell on both sides.
+    pub(super) n_useless: usize,
+}
+
+/// Parts the leaves by the separators; of separators that cross, the ones that touch fewest cells go,
+/// largest first among equals, until none cross. Separators with one cell on both sides go, too.
+pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> Cells {
+    let mut kept = separators;
+    let (mut n_crossing, mut n_useless) = (0, 0);
+    loop {
+        let (of_leaf, n_cells) = components(bsp, &kept);
+        let sides: Vec<[Vec<u32>; 2]> = kept.iter().map(|s| sides_of(bsp, s, &of_leaf)).collect();
+        // One that parts nothing can go at once: no cell changes by it.
+        let is_useless = |i: usize| sides[i][0] == sides[i][1] && sides[i][0].len() == 1;
+        let n = kept.len();
+        // All the crossing ones that share no cell with a worse one go together.
+        let mut crossing: Vec<usize> = (0..n)
+            .filter(|&i| sides[i].iter().any(|s| s.len() > 1))
+            .collect();
+        crossing.sort_by(|&a, &b| {
+            let cells = |i: usize| sides[i][0].len() + sides[i][1].len();
+            cells(a)
+                .cmp(&cells(b))
+                .then(kept[b].area.total_cmp(&kept[a].area))
+                .then(a.cmp(&b))
+        });
+        let mut touched = vec![false; n_cells];
+        let mut goes = vec![false; n];
+        for i in crossing {
+            let cells = || sides[i].iter().flatten();
+            if cells().all(|&c| !touched[c as usize]) {
+                cells().for_each(|&c| touched[c as usize] = true);
+                goes[i] = true;
+                n_crossing += 1;
+            }
+        }
+        let is_final = !goes.contains(&true);
+        for (i, goes) in goes.iter_mut().enumerate() {
+            if is_useless(i) {
+                *goes = true;
+                n_useless += 1;
+            }
+        }
+        let mut goes = goes.into_iter();
+        kept.retain(|_| !goes.next().unwrap_or(false));
+        if is_final {
+            return Cells {
+                of_leaf,
+                n_cells,
+                separators: kept,
+                n_crossing,
+                n_useless,
+            };
+        }
+    }
+}
+
+/// Cells on the positive and on the negative side, ascending.
+pub(super) fn sides_of(bsp: &Bsp, s: &Separator, of_leaf: &[u32]) -> [Vec<u32>; 2] {
+    [0, 1].map(|side| {
+        let mut cells: Vec<u32> = s
+            .portals
+            .iter()
+            .map(|&p| of_leaf[bsp.portals[p as usize].leaves[side] as usize])
+            .collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    })
+}
+
+/// Connected components of the open leaves without the separators' portals, numbered by least leaf.
+pub(super) fn components(bsp: &Bsp, separators: &[Separator]) -> (Vec<u32>, usize) {
+    let mut is_cut = vec![false; bsp.portals.len()];
+    for &p in separators.iter().flat_map(|s| &s.portals) {
+        is_cut[p as usize] = true;
+    }
+    let mut set: Vec<u32> = (0..bsp.is_open.len() as u32).collect();
+    fn root(set: &mut [u32], mut x: u32) -> u32 {
+        while set[x as usize] != x {
+            set[x as usize] = set[set[x as usize] as usize];
+            x = set[x as usize];
+        }
+        x
+    }
+    for (p, _) in bsp.portals.iter().zip(&is_cut).filter(|(_, cut)| !**cut) {
+        let [a, b] = p.leaves.map(|l| root(&mut set, l));
+        set[a.max(b) as usize] = a.min(b);
+    }
+    let mut number = vec![NO_CELL; set.len()];
+    let mut n = 0;
+    let of_leaf = (0..set.len() as u32)
+        .map(|l| {
+            if !bsp.is_open[l as usize] {
+                return NO_CELL;
+            }
+            let slot = &mut number[root(&mut set, l) as usize];
+            if *slot == NO_CELL {
+                *slot = n;
+                n += 1;
+            }
+            *slot
+        })
+        .collect();
+    (of_leaf, n as usize)
+}

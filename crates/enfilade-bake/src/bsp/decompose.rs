@@ -1,0 +1,253 @@
+//! A bake whose portals are the separators of a tree.
+
+use enfilade_cpg::{Provenance, Statistics};
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding};
+
+use crate::assemble::{Parts, assemble};
+use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
+use crate::pipeline::{input_hash, structural_triangles};
+use crate::simplify::{SimplifySettings, simplify};
+use crate::watershed::{OUTDOORS, Screen, bounds_of};
+use crate::{BakeContext, BakeError, BakeOutput};
+
+use super::cells::{self, Cells, NO_CELL};
+use super::{Bsp, BspInput, Guide, Heuristic, leak, separator, shape, split};
+
+/// Settings of a bake by binary space partition.
+#[derive(Clone, Debug, Default)]
+pub struct BspConfig {
+    /// How planes are chosen.
+    pub heuristic: Heuristic,
+    /// Planes to begin with.
+    pub guide: Guide,
+    /// Bounds on the cells, and what a cell costs. Cells above the upper bound are split.
+    pub simplify: SimplifySettings,
+}
+
+/// Finds rooms and doorways of a scene by binary space partition and separators.
+///
+/// For levels made of brushes and for clean architectural models. The same promises as
+/// [`crate::bake`]: the world comes out of the same cell complex.
+///
+/// # Errors
+/// When nothing is structural, or the caller cancels.
+pub fn bake_bsp(
+    scene: &Scene,
+    config: &BspConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    // 1. Leaves and their portals; separators; cells.
+    context.stage(4)?;
+    let (sources, triangles) = structural_triangles(scene);
+    if triangles.is_empty() {
+        return Err(BakeError::NothingStructural {
+            n_objects: scene.objects.len(),
+        });
+    }
+    let bvh = Bvh::build(&triangles);
+    let bsp = Bsp::build(
+        &input_of(scene, &triangles, &leak::inside_of(scene)),
+        config.heuristic,
+        &config.guide,
+    );
+    let counts = bsp.counts();
+    let parted = cells::part(&bsp, separator::find(&bsp));
+    let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+    let mut screens = screens_of(&bsp, &parted);
+    let mut votes = Votes::of(&bsp, &parted, &shapes);
+    let n_before = parted.n_cells;
+    let n_separators = parted.separators.len();
+    if let Some(bound) = config.simplify.max_cost {
+        split::split_large(&bsp, &parted, bound, &mut screens, &mut votes.0);
+    }
+
+    // 2. The complex makes it exact.
+    context.stage(5)?;
+    let windings: Vec<Winding> = screens.iter().map(|s| s.winding.clone()).collect();
+    let complex = build_complex(&ComplexInput {
+        triangles: &triangles,
+        screens: &windings,
+        bounds: bounds_of(&triangles).expanded(1.0),
+    });
+    context.stage(6)?;
+    // A cell of the tree is a cell whatever its size: what is too small is the simplifier's to say.
+    let settings = LabelSettings {
+        min_volume: 0.0,
+        min_room: 0.0,
+        dominance: 1.0,
+        strong_share: 0.2,
+    };
+    let partition = complex.partition(&votes.0, &settings);
+    let outward = complex.opening_tolerance();
+    let statistics = [
+        (
+            "input_triangles",
+            (sources.len() + scene.triangle_sources(Role::Detail).count()) as f64,
+        ),
+        ("structural_triangles", sources.len() as f64),
+        ("bsp_polygons", counts.n_polygons as f64),
+        ("bsp_pieces", counts.n_pieces as f64),
+        ("bsp_splits", counts.n_splits as f64),
+        ("bsp_leaves", counts.n_leaves as f64),
+        ("bsp_portals", counts.n_portals as f64),
+        ("separators", n_separators as f64),
+        ("crossing_separators", parted.n_crossing as f64),
+        ("cells_before", n_before as f64),
+        ("leaves", complex.n_leaves() as f64),
+        ("leaks", partition.leaks.len() as f64),
+    ];
+    drop(complex);
+
+    // 3. Geometry to the cells that see it, and cells within their bounds.
+    context.stage(7)?;
+    let leaks = partition.leaks.clone();
+    let settings = config.to_settings();
+    let world = assemble(&Parts {
+        scene,
+        sources: &sources,
+        triangles: &triangles,
+        bvh: &bvh,
+        partition,
+        screens: &screens,
+        outward,
+        closed_share: 1.1,
+        provenance: Provenance {
+            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
+            method: "bsp".to_owned(),
+            input_hash: input_hash(&triangles, &settings),
+            settings,
+        },
+        statistics: Statistics {
+            counts: statistics.map(|(k, v)| (k.to_owned(), v)).into(),
+        },
+    });
+    let world = simplify(&world, &config.simplify).world;
+    context.end_stage();
+    Ok(BakeOutput {
+        world,
+        voxel: 0.0,
+        dims: [0; 3],
+        times: context.times(),
+        leaks,
+    })
+}
+
+impl BspConfig {
+    fn to_settings(&self) -> std::collections::BTreeMap<String, String> {
+        let mut out = self.simplify.to_settings();
+        out.insert(
+            "bsp.heuristic".to_owned(),
+            format!("{:?}", self.heuristic).to_lowercase(),
+        );
+        let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
+        out.insert("bsp.grid".to_owned(), number(self.guide.grid));
+        out.insert("bsp.tetrahedra".to_owned(), number(self.guide.tetrahedra));
+        out.insert("bsp.planes".to_owned(), self.guide.planes.len().to_string());
+        out.insert("bsp.boxes".to_owned(), self.guide.boxes.len().to_string());
+        out
+    }
+}
+
+/// Brushes where the whole structure is made of them, its triangles where not.
+pub(super) fn input_of<'a>(
+    scene: &'a Scene,
+    triangles: &'a [Triangle],
+    inside: &'a [DVec3],
+) -> BspInput<'a> {
+    let is_brushes = !scene.solids.is_empty()
+        && scene
+            .objects
+            .iter()
+            .filter(|o| o.role == Role::Structural)
+            .all(|o| o.reason.starts_with("map: "));
+    BspInput {
+        triangles,
+        solids: if is_brushes { &scene.solids } else { &[] },
+        inside: if is_brushes { inside } else { &[] },
+    }
+}
+
+/// A screen for each separator whose portals fill their hull, for each portal otherwise.
+fn screens_of(bsp: &Bsp, cells: &Cells) -> Vec<Screen> {
+    let mut out = Vec::new();
+    for s in &cells.separators {
+        let plane = bsp.tree.planes[s.plane as usize];
+        let all: Vec<DVec3> = s
+            .portals
+            .iter()
+            .flat_map(|&p| bsp.portals[p as usize].points.iter().copied())
+            .collect();
+        let hull = Winding::hull_in_plane(&plane, &all);
+        let windings = if hull.area() <= s.area * 1.001 {
+            vec![hull]
+        } else {
+            s.portals
+                .iter()
+                .map(|&p| Winding::new(bsp.portals[p as usize].points.to_vec()))
+                .collect()
+        };
+        let leaves = bsp.portals[s.portals[0] as usize].leaves;
+        let regions = leaves.map(|l| cells.of_leaf[l as usize]);
+        out.extend(
+            windings
+                .into_iter()
+                .map(|w| screen(&grown(&w, &plane, 4.0 * bsp.tolerance.plane), regions)),
+        );
+    }
+    out
+}
+
+pub(super) fn screen(winding: &Winding, regions: [u32; 2]) -> Screen {
+    Screen {
+        regions,
+        winding: winding.clone(),
+        area: winding.area(),
+        bounded: true,
+        closed: 0.0,
+    }
+}
+
+/// The polygon with each corner moved out: a screen must reach past the rim of its opening.
+fn grown(w: &Winding, plane: &Plane, by: f64) -> Winding {
+    let n = w.points.len();
+    let moved = (0..n).map(|i| {
+        let (a, p, b) = (
+            w.points[(i + n - 1) % n],
+            w.points[i],
+            w.points[(i + 1) % n],
+        );
+        let out = |e: DVec3| e.normalize_or_zero().cross(plane.normal);
+        let (m, k) = (out(p - a), out(b - p));
+        // Sharp corners would run far off.
+        p + (m + k) * (by / (1.0 + m.dot(k)).max(0.1))
+    });
+    Winding::new(moved.collect())
+}
+
+/// A vote of each leaf for its cell.
+pub(super) struct Votes(pub(super) Vec<Vote>);
+
+impl Votes {
+    fn of(bsp: &Bsp, cells: &Cells, shapes: &[Option<shape::Shape>]) -> Self {
+        // With triangles the air around everything is a cell; its label says so.
+        let b: &Aabb = &bsp.tree.bounds;
+        let outer = cells.of_leaf[bsp.tree.leaf_of(b.min + b.size() * 1e-4) as usize];
+        let label = |cell: u32| {
+            if cell == outer {
+                OUTDOORS
+            } else {
+                OUTDOORS + 1 + cell
+            }
+        };
+        let of_leaf = |(leaf, shape): (usize, &Option<shape::Shape>)| {
+            let (cell, shape) = (cells.of_leaf[leaf], (*shape)?);
+            (cell != NO_CELL).then(|| Vote {
+                point: shape.middle,
+                label: label(cell),
+                weight: shape.volume as f32,
+            })
+        };
+        Self(shapes.iter().enumerate().filter_map(of_leaf).collect())
+    }
+}

@@ -1,0 +1,133 @@
+//! Whether what is inside is closed, and the way out where it is not.
+
+use std::collections::VecDeque;
+
+use enfilade_geom::scene::Scene;
+use enfilade_geom::{ConvexSolid, DVec3};
+
+use super::tree::Content;
+use super::{Bsp, BspInput, Guide, Heuristic};
+
+/// A way through open space from something inside to the void.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeakPath {
+    /// Which of the points inside it begins at.
+    pub from: usize,
+    /// Its corners, from that point to beyond the outermost surface. [Units: wu]
+    pub points: Vec<DVec3>,
+}
+
+pub(super) struct Reached {
+    pub(super) is_reached: Vec<bool>,
+    pub(super) path: Option<LeakPath>,
+}
+
+/// Floods from the points through the portals; a path where the border is reached.
+pub(super) fn reach(bsp: &Bsp, inside: &[DVec3]) -> Reached {
+    let n = bsp.is_open.len();
+    let mut neighbors: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
+    for (i, p) in bsp.portals.iter().enumerate() {
+        for side in 0..2 {
+            neighbors[p.leaves[side] as usize].push((p.leaves[1 - side], i as u32));
+        }
+    }
+    // Space beyond the surfaces has been left around them, so its corners are in the void.
+    let b = &bsp.tree.bounds;
+    let mut is_void = vec![false; n];
+    let margin = b.size() * 1e-4;
+    for k in 0..8 {
+        let pick = |bit: i32, lo: f64, hi: f64| if k & bit == 0 { lo } else { hi };
+        let (lo, hi) = (b.min + margin, b.max - margin);
+        let corner = DVec3::new(
+            pick(1, lo.x, hi.x),
+            pick(2, lo.y, hi.y),
+            pick(4, lo.z, hi.z),
+        );
+        let leaf = bsp.tree.leaf_of(corner) as usize;
+        is_void[leaf] = bsp.is_open[leaf];
+    }
+    let mut via: Vec<Option<(u32, u32)>> = vec![None; n];
+    let mut start: Vec<Option<usize>> = vec![None; n];
+    let mut queue = VecDeque::new();
+    for (i, &p) in inside.iter().enumerate() {
+        let leaf = bsp.tree.leaf_of(p) as usize;
+        // Things that stand in matter, or in the void on their own, tell nothing.
+        if bsp.tree.contents[leaf] == Content::Empty && bsp.is_open[leaf] && start[leaf].is_none() {
+            start[leaf] = Some(i);
+            queue.push_back(leaf as u32);
+        }
+    }
+    let mut path = None;
+    let mut is_reached: Vec<bool> = start.iter().map(Option::is_some).collect();
+    while let Some(leaf) = queue.pop_front() {
+        if is_void[leaf as usize] && path.is_none() {
+            path = Some(way_to(bsp, leaf, &via, &start, inside));
+        }
+        for &(next, portal) in &neighbors[leaf as usize] {
+            if !is_reached[next as usize] {
+                is_reached[next as usize] = true;
+                via[next as usize] = Some((leaf, portal));
+                queue.push_back(next);
+            }
+        }
+    }
+    Reached { is_reached, path }
+}
+
+fn way_to(
+    bsp: &Bsp,
+    leaf: u32,
+    via: &[Option<(u32, u32)>],
+    start: &[Option<usize>],
+    inside: &[DVec3],
+) -> LeakPath {
+    let b = &bsp.tree.bounds;
+    let mut points = Vec::new();
+    let mut at = leaf;
+    while let Some((from, portal)) = via[at as usize] {
+        let p = &bsp.portals[portal as usize].points;
+        points.push(p.iter().sum::<DVec3>() / p.len() as f64);
+        at = from;
+    }
+    let from = start[at as usize].unwrap_or(0);
+    points.push(inside[from]);
+    points.reverse();
+    // Leaves are convex, so straight on to the nearest side of the box stays in the last one or the
+    // void beyond.
+    let last = points[points.len() - 1];
+    let (axis, to) = (0..3)
+        .flat_map(|a| [(a, b.min[a]), (a, b.max[a])])
+        .min_by(|p, q| (p.1 - last[p.0]).abs().total_cmp(&(q.1 - last[q.0]).abs()))
+        .unwrap_or((0, b.max.x));
+    let mut end = last;
+    end[axis] = to;
+    points.push(end);
+    LeakPath { from, points }
+}
+
+/// Where things of a scene are that are known to be inside: entities with a place and no shape.
+pub(super) fn inside_of(scene: &Scene) -> Vec<DVec3> {
+    scene
+        .entities
+        .iter()
+        .filter(|e| e.object.is_none())
+        .filter_map(|e| e.position)
+        .collect()
+}
+
+/// The way from an entity of the scene to the void; `None` where the solids close every way, and for
+/// scenes that are not made of solids or have no entities.
+#[must_use]
+pub fn find_leak(scene: &Scene) -> Option<LeakPath> {
+    let solids: &[ConvexSolid] = &scene.solids;
+    let inside = inside_of(scene);
+    if solids.is_empty() || inside.is_empty() {
+        return None;
+    }
+    let input = BspInput {
+        triangles: &[],
+        solids,
+        inside: &inside,
+    };
+    Bsp::build(&input, Heuristic::Default, &Guide::default()).leak
+}

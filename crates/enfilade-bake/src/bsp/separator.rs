@@ -1,0 +1,254 @@
+//! Separators: portals of one plane that close a path together (Lefebvre & Hornus 2003, §2.1 step 2).
+//!
+//! An edge of a portal is valid where each of its points is on a solid surface or on another portal of
+//! the separator. A portal with an edge that is not valid is taken away, which may make its neighbors'
+//! edges invalid in turn; what is left falls into connected sets. The paper checks edge by edge with an
+//! epsilon; here each edge carries the intervals of it that are covered, and by what.
+//!
+//! Time: near-linear in portals and surfaces that are spread out; each removal looks at the neighbors of
+//! one portal only.
+
+use enfilade_geom::{Aabb, BoxTree, DVec3};
+use rayon::prelude::*;
+use smallvec::SmallVec;
+
+use crate::complex::poly;
+
+use super::Bsp;
+use super::tree::Fragment;
+
+/// Portals of one plane whose rim lies on solid surfaces.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Separator {
+    pub(super) plane: u32,
+    /// Indices of leaf portals, ascending.
+    pub(super) portals: Vec<u32>,
+    pub(super) area: f64,
+}
+
+/// All valid separators, ordered by plane and first portal.
+pub(super) fn find(bsp: &Bsp) -> Vec<Separator> {
+    let boxes: Vec<Aabb> = bsp
+        .surfaces
+        .iter()
+        .map(|f| Aabb::of_points(&f.points))
+        .collect();
+    let solids = BoxTree::new(&boxes);
+    let mut order: Vec<u32> = (0..bsp.portals.len() as u32).collect();
+    order.sort_by_key(|&i| (bsp.portals[i as usize].plane, i));
+    let groups: Vec<&[u32]> = order
+        .chunk_by(|&a, &b| bsp.portals[a as usize].plane == bsp.portals[b as usize].plane)
+        .collect();
+    groups
+        .into_par_iter()
+        .flat_map_iter(|g| of_plane(bsp, g, &solids))
+        .collect()
+}
+
+type Interval = [f64; 2];
+
+/// One edge of a portal.
+struct Edge {
+    /// Covered by solid surfaces.
+    solid: SmallVec<[Interval; 4]>,
+    /// Covered by other portals of the plane: which of the group, from where to where.
+    others: SmallVec<[(u32, Interval); 2]>,
+    /// Share of the edge that rounding may leave uncovered.
+    slack: f64,
+}
+
+fn of_plane(bsp: &Bsp, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
+    let eps = 4.0 * bsp.tolerance.plane;
+    let points = |k: usize| &bsp.portals[group[k] as usize].points;
+    let boxes: Vec<Aabb> = (0..group.len())
+        .map(|k| Aabb::of_points(points(k)).expanded(eps))
+        .collect();
+    let near = BoxTree::new(&boxes);
+    let edges: Vec<Vec<Edge>> = (0..group.len())
+        .map(|k| {
+            let p = points(k);
+            (0..p.len())
+                .map(|i| {
+                    let (a, b) = (p[i], p[(i + 1) % p.len()]);
+                    edge(a, b, eps, bsp, solids, |take| {
+                        let around = Aabb::of_points(&[a, b]).expanded(eps);
+                        near.for_each_in_box(&around, |o| {
+                            if o as usize != k
+                                && let Some(i) = shared(a, b, points(o as usize), eps)
+                            {
+                                take(o, i);
+                            }
+                        });
+                    })
+                })
+                .collect()
+        })
+        .collect();
+    let mut is_alive = vec![true; group.len()];
+    let mut queue: Vec<u32> = (0..group.len() as u32).collect();
+    while let Some(k) = queue.pop() {
+        if !is_alive[k as usize] || edges[k as usize].iter().all(|e| e.is_covered(&is_alive)) {
+            continue;
+        }
+        is_alive[k as usize] = false;
+        queue.extend(
+            edges[k as usize]
+                .iter()
+                .flat_map(|e| e.others.iter().map(|o| o.0)),
+        );
+    }
+    // Connected sets of what is left.
+    let mut set: Vec<u32> = (0..group.len() as u32).collect();
+    fn root(set: &mut [u32], mut x: u32) -> u32 {
+        while set[x as usize] != x {
+            set[x as usize] = set[set[x as usize] as usize];
+            x = set[x as usize];
+        }
+        x
+    }
+    for k in (0..group.len()).filter(|&k| is_alive[k]) {
+        for &(o, _) in edges[k].iter().flat_map(|e| &e.others) {
+            if is_alive[o as usize] {
+                let (a, b) = (root(&mut set, k as u32), root(&mut set, o));
+                set[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    let mut by_root = std::collections::BTreeMap::<u32, Vec<u32>>::new();
+    for k in (0..group.len()).filter(|&k| is_alive[k]) {
+        by_root
+            .entry(root(&mut set, k as u32))
+            .or_default()
+            .push(group[k]);
+    }
+    by_root
+        .into_values()
+        .map(|portals| Separator {
+            plane: bsp.portals[portals[0] as usize].plane,
+            area: portals
+                .iter()
+                .map(|&p| poly::area(&bsp.portals[p as usize].points))
+                .sum(),
+            portals,
+        })
+        .collect()
+}
+
+impl Edge {
+    /// Whether all of it is on solids or on portals that are there.
+    fn is_covered(&self, is_alive: &[bool]) -> bool {
+        let mut all: SmallVec<[Interval; 8]> = self.solid.iter().copied().collect();
+        all.extend(
+            self.others
+                .iter()
+                .filter(|o| is_alive[o.0 as usize])
+                .map(|o| o.1),
+        );
+        covers(&mut all, self.slack)
+    }
+}
+
+/// Whether the intervals cover 0 to 1 with no gap wider than `slack`.
+fn covers(intervals: &mut [Interval], slack: f64) -> bool {
+    intervals.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut to = 0.0;
+    for i in intervals.iter() {
+        if i[0] > to + slack {
+            return false;
+        }
+        to = f64::max(to, i[1]);
+    }
+    to >= 1.0 - slack
+}
+
+fn edge(
+    a: DVec3,
+    b: DVec3,
+    eps: f64,
+    bsp: &Bsp,
+    solids: &BoxTree,
+    others: impl FnOnce(&mut dyn FnMut(u32, Interval)),
+) -> Edge {
+    let length = a.distance(b);
+    let mut e = Edge {
+        solid: SmallVec::new(),
+        others: SmallVec::new(),
+        slack: (2.0 * eps / length).min(1.0),
+    };
+    if e.slack >= 0.5 {
+        // Shorter than what counts as touching.
+        e.solid.push([0.0, 1.0]);
+        return e;
+    }
+    solids.for_each_in_box(&Aabb::of_points(&[a, b]).expanded(eps), |s| {
+        e.solid
+            .extend(on_surface(a, b, &bsp.surfaces[s as usize], bsp, eps));
+    });
+    if !covers(&mut e.solid, e.slack) {
+        others(&mut |o, i| e.others.push((o, i)));
+    }
+    e
+}
+
+/// From where to where an edge lies on a surface.
+fn on_surface(a: DVec3, b: DVec3, f: &Fragment, bsp: &Bsp, eps: f64) -> Option<Interval> {
+    let plane = &bsp.tree.planes[f.plane as usize];
+    if plane.signed_distance(a).abs() > eps || plane.signed_distance(b).abs() > eps {
+        return None;
+    }
+    let normal = if f.is_flipped {
+        -plane.normal
+    } else {
+        plane.normal
+    };
+    let n = f.points.len();
+    let mut i = [0.0, 1.0];
+    for k in 0..n {
+        let (p, q) = (f.points[k], f.points[(k + 1) % n]);
+        let Some(inward) = normal.cross(q - p).try_normalize() else {
+            continue;
+        };
+        let (da, db) = (inward.dot(a - p) + eps, inward.dot(b - p) + eps);
+        match (da < 0.0, db < 0.0) {
+            (true, true) => return None,
+            (true, false) => i[0] = f64::max(i[0], da / (da - db)),
+            (false, true) => i[1] = f64::min(i[1], da / (da - db)),
+            (false, false) => {}
+        }
+    }
+    (i[0] < i[1]).then_some(i)
+}
+
+/// From where to where an edge runs along an edge of another polygon of its plane.
+fn shared(a: DVec3, b: DVec3, other: &[DVec3], eps: f64) -> Option<Interval> {
+    let along = b - a;
+    let length = along.length();
+    let u = along / length;
+    let n = other.len();
+    (0..n).find_map(|k| {
+        let (p, q) = (other[k], other[(k + 1) % n]);
+        let off = |r: DVec3| ((r - a) - u * u.dot(r - a)).length();
+        // The other polygon is on the other side, so its edge runs the other way.
+        if off(p) > eps || off(q) > eps || u.dot(q - p) >= 0.0 {
+            return None;
+        }
+        let (from, to) = (u.dot(q - a) / length, u.dot(p - a) / length);
+        let i = [from.max(0.0), to.min(1.0)];
+        (i[1] - i[0] > eps / length).then_some(i)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_cover_an_edge_or_leave_a_gap() {
+        assert!(covers(&mut [[0.5, 1.0], [0.0, 0.5]], 1e-9));
+        assert!(!covers(&mut [[0.6, 1.0], [0.0, 0.5]], 1e-9));
+        assert!(covers(&mut [[0.6, 1.0], [0.0, 0.5]], 0.11));
+        assert!(!covers(&mut [[0.0, 0.9]], 1e-9));
+        assert!(covers(&mut [[0.0, 0.9], [0.2, 0.4], [0.3, 1.0]], 1e-9));
+        assert!(!covers(&mut [], 1e-9));
+    }
+}

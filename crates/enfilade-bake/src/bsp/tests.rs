@@ -1,0 +1,356 @@
+use std::collections::BTreeSet;
+
+use enfilade_geom::scene::{Entity, Mesh, Object, Primitive, Role, Scene};
+use enfilade_geom::{DMat4, Plane};
+use enfilade_testkit::Rng;
+
+use super::*;
+use crate::complex::poly;
+use crate::{BakeContext, Silent};
+
+fn boxed(min: [f64; 3], max: [f64; 3]) -> ConvexSolid {
+    let mut planes = Vec::new();
+    for (axis, n) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+        planes.push(Plane {
+            normal: n,
+            d: -max[axis],
+        });
+        planes.push(Plane {
+            normal: -n,
+            d: min[axis],
+        });
+    }
+    ConvexSolid::from_planes(&planes, 1e4, 1e-6).unwrap()
+}
+
+/// Rooms of 4 × 3 × 4 m in a row, walls half a meter thick, a doorway of 1 × 2 m between neighbors.
+fn row(n: usize) -> Vec<ConvexSolid> {
+    let length = 4.5 * n as f64;
+    let mut out = vec![
+        boxed([-0.5, -0.5, -0.5], [length, 0.0, 4.5]),
+        boxed([-0.5, 3.0, -0.5], [length, 3.5, 4.5]),
+        boxed([-0.5, 0.0, -0.5], [length, 3.0, 0.0]),
+        boxed([-0.5, 0.0, 4.0], [length, 3.0, 4.5]),
+        boxed([-0.5, 0.0, 0.0], [0.0, 3.0, 4.0]),
+    ];
+    for i in 0..n {
+        let x = 4.5 * i as f64 + 4.0;
+        if i + 1 == n {
+            out.push(boxed([x, 0.0, 0.0], [x + 0.5, 3.0, 4.0]));
+        } else {
+            out.push(boxed([x, 0.0, 0.0], [x + 0.5, 3.0, 1.0]));
+            out.push(boxed([x, 0.0, 2.0], [x + 0.5, 3.0, 4.0]));
+            out.push(boxed([x, 2.0, 1.0], [x + 0.5, 3.0, 2.0]));
+        }
+    }
+    out
+}
+
+fn bsp_of(solids: &[ConvexSolid], inside: &[DVec3], heuristic: Heuristic, guide: &Guide) -> Bsp {
+    Bsp::build(
+        &BspInput {
+            triangles: &[],
+            solids,
+            inside,
+        },
+        heuristic,
+        guide,
+    )
+}
+
+const INSIDE: DVec3 = DVec3::new(2.0, 1.0, 2.0);
+
+/// Random boxes in a closed hall, on a lattice so that planes coincide often.
+fn hall(rng: &mut Rng, n: usize) -> Vec<ConvexSolid> {
+    let mut out = row(1);
+    // Wider: 16 × 6 × 16.
+    out.clear();
+    let (lo, hi) = ([-1.0, -1.0, -1.0], [17.0, 7.0, 17.0]);
+    for axis in 0..3 {
+        let (mut a, mut b) = (hi, lo);
+        a[axis] = lo[axis] + 1.0;
+        b[axis] = hi[axis] - 1.0;
+        out.push(boxed(lo, a));
+        out.push(boxed(b, hi));
+    }
+    for _ in 0..n {
+        let min = [rng.below(15) as f64, 0.0, rng.below(15) as f64];
+        let size = [
+            1.0 + rng.below(8) as f64,
+            1.0 + rng.below(6) as f64,
+            1.0 + rng.below(8) as f64,
+        ];
+        let max = [0, 1, 2].map(|k| (min[k] + size[k]).min(hi[k] - 0.5));
+        out.push(boxed(min, max));
+    }
+    out
+}
+
+#[test]
+fn leaves_fill_what_the_solids_leave_free() {
+    let mut rng = Rng::new(3);
+    for _ in 0..30 {
+        let solids = hall(&mut rng, 6);
+        let eye = (0..1000)
+            .map(|_| DVec3::new(rng.unit() * 16.0, rng.unit() * 6.0, rng.unit() * 16.0))
+            .find(|&p| !solids.iter().any(|s| s.contains(p, -1e-3)))
+            .unwrap();
+        for heuristic in [
+            Heuristic::Default,
+            Heuristic::MinCut,
+            Heuristic::MaxArea,
+            Heuristic::MaxOrtho,
+        ] {
+            let bsp = bsp_of(&solids, &[], heuristic, &Guide::default());
+            // The oracle asks the solids themselves.
+            for _ in 0..300 {
+                let p = DVec3::new(
+                    rng.unit() * 18.0 - 1.0,
+                    rng.unit() * 8.0 - 1.0,
+                    rng.unit() * 18.0 - 1.0,
+                );
+                let near = solids.iter().any(|s| s.contains(p, -1e-3));
+                let deep = solids.iter().any(|s| s.contains(p, 1e-3));
+                let leaf = bsp.tree.leaf_of(p) as usize;
+                let is_open = bsp.is_open[leaf];
+                let shape = shape::shapes(&bsp.tree, &bsp.tolerance)[leaf];
+                assert!(
+                    if deep { !is_open } else { near || is_open },
+                    "{p} {heuristic:?} deep {deep} {:?} {shape:?}",
+                    bsp.tree.contents[leaf]
+                );
+            }
+            let inner = bsp_of(&solids, &[eye], heuristic, &Guide::default());
+            assert!(inner.leak().is_none());
+            assert!(inner.counts().n_leaves < bsp.counts().n_leaves);
+        }
+    }
+}
+
+/// Whether `p` is on the surface of what is solid.
+fn is_on_solid(solids: &[ConvexSolid], p: DVec3, eps: f64) -> bool {
+    solids.iter().any(|s| s.contains(p, -eps))
+}
+
+#[test]
+fn rims_of_separators_are_on_solids_or_on_their_own_portals() {
+    let mut rng = Rng::new(11);
+    let mut n_found = 0;
+    for _ in 0..40 {
+        let solids = hall(&mut rng, 9);
+        let bsp = bsp_of(&solids, &[], Heuristic::Default, &Guide::default());
+        let found = separator::find(&bsp);
+        for s in &found {
+            for &p in &s.portals {
+                let points = &bsp.portals[p as usize].points;
+                for i in 0..points.len() {
+                    let (a, b) = (points[i], points[(i + 1) % points.len()]);
+                    for k in 0..=20 {
+                        let at = a.lerp(b, f64::from(k) / 20.0);
+                        let on_own = s.portals.iter().filter(|&&o| o != p).any(|&o| {
+                            Winding::new(bsp.portals[o as usize].points.to_vec())
+                                .contains_in_plane(at, 1e-4)
+                        });
+                        assert!(on_own || is_on_solid(&solids, at, 1e-3), "{at}");
+                    }
+                }
+            }
+        }
+        let parted = cells::part(&bsp, found);
+        n_found += parted.separators.len();
+        // Without any one of them, two cells are one.
+        for i in 0..parted.separators.len() {
+            let mut others = parted.separators.clone();
+            others.remove(i);
+            assert_eq!(
+                cells::components(&bsp, &others).1 + 1,
+                parted.n_cells.max(1),
+                "{i}"
+            );
+        }
+    }
+    assert!(n_found > 20, "{n_found}");
+}
+
+#[test]
+fn a_row_of_rooms_has_a_cell_a_room_and_a_cell_a_doorway() {
+    for n in [1, 2, 5] {
+        let bsp = bsp_of(&row(n), &[INSIDE], Heuristic::Default, &Guide::default());
+        let g = bsp.grouping();
+        assert_eq!((g.n_cells, g.n_separators), (2 * n - 1, 2 * (n - 1)), "{n}");
+    }
+}
+
+#[test]
+fn guides_cut_first_and_change_no_space() {
+    let guide = Guide {
+        grid: Some(1.3),
+        tetrahedra: Some(2.0),
+        planes: vec![Plane::through(
+            INSIDE,
+            DVec3::new(1.0, 2.0, 3.0).normalize(),
+        )],
+        boxes: vec![Aabb::new(DVec3::ONE, DVec3::splat(2.5))],
+    };
+    let plain = bsp_of(&row(2), &[INSIDE], Heuristic::Default, &Guide::default());
+    let guided = bsp_of(&row(2), &[INSIDE], Heuristic::Default, &guide);
+    assert!(guided.counts().n_leaves > 5 * plain.counts().n_leaves);
+    let volume = |b: &Bsp| -> f64 {
+        let shapes = shape::shapes(&b.tree, &b.tolerance);
+        shapes
+            .iter()
+            .zip(&b.is_open)
+            .filter(|s| *s.1)
+            .filter_map(|s| s.0.map(|s| s.volume))
+            .sum()
+    };
+    // Two rooms of 48 m³ and a doorway of half a meter by 1 × 2 m.
+    for b in [&plain, &guided] {
+        assert!((volume(b) - 97.0).abs() < 1e-3, "{}", volume(b));
+    }
+    // Every grid plane through the rooms is a plane of portals.
+    let planes: BTreeSet<u32> = guided.portals.iter().map(|p| p.plane).collect();
+    assert!(planes.len() > 20);
+}
+
+#[test]
+fn a_gap_is_a_leak_and_the_way_out_is_open() {
+    let mut solids = row(2);
+    assert!(
+        bsp_of(&solids, &[INSIDE], Heuristic::Default, &Guide::default())
+            .leak()
+            .is_none()
+    );
+    // The ceiling of the first room ends early.
+    solids[1] = boxed([0.5, 3.0, -0.5], [9.0, 3.5, 4.5]);
+    let bsp = bsp_of(&solids, &[INSIDE], Heuristic::Default, &Guide::default());
+    let leak = bsp.leak().expect("it leaks");
+    assert_eq!(leak.points[0], INSIDE);
+    assert!(leak.points.last().unwrap().y > 3.0 || leak.points.len() > 2);
+    for way in leak.points.windows(2) {
+        for k in 0..=50 {
+            let p = way[0].lerp(way[1], f64::from(k) / 50.0);
+            assert!(
+                !solids.iter().any(|s| s.contains(p, 1e-4)),
+                "{p} is in matter"
+            );
+        }
+    }
+    // The tree is still good for a bake.
+    assert!(bsp.counts().n_leaves > 0);
+}
+
+#[test]
+fn the_pieces_of_a_tree_have_the_area_of_what_went_in() {
+    let mut rng = Rng::new(5);
+    let solids = hall(&mut rng, 12);
+    let bsp = bsp_of(&solids, &[], Heuristic::MaxArea, &Guide::default());
+    let area = |f: &[tree::Fragment]| f.iter().map(|f| poly::area(&f.points)).sum::<f64>();
+    let (before, after) = (area(&bsp.surfaces), area(&bsp.tree.on_plane));
+    assert!((before - after).abs() < 1e-6 * before, "{before} {after}");
+    assert!(bsp.counts().n_splits > 0);
+}
+
+/// The solids as a scene, as the importer of maps makes it.
+fn scene_of(solids: &[ConvexSolid], inside: &[DVec3]) -> Scene {
+    let mut primitive = Primitive::default();
+    for w in solids.iter().flat_map(|s| &s.faces) {
+        let first = primitive.positions.len() as u32;
+        primitive
+            .positions
+            .extend(w.points.iter().map(|p| p.as_vec3().to_array()));
+        let n = w.points.len() as u32;
+        primitive
+            .indices
+            .extend((1..n - 1).flat_map(|k| [first, first + k, first + k + 1]));
+    }
+    Scene {
+        meshes: vec![Mesh {
+            name: String::new(),
+            primitives: vec![primitive],
+        }],
+        objects: vec![Object {
+            name: "world".into(),
+            mesh: 0,
+            transform: DMat4::IDENTITY,
+            role: Role::Structural,
+            reason: "map: brushes of worldspawn".into(),
+        }],
+        solids: solids.to_vec(),
+        entities: inside
+            .iter()
+            .map(|&p| Entity {
+                class: "light".into(),
+                position: Some(p),
+                ..Entity::default()
+            })
+            .collect(),
+        ..Scene::default()
+    }
+}
+
+fn baked(scene: &Scene, config: &BspConfig) -> enfilade_cpg::World {
+    let out = bake_bsp(scene, config, &BakeContext::new(&Silent, None)).unwrap();
+    out.world.validate().unwrap();
+    out.world
+}
+
+#[test]
+fn worlds_keep_their_promises_whatever_the_settings() {
+    use enfilade_verify::{VerifyOptions, verify_world};
+    let mut rng = Rng::new(23);
+    let mut with_void = BspConfig::default();
+    with_void.simplify.min_cost = 30.0;
+    let mut small = BspConfig::default();
+    small.simplify.max_cost = Some(20.0);
+    let mut guided = BspConfig::default();
+    guided.guide.tetrahedra = Some(5.0);
+    for (i, config) in [BspConfig::default(), with_void, small, guided]
+        .iter()
+        .enumerate()
+    {
+        for solids in [row(3), hall(&mut rng, 7)] {
+            for inside in [vec![], vec![INSIDE]] {
+                let mut scene = scene_of(&solids, &inside);
+                if i == 1 {
+                    // As triangles that nobody knows to be solids.
+                    scene.solids.clear();
+                }
+                let world = baked(&scene, config);
+                let options = VerifyOptions {
+                    rays: 4000,
+                    ..VerifyOptions::default()
+                };
+                let report = verify_world(&world, None, &options);
+                assert!(report.holds(), "{i}: {report:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rooms_of_a_row_are_found_and_large_ones_are_cut() {
+    let scene = scene_of(&row(3), &[INSIDE]);
+    let world = baked(&scene, &BspConfig::default());
+    assert_eq!(world.graph.cells.len(), 5);
+    assert_eq!(world.graph.portals.len(), 4);
+    let mut config = BspConfig::default();
+    config.simplify.max_cost = Some(8.0);
+    assert!(baked(&scene, &config).graph.cells.len() > 5);
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let mut rng = Rng::new(31);
+    let scene = scene_of(&hall(&mut rng, 12), &[]);
+    let mut config = BspConfig::default();
+    config.simplify.min_cost = 40.0;
+    let bytes = |n: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .unwrap();
+        pool.install(|| enfilade_cpg::wire::encode_glb(&baked(&scene, &config)).unwrap())
+    };
+    assert!(bytes(1) == bytes(4));
+}

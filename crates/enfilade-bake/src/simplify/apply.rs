@@ -1,0 +1,180 @@
+//! Merged cells in a world: everything that names a cell names the new one.
+
+use std::collections::BTreeMap;
+
+use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, World};
+use enfilade_geom::scene::Primitive;
+
+/// The world with each cell part of the cell that `into` says, and the new number of each old cell.
+///
+/// `into` names a cell of each group for all of it. Linear in the world.
+pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
+    let old = &world.graph;
+    let mut number = vec![u32::MAX; into.len()];
+    let mut cells: Vec<Cell> = Vec::new();
+    let mut cell_of: Vec<CellId> = Vec::with_capacity(into.len());
+    for (c, &to) in into.iter().enumerate() {
+        let from = &old.cells[c];
+        let slot = &mut number[to as usize];
+        if *slot == u32::MAX {
+            *slot = cells.len() as u32;
+            cells.push(Cell {
+                portals: Vec::new(),
+                n_triangles: 0,
+                n_detail_triangles: 0,
+                ..from.clone()
+            });
+        } else {
+            let cell = &mut cells[*slot as usize];
+            for k in 0..3 {
+                cell.aabb[0][k] = cell.aabb[0][k].min(from.aabb[0][k]);
+                cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);
+            }
+            cell.volume += from.volume;
+            if from.outdoor && !cell.outdoor {
+                cell.name.clone_from(&from.name);
+                cell.outdoor = true;
+            }
+        }
+        cell_of.push(CellId(*slot));
+    }
+    let renumbered = |list: &[CellId]| {
+        let mut out: Vec<CellId> = list.iter().map(|c| cell_of[c.0 as usize]).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
+    };
+    let mut portals = Vec::new();
+    for p in &old.portals {
+        let joined = p.cells.map(|c| cell_of[c.0 as usize]);
+        if joined[0] != joined[1] {
+            for c in joined {
+                cells[c.0 as usize]
+                    .portals
+                    .push(PortalId(portals.len() as u32));
+            }
+            portals.push(enfilade_cpg::Portal {
+                cells: joined,
+                ..p.clone()
+            });
+        }
+    }
+    let mut batches: BTreeMap<Key, Primitive> = BTreeMap::new();
+    for b in &world.batches {
+        let key = (
+            renumbered(&b.cells),
+            b.primitive.material,
+            layout_of(&b.primitive),
+        );
+        append(batches.entry(key).or_default(), &b.primitive);
+    }
+    let batches: Vec<Batch> = batches
+        .into_iter()
+        .map(|((cells, ..), primitive)| Batch { cells, primitive })
+        .collect();
+    for b in &batches {
+        for c in &b.cells {
+            cells[c.0 as usize].n_triangles += (b.primitive.indices.len() / 3) as u32;
+        }
+    }
+    let mut details = world.details.clone();
+    for d in &mut details {
+        d.cells = renumbered(&d.cells);
+        let mesh = &world.detail_meshes[d.mesh as usize];
+        let n: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
+        for c in &d.cells {
+            cells[c.0 as usize].n_detail_triangles += n as u32;
+        }
+    }
+    let mut out = world.clone();
+    out.graph.locator = locator(&old.locator, &cell_of);
+    out.graph.cells = cells;
+    out.graph.portals = portals;
+    out.batches = batches;
+    out.details = details;
+    (out, cell_of)
+}
+
+/// Which attributes a primitive has; those that differ cannot share its lists.
+type Layout = (bool, bool, usize, bool);
+type Key = (Vec<CellId>, Option<u32>, Layout);
+
+fn layout_of(p: &Primitive) -> Layout {
+    (
+        !p.normals.is_empty(),
+        !p.tangents.is_empty(),
+        p.uvs.len(),
+        !p.colors.is_empty(),
+    )
+}
+
+fn append(to: &mut Primitive, from: &Primitive) {
+    let first = to.positions.len() as u32;
+    to.material = from.material;
+    to.positions.extend_from_slice(&from.positions);
+    to.normals.extend_from_slice(&from.normals);
+    to.tangents.extend_from_slice(&from.tangents);
+    to.colors.extend_from_slice(&from.colors);
+    to.uvs.resize(from.uvs.len(), Vec::new());
+    for (to, from) in to.uvs.iter_mut().zip(&from.uvs) {
+        to.extend_from_slice(from);
+    }
+    to.indices.extend(from.indices.iter().map(|i| i + first));
+}
+
+/// The locator with new numbers; nodes that no longer tell cells apart are left out.
+fn locator(old: &Locator, cell_of: &[CellId]) -> Locator {
+    let renumbered = |child: i32| match child {
+        c if c <= -2 => Locator::leaf(Some(cell_of[(-2 - c) as usize])),
+        c => c,
+    };
+    // What each node comes to: children come after their parents.
+    let mut becomes: Vec<i32> = vec![0; old.nodes.len()];
+    let resolve = |becomes: &[i32], child: i32| {
+        if child >= 0 {
+            becomes[child as usize]
+        } else {
+            renumbered(child)
+        }
+    };
+    for i in (0..old.nodes.len()).rev() {
+        let [f, b] = old.nodes[i].children.map(|c| resolve(&becomes, c));
+        becomes[i] = if f == b && f < 0 { f } else { i as i32 };
+    }
+    let mut out = Locator {
+        bounds: old.bounds,
+        outside: old.outside.map(|c| cell_of[c.0 as usize]),
+        planes: old.planes.clone(),
+        ..Locator::default()
+    };
+    let mut new_index = vec![-1_i32; old.nodes.len()];
+    // In the old order, so that children still come after their parents.
+    let mut is_used = vec![false; old.nodes.len()];
+    let root = resolve(&becomes, old.root);
+    if root >= 0 {
+        is_used[root as usize] = true;
+    }
+    for i in 0..old.nodes.len() {
+        if is_used[i] {
+            new_index[i] = out.nodes.len() as i32;
+            out.nodes.push(old.nodes[i]);
+            for child in old.nodes[i].children.map(|c| resolve(&becomes, c)) {
+                if child >= 0 {
+                    is_used[child as usize] = true;
+                }
+            }
+        }
+    }
+    let settled = |child: i32| {
+        if child >= 0 {
+            new_index[child as usize]
+        } else {
+            child
+        }
+    };
+    for node in &mut out.nodes {
+        node.children = node.children.map(|c| settled(resolve(&becomes, c)));
+    }
+    out.root = settled(root);
+    out
+}

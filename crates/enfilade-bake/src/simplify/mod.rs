@@ -1,0 +1,248 @@
+//! Makes any cell-and-portal graph simpler: merges cells until their costs are within bounds.
+//!
+//! After Lefebvre & Hornus 2003, §3: the cheapest cell first, the worst of its portals removed; the
+//! lower bound is sought, the upper one guaranteed. Works on any [`World`], whatever built it, since a
+//! merge needs nothing but the world: the two cells become one, the portals between them go, what
+//! either saw the new one sees.
+//!
+//! **Every promise is kept:** a portal is left out only where both its sides are the same cell.
+
+mod apply;
+mod merge;
+mod metric;
+
+use std::collections::BTreeMap;
+
+use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_geom::DVec3;
+
+use merge::{Bounds, CostGraph, Eyes};
+
+/// How portals are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Metric {
+    /// Triangles that sampled views draw more without the portal.
+    #[default]
+    ExpectedTriangles,
+    /// Volume that sees the portal times the difference of its cells' costs (Lefebvre & Hornus 2003).
+    VisibleVolume,
+}
+
+/// What drawing a cell costs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CostModel {
+    /// Of a triangle. [Limit: at least 0]
+    pub triangle: f64,
+    /// Of its area. [Units: 1/wu²] [Limit: at least 0]
+    pub area: f64,
+    /// By what a material's name multiplies both; 1 for those not named. [Limit: at least 0]
+    pub materials: BTreeMap<String, f64>,
+}
+
+impl Default for CostModel {
+    fn default() -> Self {
+        Self {
+            triangle: 1.0,
+            area: 0.0,
+            materials: BTreeMap::new(),
+        }
+    }
+}
+
+/// Settings of the simplifier.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SimplifySettings {
+    /// Cheaper cells are merged with neighbors, where that keeps the upper bound.
+    pub min_cost: f64,
+    /// No merge makes a cell that costs more.
+    pub max_cost: Option<f64>,
+    /// Cells are merged until there are no more than this, where that keeps the upper bound.
+    pub max_cells: Option<usize>,
+    /// How portals are compared.
+    pub metric: Metric,
+    /// What drawing costs.
+    pub cost: CostModel,
+}
+
+impl SimplifySettings {
+    /// Every setting by name, as text.
+    pub(crate) fn to_settings(&self) -> BTreeMap<String, String> {
+        let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
+        let mut out: BTreeMap<String, String> = [
+            ("simplify.min_cost", self.min_cost.to_string()),
+            ("simplify.max_cost", number(self.max_cost)),
+            (
+                "simplify.max_cells",
+                number(self.max_cells.map(|n| n as f64)),
+            ),
+            ("simplify.metric", format!("{:?}", self.metric)),
+            ("cost.triangle", self.cost.triangle.to_string()),
+            ("cost.area", self.cost.area.to_string()),
+        ]
+        .map(|(k, v)| (k.to_owned(), v))
+        .into();
+        for (name, weight) in &self.cost.materials {
+            out.insert(format!("cost.material.{name}"), weight.to_string());
+        }
+        out
+    }
+}
+
+/// A simpler world and how it compares.
+#[derive(Clone, Debug)]
+pub struct Simplified {
+    /// The world.
+    pub world: World,
+    /// The cell of the result that each old cell is part of.
+    pub cell_of: Vec<CellId>,
+    /// Greatest cost of a cell.
+    pub max_cost: f64,
+    /// Least cost of a cell.
+    pub min_cost: f64,
+}
+
+/// Sampled eyes for the metric; twice as many change few merges.
+const EYES: usize = 512;
+/// Where the sequence of eyes that judge results begins: none of them helped to choose.
+const JUDGES: u32 = 1 << 20;
+
+/// Merges cells of a world until they are within bounds.
+///
+/// Deterministic for any number of threads. Time: the metric's rays, about 100,000, and the merges.
+#[must_use]
+pub fn simplify(world: &World, settings: &SimplifySettings) -> Simplified {
+    let graph = cost_graph(world, &settings.cost);
+    let bounds = Bounds {
+        min_cost: settings.min_cost,
+        max_cost: settings.max_cost.unwrap_or(f64::INFINITY),
+        max_cells: settings.max_cells.unwrap_or(usize::MAX),
+    };
+    let n = world.graph.cells.len();
+    let is_done = n <= bounds.max_cells && (0..n as u32).all(|c| graph.cost(c) >= bounds.min_cost);
+    let into = if is_done {
+        (0..n as u32).collect()
+    } else {
+        match settings.metric {
+            Metric::ExpectedTriangles => {
+                merge::merge(graph, &bounds, &mut metric::views(world, EYES, 0))
+            }
+            Metric::VisibleVolume => {
+                merge::merge(graph, &bounds, &mut metric::visible_volumes(world))
+            }
+        }
+    };
+    finish(world, &into, &settings.cost)
+}
+
+/// Takes a portal away: its two cells become one, and all other portals between them go, too.
+///
+/// `None` when there is no such portal.
+#[must_use]
+pub fn delete_portal(world: &World, portal: PortalId) -> Option<Simplified> {
+    let [a, b] = world
+        .graph
+        .portals
+        .get(portal.0 as usize)?
+        .cells
+        .map(|c| c.0);
+    let into: Vec<u32> = (0..world.graph.cells.len() as u32)
+        .map(|c| if c == a || c == b { a.min(b) } else { c })
+        .collect();
+    Some(finish(world, &into, &CostModel::default()))
+}
+
+fn finish(world: &World, into: &[u32], cost: &CostModel) -> Simplified {
+    let (world, cell_of) = apply::merged(world, into);
+    let graph = cost_graph(&world, cost);
+    let costs = || (0..world.graph.cells.len() as u32).map(|c| graph.cost(c));
+    Simplified {
+        cell_of,
+        max_cost: costs().fold(0.0, f64::max),
+        min_cost: costs().fold(f64::INFINITY, f64::min),
+        world,
+    }
+}
+
+/// Mean cost of what a view reaches, over sampled views: what a metric is judged by.
+///
+/// A cell is drawn whole if a ray of the view comes into it; views are none of those that the metric
+/// [`Metric::ExpectedTriangles`] looks at.
+#[must_use]
+pub fn expected_cost(world: &World, cost: &CostModel, n_views: usize) -> f64 {
+    let graph = cost_graph(world, cost);
+    let Eyes(seen_by) = metric::views(world, n_views, JUDGES);
+    let total: f64 = (0..n_views)
+        .map(|eye| {
+            let sees = |c: usize| seen_by[c][eye / 64] >> (eye % 64) & 1 == 1;
+            let mut items: Vec<u32> = (0..seen_by.len())
+                .filter(|&c| sees(c))
+                .flat_map(|c| graph.items[c].iter().copied())
+                .collect();
+            items.sort_unstable();
+            items.dedup();
+            items
+                .iter()
+                .map(|&i| graph.weights[i as usize])
+                .sum::<f64>()
+        })
+        .sum();
+    total / n_views.max(1) as f64
+}
+
+/// Cells with what drawing them costs: a batch is an item, so is a detail object.
+fn cost_graph(world: &World, cost: &CostModel) -> CostGraph {
+    let n = world.graph.cells.len();
+    let mut graph = CostGraph {
+        items: vec![Vec::new(); n],
+        pairs: world
+            .graph
+            .portals
+            .iter()
+            .map(|p| p.cells.map(|c| c.0))
+            .collect(),
+        aloof: world.graph.cells.iter().map(|c| c.outdoor).collect(),
+        ..CostGraph::default()
+    };
+    let factor = |material: Option<u32>| {
+        let name = material
+            .and_then(|m| world.materials.get(m as usize))
+            .map_or("", |m| &m.name);
+        cost.materials.get(name).copied().unwrap_or(1.0)
+    };
+    let of_primitive = |p: &enfilade_geom::scene::Primitive, scale: f64| {
+        let area = if cost.area == 0.0 {
+            0.0
+        } else {
+            let at = |i: u32| DVec3::from(p.positions[i as usize].map(f64::from));
+            let double: f64 = p
+                .indices
+                .chunks_exact(3)
+                .map(|t| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).length())
+                .sum();
+            0.5 * double * scale
+        };
+        factor(p.material) * (cost.triangle * (p.indices.len() / 3) as f64 + cost.area * area)
+    };
+    let mut add = |cells: &[CellId], weight: f64| {
+        let item = graph.weights.len() as u32;
+        graph.weights.push(weight);
+        cells
+            .iter()
+            .for_each(|c| graph.items[c.0 as usize].push(item));
+    };
+    for b in &world.batches {
+        add(&b.cells, of_primitive(&b.primitive, 1.0));
+    }
+    for d in &world.details {
+        let t = d.transform;
+        let column = |k: usize| DVec3::new(t[k].into(), t[k + 1].into(), t[k + 2].into());
+        let volume = column(0).dot(column(4).cross(column(8))).abs();
+        let mesh = &world.detail_meshes[d.mesh as usize];
+        let scale = volume.powf(2.0 / 3.0);
+        add(
+            &d.cells,
+            mesh.primitives.iter().map(|p| of_primitive(p, scale)).sum(),
+        );
+    }
+    graph
+}

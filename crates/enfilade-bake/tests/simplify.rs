@@ -1,0 +1,131 @@
+//! The simplifier on random worlds: promises kept, bounds kept, views not much dearer.
+
+use enfilade_bake::simplify::{
+    CostModel, Metric, SimplifySettings, delete_portal, expected_cost, simplify,
+};
+use enfilade_cpg::{PortalId, World};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_verify::{VerifyOptions, verify_world};
+
+fn grid(rng: &mut Rng) -> World {
+    let size = [2 + rng.below(4), 1 + rng.below(2), 2 + rng.below(4)];
+    room_grid(&GridParams {
+        size,
+        doors: 0.5 + 0.5 * rng.unit(),
+        merges: 0.2 * rng.unit(),
+        outdoors: rng.chance(0.5),
+        furniture: 1,
+        ..GridParams::offices(4, rng.below(1 << 20) as u64)
+    })
+}
+
+fn holds(world: &World) {
+    world.validate().unwrap();
+    let options = VerifyOptions {
+        rays: 3000,
+        ..VerifyOptions::default()
+    };
+    let report = verify_world(world, None, &options);
+    assert!(report.holds(), "{report:?}");
+}
+
+#[test]
+fn merged_worlds_keep_their_promises_and_bounds() {
+    let mut rng = Rng::new(1);
+    for i in 0..40 {
+        let world = grid(&mut rng);
+        let before = simplify(&world, &SimplifySettings::default());
+        // Nothing asked, nothing done.
+        assert!(before.world.graph.cells == world.graph.cells);
+        assert!(before.world.graph.portals == world.graph.portals);
+        let max = before.max_cost * (1.0 + 3.0 * rng.unit());
+        let settings = SimplifySettings {
+            min_cost: rng.unit() * max,
+            max_cost: Some(max),
+            max_cells: rng.chance(0.5).then(|| 1 + rng.below(6)),
+            metric: if i % 2 == 0 {
+                Metric::ExpectedTriangles
+            } else {
+                Metric::VisibleVolume
+            },
+            cost: CostModel {
+                area: 0.1,
+                ..CostModel::default()
+            },
+        };
+        let bound = simplify(
+            &world,
+            &SimplifySettings {
+                cost: settings.cost.clone(),
+                ..SimplifySettings::default()
+            },
+        )
+        .max_cost
+        .max(max);
+        let simple = simplify(&world, &settings);
+        assert!(
+            simple.max_cost <= bound * (1.0 + 1e-12),
+            "{} > {bound}",
+            simple.max_cost
+        );
+        assert!(simple.world.graph.cells.len() <= world.graph.cells.len());
+        holds(&simple.world);
+        // Every triangle is still there, and every point in the cell that its old one became.
+        let n = |w: &World| {
+            w.batches
+                .iter()
+                .map(|b| b.primitive.indices.len())
+                .sum::<usize>()
+        };
+        assert_eq!(n(&simple.world), n(&world));
+        let b = world.graph.locator.bounds;
+        for _ in 0..200 {
+            let p =
+                b.min + b.size() * enfilade_geom::DVec3::new(rng.unit(), rng.unit(), rng.unit());
+            let expected = world
+                .graph
+                .locator
+                .locate(p)
+                .map(|c| simple.cell_of[c.0 as usize]);
+            assert_eq!(simple.world.graph.locator.locate(p), expected);
+        }
+    }
+}
+
+#[test]
+fn a_deleted_portal_makes_one_cell_of_two() {
+    let mut rng = Rng::new(7);
+    for _ in 0..20 {
+        let world = grid(&mut rng);
+        let Some(last) = world.graph.portals.len().checked_sub(1) else {
+            continue;
+        };
+        let gone = delete_portal(&world, PortalId(last as u32)).unwrap();
+        assert_eq!(gone.world.graph.cells.len() + 1, world.graph.cells.len());
+        assert!(gone.world.graph.portals.len() <= last);
+        let [a, b] = world.graph.portals[last].cells;
+        assert_eq!(gone.cell_of[a.0 as usize], gone.cell_of[b.0 as usize]);
+        holds(&gone.world);
+        assert!(delete_portal(&world, PortalId(last as u32 + 1)).is_none());
+    }
+}
+
+#[test]
+fn material_weights_count() {
+    let world = grid(&mut Rng::new(3));
+    let plain = simplify(&world, &SimplifySettings::default()).max_cost;
+    let cost = CostModel {
+        triangle: 2.0,
+        ..CostModel::default()
+    };
+    let double = simplify(
+        &world,
+        &SimplifySettings {
+            cost: cost.clone(),
+            ..SimplifySettings::default()
+        },
+    );
+    assert!((double.max_cost - 2.0 * plain).abs() < 1e-9);
+    let views = expected_cost(&world, &CostModel::default(), 64);
+    assert!((expected_cost(&world, &cost, 64) - 2.0 * views).abs() < 1e-6 * views);
+}

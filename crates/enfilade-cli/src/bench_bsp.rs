@@ -1,0 +1,158 @@
+//! `enfilade bench bsp` and `bench simplify`: the tables of `docs/benchmarks/bsp.md`.
+
+use std::path::{Path, PathBuf};
+
+use enfilade::bake::bsp::{Bsp, BspConfig, BspInput, Guide, Heuristic, bake_bsp};
+use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings, expected_cost, simplify};
+use enfilade::bake::{BakeContext, Silent};
+use enfilade::geom::scene::Role;
+use enfilade::geom::{DVec3, Triangle};
+use enfilade::import::{ImportOptions, import};
+
+use crate::world::read_world;
+
+/// Processor seconds that this process has used so far, all threads together; 0 where the system does
+/// not say.
+fn cpu_seconds() -> f64 {
+    let of_task = |entry: std::io::Result<std::fs::DirEntry>| {
+        let text = std::fs::read_to_string(entry.ok()?.path().join("schedstat")).ok()?;
+        text.split_ascii_whitespace().next()?.parse::<f64>().ok()
+    };
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
+    tasks.filter_map(of_task).sum::<f64>() * 1e-9
+}
+
+fn name(path: &Path) -> String {
+    path.file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}
+
+const HEURISTICS: [(&str, Heuristic); 4] = [
+    ("default", Heuristic::Default),
+    ("min-cut", Heuristic::MinCut),
+    ("max-area", Heuristic::MaxArea),
+    ("max-ortho", Heuristic::MaxOrtho),
+];
+
+pub(crate) fn bench_bsp(
+    table: &mut Vec<String>,
+    scenes: &[PathBuf],
+    all: bool,
+    bake: bool,
+) -> anyhow::Result<()> {
+    table.push(
+        "| scene | heuristic | polygons in | BSP s | polygons out | splits | leaves | portals | grouping s | \
+         valid | crossing | separators | cells before | cells | final portals |"
+            .into(),
+    );
+    table.push("| --- | --- |".to_owned() + &" ---: |".repeat(13));
+    let options = ImportOptions::default();
+    for path in scenes {
+        let imported = import(std::slice::from_ref(path), &[], &options)?;
+        let scene = &imported.scene;
+        let triangles: Vec<Triangle> = if scene.solids.is_empty() {
+            let sources = scene.triangle_sources(Role::Structural);
+            sources.map(|s| scene.world_triangle(s)).collect()
+        } else {
+            Vec::new()
+        };
+        let entities = scene.entities.iter().filter(|e| e.object.is_none());
+        let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
+        let input = BspInput {
+            triangles: &triangles,
+            solids: &scene.solids,
+            inside: &inside,
+        };
+        for (heuristic_name, heuristic) in HEURISTICS.into_iter().take(if all { 4 } else { 1 }) {
+            let start = cpu_seconds();
+            let bsp = Bsp::build(&input, heuristic, &Guide::default());
+            let built = cpu_seconds();
+            let found = bsp.grouping();
+            let grouped = cpu_seconds();
+            let c = bsp.counts();
+            let (cells, portals) = if bake {
+                let config = BspConfig {
+                    heuristic,
+                    simplify: SimplifySettings {
+                        min_cost: 50.0,
+                        ..SimplifySettings::default()
+                    },
+                    ..BspConfig::default()
+                };
+                let world = bake_bsp(scene, &config, &BakeContext::new(&Silent, None))?.world;
+                let (cells, portals) = (world.graph.cells.len(), world.graph.portals.len());
+                (cells.to_string(), portals.to_string())
+            } else {
+                ("-".to_owned(), "-".to_owned())
+            };
+            table.push(format!(
+                "| {} | {heuristic_name} | {} | {:.2} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {cells} | {portals} |",
+                name(path),
+                c.n_polygons,
+                built - start,
+                c.n_pieces,
+                c.n_splits,
+                c.n_leaves,
+                c.n_portals,
+                grouped - built,
+                found.n_valid,
+                found.n_crossing,
+                found.n_separators,
+                found.n_cells,
+            ));
+            if let Some(leak) = bsp.leak() {
+                let n = leak.points.len();
+                table.push(format!("{} leaks, by a path of {n} points", name(path)));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Expected triangles a view before and after, by both metrics, at the same share of portals.
+pub(crate) fn bench_simplify(table: &mut Vec<String>, worlds: &[PathBuf]) -> anyhow::Result<()> {
+    const VIEWS: usize = 1000;
+    table.push(
+        "| world | cells | portals | metric | cells after | portals after | triangles a view | after |"
+            .into(),
+    );
+    table.push("| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: |".into());
+    for path in worlds {
+        let world = read_world(path)?;
+        let cost = CostModel::default();
+        let before = expected_cost(&world, &cost, VIEWS);
+        let n_portals = world.graph.portals.len();
+        for share in [0.5, 0.3] {
+            for (metric_name, metric) in [
+                ("expected triangles", Metric::ExpectedTriangles),
+                ("visible volume", Metric::VisibleVolume),
+            ] {
+                let run = |n: usize| {
+                    let settings = SimplifySettings {
+                        max_cells: Some(n),
+                        metric,
+                        ..SimplifySettings::default()
+                    };
+                    simplify(&world, &settings)
+                };
+                // Portals grow with cells; a few steps end close below the share.
+                let mut n = (share * world.graph.cells.len() as f64) as usize;
+                let mut simple = run(n);
+                while simple.world.graph.portals.len() as f64 > share * n_portals as f64 && n > 1 {
+                    n = n * 9 / 10;
+                    simple = run(n);
+                }
+                table.push(format!(
+                    "| {} | {} | {n_portals} | {metric_name} | {} | {} | {before:.0} | {:.2} × |",
+                    name(path),
+                    world.graph.cells.len(),
+                    simple.world.graph.cells.len(),
+                    simple.world.graph.portals.len(),
+                    expected_cost(&simple.world, &cost, VIEWS) / before,
+                ));
+            }
+        }
+    }
+    Ok(())
+}

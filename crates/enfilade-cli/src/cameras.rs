@@ -1,0 +1,296 @@
+//! Cameras: given, found by themselves, on a walk, on a recorded path, at random.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use enfilade::cpg::{Cell, CellId, Portal, PortalId, World};
+use enfilade::runtime::{Sight, Sightlines};
+use enfilade_render::{Camera, Culling, RenderError, Shown, Studio};
+use enfilade_testkit::Rng;
+
+/// Height of an eye above the floor. [Units: wu]
+pub(crate) const EYE_HEIGHT: f32 = 1.6;
+
+/// Angle of a picture from its lower to its upper edge, unless said otherwise. [Units: rad]
+pub(crate) const FOV: f32 = 1.1;
+
+fn center(cell: &Cell) -> [f32; 3] {
+    [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5)
+}
+
+fn middle(portal: &Portal) -> [f32; 3] {
+    let n = portal.outline.len().max(1) as f32;
+    [0, 1, 2].map(|k| portal.outline.iter().map(|c| c[k]).sum::<f32>() / n)
+}
+
+/// The eye of somebody who stands below `p`.
+fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
+    let hit = lines.first_hit(p, [p[0], p[1] - 100.0, p[2]])?;
+    let floor = p[1] - 100.0 * hit.t as f32;
+    Some([p[0], floor + EYE_HEIGHT, p[2]])
+}
+
+/// A camera with much to see: of those that stand in large rooms, the one whose picture shows most
+/// different things, far away, with nothing right before it.
+pub(crate) fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
+    let lines = Sightlines::build(world);
+    let mut cells: Vec<(u32, &Cell)> = (0..).zip(&world.graph.cells).collect();
+    cells.retain(|(_, c)| !c.outdoor && c.volume > 0.0);
+    cells.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
+    let mut best = (f32::NEG_INFINITY, overview(studio));
+    for &(id, cell) in cells.iter().take(8) {
+        let [low, high] = cell.aabb;
+        for [u, v] in [[0.5, 0.5], [0.2, 0.2], [0.8, 0.2], [0.2, 0.8], [0.8, 0.8]] {
+            let at = |k: usize, t: f32| low[k] + (high[k] - low[k]) * t;
+            let p = [at(0, u), at(1, 0.5), at(2, v)];
+            if studio.sight.locate(p) != Some(CellId(id)) {
+                continue;
+            }
+            let eye = standing(&lines, p)
+                .filter(|&e| studio.sight.locate(e) == Some(CellId(id)))
+                .unwrap_or(p);
+            for i in 0..8 {
+                let angle = (i as f32 + 0.5) * std::f32::consts::FRAC_PI_4;
+                let camera = Camera {
+                    eye,
+                    toward: [angle.cos(), -0.08, angle.sin()],
+                    fov_y: FOV,
+                };
+                let score = interest(studio, &camera)?;
+                if score > best.0 {
+                    best = (score, camera);
+                }
+            }
+        }
+    }
+    Ok(best.1)
+}
+
+/// The whole world from above, aside.
+fn overview(studio: &Studio) -> Camera {
+    let [low, high] = studio.world.bounds();
+    let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
+    let size = [0, 1, 2].map(|k| high[k] - low[k]);
+    let radius = (size[0] * size[0] + size[1] * size[1] + size[2] * size[2]).sqrt() * 0.5;
+    let back = [0.55, 0.5, 0.67].map(|d| d * radius * 2.1);
+    Camera::looking_at([0, 1, 2].map(|k| center[k] + back[k]), center)
+}
+
+fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
+    let [solid, _] = studio.ids(camera, Culling::Portals, [48, 27])?;
+    let mut things = Vec::new();
+    let (mut near, mut far, mut sky) = (0, 0, 0);
+    for (shown, depth) in solid.pixels {
+        match shown {
+            Shown::Sky => sky += 1,
+            Shown::Structure { triangle } => {
+                let chunk = studio.world.chunk_of_triangle(triangle);
+                things.push((0, chunk.and_then(|c| studio.world.batch_of_chunk(c))));
+            }
+            Shown::Detail { detail, .. } => things.push((1, Some(detail))),
+        }
+        let distance = Camera::distance_of(depth);
+        near += u32::from(distance < 1.0);
+        far += u32::from(depth > 0.0 && distance > 6.0);
+    }
+    things.sort_unstable();
+    things.dedup();
+    let n = 48.0 * 27.0;
+    let share = |count: u32| count as f32 / n;
+    Ok((things.len() as f32).ln_1p() + 2.0 * share(far) - 4.0 * share(near) - share(sky))
+}
+
+/// A walk through the doorways of a world: points on the way, with the way onwards.
+pub(crate) fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
+    let mut stops = Vec::new();
+    let mut been = vec![0_u32; world.graph.cells.len()];
+    let Some(first) = world.graph.cells.iter().position(|c| !c.outdoor) else {
+        return Vec::new();
+    };
+    let (mut cell, mut came_by) = (first, None);
+    stops.push(center(&world.graph.cells[cell]));
+    // Always to the neighbor that was visited least, by the first such portal.
+    while stops.len() < 2 * views {
+        been[cell] += 1;
+        let next = world.graph.cells[cell]
+            .portals
+            .iter()
+            .map(|&id| {
+                let p = &world.graph.portals[id.0 as usize];
+                let to = p.cells[usize::from(p.cells[0].0 as usize == cell)].0 as usize;
+                (been[to], Some(id) == came_by, id, to)
+            })
+            .filter(|(.., to)| !world.graph.cells[*to].outdoor)
+            .min_by_key(|&(n, is_back, id, _)| (n, is_back, id));
+        let Some((_, _, id, to)) = next else { break };
+        stops.push(middle(&world.graph.portals[id.0 as usize]));
+        stops.push(center(&world.graph.cells[to]));
+        (cell, came_by) = (to, Some(id));
+    }
+    // A stretch of a meter a view.
+    let mut out = Vec::new();
+    for pair in stops.windows(2) {
+        let d = [0, 1, 2].map(|k| pair[1][k] - pair[0][k]);
+        let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        let n = (length.ceil() as usize).max(1);
+        for i in 0..n {
+            let t = i as f32 / n as f32;
+            let at = [0, 1, 2].map(|k| pair[0][k] + d[k] * t);
+            if length > 0.0 && sight.locate(at).is_some() && out.len() < views {
+                out.push((at, [d[0], 0.0, d[2]]));
+            }
+        }
+    }
+    out
+}
+
+/// The same as cameras, at eye height where there is a floor.
+pub(crate) fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> Vec<Camera> {
+    let lines = Sightlines::build(world);
+    let mut last = [1.0, 0.0, 0.0];
+    walk(world, sight, views)
+        .into_iter()
+        .map(|(p, toward)| {
+            // Straight up or down has no heading: the last one stays.
+            if toward[0].hypot(toward[2]) > 1e-3 {
+                last = toward;
+            }
+            let eye = standing(&lines, p).filter(|&e| sight.locate(e).is_some());
+            Camera {
+                eye: eye.unwrap_or(p),
+                toward: last,
+                fov_y,
+            }
+        })
+        .collect()
+}
+
+/// Reads a path: a line for each camera, `eye-x eye-y eye-z look-x look-y look-z`, in meters.
+pub(crate) fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut out = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse).collect();
+        match numbers.as_deref() {
+            Ok(&[x, y, z, a, b, c]) if [x, y, z, a, b, c].iter().all(|v| v.is_finite()) => {
+                out.push(Camera {
+                    eye: [x, y, z].map(|v| v as f32),
+                    // From the eye as it was before it was written in few digits.
+                    toward: [[a, x], [b, y], [c, z]]
+                        .map(|[to, from]| (to - f64::from(from as f32)) as f32),
+                    fov_y,
+                });
+            }
+            _ => bail!(
+                "{}:{}: six numbers are needed, eye and point looked at: x y z x y z",
+                path.display(),
+                i + 1
+            ),
+        }
+    }
+    if out.is_empty() {
+        bail!("{}: holds no camera", path.display());
+    }
+    Ok(out)
+}
+
+/// The path as [`read_path`] reads it.
+pub(crate) fn path_text(cameras: &[Camera]) -> String {
+    let mut out = String::from("# eye x y z, point looked at x y z; meters\n");
+    for c in cameras {
+        let [x, y, z] = c.eye;
+        // Summed with more digits than either has, so that what is read back is what was written.
+        let [a, b, d] = [0, 1, 2].map(|k| f64::from(c.eye[k]) + f64::from(c.toward[k]));
+        out += &format!("{x} {y} {z} {a} {b} {d}\n");
+    }
+    out
+}
+
+/// A random camera of `verify --views`: mostly in a cell, now and then in an opening, or anywhere,
+/// walls and the outside included.
+pub(crate) fn random_camera(
+    rng: &mut Rng,
+    world: &World,
+    sight: &Sight,
+    bounds: [[f32; 3]; 2],
+) -> Camera {
+    let in_box = |rng: &mut Rng, [low, high]: [[f32; 3]; 2]| {
+        [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32)
+    };
+    let graph = &world.graph;
+    let kind = rng.below(10);
+    let mut eye = in_box(rng, bounds);
+    if kind == 0 && !graph.portals.is_empty() {
+        // On its plane but for a rounding, or a little beside it.
+        let portal = &graph.portals[rng.below(graph.portals.len())];
+        let middle = middle(portal);
+        let corner = portal.outline[rng.below(portal.outline.len())];
+        let t = rng.unit() as f32 * 0.95;
+        let off = [0.0, 1e-5, 1e-3, 0.03][rng.below(4)];
+        eye = [0, 1, 2].map(|k| middle[k] + (corner[k] - middle[k]) * t + portal.normal[k] * off);
+    } else if kind > 1 && !graph.cells.is_empty() {
+        for _ in 0..1000 {
+            let c = rng.below(graph.cells.len());
+            let p = in_box(rng, graph.cells[c].aabb);
+            if sight.locate(p) == Some(CellId(c as u32)) {
+                eye = p;
+                break;
+            }
+        }
+    }
+    let angle = rng.range(0.0, std::f64::consts::TAU);
+    let level = rng.range(-1.2, 1.2) * rng.unit();
+    Camera {
+        eye,
+        toward: [angle.cos(), level.tan(), angle.sin()].map(|x| x as f32),
+        fov_y: rng.range(0.4, 1.9) as f32,
+    }
+}
+
+/// What opens nearest to where a camera looks, and how far away it is. [Units: wu]
+pub(crate) fn portal_looked_at(
+    world: &World,
+    lines: &Sightlines,
+    camera: &Camera,
+) -> Option<(PortalId, f32)> {
+    let length = camera.toward.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let forward = camera.toward.map(|x| x / length.max(1e-9));
+    let far = 30.0;
+    let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * far);
+    let wall = lines
+        .first_hit(camera.eye, end)
+        .map_or(far, |h| h.t as f32 * far);
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|k| a[k] - b[k]);
+    let cross = |a: [f32; 3], b: [f32; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let mut best: Option<(PortalId, f32)> = None;
+    for (i, portal) in (0..).zip(&world.graph.portals) {
+        let facing = dot(portal.normal, forward);
+        let t = dot(portal.normal, sub(portal.outline[0], camera.eye)) / facing;
+        if facing.abs() < 1e-6 || t <= 0.0 || t > wall + 0.05 || best.is_some_and(|b| b.1 <= t) {
+            continue;
+        }
+        let p = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * t);
+        let next = portal.outline.iter().cycle().skip(1);
+        let is_inside = portal
+            .outline
+            .iter()
+            .zip(next)
+            .all(|(a, b)| dot(portal.normal, cross(sub(*b, *a), sub(p, *a))) >= 0.0);
+        if is_inside {
+            best = Some((PortalId(i), t));
+        }
+    }
+    best
+}

@@ -1,0 +1,260 @@
+//! `verify --views`: pictures with and without culling, compared pixel by pixel.
+
+mod oracle;
+
+use std::fmt;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use enfilade::cpg::World;
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, Gpu, LostPixel, Mark, Picture, Shape, Shown, Studio, Style,
+};
+use enfilade_testkit::Rng;
+use serde::Serialize;
+
+use self::oracle::Oracle;
+use crate::cameras::random_camera;
+use crate::output::write_atomically;
+use crate::progress::StageBar;
+
+/// What to compare, and with what.
+pub(crate) struct Asked<'a> {
+    pub(crate) views: u64,
+    pub(crate) seed: u64,
+    pub(crate) size: [u32; 2],
+    pub(crate) adapter: &'a AdapterChoice,
+    pub(crate) pictures: Option<&'a PathBuf>,
+    pub(crate) max_listed: usize,
+}
+
+/// What was found.
+#[derive(Default, Serialize)]
+pub(crate) struct Exactness {
+    views: u64,
+    pixels: u64,
+    /// Pixels that show something else.
+    pub(crate) differing: u64,
+    /// Views with such pixels.
+    differing_views: u64,
+    /// Pixels that show another triangle in the very same place.
+    tied: u64,
+    /// Pixels whose middle lies on an edge, to a 64th of a pixel: both pictures are right.
+    edges: u64,
+    /// Pixels where the picture without culling shows what no exact ray meets first: through a crack
+    /// that the adapter's rounding opens between triangles which touch.
+    cracks: u64,
+    /// Views passed over: the eye was on a surface.
+    on_surface: u64,
+    /// Triangles drawn, of those drawn without culling.
+    triangles: [u64; 2],
+    adapter: String,
+    lost: Vec<Lost>,
+}
+
+/// Something lost.
+#[derive(Serialize)]
+struct Lost {
+    view: u64,
+    eye: [f32; 3],
+    look: [f32; 3],
+    fov_degrees: f32,
+    cell: Option<u32>,
+    at: [u32; 2],
+    pixels: usize,
+    expected: String,
+    /// Cells that see what is lost.
+    cells: Vec<u32>,
+    found: String,
+    /// Distances along the view direction of what is lost and what is shown. [Units: wu]
+    depths: [f32; 2],
+}
+
+impl fmt::Display for Exactness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let share = 100.0 * self.triangles[0] as f64 / self.triangles[1].max(1) as f64;
+        writeln!(
+            f,
+            "exact      {} views, {} pixels: {} lost in {} views; {} show another triangle in the same place, {} are on an edge, \
+             {} look through cracks of the adapter's rounding\n                 {} views passed over at a surface; {share:.2} % of the triangles drawn; {}",
+            self.views,
+            self.pixels,
+            self.differing,
+            self.differing_views,
+            self.tied,
+            self.edges,
+            self.cracks,
+            self.on_surface,
+            self.adapter
+        )?;
+        for l in &self.lost {
+            let p = |p: [f32; 3]| format!("{},{},{}", p[0], p[1], p[2]);
+            writeln!(
+                f,
+                "  view {}: {} pixels, at {},{} {} of cells {:?} at {:.4} m is not drawn, {} at {:.4} m is; \
+                 --eye {} --look {} --fov {}, in {}",
+                l.view,
+                l.pixels,
+                l.at[0],
+                l.at[1],
+                l.expected,
+                l.cells,
+                l.depths[0],
+                l.found,
+                l.depths[1],
+                p(l.eye),
+                p(l.look),
+                l.fov_degrees,
+                l.cell.map_or("no cell".to_owned(), |c| format!("cell {c}"))
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// What a pixel shows, in words, and the cells that see it.
+fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<u32>) {
+    let ids = |cells: &[enfilade::cpg::CellId]| cells.iter().map(|c| c.0).collect();
+    match shown {
+        Shown::Sky => ("the sky".into(), Vec::new()),
+        Shown::Structure { triangle } => {
+            let chunk = studio.world.chunk_of_triangle(triangle);
+            let batch = chunk.and_then(|c| studio.world.batch_of_chunk(c));
+            let cells = batch.map_or(Vec::new(), |b| ids(&world.batches[b as usize].cells));
+            let batch = batch.map_or("?".to_owned(), |b| b.to_string());
+            (format!("triangle {triangle} of batch {batch}"), cells)
+        }
+        Shown::Detail { detail, .. } => {
+            let d = &world.details[detail as usize];
+            (format!("detail {detail} ({})", d.name), ids(&d.cells))
+        }
+    }
+}
+
+pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Result<Exactness> {
+    let mut studio = Studio::new(Gpu::open(asked.adapter)?, world)?;
+    let bounds = studio.world.bounds();
+    let margin = 0.05;
+    let bounds = [bounds[0].map(|x| x - margin), bounds[1].map(|x| x + margin)];
+    let mut rng = Rng::new(asked.seed);
+    let mut out = Exactness {
+        views: asked.views,
+        adapter: studio.gpu.name(),
+        ..Exactness::default()
+    };
+    if let Some(dir) = asked.pictures {
+        std::fs::create_dir_all(dir)
+            .with_context(|| format!("cannot make folder {}", dir.display()))?;
+    }
+    let oracle = Oracle::new(world, &studio.sight);
+    let bar = StageBar::new();
+    bar.start("comparing pictures", asked.views);
+    let aspect = asked.size[0] as f32 / asked.size[1] as f32;
+    for view in 0..asked.views {
+        let camera = random_camera(&mut rng, world, &studio.sight, bounds);
+        if oracle.is_at_surface(camera.eye) {
+            out.on_surface += 1;
+            continue;
+        }
+        let whole = studio.ids(&camera, Culling::Everything, asked.size)?;
+        let culled = studio.ids(&camera, Culling::Portals, asked.size)?;
+        out.triangles[1] += studio.world.n_triangles();
+        let seen = camera.view(aspect)?;
+        out.triangles[0] += studio
+            .list(&seen, camera.eye, Culling::Portals, asked.size)
+            .n_triangles();
+        let mut lost = Vec::new();
+        for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
+            let mut difference = a.difference(b);
+            // Each pixel once, though there are two layers of it.
+            out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
+            out.tied += difference.n_tied;
+            difference.lost.retain(|l| {
+                let drawn = f64::from(Camera::distance_of(l.found.1));
+                let on_edge = oracle.is_right(&camera, l.at, asked.size, drawn, layer == 1);
+                let in_crack = !oracle.is_met(&camera, l.at, asked.size, l.expected.0, layer == 1);
+                out.edges += u64::from(on_edge);
+                out.cracks += u64::from(in_crack && !on_edge);
+                !on_edge && !in_crack
+            });
+            lost.extend(difference.lost);
+        }
+        if !lost.is_empty() {
+            out.differing += lost.len() as u64;
+            out.differing_views += 1;
+            if out.lost.len() < asked.max_listed {
+                out.lost
+                    .push(describe(&studio, world, &camera, view, &lost));
+                if let Some(dir) = asked.pictures {
+                    let picture = picture_of_loss(&mut studio, &camera, &lost, asked.size)?;
+                    write_atomically(&dir.join(format!("view-{view}.png")), &picture.to_png()?)?;
+                }
+            }
+        }
+        bar.set(view + 1);
+    }
+    bar.finish();
+    Ok(out)
+}
+
+fn describe(
+    studio: &Studio,
+    world: &World,
+    camera: &Camera,
+    view: u64,
+    lost: &[LostPixel],
+) -> Lost {
+    let first = lost[0];
+    let (expected, cells) = named(studio, world, first.expected.0);
+    let (found, _) = named(studio, world, first.found.0);
+    Lost {
+        view,
+        eye: camera.eye,
+        look: [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]),
+        fov_degrees: camera.fov_y.to_degrees(),
+        cell: studio.sight.locate(camera.eye).map(|c| c.0),
+        at: first.at,
+        pixels: lost.len(),
+        expected,
+        cells,
+        found,
+        depths: [first.expected.1, first.found.1].map(Camera::distance_of),
+    }
+}
+
+/// Everything, what is drawn, and both apart: side by side, with frames around what is lost.
+fn picture_of_loss(
+    studio: &mut Studio,
+    camera: &Camera,
+    lost: &[LostPixel],
+    size: [u32; 2],
+) -> anyhow::Result<Picture> {
+    let style = Style {
+        shadows: false,
+        dark_corners: false,
+        ..Style::default()
+    };
+    let marks: Vec<Mark> = lost
+        .iter()
+        .take(200)
+        .map(|l| {
+            let at = |i: usize, d: f32| (l.at[i] as f32 + 0.5 + d) / size[i] as f32 * 2.0 - 1.0;
+            Mark {
+                shape: Shape::Rectangle([at(0, -4.0), -at(1, 4.0), at(0, 4.0), -at(1, -4.0)]),
+                color: [1.0, 0.0, 0.2, 1.0],
+                width: 1.5,
+                on_top: true,
+            }
+        })
+        .collect();
+    let whole = studio.picture(camera, Culling::Everything, style, &marks, size)?;
+    let culled = studio.picture(camera, Culling::Portals, style, &marks, size)?;
+    let mut out = Picture {
+        width: size[0] * 2,
+        height: size[1],
+        rgba: vec![255; (size[0] * size[1] * 8) as usize],
+    };
+    out.put(&whole, 0, 0);
+    out.put(&culled, size[0], 0);
+    Ok(out)
+}

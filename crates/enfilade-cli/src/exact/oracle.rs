@@ -1,0 +1,297 @@
+//! What a pixel shows by exact sight lines, to tell what culling lost from what an adapter rounds.
+//!
+//! Adapters round corners to a grid of 1/256 pixel before they fill triangles. Where two triangles
+//! share an edge, or a hidden one ends at it, which of them a pixel on that edge shows is a rounding;
+//! and pictures with more triangles have more such edges. So each pixel that differs is asked of a ray
+//! in 64-bit arithmetic: it is lost unless the ray, moved by less than a 64th of a pixel, says that
+//! what was drawn is right.
+
+use enfilade::cpg::World;
+use enfilade::geom::scene::Primitive;
+use enfilade::geom::{Bvh, DMat4, DVec3, Ray, Triangle};
+use enfilade::runtime::Sight;
+use enfilade_render::{Camera, Shown};
+
+/// How far a sight line is moved, in pixels: a little over what adapters round by.
+const NUDGE: f64 = 1.0 / 64.0;
+
+/// The triangles of a world, those that hide and those that do not.
+pub(super) struct Oracle {
+    solid: Bvh,
+    transparent: Bvh,
+    /// By triangle of each: what a picture calls it.
+    solid_keys: Vec<Shown>,
+    transparent_keys: Vec<Shown>,
+    tolerance: f64,
+}
+
+fn dvec(p: [f32; 3]) -> DVec3 {
+    DVec3::new(p[0].into(), p[1].into(), p[2].into())
+}
+
+impl Oracle {
+    /// `sight` numbers the triangles as pictures do.
+    pub(super) fn new(world: &World, sight: &Sight) -> Self {
+        let mut triangles: [Vec<Triangle>; 2] = [Vec::new(), Vec::new()];
+        let mut keys: [Vec<Shown>; 2] = [Vec::new(), Vec::new()];
+        let mut add = |primitive: &Primitive,
+                       indices: &[u32],
+                       place: &dyn Fn(DVec3) -> DVec3,
+                       key: &dyn Fn(u32) -> Shown| {
+            let material = primitive
+                .material
+                .and_then(|m| world.materials.get(m as usize));
+            let to = usize::from(material.is_some_and(|m| m.transparent));
+            for (i, t) in (0..).zip(indices.chunks_exact(3)) {
+                let corners = [0, 1, 2].map(|k| place(dvec(primitive.positions[t[k] as usize])));
+                triangles[to].push(corners);
+                keys[to].push(key(i));
+            }
+        };
+        let mut n = 0;
+        for (i, batch) in (0..).zip(&world.batches) {
+            let indices = sight.indices(i);
+            add(&batch.primitive, indices, &|p| p, &|t| Shown::Structure {
+                triangle: n + t,
+            });
+            n += indices.len() as u32 / 3;
+        }
+        let mut first_of_mesh = Vec::new();
+        for mesh in &world.detail_meshes {
+            first_of_mesh.push(n);
+            n += mesh
+                .primitives
+                .iter()
+                .map(|p| p.indices.len() as u32 / 3)
+                .sum::<u32>();
+        }
+        for (detail, object) in (0..).zip(&world.details) {
+            let m = DMat4::from_cols_array(&object.transform.map(f64::from));
+            let mut n = first_of_mesh[object.mesh as usize];
+            for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+                add(
+                    primitive,
+                    &primitive.indices,
+                    &|p| m.transform_point3(p),
+                    &|t| Shown::Detail {
+                        detail,
+                        triangle: n + t,
+                    },
+                );
+                n += primitive.indices.len() as u32 / 3;
+            }
+        }
+        let [solid_keys, transparent_keys] = keys;
+        Self {
+            solid: Bvh::build(&triangles[0]),
+            transparent: Bvh::build(&triangles[1]),
+            solid_keys,
+            transparent_keys,
+            tolerance: sight.tolerance(),
+        }
+    }
+
+    /// Whether an eye is so near to a surface that the near plane cuts it.
+    pub(super) fn is_at_surface(&self, eye: [f32; 3]) -> bool {
+        let near = f64::from(Camera::NEAR) * 8.0;
+        [&self.solid, &self.transparent]
+            .iter()
+            .any(|b| b.nearest(dvec(eye), near).is_some())
+    }
+
+    /// Whether what is drawn at a pixel, `found` meters away along the view direction (infinity for
+    /// the sky), is right but for less than a 64th of a pixel.
+    pub(super) fn is_right(
+        &self,
+        camera: &Camera,
+        at: [u32; 2],
+        size: [u32; 2],
+        found: f64,
+        is_transparent: bool,
+    ) -> bool {
+        let same = |a: f64, b: f64| {
+            if a.is_infinite() || b.is_infinite() {
+                return a == b;
+            }
+            // Rounding of places, and of depths in 32 bits.
+            (a - b).abs() <= 2.0 * self.tolerance + 4e-6 * a
+        };
+        if same(
+            self.distance(camera, at, [0.0; 2], size, is_transparent),
+            found,
+        ) {
+            return true;
+        }
+        // Nearby: the place where an oblique surface is met moves as well.
+        let near = |a: f64, b: f64| same(a, b) || (a - b).abs() <= 0.02 * a.min(b);
+        around().any(|nudge| {
+            near(
+                self.distance(camera, at, nudge, size, is_transparent),
+                found,
+            )
+        })
+    }
+
+    /// Whether `shown` is what an exact ray through the middle of the pixel meets first, or among several
+    /// in one place; and so at two or more places a 64th of a pixel away. What is seen at the middle
+    /// alone is seen through a gap that comes of rounding corners to 32 bits.
+    pub(super) fn is_met(
+        &self,
+        camera: &Camera,
+        at: [u32; 2],
+        size: [u32; 2],
+        shown: Shown,
+        is_transparent: bool,
+    ) -> bool {
+        let met = |nudge| self.is_met_there(camera, at, nudge, size, shown, is_transparent);
+        met([0.0; 2]) && around().filter(|&nudge| met(nudge)).count() >= 2
+    }
+
+    fn is_met_there(
+        &self,
+        camera: &Camera,
+        at: [u32; 2],
+        nudge: [f64; 2],
+        size: [u32; 2],
+        shown: Shown,
+        is_transparent: bool,
+    ) -> bool {
+        let first = self.distance(camera, at, nudge, size, is_transparent);
+        if first.is_infinite() {
+            return shown == Shown::Sky;
+        }
+        let (bvh, keys) = if is_transparent {
+            (&self.transparent, &self.transparent_keys)
+        } else {
+            (&self.solid, &self.solid_keys)
+        };
+        let ray = Ray {
+            t_max: first - f64::from(Camera::NEAR) + 1e-6 * first,
+            ..ray_through(camera, at, nudge, size)
+        };
+        let mut is_met = false;
+        bvh.for_each_hit(&ray, |hit| {
+            is_met |= keys[hit.triangle as usize] == shown;
+        });
+        is_met
+    }
+
+    /// How far away along the view direction the first surface is. [Units: wu]
+    fn distance(
+        &self,
+        camera: &Camera,
+        at: [u32; 2],
+        nudge: [f64; 2],
+        size: [u32; 2],
+        is_transparent: bool,
+    ) -> f64 {
+        let ray = ray_through(camera, at, nudge, size);
+        let first = |bvh: &Bvh| {
+            bvh.closest_hit(&ray, |_| false)
+                .map_or(f64::INFINITY, |h| h.t)
+        };
+        let solid = first(&self.solid);
+        let t = if is_transparent {
+            let t = first(&self.transparent);
+            if t < solid { t } else { f64::INFINITY }
+        } else {
+            solid
+        };
+        t + f64::from(Camera::NEAR)
+    }
+}
+
+/// Sixteen places around the middle of a pixel.
+fn around() -> impl Iterator<Item = [f64; 2]> {
+    (0..16).map(|i| {
+        let angle = (f64::from(i) + 0.31) * std::f64::consts::FRAC_PI_8;
+        [angle.cos() * NUDGE, angle.sin() * NUDGE]
+    })
+}
+
+/// From the near plane on, in lengths of the view direction.
+fn ray_through(camera: &Camera, at: [u32; 2], nudge: [f64; 2], size: [u32; 2]) -> Ray {
+    let [right, up, forward] = camera.axes().map(|v| dvec(v.to_array()));
+    let tan = f64::from(camera.fov_y * 0.5).tan();
+    let [w, h] = size.map(f64::from);
+    let x = (f64::from(at[0]) + 0.5 + nudge[0]) / w * 2.0 - 1.0;
+    let y = 1.0 - (f64::from(at[1]) + 0.5 + nudge[1]) / h * 2.0;
+    let direction = forward + right * (x * tan * w / h) + up * (y * tan);
+    Ray {
+        origin: dvec(camera.eye) + direction * f64::from(Camera::NEAR),
+        direction,
+        t_max: f64::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade::cpg::Batch;
+
+    /// A wall 5 m ahead, from x = 0 on to the right.
+    fn wall() -> World {
+        let primitive = Primitive {
+            positions: vec![
+                [0.0, -9.0, -5.0],
+                [9.0, -9.0, -5.0],
+                [9.0, 9.0, -5.0],
+                [0.0, 9.0, -5.0],
+            ],
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..Primitive::default()
+        };
+        World {
+            batches: vec![Batch {
+                cells: Vec::new(),
+                primitive,
+            }],
+            ..World::default()
+        }
+    }
+
+    fn oracle() -> Oracle {
+        let world = wall();
+        Oracle::new(&world, &Sight::build(&world).unwrap())
+    }
+
+    #[test]
+    fn only_what_an_exact_ray_shows_is_right() {
+        let oracle = oracle();
+        // 4 pixels wide: the wall's edge is between the second and the third.
+        let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
+        let right = |x, d| oracle.is_right(&camera, [x, 2], [4, 4], d, false);
+        assert!(right(2, 5.0) && !right(2, f64::INFINITY) && !right(2, 4.0));
+        assert!(right(1, f64::INFINITY) && !right(1, 5.0));
+    }
+
+    #[test]
+    fn on_an_edge_both_sides_are_right() {
+        let oracle = oracle();
+        let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
+        // 5 pixels: the middle of the third is on the edge.
+        for d in [5.0, f64::INFINITY] {
+            assert!(oracle.is_right(&camera, [2, 2], [5, 5], d, false));
+        }
+        assert!(!oracle.is_right(&camera, [2, 2], [5, 5], 7.0, false));
+    }
+
+    #[test]
+    fn what_is_behind_a_wall_is_not_met() {
+        let oracle = oracle();
+        let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
+        let met = |x, shown| oracle.is_met(&camera, [x, 2], [4, 4], shown, false);
+        // Chunks put the two triangles in an order of their own.
+        let wall = [0, 1].map(|triangle| Shown::Structure { triangle });
+        assert!(wall.iter().any(|&t| met(2, t)) && !met(2, Shown::Sky));
+        assert!(met(1, Shown::Sky) && !wall.iter().any(|&t| met(1, t)));
+        assert!(!met(2, Shown::Structure { triangle: 9 }));
+    }
+
+    #[test]
+    fn an_eye_at_a_wall_is_known() {
+        let oracle = oracle();
+        assert!(oracle.is_at_surface([1.0, 0.0, -4.99999]));
+        assert!(!oracle.is_at_surface([1.0, 0.0, -4.9]));
+    }
+}

@@ -1,0 +1,369 @@
+//! `enfilade render`: pictures, without a display.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+use enfilade::cpg::{PortalId, World};
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Studio,
+    Style,
+};
+use serde_json::json;
+
+use crate::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
+use crate::output::{check_target, write_atomically};
+use crate::see::{point, size};
+use crate::world::read_world;
+
+/// Draws a picture of a world, or one for each camera of a path, to PNG files; needs no display.
+#[derive(clap::Args)]
+pub(crate) struct Render {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+    /// Where to write the picture; of a path, `walk.png` becomes `walk-0001.png` and so on.
+    #[arg(short, long, value_name = "PNG")]
+    output: PathBuf,
+    /// Where the eye is, in meters; without it, a place with much to see is looked for.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "look")]
+    eye: Option<[f32; 3]>,
+    /// The point looked at, in meters; not a direction.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "eye")]
+    look: Option<[f32; 3]>,
+    /// A picture for each line of this file: eye and point looked at, `x y z x y z`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "walk"])]
+    path: Option<PathBuf>,
+    /// So many pictures on a walk through the doorways.
+    #[arg(long, value_name = "N", conflicts_with = "eye")]
+    walk: Option<usize>,
+    /// Write the cameras of the pictures to this file, for --path.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Angle from the lower to the upper edge of the picture, in degrees.
+    #[arg(long, value_name = "DEG", default_value_t = FOV.to_degrees(), value_parser = angle)]
+    fov: f32,
+    /// Width and height of the picture.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
+    size: [u32; 2],
+    /// What is drawn: all, what meets the view, or what is seen through portals.
+    #[arg(long, value_enum, default_value_t = Mode::Portals)]
+    mode: Mode,
+    /// How surfaces are painted: as they look, by cell, or by how often pixels are drawn.
+    #[arg(long, value_enum, default_value_t = Colors::Lit)]
+    paint: Colors,
+    /// Outline the portals that something is seen through, and what each narrows the view to.
+    #[arg(long)]
+    portals: bool,
+    /// Show the world from above, with the view and what is culled: dark is out of view, red behind
+    /// walls, orange hidden by a large polygon.
+    #[arg(long)]
+    above: bool,
+    /// Take off what is higher than this, in meters; with --above, 0.5 above the eye by default.
+    #[arg(long, value_name = "METERS", allow_hyphen_values = true)]
+    cut: Option<f32>,
+    /// Portals that are closed, by number.
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    close: Vec<u32>,
+    /// No shadows and no dark corners: quicker.
+    #[arg(long)]
+    plain: bool,
+    /// What draws: `best`, `gpu`, `software`, or part of a name.
+    #[arg(long, default_value = "best", value_name = "NAME")]
+    adapter: AdapterChoice,
+    /// Print what was drawn as JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Mode {
+    Everything,
+    Frustum,
+    Portals,
+}
+
+impl Mode {
+    pub(crate) fn culling(self) -> Culling {
+        match self {
+            Self::Everything => Culling::Everything,
+            Self::Frustum => Culling::Frustum,
+            Self::Portals => Culling::Portals,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Colors {
+    Lit,
+    Cells,
+    Overdraw,
+}
+
+fn angle(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if (1.0..=165.0).contains(&x) => Ok(x),
+        _ => Err("an angle between 1 and 165 degrees is needed".into()),
+    }
+}
+
+/// Reads a world and puts it on an adapter.
+pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
+    let world = read_world(path)?;
+    let studio =
+        Studio::new(Gpu::open(adapter)?, &world).with_context(|| path.display().to_string())?;
+    let n = studio.world.n_missing_pictures();
+    if n > 0 {
+        eprintln!("enfilade: {n} pictures of textures are missing or damaged; drawn without");
+    }
+    Ok((world, studio))
+}
+
+/// A picture at twice the size, halved: smooth edges.
+pub(crate) fn smooth(
+    size: [u32; 2],
+    draw: impl FnOnce([u32; 2]) -> anyhow::Result<Picture>,
+) -> anyhow::Result<Picture> {
+    // Beyond 4096 the adapter's limit is near, and edges are fine as they are.
+    if size[0].max(size[1]) > 4096 {
+        return draw(size);
+    }
+    Ok(draw(size.map(|n| n * 2))?.halved())
+}
+
+pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
+    let fov = args.fov.to_radians();
+    let is_path = args.path.is_some() || args.walk.is_some();
+    if !is_path {
+        check_target(&args.output)?;
+    }
+    let given = args
+        .path
+        .as_deref()
+        .map(|p| read_path(p, fov))
+        .transpose()?;
+    let (world, mut studio) = open(&args.world, &args.adapter)?;
+    for &p in &args.close {
+        if p as usize >= world.graph.portals.len() {
+            bail!("there is no portal {p}; `enfilade inspect` lists them");
+        }
+        studio.state.close(PortalId(p));
+    }
+    let cameras = match (given, args.walk, args.eye.zip(args.look)) {
+        (Some(path), ..) => path,
+        (_, Some(n), _) => walk_cameras(&world, &studio.sight, n, fov),
+        (.., Some((eye, look))) => vec![Camera {
+            fov_y: fov,
+            ..Camera::looking_at(eye, look)
+        }],
+        _ => vec![Camera {
+            fov_y: fov,
+            ..good_camera(&mut studio, &world)?
+        }],
+    };
+    if cameras.is_empty() {
+        bail!("{}: no room to walk in", args.world.display());
+    }
+    let style = Style {
+        paint: match args.paint {
+            Colors::Lit => Paint::Lit,
+            Colors::Cells => Paint::Cells,
+            Colors::Overdraw => Paint::Overdraw,
+        },
+        dark_corners: !args.plain,
+        shadows: !args.plain,
+        cut_above: args.cut.unwrap_or(f32::INFINITY),
+    };
+    let mut out = io::stdout().lock();
+    for (i, camera) in cameras.iter().enumerate() {
+        let picture = smooth(args.size, |size| {
+            if args.above {
+                above(&mut studio, &world, camera, args.cut, size)
+            } else {
+                let marks = if args.portals {
+                    portal_marks(&mut studio, &world, camera, size)?
+                } else {
+                    Vec::new()
+                };
+                Ok(studio.picture(camera, args.mode.culling(), style, &marks, size)?)
+            }
+        })?;
+        let to = if is_path {
+            numbered(&args.output, i + 1)
+        } else {
+            args.output.clone()
+        };
+        write_atomically(&to, &picture.to_png()?)?;
+        report(&mut out, args, &mut studio, &world, camera, &to)?;
+    }
+    if let Some(record) = &args.record {
+        write_atomically(record, path_text(&cameras).as_bytes())?;
+    }
+    Ok(())
+}
+
+fn numbered(path: &Path, n: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-{n:04}.png"))
+}
+
+fn report(
+    out: &mut impl Write,
+    args: &Render,
+    studio: &mut Studio,
+    world: &World,
+    camera: &Camera,
+    to: &Path,
+) -> anyhow::Result<()> {
+    let view = camera.view(args.size[0] as f32 / args.size[1] as f32)?;
+    let list = studio.list(&view, camera.eye, args.mode.culling(), args.size);
+    let (n_triangles, n_draws) = (list.n_triangles(), list.n_draws());
+    let cell = studio.sight.locate(camera.eye);
+    let name = cell.map(|c| world.graph.cells[c.0 as usize].name.as_str());
+    let look = [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]);
+    if args.json {
+        let line = json!({
+            "file": to, "eye": camera.eye, "look": look, "cell": cell.map(|c| c.0),
+            "triangles": n_triangles, "of_triangles": studio.world.n_triangles(),
+            "draws": n_draws, "adapter": studio.gpu.name(),
+        });
+        writeln!(out, "{line}")?;
+    } else {
+        let text = |p: [f32; 3]| p.map(|x| format!("{x:.2}")).join(",");
+        writeln!(
+            out,
+            "{}: --eye {} --look {}, in {}, {n_triangles} of {} triangles in {n_draws} draws, {}",
+            to.display(),
+            text(camera.eye),
+            text(look),
+            name.unwrap_or("no cell"),
+            studio.world.n_triangles(),
+            studio.gpu.name()
+        )?;
+    }
+    Ok(())
+}
+
+/// Outlines of the portals seen through, and the rectangles they narrow the view to.
+pub(crate) fn portal_marks(
+    studio: &mut Studio,
+    world: &World,
+    camera: &Camera,
+    size: [u32; 2],
+) -> anyhow::Result<Vec<Mark>> {
+    let view = camera.view(size[0] as f32 / size[1] as f32)?;
+    let width = size[1] as f32 / 240.0;
+    let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
+    let mut marks = Vec::new();
+    for p in seen.portals() {
+        let outline = &world.graph.portals[p.0 as usize].outline;
+        let mark = |shape, color, width, on_top| Mark {
+            shape,
+            color,
+            width,
+            on_top,
+        };
+        let area = Shape::Area(outline.clone());
+        marks.push(mark(area, [1.0, 0.62, 0.05, 0.10], 0.0, false));
+        let line = Shape::Outline(outline.clone());
+        marks.push(mark(line.clone(), [1.0, 0.45, 0.02, 0.22], width, true));
+        marks.push(mark(line, [1.0, 0.45, 0.02, 1.0], width, false));
+    }
+    for v in seen
+        .visits()
+        .iter()
+        .filter(|v| v.via.is_some() && v.face == 0)
+    {
+        marks.push(Mark {
+            shape: Shape::Rectangle(v.rectangle),
+            color: [0.05, 0.55, 0.9, 0.8],
+            width: width * 0.5,
+            on_top: true,
+        });
+    }
+    Ok(marks)
+}
+
+/// The world from above, with the view frozen: what is drawn of it, and what is culled and why.
+pub(crate) fn above(
+    studio: &mut Studio,
+    world: &World,
+    camera: &Camera,
+    cut: Option<f32>,
+    size: [u32; 2],
+) -> anyhow::Result<Picture> {
+    let aspect = size[0] as f32 / size[1] as f32;
+    let view = camera.view(aspect.max(1.0))?;
+    let list = studio.explained(&view);
+    let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
+    let cut = cut.unwrap_or(camera.eye[1] + 0.5);
+    let width = size[1] as f32 / 260.0;
+    let line = |shape, color, width| Mark {
+        shape,
+        color,
+        width,
+        on_top: true,
+    };
+    let mut marks = Vec::new();
+    for p in seen.portals() {
+        let outline = world.graph.portals[p.0 as usize].outline.clone();
+        marks.push(line(Shape::Outline(outline), [1.0, 0.42, 0.0, 1.0], width));
+    }
+    // Rooms are what pictures from above are of: the ground around them is not.
+    let mut low = [f32::INFINITY; 3];
+    let mut high = [f32::NEG_INFINITY; 3];
+    for cell in world.graph.cells.iter().filter(|c| !c.outdoor) {
+        for k in 0..3 {
+            low[k] = low[k].min(cell.aabb[0][k]);
+            high[k] = high[k].max(cell.aabb[1][k]);
+        }
+    }
+    if low[0] > high[0] {
+        [low, high] = studio.world.bounds();
+    }
+    let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
+    let [x, z] = [high[0] - low[0], high[2] - low[2]];
+    let reach = x.hypot(z);
+    for corner in camera.corners(aspect.max(1.0)) {
+        let d = corner.to_array();
+        let flat = d[0].hypot(d[2]).max(1e-6);
+        let end = [0, 1, 2].map(|k| camera.eye[k] + d[k] / flat * reach * [1.0, 0.0, 1.0][k]);
+        marks.push(line(
+            Shape::Line([camera.eye, end]),
+            [0.02, 0.30, 0.85, 0.9],
+            width,
+        ));
+    }
+    let ring: Vec<[f32; 3]> = (0..24)
+        .map(|i| {
+            let a = i as f32 / 24.0 * std::f32::consts::TAU;
+            let r = reach * 0.008;
+            [
+                camera.eye[0] + a.cos() * r,
+                camera.eye[1],
+                camera.eye[2] + a.sin() * r,
+            ]
+        })
+        .collect();
+    marks.push(line(Shape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));
+    // A little aslant, so that walls have a side.
+    let toward = [0.0, -1.0, -0.38];
+    let height = (z * 0.94 + (high[1] - low[1]) * 0.38).max(x / aspect) * 1.06;
+    let projection = Projection::parallel(center, toward, height, aspect, reach.max(50.0) * 2.0);
+    let style = Style {
+        shadows: false,
+        cut_above: cut,
+        ..Style::default()
+    };
+    let frame = Frame {
+        projection,
+        list: &list,
+        style: Style {
+            paint: Paint::Cells,
+            ..style
+        },
+        marks: &marks,
+    };
+    Ok(studio.picture_of(&frame, size)?)
+}

@@ -1,0 +1,256 @@
+//! `enfilade report`: one page about a world.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use enfilade::bake::vis::{VisConfig, VisContext, see_all};
+use enfilade::cpg::{CellSet, SightGraph, World};
+use enfilade::runtime::{Sight, SightState, Viewer};
+use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, Style};
+use enfilade_report::{Figure, ReportParts, Table, report_html};
+
+use crate::cameras::{FOV, good_camera, walk_cameras};
+use crate::output::{check_target, write_atomically};
+use crate::render::{above, portal_marks, smooth};
+use crate::world::read_world;
+
+/// Writes one self-contained page: plans, the graph, what can be seen from where, tables, pictures.
+#[derive(clap::Args)]
+pub(crate) struct Report {
+    /// World written by `enfilade bake`.
+    world: PathBuf,
+    /// Where to write the page.
+    #[arg(short, long, value_name = "HTML")]
+    output: PathBuf,
+    /// Views on the walk that is measured.
+    #[arg(long, default_value_t = 200, value_name = "N")]
+    views: usize,
+    /// What draws the pictures: `best`, `gpu`, `software`, or part of a name.
+    #[arg(long, default_value = "best", value_name = "NAME")]
+    adapter: AdapterChoice,
+    /// No pictures: nothing is needed to draw them.
+    #[arg(long)]
+    no_pictures: bool,
+}
+
+const SIZE: [u32; 2] = [960, 540];
+/// Time to find out what can be seen; after that, what is not decided counts as visible.
+const BUDGET: Duration = Duration::from_secs(20);
+
+pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
+    check_target(&args.output)?;
+    let world = read_world(&args.world)?;
+    let name = args.world.file_stem().unwrap_or_default().to_string_lossy();
+    let mut parts = ReportParts {
+        title: name.into_owned(),
+        ..ReportParts::default()
+    };
+    parts.visible = visible(&world, &mut parts.notes)?;
+    let sight = Sight::build(&world).with_context(|| args.world.display().to_string())?;
+    let steps = measured(&world, &sight, args.views);
+    parts
+        .tables
+        .push(in_numbers(&world, &sight, &parts.visible));
+    if !steps.is_empty() {
+        parts.tables.push(on_a_walk(&sight, &steps));
+    }
+    if !args.no_pictures {
+        match Gpu::open(&args.adapter) {
+            Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
+            Err(why @ RenderError::NoAdapter) => {
+                eprintln!("enfilade: the report has no pictures: {why}");
+                parts.notes.push(format!("No pictures: {why}."));
+            }
+            Err(why) => bail!(why),
+        }
+    }
+    write_atomically(&args.output, report_html(&world, &parts).as_bytes())
+}
+
+fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Vec<CellSet>> {
+    let start = Instant::now();
+    let mut on_round = |_, _| start.elapsed() < BUDGET;
+    let mut context = VisContext {
+        on_round: &mut on_round,
+        blocker: None,
+        checkpoint: None,
+    };
+    let graph = SightGraph::of_graph(&world.graph);
+    let out = see_all(&graph, &VisConfig::default(), &mut context)?;
+    if !out.is_complete {
+        notes.push(format!(
+            "Visibility was not searched to its end in {} s: it shows more than can be seen.",
+            BUDGET.as_secs()
+        ));
+    }
+    Ok(out.cells)
+}
+
+/// One view of the walk.
+struct Step {
+    camera: Camera,
+    frustum: u64,
+    portals: u64,
+    cells: usize,
+    micros: f64,
+}
+
+fn measured(world: &World, sight: &Sight, views: usize) -> Vec<Step> {
+    let state = SightState::new(sight);
+    let mut viewer = Viewer::new(sight);
+    let mut steps = Vec::new();
+    for camera in walk_cameras(world, sight, views, FOV) {
+        let Ok(view) = camera.view(16.0 / 9.0) else {
+            continue;
+        };
+        let frustum = viewer.see_through_walls(sight, &view).n_triangles();
+        let mut micros = f64::INFINITY;
+        for _ in 0..3 {
+            let start = Instant::now();
+            std::hint::black_box(viewer.see(sight, &state, &view));
+            micros = micros.min(start.elapsed().as_secs_f64() * 1e6);
+        }
+        let seen = viewer.see(sight, &state, &view);
+        steps.push(Step {
+            camera,
+            frustum,
+            portals: seen.n_triangles(),
+            cells: seen.cells().len(),
+            micros,
+        });
+    }
+    steps
+}
+
+fn row(cells: &[&str]) -> Vec<String> {
+    cells.iter().map(ToString::to_string).collect()
+}
+
+/// The counts that the papers give of their scenes.
+fn in_numbers(world: &World, sight: &Sight, visible: &[CellSet]) -> Table {
+    let graph = &world.graph;
+    let (n_cells, n_portals) = (graph.cells.len(), graph.portals.len());
+    let structure: usize = world
+        .batches
+        .iter()
+        .map(|b| b.primitive.indices.len() / 3)
+        .sum();
+    let most = graph
+        .cells
+        .iter()
+        .map(|c| c.portals.len())
+        .max()
+        .unwrap_or(0);
+    let mean = |sum: usize| format!("{:.2}", sum as f64 / n_cells.max(1) as f64);
+    let seen: usize = visible.iter().map(CellSet::len).sum();
+    let most_seen = visible.iter().map(CellSet::len).max().unwrap_or(0);
+    Table {
+        title: "In numbers".into(),
+        note: "As the sources describe their scenes.".into(),
+        rows: vec![
+            row(&["", "all", "mean of a room", "most of a room"]),
+            row(&["rooms (outdoors included)", &n_cells.to_string(), "", ""]),
+            row(&[
+                "doorways",
+                &n_portals.to_string(),
+                &mean(2 * n_portals),
+                &most.to_string(),
+            ]),
+            row(&[
+                "triangles of structure",
+                &structure.to_string(),
+                &mean(structure),
+                "",
+            ]),
+            row(&[
+                "triangles with objects",
+                &sight.n_triangles().to_string(),
+                &mean(sight.n_triangles() as usize),
+                "",
+            ]),
+            row(&["rooms seen", "", &mean(seen), &most_seen.to_string()]),
+        ],
+    }
+}
+
+fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
+    let all = sight.n_triangles().max(1) as f64;
+    let line = |name: &str, digits: usize, value: &dyn Fn(&Step) -> f64| {
+        let values = || steps.iter().map(value);
+        let mean = values().sum::<f64>() / steps.len() as f64;
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(0.0, f64::max);
+        let mut cells = vec![name.to_owned()];
+        cells.extend([low, mean, high].map(|x| format!("{x:.digits$}")));
+        cells
+    };
+    Table {
+        title: "On a walk".into(),
+        note: format!(
+            "{} views at eye height, a meter apart, through the doorways.",
+            steps.len()
+        ),
+        rows: vec![
+            row(&["", "least", "mean", "most"]),
+            line("triangles in the view frustum, %", 2, &|s| {
+                s.frustum as f64 / all * 100.0
+            }),
+            line("triangles seen through doorways, %", 2, &|s| {
+                s.portals as f64 / all * 100.0
+            }),
+            line("rooms seen", 1, &|s| s.cells as f64),
+            line("time to find out, µs", 1, &|s| s.micros),
+        ],
+    }
+}
+
+fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figure>> {
+    let mut studio = Studio::new(gpu, world)?;
+    let mut out = Vec::new();
+    let style = Style::default();
+    let camera = good_camera(&mut studio, world)?;
+    let picture = smooth(SIZE, |size| {
+        Ok(studio.picture(&camera, Culling::Portals, style, &[], size)?)
+    })?;
+    out.push(Figure {
+        caption: "A view inside.".into(),
+        png: picture.to_png()?,
+    });
+    let picture = smooth(SIZE, |size| {
+        let marks = portal_marks(&mut studio, world, &camera, size)?;
+        Ok(studio.picture(&camera, Culling::Portals, style, &marks, size)?)
+    })?;
+    out.push(Figure {
+        caption: "The same view: doorways in orange, what each narrows the view to in blue.".into(),
+        png: picture.to_png()?,
+    });
+    let picture = smooth(SIZE, |size| above(&mut studio, world, &camera, None, size))?;
+    out.push(Figure {
+        caption: "The same view from above: what is drawn in the rooms' colors, behind walls red, out of view dark.".into(),
+        png: picture.to_png()?,
+    });
+    let mut worst: Vec<&Step> = steps.iter().collect();
+    worst.sort_by_key(|s| std::cmp::Reverse(s.portals));
+    let mut eyes: Vec<[f32; 3]> = Vec::new();
+    for step in worst {
+        let e = step.camera.eye;
+        // Of a place, one picture will do.
+        let is_near = |o: &[f32; 3]| (0..3).map(|k| (o[k] - e[k]).powi(2)).sum::<f32>() < 9.0;
+        if eyes.len() == 3 || eyes.iter().any(is_near) {
+            continue;
+        }
+        eyes.push(e);
+        let picture = smooth(SIZE, |size| {
+            Ok(studio.picture(&step.camera, Culling::Portals, style, &[], size)?)
+        })?;
+        out.push(Figure {
+            caption: format!(
+                "Among the views with most to draw: {} triangles in {} rooms, at {:.1}, {:.1}, {:.1}.",
+                step.portals, step.cells, e[0], e[1], e[2]
+            ),
+            png: picture.to_png()?,
+        });
+    }
+    Ok(out)
+}

@@ -1,0 +1,182 @@
+//! `enfilade simplify` and `enfilade edit`: a graph becomes a simpler one.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use enfilade::bake::simplify::{
+    CostModel, Metric, Simplified, SimplifySettings, delete_portal, simplify,
+};
+use enfilade::cpg::wire::encode_glb;
+use enfilade::cpg::{PortalId, World};
+
+use crate::output::{check_target, write_atomically};
+use crate::world::read_world;
+
+/// Merges cells of a world until their costs are within bounds.
+#[derive(clap::Args)]
+pub(crate) struct Simplify {
+    /// World, whatever built it.
+    #[arg(value_name = "IN.glb")]
+    input: PathBuf,
+    /// World to write.
+    #[arg(short, long, value_name = "OUT.glb")]
+    output: PathBuf,
+    /// Merge until there are no more cells than this, as far as the cost bound allows.
+    #[arg(long, value_name = "N")]
+    max_cells: Option<usize>,
+    /// Merge cells that cost less than this, as far as the upper bound allows.
+    #[arg(long, value_name = "COST", value_parser = parse_cost)]
+    min_cost: Option<f64>,
+    /// No merge makes a cell that costs more than this.
+    #[arg(long, value_name = "COST", value_parser = parse_cost)]
+    max_cost: Option<f64>,
+    /// How portals are compared.
+    #[arg(long, value_enum, default_value_t = MetricName::ExpectedTriangles)]
+    metric: MetricName,
+    /// What a triangle costs.
+    #[arg(long, value_name = "COST", value_parser = parse_cost, default_value_t = 1.0)]
+    triangle_cost: f64,
+    /// What a square meter costs.
+    #[arg(long, value_name = "COST", value_parser = parse_cost, default_value_t = 0.0)]
+    area_cost: f64,
+    /// Multiplies the cost of a material, e.g. `--material-cost water=3`.
+    #[arg(long, value_name = "NAME=FACTOR", value_parser = parse_material)]
+    material_cost: Vec<(String, f64)>,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum MetricName {
+    /// Triangles that sampled views draw more without the portal.
+    ExpectedTriangles,
+    /// Volume that sees the portal, times the difference of the cells' costs.
+    VisibleVolume,
+}
+
+fn parse_cost(text: &str) -> Result<f64, String> {
+    let value: f64 = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number"))?;
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not at least 0"))
+    }
+}
+
+fn parse_material(text: &str) -> Result<(String, f64), String> {
+    let (name, factor) = text
+        .rsplit_once('=')
+        .ok_or("give a material's name, '=' and a number")?;
+    Ok((name.to_owned(), parse_cost(factor)?))
+}
+
+pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
+    if args.max_cells.is_none() && args.min_cost.is_none() {
+        bail!("nothing to do: give --max-cells or --min-cost");
+    }
+    if let (Some(min), Some(max)) = (args.min_cost, args.max_cost)
+        && min > max
+    {
+        bail!("--min-cost {min} is above --max-cost {max}; no cell can be within both");
+    }
+    check_target(&args.output)?;
+    let world = read_world(&args.input)?;
+    let settings = SimplifySettings {
+        min_cost: args.min_cost.unwrap_or(0.0),
+        max_cost: args.max_cost,
+        max_cells: args.max_cells,
+        metric: match args.metric {
+            MetricName::ExpectedTriangles => Metric::ExpectedTriangles,
+            MetricName::VisibleVolume => Metric::VisibleVolume,
+        },
+        cost: CostModel {
+            triangle: args.triangle_cost,
+            area: args.area_cost,
+            materials: args.material_cost.iter().cloned().collect(),
+        },
+    };
+    let simplified = simplify(&world, &settings);
+    write(&args.output, &world, &simplified)?;
+    if let Some(max) = args.max_cost.filter(|m| simplified.max_cost > *m) {
+        writeln!(
+            io::stderr(),
+            "a cell costs {:.0}, more than {max}, and did before; only a bake can cut it",
+            simplified.max_cost
+        )?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, before: &World, after: &Simplified) -> anyhow::Result<()> {
+    let bytes = encode_glb(&after.world).context("the new world breaks an invariant (a bug)")?;
+    write_atomically(path, &bytes)?;
+    let count = |w: &World| (w.graph.cells.len(), w.graph.portals.len());
+    let ((cells, portals), (c, p)) = (count(before), count(&after.world));
+    let mut out = io::stdout().lock();
+    writeln!(out, "cells   {cells:>7} → {c}")?;
+    writeln!(out, "portals {portals:>7} → {p}")?;
+    writeln!(
+        out,
+        "cost of a cell {:.0} to {:.0}",
+        after.min_cost, after.max_cost
+    )?;
+    writeln!(
+        out,
+        "wrote {} ({:.1} MB)",
+        path.display(),
+        bytes.len() as f64 / 1e6
+    )?;
+    Ok(())
+}
+
+/// Takes portals out of a world: the cells on both sides become one.
+#[derive(clap::Args)]
+pub(crate) struct Edit {
+    /// World, whatever built it.
+    #[arg(value_name = "IN.glb")]
+    input: PathBuf,
+    /// World to write.
+    #[arg(short, long, value_name = "OUT.glb")]
+    output: PathBuf,
+    /// Portal to take away, by its number in the input; all others between its two cells go, too.
+    #[arg(long, value_name = "ID", required = true)]
+    delete_portal: Vec<u32>,
+}
+
+pub(crate) fn run_edit(args: &Edit) -> anyhow::Result<()> {
+    check_target(&args.output)?;
+    let before = read_world(&args.input)?;
+    let n = before.graph.portals.len();
+    if let Some(id) = args.delete_portal.iter().find(|&&id| id as usize >= n) {
+        bail!(
+            "there is no portal {id}: {} has {n}, counted from 0",
+            args.input.display()
+        );
+    }
+    let mut result: Option<Simplified> = None;
+    // Numbers change as portals go, so each is found again by its cells' new numbers.
+    let mut cell_of: Vec<u32> = (0..before.graph.cells.len() as u32).collect();
+    for &id in &args.delete_portal {
+        let cells = before.graph.portals[id as usize]
+            .cells
+            .map(|c| cell_of[c.0 as usize]);
+        let world = result.as_ref().map_or(&before, |r| &r.world);
+        let between = |p: &enfilade::cpg::Portal| {
+            let now = p.cells.map(|c| c.0);
+            now == cells || now == [cells[1], cells[0]]
+        };
+        let Some(portal) = world.graph.portals.iter().position(between) else {
+            // Gone already with another one between the same cells.
+            continue;
+        };
+        if let Some(next) = delete_portal(world, PortalId(portal as u32)) {
+            for c in &mut cell_of {
+                *c = next.cell_of[*c as usize].0;
+            }
+            result = Some(next);
+        }
+    }
+    let result = result.context("no portal was taken away")?;
+    write(&args.output, &before, &result)
+}

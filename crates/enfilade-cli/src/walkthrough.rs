@@ -1,0 +1,290 @@
+//! `enfilade bench walkthrough`: a walk, drawn whole, with frustum culling and by portals.
+
+use std::collections::VecDeque;
+use std::f32::consts::TAU;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use enfilade::bake::BakeConfig;
+use enfilade::cpg::{CellId, DetailObject, World};
+use enfilade::geom::DVec3;
+use enfilade::geom::scene::{Mesh, Primitive};
+use enfilade::runtime::Sight;
+use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Studio, Style, Target};
+use enfilade_testkit::{TowerParams, office_tower};
+
+use crate::bake::bake_scene;
+use crate::cameras::{FOV, walk_cameras};
+use crate::see::size;
+use crate::world::read_world;
+
+/// What to walk through.
+#[derive(clap::Args)]
+pub(crate) struct Walkthrough {
+    /// Worlds.
+    scenes: Vec<PathBuf>,
+    /// Rooms of a generated, furnished office tower, baked on the spot.
+    #[arg(long, value_name = "ROOMS")]
+    tower: Option<usize>,
+    /// Place an object in each room, the same everywhere, of so many triangles that the world has as
+    /// many as this.
+    #[arg(long, value_name = "TRIANGLES")]
+    total: Option<u64>,
+    /// Frames of the walk.
+    #[arg(long, default_value_t = 200)]
+    frames: usize,
+    /// Size of the frames.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
+    size: [u32; 2],
+    /// With shadows and dark corners.
+    #[arg(long)]
+    full: bool,
+    /// What draws: `best`, `gpu`, `software`, or part of a name.
+    #[arg(long, default_value = "best", value_name = "NAME")]
+    adapter: AdapterChoice,
+    /// Frames left out of *everything*, but for one of so many; for adapters that are slow.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    sparse: usize,
+}
+
+/// Frames that may be under way at once, as in a program with a window.
+const IN_FLIGHT: usize = 2;
+
+pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Result<()> {
+    let mut worlds = Vec::new();
+    for path in &args.scenes {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        worlds.push((name.into_owned(), read_world(path)?));
+    }
+    if let Some(rooms) = args.tower {
+        let scene = office_tower(&TowerParams::with_rooms(rooms, 1)).scene;
+        let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
+        worlds.push((format!("office tower of {rooms} rooms"), baked.world));
+    }
+    if worlds.is_empty() {
+        bail!("a world is needed, or --tower ROOMS");
+    }
+    table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | triangles drawn | draws | ms on the processor |".into());
+    table.push("| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |".into());
+    let mut adapter = String::new();
+    for (name, mut world) in worlds {
+        if let Some(total) = args.total {
+            furnish(&mut world, total)?;
+        }
+        let mut studio =
+            Studio::new(Gpu::open(&args.adapter)?, &world).with_context(|| name.clone())?;
+        adapter = studio.gpu.name();
+        let cameras = walk_cameras(&world, &studio.sight, args.frames, FOV);
+        if cameras.is_empty() {
+            bail!("{name}: no room to walk in");
+        }
+        let target = studio.target(args.size)?;
+        let mut frustum = f64::NAN;
+        let modes = [
+            ("by frustum culling", Culling::Frustum),
+            ("everything", Culling::Everything),
+            ("by portals", Culling::Portals),
+        ];
+        let mut lines = Vec::new();
+        for (label, culling) in modes {
+            let step = if culling == Culling::Everything {
+                args.sparse.max(1)
+            } else {
+                1
+            };
+            let cameras: Vec<Camera> = cameras.iter().copied().step_by(step).collect();
+            let run = walk(&mut studio, &cameras, culling, args, &target)?;
+            if culling == Culling::Frustum {
+                frustum = run.mean();
+            }
+            let n = run.seconds.len() as f64;
+            let all = studio.world.n_triangles() as f64;
+            let ms = |x: f64| format!("{:.2}", x * 1e3);
+            lines.push(format!(
+                "| {name} | {all} | {label} | {} | {} | {} | {:.2} | {:.2} % | {:.0} | {} |",
+                ms(run.seconds.iter().copied().fold(f64::INFINITY, f64::min)),
+                ms(run.mean()),
+                ms(run.seconds.iter().copied().fold(0.0, f64::max)),
+                frustum / run.mean(),
+                run.triangles / n / all * 100.0,
+                run.draws / n,
+                ms(run.processor / n),
+            ));
+        }
+        // From all to least.
+        lines.swap(0, 1);
+        table.extend(lines);
+    }
+    table.push(String::new());
+    table.push(format!(
+        "{}×{}, {} frames a walk, {}.",
+        args.size[0], args.size[1], args.frames, adapter
+    ));
+    Ok(())
+}
+
+#[derive(Default)]
+struct Run {
+    seconds: Vec<f64>,
+    processor: f64,
+    triangles: f64,
+    draws: f64,
+}
+
+impl Run {
+    fn mean(&self) -> f64 {
+        self.seconds.iter().sum::<f64>() / self.seconds.len().max(1) as f64
+    }
+}
+
+fn walk(
+    studio: &mut Studio,
+    cameras: &[Camera],
+    culling: Culling,
+    args: &Walkthrough,
+    target: &Target,
+) -> anyhow::Result<Run> {
+    let aspect = args.size[0] as f32 / args.size[1] as f32;
+    let style = Style {
+        paint: Paint::Lit,
+        dark_corners: args.full,
+        shadows: args.full,
+        ..Style::default()
+    };
+    let mut run = Run::default();
+    let mut pending = VecDeque::new();
+    // Buffers grow and pipelines are built in frames that do not count.
+    let warm = cameras.iter().take(3).map(|c| (c, false));
+    let mut last = Instant::now();
+    for (camera, counts) in warm.chain(cameras.iter().map(|c| (c, true))) {
+        let begin = Instant::now();
+        let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
+        let list = studio.take_list(&view, camera.eye, culling, args.size);
+        let frame = Frame {
+            projection,
+            list: &list,
+            style,
+            marks: &[],
+        };
+        studio.draw_to(&frame, target)?;
+        let processor = begin.elapsed().as_secs_f64();
+        pending.push_back(studio.gpu.mark());
+        if !counts {
+            studio.gpu.wait()?;
+            pending.clear();
+            last = Instant::now();
+        } else {
+            if pending.len() > IN_FLIGHT
+                && let Some(mark) = pending.pop_front()
+            {
+                studio.gpu.wait_for(mark)?;
+            }
+            let now = Instant::now();
+            run.seconds.push((now - last).as_secs_f64());
+            last = now;
+            run.processor += processor;
+            run.triangles += list.n_triangles() as f64;
+            run.draws += list.n_draws() as f64;
+        }
+        studio.give_list(list);
+    }
+    studio.gpu.wait()?;
+    // What is still under way when the last frame is handed in belongs to the frames as well.
+    if let Some(seconds) = run.seconds.last_mut() {
+        *seconds += last.elapsed().as_secs_f64();
+    }
+    Ok(run)
+}
+
+/// Places one object in each room, all alike, until the world has about `total` triangles.
+fn furnish(world: &mut World, total: u64) -> anyhow::Result<()> {
+    let sight = Sight::build(world)?;
+    let mut places = Vec::new();
+    for (i, cell) in (0..).zip(&world.graph.cells) {
+        let [low, high] = cell.aabb;
+        let at = |t: [f32; 3]| [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * t[k]);
+        let spots = [
+            [0.5, 0.35, 0.5],
+            [0.3, 0.35, 0.3],
+            [0.7, 0.35, 0.7],
+            [0.3, 0.4, 0.7],
+        ];
+        let spot = spots
+            .iter()
+            .map(|&t| at(t))
+            .find(|&p| sight.locate(p) == Some(CellId(i)));
+        if let Some(p) = spot.filter(|_| !cell.outdoor) {
+            places.push(p);
+        }
+    }
+    let missing = total.saturating_sub(sight.n_triangles());
+    if places.is_empty() || missing == 0 {
+        bail!(
+            "it has {} triangles already, or no rooms",
+            sight.n_triangles()
+        );
+    }
+    let each = missing.div_ceil(places.len() as u64);
+    // A ring, wound about itself: 4 by 1 quads.
+    let around = ((each as f64 / 8.0).sqrt().ceil() as u32).max(2) * 2;
+    let along = u32::try_from(each.div_ceil(u64::from(around) * 2))?.max(3);
+    let mesh = world.detail_meshes.len() as u32;
+    world.detail_meshes.push(Mesh {
+        name: "ring".into(),
+        primitives: vec![ring(along, around)],
+    });
+    let radius = 0.42;
+    for p in places {
+        let mut cells = Vec::new();
+        let center = DVec3::new(p[0].into(), p[1].into(), p[2].into());
+        cells.extend(world.graph.locator.locate(center));
+        for axis in 0..3 {
+            for side in [-radius, radius] {
+                let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[u, v]| {
+                    let mut d = [0.0; 3];
+                    d[axis] = side;
+                    d[(axis + 1) % 3] = u * radius;
+                    d[(axis + 2) % 3] = v * radius;
+                    center + DVec3::from(d)
+                });
+                world.graph.locator.cells_touching(&corners, &mut cells);
+            }
+        }
+        cells.sort_unstable();
+        cells.dedup();
+        let mut transform = [0.0; 16];
+        for k in 0..3 {
+            transform[k * 5] = 1.0;
+            transform[12 + k] = p[k];
+        }
+        transform[15] = 1.0;
+        world.details.push(DetailObject {
+            name: "ring".into(),
+            mesh,
+            transform,
+            cells,
+        });
+    }
+    Ok(())
+}
+
+/// A ring of 40 cm radius with a wave on it.
+fn ring(along: u32, around: u32) -> Primitive {
+    let mut out = Primitive::default();
+    for i in 0..along {
+        let a = i as f32 / along as f32 * TAU;
+        for j in 0..around {
+            let b = j as f32 / around as f32 * TAU;
+            let r = 0.09 * (1.0 + 0.25 * (a * 12.0 + b * 3.0).sin());
+            let (x, y) = (0.28 + r * b.cos(), r * b.sin());
+            out.positions.push([x * a.cos(), y, x * a.sin()]);
+            out.normals
+                .push([b.cos() * a.cos(), b.sin(), b.cos() * a.sin()]);
+            let at = |i: u32, j: u32| (i % along) * around + j % around;
+            let q = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            out.indices.extend([q[0], q[1], q[2], q[0], q[2], q[3]]);
+        }
+    }
+    out
+}

@@ -1,0 +1,198 @@
+//! Cameras: where a picture is taken from, and what takes points to the screen.
+//!
+//! Depth runs from 1 at the near plane to 0 at infinity, in 32-bit floats: so that two surfaces a
+//! millimeter apart stay apart across a large building, and nothing is cut off far away. Points are
+//! made relative to the camera before anything is multiplied, so that large coordinates cost no
+//! precision.
+
+use enfilade_runtime::{View, ViewError};
+use glam::{Mat4, Vec3, Vec4};
+
+/// Where the eye is, which way it looks, how wide. Upright: +Y is up in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where it is. [Units: wu]
+    pub eye: [f32; 3],
+    /// Where it looks; any length.
+    pub toward: [f32; 3],
+    /// Angle from the lower to the upper edge of the picture. [Units: rad] [Limit: above 0, below pi]
+    pub fov_y: f32,
+}
+
+impl Camera {
+    /// What is nearer than this is not drawn. [Units: wu]
+    ///
+    /// Depths are floats that are finest at zero, which is infinitely far away: so that this can be as
+    /// little as the smallest gap between an eye and a wall that matters.
+    pub const NEAR: f32 = 1e-4;
+
+    /// How far away a depth of an [`IdPicture`](crate::IdPicture) is along the view direction.
+    /// [Units: wu]
+    #[must_use]
+    pub fn distance_of(depth: f32) -> f32 {
+        Self::NEAR / depth
+    }
+
+    /// A camera at `eye` that looks at the point `at`, 60 degrees high.
+    #[must_use]
+    pub fn looking_at(eye: [f32; 3], at: [f32; 3]) -> Self {
+        Self {
+            eye,
+            toward: [0, 1, 2].map(|k| at[k] - eye[k]),
+            fov_y: 60_f32.to_radians(),
+        }
+    }
+
+    /// The view that the run-time is asked about, of a picture `aspect` times as wide as high.
+    ///
+    /// # Errors
+    ///
+    /// A camera without a direction, with numbers that are not finite, or with no angle.
+    pub fn view(&self, aspect: f32) -> Result<View, ViewError> {
+        View::perspective(self.eye, self.toward, [0.0, 1.0, 0.0], self.fov_y, aspect)
+    }
+
+    /// What takes points to the screen.
+    ///
+    /// # Errors
+    ///
+    /// As [`Camera::view`].
+    pub fn projection(&self, aspect: f32) -> Result<Projection, ViewError> {
+        self.view(aspect)?;
+        let [right, up, forward] = self.axes();
+        let focal = 1.0 / (self.fov_y * 0.5).tan();
+        let rows = [
+            (right * (focal / aspect)).extend(0.0),
+            (up * focal).extend(0.0),
+            Vec4::new(0.0, 0.0, 0.0, Self::NEAR),
+            forward.extend(0.0),
+        ];
+        Ok(Projection {
+            clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
+            origin: Vec3::from(self.eye),
+            eye: Vec3::from(self.eye),
+            is_parallel: false,
+        })
+    }
+
+    /// Right, up and forward, of unit length and at right angles.
+    #[must_use]
+    pub fn axes(&self) -> [Vec3; 3] {
+        let forward = Vec3::from(self.toward).normalize_or(Vec3::NEG_Z);
+        // As `View::perspective` does it, so that pictures and answers mean the same view.
+        let right = forward.cross(Vec3::Y);
+        let right = if right.length() > 1e-6 {
+            right.normalize()
+        } else {
+            forward.as_dvec3().any_orthonormal_vector().as_vec3()
+        };
+        [right, right.cross(forward), forward]
+    }
+
+    /// The four directions to the corners of the picture, counter-clockwise from the lower left.
+    #[must_use]
+    pub fn corners(&self, aspect: f32) -> [Vec3; 4] {
+        let [right, up, forward] = self.axes();
+        let tan = (self.fov_y * 0.5).tan();
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]| forward + right * (x * tan * aspect) + up * (y * tan))
+    }
+}
+
+/// What takes points to the screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    /// From points relative to `origin` to clip space.
+    pub(crate) clip_from_relative: Mat4,
+    pub(crate) origin: Vec3,
+    /// Where lines of sight come from; of a parallel projection, far away.
+    pub(crate) eye: Vec3,
+    pub(crate) is_parallel: bool,
+}
+
+impl Projection {
+    /// Parallel lines along `toward`, onto a picture that is `height` meters high in the middle at
+    /// `center`; what is up to `depth` meters before and behind that is in it.
+    #[must_use]
+    pub fn parallel(
+        center: [f32; 3],
+        toward: [f32; 3],
+        height: f32,
+        aspect: f32,
+        depth: f32,
+    ) -> Self {
+        let camera = Camera {
+            eye: center,
+            toward,
+            fov_y: 1.0,
+        };
+        let [right, up, forward] = camera.axes();
+        let half = height * 0.5;
+        let rows = [
+            (right / (half * aspect)).extend(0.0),
+            (up / half).extend(0.0),
+            // 1 at the near end, 0 at the far one.
+            (forward * (-0.5 / depth)).extend(0.5),
+            Vec4::W,
+        ];
+        let origin = Vec3::from(center);
+        Self {
+            clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
+            origin,
+            eye: origin - forward * depth,
+            is_parallel: true,
+        }
+    }
+
+    /// Where on the picture a point lies, 0 to 1 from the upper left; `None` behind the eye.
+    #[must_use]
+    pub fn place(&self, p: [f32; 3]) -> Option<[f32; 2]> {
+        let q = self.clip_from_relative * (Vec3::from(p) - self.origin).extend(1.0);
+        (q.w > 1e-6).then(|| [0.5 + 0.5 * q.x / q.w, 0.5 - 0.5 * q.y / q.w])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_point_looked_at_is_in_the_middle_and_up_is_up() {
+        let camera = Camera::looking_at([1.0, 2.0, 3.0], [4.0, 1.0, -2.0]);
+        let p = camera.projection(1.5).unwrap();
+        let [x, y] = p.place([4.0, 1.0, -2.0]).unwrap();
+        assert!((x - 0.5).abs() < 1e-6 && (y - 0.5).abs() < 1e-6, "{x} {y}");
+        let [_, above] = p.place([4.0, 1.5, -2.0]).unwrap();
+        assert!(above < y);
+        assert_eq!(p.place([0.0, 2.5, 8.0]), None, "behind the eye");
+    }
+
+    #[test]
+    fn corners_of_the_view_are_corners_of_the_picture() {
+        let camera = Camera::looking_at([0.0; 3], [3.0, 4.0, 1.0]);
+        let p = camera.projection(2.0).unwrap();
+        let at: Vec<[f32; 2]> = camera
+            .corners(2.0)
+            .iter()
+            .map(|c| p.place((*c * 7.0).to_array()).unwrap())
+            .collect();
+        for (got, want) in at
+            .iter()
+            .zip([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
+        {
+            assert!((got[0] - want[0]).abs() < 1e-5 && (got[1] - want[1]).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_camera_that_looks_nowhere_is_an_error() {
+        for toward in [[0.0; 3], [f32::NAN, 0.0, 0.0]] {
+            let camera = Camera {
+                eye: [0.0; 3],
+                toward,
+                fov_y: 1.0,
+            };
+            assert!(camera.projection(1.0).is_err());
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! The adapter that draws: a graphics card, or software that stands in for one.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Why something cannot be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// No adapter at all.
+    #[error(
+        "no graphics adapter was found: install a driver, or software that stands in for one \
+         (Debian and Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1`)"
+    )]
+    NoAdapter,
+    /// Adapters, but none as asked for.
+    #[error("no adapter is {asked}; there are: {found}")]
+    NoSuchAdapter {
+        /// What was asked for.
+        asked: String,
+        /// Names of those there are.
+        found: String,
+    },
+    /// The adapter gives no device, or lacks what drawing needs.
+    #[error("{adapter} cannot be used: {why}; choose another with --adapter")]
+    Device {
+        /// Its name.
+        adapter: String,
+        /// What it said.
+        why: String,
+    },
+    /// A world, or a picture, that the adapter has no room for.
+    #[error(
+        "{what} takes {needed}, and the adapter's limit is {limit}; choose another adapter, or less"
+    )]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// What it takes.
+        needed: u64,
+        /// What there is.
+        limit: u64,
+    },
+    /// The device was lost, or ran out of memory, while it drew.
+    #[error("the adapter failed while drawing: {0}")]
+    Lost(String),
+    /// A picture could not be encoded.
+    #[error("the picture cannot be encoded: {0}")]
+    Encode(String),
+    /// A camera without a direction, or with numbers that are not finite.
+    #[error(transparent)]
+    Camera(#[from] enfilade_runtime::ViewError),
+    /// A world that breaks invariants; decoded worlds never do.
+    #[error(transparent)]
+    World(#[from] enfilade_runtime::SightError),
+}
+
+/// Which adapter to draw with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// The fastest there is: a discrete card, an integrated one, software.
+    #[default]
+    Best,
+    /// A graphics card, and nothing else.
+    Gpu,
+    /// Software, and nothing else: the same pictures on every machine.
+    Software,
+    /// The first whose name holds this text, whatever its case.
+    Named(String),
+}
+
+impl FromStr for AdapterChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text {
+            "best" => Self::Best,
+            "gpu" => Self::Gpu,
+            "software" => Self::Software,
+            name => Self::Named(name.to_owned()),
+        })
+    }
+}
+
+impl fmt::Display for AdapterChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Best => f.write_str("usable"),
+            Self::Gpu => f.write_str("a graphics card"),
+            Self::Software => f.write_str("software"),
+            Self::Named(name) => write!(f, "named `{name}`"),
+        }
+    }
+}
+
+/// A point in what was submitted.
+#[derive(Clone, Debug)]
+pub struct Submitted(wgpu::SubmissionIndex);
+
+/// An adapter, opened.
+pub struct Gpu {
+    /// Its instance, which windows make surfaces with.
+    pub instance: wgpu::Instance,
+    /// The adapter.
+    pub adapter: wgpu::Adapter,
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+}
+
+impl fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Gpu({})", self.name())
+    }
+}
+
+fn rank(info: &wgpu::AdapterInfo) -> u32 {
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    // OpenGL is what is left where nothing else works.
+    kind * 2 + u32::from(info.backend == wgpu::Backend::Gl)
+}
+
+fn fits(choice: &AdapterChoice, info: &wgpu::AdapterInfo) -> bool {
+    match choice {
+        AdapterChoice::Best => true,
+        AdapterChoice::Gpu => info.device_type != wgpu::DeviceType::Cpu,
+        AdapterChoice::Software => info.device_type == wgpu::DeviceType::Cpu,
+        AdapterChoice::Named(name) => {
+            let text = format!("{} {} {}", info.name, info.driver, info.backend);
+            text.to_lowercase().contains(&name.to_lowercase())
+        }
+    }
+}
+
+impl Gpu {
+    /// Opens an adapter; no display is needed.
+    ///
+    /// # Errors
+    ///
+    /// When there is none as asked for, or it gives no device.
+    pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        Self::open_with(&instance, choice, None)
+    }
+
+    /// Opens an adapter of `instance` that can draw to `surface`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Gpu::open`].
+    pub fn open_with(
+        instance: &wgpu::Instance,
+        choice: &AdapterChoice,
+        surface: Option<&wgpu::Surface<'_>>,
+    ) -> Result<Self, RenderError> {
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        adapters.retain(|a| surface.is_none_or(|s| a.is_surface_supported(s)));
+        adapters.sort_by_key(|a| rank(&a.get_info()));
+        if adapters.is_empty() {
+            return Err(RenderError::NoAdapter);
+        }
+        let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
+        let mut failed = None;
+        for adapter in adapters {
+            if !fits(choice, &adapter.get_info()) {
+                continue;
+            }
+            match Self::of_adapter(instance.clone(), adapter) {
+                Ok(gpu) => return Ok(gpu),
+                // The next best may do.
+                Err(why) => failed = failed.or(Some(why)),
+            }
+        }
+        Err(failed.unwrap_or_else(|| RenderError::NoSuchAdapter {
+            asked: choice.to_string(),
+            found: names.join(", "),
+        }))
+    }
+
+    fn of_adapter(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self, RenderError> {
+        let name = adapter.get_info().name;
+        let limits = adapter.limits();
+        let broken = |why: String| RenderError::Device {
+            adapter: name.clone(),
+            why,
+        };
+        if limits.max_storage_buffers_per_shader_stage < 4 {
+            return Err(broken(
+                "its shaders read no storage buffers, which drawing needs".into(),
+            ));
+        }
+        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::INDIRECT_FIRST_INSTANCE;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("enfilade"),
+            required_features: wanted & adapter.features(),
+            required_limits: limits,
+            ..wgpu::DeviceDescriptor::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|why| broken(why.to_string()))?;
+        Ok(Self {
+            instance,
+            adapter,
+            device,
+            queue,
+        })
+    }
+
+    /// The adapter's name, and how it is spoken to, e.g. `llvmpipe (Vulkan)`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let info = self.adapter.get_info();
+        format!("{} ({})", info.name, info.backend)
+    }
+
+    /// Whether software stands in for a card: what it takes says little of cards.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Waits until all that was submitted is done.
+    ///
+    /// # Errors
+    ///
+    /// A device that was lost.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map(|_| ())
+            .map_err(|why| RenderError::Lost(why.to_string()))
+    }
+
+    /// A mark after all that was submitted, for [`Gpu::wait_for`].
+    #[must_use]
+    pub fn mark(&self) -> Submitted {
+        Submitted(self.queue.submit([]))
+    }
+
+    /// Waits until what was submitted before the mark is done.
+    ///
+    /// # Errors
+    ///
+    /// A device that was lost.
+    pub fn wait_for(&self, mark: Submitted) -> Result<(), RenderError> {
+        let submission_index = Some(mark.0);
+        let wait = wgpu::PollType::Wait {
+            submission_index,
+            timeout: None,
+        };
+        let done = self.device.poll(wait);
+        done.map(|_| ())
+            .map_err(|why| RenderError::Lost(why.to_string()))
+    }
+
+    /// Checks a size against a limit before the device would refuse it in a less helpful way.
+    pub(crate) fn check(
+        what: &'static str,
+        needed: u64,
+        limit: impl Into<u64>,
+    ) -> Result<(), RenderError> {
+        let limit = limit.into();
+        if needed > limit {
+            return Err(RenderError::TooLarge {
+                what,
+                needed,
+                limit,
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,197 @@
+//! Pictures of numbers: which triangle each pixel shows, and how deep it is.
+//!
+//! Drawn through the same lists as pictures are, scissors included, so that what is tried is what is
+//! drawn. Two layers: surfaces that hide what is behind them, and the nearest that is seen through.
+
+use crate::camera::Projection;
+use crate::gpu::{Gpu, RenderError};
+use crate::list::{DrawList, Run};
+use crate::pipelines::ID;
+use crate::renderer::{
+    Renderer, Stage, Style, bound, color_attachment, depth_attachment, read_texture, texture,
+};
+use crate::scene::GpuWorld;
+
+/// What one pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Shown {
+    /// Nothing: the sky.
+    Sky,
+    /// A structural triangle, by its number among all.
+    Structure {
+        /// The triangle; [`GpuWorld::chunk_of_triangle`] knows more.
+        triangle: u32,
+    },
+    /// A triangle of a detail object.
+    Detail {
+        /// Index into `World::details`.
+        detail: u32,
+        /// The triangle, by its number among all.
+        triangle: u32,
+    },
+}
+
+/// A picture of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdPicture {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// By pixel: what it shows, and its depth (1 at the near plane, 0 at infinity).
+    pub pixels: Vec<(Shown, f32)>,
+}
+
+/// Pixels in which two pictures of numbers differ.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// Pixels, all of them.
+    pub n_pixels: u64,
+    /// Pixels where something else is shown, at another depth.
+    pub lost: Vec<LostPixel>,
+    /// Pixels where another triangle is shown at the very same depth: two triangles in one place, of
+    /// which the first drawn is shown.
+    pub n_tied: u64,
+}
+
+/// A pixel that shows something else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LostPixel {
+    /// Column and row.
+    pub at: [u32; 2],
+    /// What is to be shown, and its depth.
+    pub expected: (Shown, f32),
+    /// What is shown instead.
+    pub found: (Shown, f32),
+}
+
+impl IdPicture {
+    /// Compares what is expected (`self`) with what is found.
+    ///
+    /// # Panics
+    ///
+    /// When sizes differ.
+    #[must_use]
+    pub fn difference(&self, found: &Self) -> Difference {
+        assert_eq!(self.pixels.len(), found.pixels.len(), "sizes differ");
+        let mut out = Difference {
+            n_pixels: self.pixels.len() as u64,
+            ..Difference::default()
+        };
+        for (i, (a, b)) in self.pixels.iter().zip(&found.pixels).enumerate() {
+            if a.0 == b.0 {
+                continue;
+            }
+            // The same adapter computes both depths from the same numbers: where they are equal,
+            // neither triangle is before the other.
+            if a.1 == b.1 && a.0 != Shown::Sky && b.0 != Shown::Sky {
+                out.n_tied += 1;
+            } else {
+                let i = i as u32;
+                out.lost.push(LostPixel {
+                    at: [i % self.width, i / self.width],
+                    expected: *a,
+                    found: *b,
+                });
+            }
+        }
+        out
+    }
+}
+
+impl Renderer {
+    /// Draws the two pictures of numbers of a list: what hides, and the nearest that does not.
+    ///
+    /// # Errors
+    ///
+    /// A size beyond the adapter's limit; a device that was lost.
+    pub fn ids(
+        &mut self,
+        gpu: &Gpu,
+        world: &GpuWorld,
+        stage: &Stage,
+        projection: &Projection,
+        list: &DrawList,
+        size: [u32; 2],
+    ) -> Result<[IdPicture; 2], RenderError> {
+        self.resize(gpu, size)?;
+        self.write_globals(gpu, stage, projection, &Style::default(), size);
+        self.instances
+            .write(gpu, bytemuck::cast_slice(&list.instances));
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("ids"),
+            layout: &self.layouts.ids,
+            entries: &[
+                bound(0, &self.globals),
+                bound(3, &world.instances),
+                bound(6, &world.corners),
+                bound(7, &world.indices),
+            ],
+        });
+        let target = || texture(gpu, "ids", size, ID, wgpu::TextureUsages::COPY_SRC);
+        let layers = [target(), target()];
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        if let Some(targets) = &self.targets {
+            for (i, runs) in [&list.opaque, &list.transparent].into_iter().enumerate() {
+                let view = layers[i].create_view(&wgpu::TextureViewDescriptor::default());
+                // What is seen through is drawn over the depth of what is not.
+                let depth = (i == 0).then_some(0.0);
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("ids"),
+                    color_attachments: &[Some(color_attachment(
+                        &view,
+                        Some(wgpu::Color::TRANSPARENT),
+                    ))],
+                    depth_stencil_attachment: Some(depth_attachment(&targets.depth, depth)),
+                    ..wgpu::RenderPassDescriptor::default()
+                });
+                pass.set_pipeline(&self.pipelines.id);
+                pass.set_bind_group(0, &group, &[]);
+                pass.set_vertex_buffer(0, self.instances.buffer.slice(..));
+                for run in ordered(runs) {
+                    let [x, y, w, h] = run.scissor.unwrap_or([0, 0, size[0], size[1]]);
+                    pass.set_scissor_rect(x, y, w, h);
+                    pass.draw(run.first..run.first + run.n, run.instances.clone());
+                }
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        let [a, b] = &layers;
+        Ok([read_ids(gpu, a, size)?, read_ids(gpu, b, size)?])
+    }
+}
+
+/// In the order of the world, so that two lists draw what they share in the same order: of two triangles
+/// in one place, the first one drawn is shown.
+fn ordered(runs: &[Run]) -> Vec<&Run> {
+    let mut out: Vec<&Run> = runs.iter().collect();
+    out.sort_by_key(|r| r.first);
+    out
+}
+
+fn read_ids(gpu: &Gpu, texture: &wgpu::Texture, size: [u32; 2]) -> Result<IdPicture, RenderError> {
+    let bytes = read_texture(gpu, texture, size, 16)?;
+    let pixels = bytes
+        .chunks_exact(16)
+        .map(|p| {
+            let word = |i: usize| u32::from_le_bytes([p[i], p[i + 1], p[i + 2], p[i + 3]]);
+            let triangle = word(4);
+            let shown = match word(0) {
+                0 => Shown::Sky,
+                1 => Shown::Structure { triangle },
+                n => Shown::Detail {
+                    detail: n - 2,
+                    triangle,
+                },
+            };
+            (shown, f32::from_bits(word(8)))
+        })
+        .collect();
+    Ok(IdPicture {
+        width: size[0],
+        height: size[1],
+        pixels,
+    })
+}

@@ -1,0 +1,32 @@
+//! Draws worlds of cells and portals with wgpu: to files without a display, or to a window's texture.
+//!
+//! A world is loaded once ([`GpuWorld`]); each frame, a [`Lister`] turns what the run-time sees into a
+//! short list of draws, and a [`Renderer`] draws it. Any adapter that wgpu supports will do, software
+//! included.
+//!
+//! # What is not promised
+//!
+//! Looks are meant to be clear, not physical: base color, emission, alpha, one sun with shadows, sky
+//! light and dark corners. Metal, roughness and normal maps are not drawn.
+
+mod camera;
+mod gpu;
+mod ids;
+mod list;
+mod marks;
+mod materials;
+mod picture;
+mod pipelines;
+mod renderer;
+mod scene;
+mod studio;
+
+pub use camera::{Camera, Projection};
+pub use gpu::{AdapterChoice, Gpu, RenderError};
+pub use ids::{Difference, IdPicture, LostPixel, Shown};
+pub use list::{DrawList, Lister, Reason};
+pub use marks::{Mark, Shape};
+pub use picture::Picture;
+pub use renderer::{Frame, Paint, Renderer, Stage, Style};
+pub use scene::{GpuWorld, cell_color};
+pub use studio::{Culling, Studio, Target};

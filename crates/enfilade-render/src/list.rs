@@ -1,0 +1,326 @@
+//! What one frame draws: ranges of triangles, each once, near to far.
+//!
+//! A frame must not cost the processor more than the adapter. Chunks of a batch that stand side by
+//! side become one draw; all visible objects of a mesh become one draw, however many rooms they are
+//! in; buffers are kept from frame to frame.
+
+use std::ops::Range;
+
+use enfilade_cpg::CellId;
+use enfilade_runtime::{ChunkId, DetailId, Seen, Sight};
+use glam::Vec3;
+
+use crate::scene::{Finish, GpuWorld};
+
+/// Why something is drawn though it is not seen, for pictures that explain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Reason {
+    /// It is seen.
+    Seen = 0,
+    /// It is out of the view frustum.
+    OutOfView = 1,
+    /// It is in the view frustum, and no chain of portals leads there.
+    BehindWalls = 2,
+    /// A large polygon of a cell that is seen hides it.
+    Occluded = 3,
+}
+
+/// Pixels of a picture: `[x, y, width, height]`.
+pub(crate) type Scissor = [u32; 4];
+
+/// One draw.
+#[derive(Clone, Debug)]
+pub(crate) struct Run {
+    pub(crate) first: u32,
+    pub(crate) n: u32,
+    pub(crate) texture: u32,
+    pub(crate) finish: Finish,
+    /// Into [`DrawList::instances`].
+    pub(crate) instances: Range<u32>,
+    /// `None` for the whole picture.
+    pub(crate) scissor: Option<Scissor>,
+}
+
+/// What one frame draws, and in which order.
+#[derive(Clone, Debug, Default)]
+pub struct DrawList {
+    pub(crate) opaque: Vec<Run>,
+    /// Far to near.
+    pub(crate) transparent: Vec<Run>,
+    /// The number of each instance drawn, and why in its highest four bits. Structure is number 0.
+    pub(crate) instances: Vec<u32>,
+    n_triangles: u64,
+}
+
+impl DrawList {
+    /// Triangles that it draws.
+    #[must_use]
+    pub fn n_triangles(&self) -> u64 {
+        self.n_triangles
+    }
+
+    /// Draws that it takes.
+    #[must_use]
+    pub fn n_draws(&self) -> usize {
+        self.opaque.len() + self.transparent.len()
+    }
+
+    /// Adds what another list draws, after what this one does.
+    pub fn append(&mut self, other: &Self) {
+        let base = self.instances.len() as u32;
+        self.instances.extend_from_slice(&other.instances);
+        let moved = |run: &Run| Run {
+            instances: run.instances.start + base..run.instances.end + base,
+            ..run.clone()
+        };
+        self.opaque.extend(other.opaque.iter().map(moved));
+        self.transparent.extend(other.transparent.iter().map(moved));
+        self.n_triangles += other.n_triangles;
+    }
+
+    fn clear(&mut self) {
+        self.opaque.clear();
+        self.transparent.clear();
+        self.instances.clear();
+        self.n_triangles = 0;
+    }
+}
+
+/// Makes lists, frame by frame; keeps its buffers.
+#[derive(Default)]
+pub struct Lister {
+    list: DrawList,
+    stamp: u32,
+    /// By cell: the part of the screen that it is seen in, and when that was found out.
+    rectangles: Vec<(u32, [f32; 4])>,
+    /// By batch: its place in the order of drawing.
+    ranks: Vec<(u32, u32)>,
+    chunks: Vec<(u32, u32)>,
+    details: Vec<(u32, u32)>,
+    far: Vec<(f32, Run)>,
+}
+
+/// A range of draws that grows while what is added continues it.
+fn push_run(runs: &mut Vec<Run>, run: Run) {
+    if let Some(last) = runs.last_mut()
+        && last.first + last.n == run.first
+        && last.texture == run.texture
+        && last.finish == run.finish
+        && last.instances == run.instances
+        && last.scissor == run.scissor
+    {
+        last.n += run.n;
+    } else {
+        runs.push(run);
+    }
+}
+
+impl Lister {
+    /// A lister; one serves any number of worlds, one after the other.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The last list; its buffers are missed until it is given back.
+    pub(crate) fn take(&mut self) -> DrawList {
+        std::mem::take(&mut self.list)
+    }
+
+    pub(crate) fn give(&mut self, list: DrawList) {
+        self.list = list;
+    }
+
+    /// All that there is, whatever the view.
+    pub fn everything(&mut self, world: &GpuWorld, sight: &Sight, eye: [f32; 3]) -> &DrawList {
+        let chunks = 0..world.chunks.len() as u32;
+        let details = 0..world.details.len() as u32;
+        self.begin(Reason::Seen);
+        self.chunks.extend(chunks.map(|c| (0, c)));
+        self.details
+            .extend(details.map(|d| (world.details[d as usize].mesh, d)));
+        self.finish(world, sight, eye, None)
+    }
+
+    /// What an answer of the run-time names. With the `size` of a picture, each batch is drawn
+    /// within the rectangle that its cells are seen in; views that look all around take none.
+    pub fn seen(
+        &mut self,
+        world: &GpuWorld,
+        sight: &Sight,
+        seen: &Seen<'_>,
+        eye: [f32; 3],
+        size: Option<[u32; 2]>,
+    ) -> &DrawList {
+        let is_flat = seen.visits().iter().all(|v| v.face == 0);
+        let size =
+            size.filter(|_| is_flat && !seen.counts().is_eye_lost && !seen.counts().is_capped);
+        self.begin(Reason::Seen);
+        if size.is_some() {
+            self.rectangles.resize(sight.n_cells(), (0, [0.0; 4]));
+            for v in seen.visits() {
+                let r = &mut self.rectangles[v.cell.0 as usize];
+                let [left, bottom, right, top] = v.rectangle;
+                *r = if r.0 == self.stamp {
+                    let [l, b, t, u] = r.1;
+                    (r.0, [l.min(left), b.min(bottom), t.max(right), u.max(top)])
+                } else {
+                    (self.stamp, v.rectangle)
+                };
+            }
+        }
+        self.ranks.resize(world.batch_cells.len(), (0, 0));
+        let mut n_ranks = 0;
+        for c in seen.chunks() {
+            let rank = &mut self.ranks[world.batch_of[c.0 as usize] as usize];
+            if rank.0 != self.stamp {
+                *rank = (self.stamp, n_ranks);
+                n_ranks += 1;
+            }
+            self.chunks.push((rank.1, c.0));
+        }
+        self.details.extend(
+            seen.details()
+                .iter()
+                .map(|d| (world.details[d.0 as usize].mesh, d.0)),
+        );
+        self.finish(world, sight, eye, size)
+    }
+
+    /// Chunks and details of one's own choice, colored by why they are drawn.
+    pub fn chosen(
+        &mut self,
+        world: &GpuWorld,
+        sight: &Sight,
+        chunks: impl Iterator<Item = ChunkId>,
+        details: impl Iterator<Item = DetailId>,
+        reason: Reason,
+    ) -> &DrawList {
+        self.begin(reason);
+        self.chunks.extend(chunks.map(|c| (0, c.0)));
+        self.details
+            .extend(details.map(|d| (world.details[d.0 as usize].mesh, d.0)));
+        self.finish(world, sight, [0.0; 3], None)
+    }
+
+    fn begin(&mut self, reason: Reason) {
+        self.stamp = self.stamp.wrapping_add(1);
+        if self.stamp == 0 {
+            self.rectangles.clear();
+            self.ranks.clear();
+            self.stamp = 1;
+        }
+        self.list.clear();
+        self.list.instances.push((reason as u32) << 28);
+        self.chunks.clear();
+        self.details.clear();
+        self.far.clear();
+    }
+
+    /// The pixels that a batch is seen in; `None` where it is nowhere.
+    fn scissor(&self, cells: &[CellId], size: [u32; 2]) -> Option<Scissor> {
+        let mut r = [f32::INFINITY, f32::INFINITY, -f32::INFINITY, -f32::INFINITY];
+        for c in cells {
+            if let Some(&(stamp, [left, bottom, right, top])) = self.rectangles.get(c.0 as usize)
+                && stamp == self.stamp
+            {
+                r = [
+                    r[0].min(left),
+                    r[1].min(bottom),
+                    r[2].max(right),
+                    r[3].max(top),
+                ];
+            }
+        }
+        let [w, h] = size.map(|n| n as f32);
+        // A pixel of margin: the rectangle is rounded.
+        let low = |x: f32, n: f32| ((x * 0.5 + 0.5) * n - 1.0).floor().clamp(0.0, n) as u32;
+        let high = |x: f32, n: f32| ((x * 0.5 + 0.5) * n + 1.0).ceil().clamp(0.0, n) as u32;
+        let (x0, x1) = (low(r[0], w), high(r[2], w));
+        let (y0, y1) = (low(-r[3], h), high(-r[1], h));
+        (x0 < x1 && y0 < y1).then(|| [x0, y0, x1 - x0, y1 - y0])
+    }
+
+    fn finish(
+        &mut self,
+        world: &GpuWorld,
+        sight: &Sight,
+        eye: [f32; 3],
+        size: Option<[u32; 2]>,
+    ) -> &DrawList {
+        let eye = Vec3::from(eye);
+        let reason = self.list.instances[0];
+        // Within a batch in the order of the buffer, so that neighbors join.
+        self.chunks.sort_unstable();
+        let mut batch = (u32::MAX, None);
+        for &(_, c) in &self.chunks {
+            let span = world.chunks[c as usize];
+            let b = world.batch_of[c as usize];
+            if batch.0 != b {
+                let scissor = size.map(|size| self.scissor(&world.batch_cells[b as usize], size));
+                batch = (b, scissor);
+            }
+            let scissor = match batch.1 {
+                None => None,
+                Some(Some(s)) => Some(s),
+                Some(None) => continue,
+            };
+            self.list.n_triangles += u64::from(span.n / 3);
+            let run = Run {
+                first: span.first,
+                n: span.n,
+                texture: span.texture,
+                finish: span.finish,
+                instances: 0..1,
+                scissor,
+            };
+            if span.is_transparent {
+                let [low, high] = sight.chunks()[c as usize].aabb.map(Vec3::from);
+                self.far.push((((low + high) * 0.5).distance(eye), run));
+            } else {
+                push_run(&mut self.list.opaque, run);
+            }
+        }
+        self.details.sort_unstable();
+        let mut i = 0;
+        while i < self.details.len() {
+            let mesh = self.details[i].0;
+            let first = self.list.instances.len() as u32;
+            let start = i;
+            while let Some(&(m, detail)) = self.details.get(i)
+                && m == mesh
+            {
+                self.list.instances.push((detail + 1) | reason);
+                i += 1;
+            }
+            let last = self.list.instances.len() as u32;
+            for span in world.meshes.get(mesh as usize).into_iter().flatten() {
+                self.list.n_triangles += u64::from(span.n / 3) * u64::from(last - first);
+                let run = |instances| Run {
+                    first: span.first,
+                    n: span.n,
+                    texture: span.texture,
+                    finish: span.finish,
+                    instances,
+                    scissor: None,
+                };
+                if span.is_transparent {
+                    for (at, &(_, detail)) in (first..last).zip(&self.details[start..i]) {
+                        let center = world.details[detail as usize].center;
+                        self.far.push((center.distance(eye), run(at..at + 1)));
+                    }
+                } else {
+                    self.list.opaque.push(run(first..last));
+                }
+            }
+        }
+        // Equal distances in the order of the world: the same picture every time.
+        self.far
+            .sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.first.cmp(&b.1.first)));
+        for (_, run) in self.far.drain(..) {
+            self.list.transparent.push(run);
+        }
+        &self.list
+    }
+}

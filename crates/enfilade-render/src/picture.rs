@@ -1,0 +1,121 @@
+//! Pictures on their way from the adapter to files.
+
+use crate::gpu::RenderError;
+
+/// A picture: RGBA, 8 bits each, sRGB, rows from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Four bytes a pixel.
+    pub rgba: Vec<u8>,
+}
+
+impl Picture {
+    /// The picture as a PNG file.
+    ///
+    /// # Errors
+    ///
+    /// A picture whose bytes are not as many as its sides say.
+    pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let image = image::RgbaImage::from_raw(self.width, self.height, self.rgba.clone())
+            .ok_or_else(|| RenderError::Encode("too few bytes for its size".into()))?;
+        // Nothing shines through: three bytes a pixel do.
+        image::DynamicImage::ImageRgba8(image)
+            .into_rgb8()
+            .write_to(&mut bytes, image::ImageFormat::Png)
+            .map_err(|why| RenderError::Encode(why.to_string()))?;
+        Ok(bytes.into_inner())
+    }
+
+    /// The picture at a quarter of its pixels, each the mean of four, averaged as light adds up.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let to_light: Vec<f32> = (0..256).map(|c| (c as f32 / 255.0).powf(2.2)).collect();
+        let (width, height) = (self.width / 2, self.height / 2);
+        let mut rgba = Vec::with_capacity((width * height * 4) as usize);
+        for y in 0..height {
+            for x in 0..width {
+                for k in 0..3 {
+                    let at = |dx, dy| {
+                        let i = ((y * 2 + dy) * self.width + x * 2 + dx) * 4 + k;
+                        to_light[usize::from(self.rgba[i as usize])]
+                    };
+                    let sum = at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1);
+                    rgba.push(((sum * 0.25).powf(1.0 / 2.2) * 255.0).round() as u8);
+                }
+                rgba.push(255);
+            }
+        }
+        Self {
+            width,
+            height,
+            rgba,
+        }
+    }
+
+    /// The color of a pixel.
+    ///
+    /// # Panics
+    ///
+    /// Outside of the picture.
+    #[must_use]
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
+        let i = ((y * self.width + x) * 4) as usize;
+        [0, 1, 2, 3].map(|k| self.rgba[i + k])
+    }
+
+    /// Draws another picture over this one, its upper left corner at `(x, y)`; what sticks out is
+    /// left out.
+    pub fn put(&mut self, other: &Self, x: u32, y: u32) {
+        let columns = other.width.min(self.width.saturating_sub(x)) as usize;
+        for row in 0..other.height.min(self.height.saturating_sub(y)) {
+            let to = (((y + row) * self.width + x) * 4) as usize;
+            let from = (row * other.width * 4) as usize;
+            self.rgba[to..to + columns * 4].copy_from_slice(&other.rgba[from..from + columns * 4]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_comes_back_from_its_png() {
+        let rgba = [9, 8, 7, 255, 1, 2, 3, 255].to_vec();
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            rgba,
+        };
+        let png = picture.to_png().unwrap();
+        let back = image::load_from_memory(&png).unwrap().into_rgba8();
+        assert_eq!((back.dimensions(), back.as_raw()), ((2, 1), &picture.rgba));
+        let short = Picture {
+            rgba: vec![0; 3],
+            ..picture
+        };
+        assert!(short.to_png().is_err());
+    }
+
+    #[test]
+    fn half_black_half_white_is_half_the_light() {
+        let rgba = [[0, 0, 0, 255], [255; 4], [255; 4], [0, 0, 0, 255]].concat();
+        let half = Picture {
+            width: 2,
+            height: 2,
+            rgba,
+        }
+        .halved();
+        assert_eq!((half.width, half.height), (1, 1));
+        assert!(
+            (185..190).contains(&half.pixel(0, 0)[0]),
+            "{:?}",
+            half.pixel(0, 0)
+        );
+    }
+}

@@ -1,0 +1,517 @@
+//! A world on the adapter: corners, indices, materials, textures, placed objects.
+//!
+//! All triangles stand in one buffer, in the order in which chunks of [`Sight`] are ranges, and those of
+//! detail meshes after them, each mesh once. What is drawn is a list of ranges, so that neighboring
+//! chunks join to one draw whatever room they belong to.
+
+use enfilade_cpg::{CellId, World};
+use enfilade_geom::scene::Primitive;
+use enfilade_runtime::Sight;
+use glam::{Mat4, Vec3};
+use wgpu::util::DeviceExt;
+
+use crate::gpu::{Gpu, RenderError};
+use crate::materials::{Look, decode, wrapping};
+
+/// A corner of a triangle, 32 bytes. The shader that draws ids reads it as eight words.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Corner {
+    position: [f32; 3],
+    normal: [i8; 4],
+    uv: [f32; 2],
+    color: [u8; 4],
+    part: u32,
+}
+
+pub(crate) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Corner>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![
+        0 => Float32x3, 1 => Snorm8x4, 2 => Float32x2, 3 => Unorm8x4, 4 => Uint32
+    ],
+};
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Part {
+    material: u32,
+    color: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Material {
+    base_color: [f32; 4],
+    emissive: [f32; 4],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Instance {
+    rows: [[f32; 4]; 3],
+    color: [u32; 4],
+}
+
+/// Triangles that are drawn alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Span {
+    pub(crate) first: u32,
+    pub(crate) n: u32,
+    /// Index into [`GpuWorld::textures`].
+    pub(crate) texture: u32,
+    pub(crate) finish: Finish,
+    pub(crate) is_transparent: bool,
+}
+
+/// What it takes to shade a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Finish {
+    Plain = 0,
+    Textured = 1,
+    /// With holes.
+    Masked = 2,
+}
+
+/// A placed detail object, as drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub(crate) mesh: u32,
+    pub(crate) center: Vec3,
+    /// Of a sphere that holds it. [Units: wu]
+    pub(crate) radius: f32,
+}
+
+/// A world on the adapter, ready to be drawn.
+pub struct GpuWorld {
+    pub(crate) corners: wgpu::Buffer,
+    pub(crate) indices: wgpu::Buffer,
+    pub(crate) parts: wgpu::Buffer,
+    pub(crate) materials: wgpu::Buffer,
+    pub(crate) instances: wgpu::Buffer,
+    /// Base color textures; the first is white.
+    pub(crate) textures: Vec<wgpu::BindGroup>,
+    /// By chunk of the sight.
+    pub(crate) chunks: Vec<Span>,
+    /// By chunk: its batch.
+    pub(crate) batch_of: Vec<u32>,
+    /// By batch: the cells that see it.
+    pub(crate) batch_cells: Vec<Vec<CellId>>,
+    /// By detail mesh: its parts.
+    pub(crate) meshes: Vec<Vec<Span>>,
+    pub(crate) details: Vec<Placed>,
+    /// Least and greatest corner of all that is drawn. [Units: wu]
+    pub(crate) bounds: [Vec3; 2],
+    pub(crate) n_triangles: u64,
+    n_missing_pictures: u32,
+}
+
+/// The color of a cell, here and in drawings: neighbors in number differ most. sRGB, 0 to 1.
+#[must_use]
+pub fn cell_color(cell: CellId) -> [f32; 3] {
+    let hue = (cell.0 as f32 * 0.618_034 + 0.08).fract() * 6.0;
+    let (saturation, value) = ([0.55, 0.42][cell.0 as usize / 2 % 2], 0.92);
+    [5.0_f32, 3.0, 1.0].map(|n| {
+        let k = (n + hue) % 6.0;
+        value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)
+    })
+}
+
+fn packed(c: [f32; 3]) -> u32 {
+    let [r, g, b] = c.map(|x| (x.clamp(0.0, 1.0) * 255.0) as u32);
+    r | g << 8 | b << 16 | 0xff << 24
+}
+
+fn color_of(cells: &[CellId]) -> u32 {
+    packed(cells.first().map_or([0.35; 3], |&c| cell_color(c)))
+}
+
+/// Fills the buffers; what is on the adapter is made of it at the end.
+struct Filling<'w> {
+    world: &'w World,
+    looks: Vec<Look>,
+    /// By texture of the world: index into the textures drawn, 0 for none.
+    texture_of: Vec<u32>,
+    corners: Vec<Corner>,
+    indices: Vec<u32>,
+    parts: Vec<Part>,
+}
+
+impl Filling<'_> {
+    fn look(&self, primitive: &Primitive) -> (u32, Look) {
+        // The last stands for none.
+        let none = self.looks.len() - 1;
+        let at = primitive.material.map_or(none, |m| m as usize).min(none);
+        (at as u32, self.looks[at])
+    }
+
+    /// Adds a primitive's triangles, by `order` of its positions; returns where they stand.
+    fn add(&mut self, primitive: &Primitive, order: &[u32], color: u32) -> Span {
+        let (material, look) = self.look(primitive);
+        let part = self.parts.len() as u32;
+        self.parts.push(Part { material, color });
+        let uvs = primitive.uvs.get(look.uv_set);
+        let base = self.corners.len() as u32;
+        for (i, &position) in primitive.positions.iter().enumerate() {
+            let normal = primitive.normals.get(i).map_or([0; 4], |n| {
+                let [x, y, z] = n.map(|v| (v.clamp(-1.0, 1.0) * 127.0).round() as i8);
+                [x, y, z, 127]
+            });
+            let color = primitive.colors.get(i).copied().unwrap_or([1.0; 4]);
+            self.corners.push(Corner {
+                position,
+                normal,
+                uv: uvs.and_then(|u| u.get(i)).copied().unwrap_or_default(),
+                color: color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8),
+                part,
+            });
+        }
+        let first = self.indices.len() as u32;
+        self.indices.extend(order.iter().map(|&i| base + i));
+        let texture = look
+            .texture
+            .and_then(|t| self.texture_of.get(t as usize))
+            .copied()
+            .filter(|_| uvs.is_some());
+        let texture = texture.unwrap_or(0);
+        Span {
+            first,
+            n: order.len() as u32,
+            texture,
+            finish: if look.cutoff > 0.0 {
+                Finish::Masked
+            } else if texture > 0 {
+                Finish::Textured
+            } else {
+                Finish::Plain
+            },
+            is_transparent: look.is_transparent,
+        }
+    }
+}
+
+impl GpuWorld {
+    /// Puts a world on the adapter. `sight` was made of the same world.
+    ///
+    /// Pictures that are missing or damaged are drawn as their material's color.
+    ///
+    /// # Errors
+    ///
+    /// A world larger than the adapter's buffers.
+    pub fn load(gpu: &Gpu, world: &World, sight: &Sight) -> Result<Self, RenderError> {
+        let mut looks: Vec<Look> = world.materials.iter().map(Look::of).collect();
+        looks.push(Look::default());
+        let (textures, texture_of, n_missing_pictures) = load_textures(gpu, world, &looks)?;
+        let mut filling = Filling {
+            world,
+            looks,
+            texture_of,
+            corners: Vec::new(),
+            indices: Vec::new(),
+            parts: Vec::new(),
+        };
+        let batches = filling.add_batches(sight);
+        let meshes = filling.add_meshes();
+        let (instances, details) = placed(world);
+        let chunks: Vec<Span> = sight
+            .chunks()
+            .iter()
+            .map(|c| Span {
+                first: batches[c.batch as usize].first + c.first_index,
+                n: c.n_indices,
+                ..batches[c.batch as usize]
+            })
+            .collect();
+        let materials: Vec<Material> = filling
+            .looks
+            .iter()
+            .map(|l| Material {
+                base_color: l.base_color,
+                emissive: [l.emissive[0], l.emissive[1], l.emissive[2], l.cutoff],
+            })
+            .collect();
+        let bounds = bounds_of(world, &details);
+        let storage = wgpu::BufferUsages::STORAGE;
+        let buffer = |what, bytes: &[u8], usage| make_buffer(gpu, what, bytes, usage);
+        let corners = bytemuck::cast_slice(&filling.corners);
+        let indices = bytemuck::cast_slice(&filling.indices);
+        Ok(Self {
+            corners: buffer("the world's corners", corners, wgpu::BufferUsages::VERTEX)?,
+            indices: buffer("the world's indices", indices, wgpu::BufferUsages::INDEX)?,
+            parts: buffer("parts", bytemuck::cast_slice(&filling.parts), storage)?,
+            materials: buffer("materials", bytemuck::cast_slice(&materials), storage)?,
+            instances: buffer("placed objects", bytemuck::cast_slice(&instances), storage)?,
+            textures,
+            chunks,
+            batch_of: sight.chunks().iter().map(|c| c.batch).collect(),
+            batch_cells: world.batches.iter().map(|b| b.cells.clone()).collect(),
+            meshes,
+            details,
+            bounds,
+            n_triangles: sight.n_triangles(),
+            n_missing_pictures,
+        })
+    }
+
+    /// Triangles of structure and placed objects.
+    #[must_use]
+    pub fn n_triangles(&self) -> u64 {
+        self.n_triangles
+    }
+
+    /// Pictures of textures that are missing or damaged.
+    #[must_use]
+    pub fn n_missing_pictures(&self) -> u32 {
+        self.n_missing_pictures
+    }
+
+    /// Least and greatest corner of all that is drawn; of an empty world, a box around its origin.
+    /// [Units: wu]
+    #[must_use]
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        self.bounds.map(|p| p.to_array())
+    }
+
+    /// The chunk of a structural triangle, by its number in an id picture.
+    #[must_use]
+    pub fn chunk_of_triangle(&self, triangle: u32) -> Option<u32> {
+        // Chunks come in ascending order of their ranges.
+        let at = self
+            .chunks
+            .partition_point(|c| c.first + c.n <= triangle * 3);
+        let chunk = self.chunks.get(at)?;
+        (chunk.first <= triangle * 3).then_some(at as u32)
+    }
+
+    /// The batch of a chunk, and the triangle's place in it as [`Sight::indices`] orders them.
+    #[must_use]
+    pub fn batch_of_chunk(&self, chunk: u32) -> Option<u32> {
+        self.batch_of.get(chunk as usize).copied()
+    }
+}
+
+impl Filling<'_> {
+    fn add_batches(&mut self, sight: &Sight) -> Vec<Span> {
+        let batches = &self.world.batches;
+        batches
+            .iter()
+            .enumerate()
+            .map(|(i, batch)| {
+                let order = sight.indices(i as u32);
+                self.add(&batch.primitive, order, color_of(&batch.cells))
+            })
+            .collect()
+    }
+
+    fn add_meshes(&mut self) -> Vec<Vec<Span>> {
+        let meshes = &self.world.detail_meshes;
+        meshes
+            .iter()
+            .map(|mesh| {
+                let parts = mesh.primitives.iter().filter(|p| !p.indices.is_empty());
+                parts.map(|p| self.add(p, &p.indices, 0)).collect()
+            })
+            .collect()
+    }
+}
+
+fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
+    // The first is where structure stands: where it is.
+    let mut instances = vec![Instance {
+        rows: [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ],
+        color: [packed([0.35; 3]); 4],
+    }];
+    let mut details = Vec::new();
+    for detail in &world.details {
+        let m = Mat4::from_cols_array(&detail.transform);
+        instances.push(Instance {
+            rows: [m.row(0), m.row(1), m.row(2)].map(|r| r.to_array()),
+            color: [color_of(&detail.cells); 4],
+        });
+        let mut low = Vec3::INFINITY;
+        let mut high = Vec3::NEG_INFINITY;
+        let mesh = world.detail_meshes.get(detail.mesh as usize);
+        for p in mesh.iter().flat_map(|m| &m.primitives) {
+            for &q in &p.positions {
+                let q = m.transform_point3(q.into());
+                (low, high) = (low.min(q), high.max(q));
+            }
+        }
+        let is_empty = low.x > high.x;
+        details.push(Placed {
+            mesh: detail.mesh,
+            center: if is_empty {
+                m.w_axis.truncate()
+            } else {
+                (low + high) * 0.5
+            },
+            radius: if is_empty {
+                0.0
+            } else {
+                (high - low).length() * 0.5
+            },
+        });
+    }
+    (instances, details)
+}
+
+fn bounds_of(world: &World, details: &[Placed]) -> [Vec3; 2] {
+    let mut low = Vec3::INFINITY;
+    let mut high = Vec3::NEG_INFINITY;
+    for p in world.batches.iter().flat_map(|b| &b.primitive.positions) {
+        (low, high) = (low.min((*p).into()), high.max((*p).into()));
+    }
+    for d in details {
+        (low, high) = (low.min(d.center - d.radius), high.max(d.center + d.radius));
+    }
+    if low.is_finite() && high.is_finite() && low.x <= high.x {
+        [low, high]
+    } else {
+        [Vec3::NEG_ONE, Vec3::ONE]
+    }
+}
+
+fn make_buffer(
+    gpu: &Gpu,
+    what: &'static str,
+    bytes: &[u8],
+    usage: wgpu::BufferUsages,
+) -> Result<wgpu::Buffer, RenderError> {
+    let limits = gpu.device.limits();
+    Gpu::check(what, bytes.len() as u64, limits.max_buffer_size)?;
+    Gpu::check(
+        what,
+        bytes.len() as u64,
+        limits.max_storage_buffer_binding_size,
+    )?;
+    // A buffer must not be empty; 64 bytes are as large as the largest element.
+    let empty = [0; 64];
+    let contents = if bytes.is_empty() { &empty } else { bytes };
+    Ok(gpu
+        .device
+        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(what),
+            contents,
+            usage: usage | wgpu::BufferUsages::STORAGE,
+        }))
+}
+
+/// The layout of a texture's bind group.
+pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    gpu.device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("texture"),
+            entries: &[
+                wgpu::BindGroupLayoutEntry {
+                    binding: 0,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                        view_dimension: wgpu::TextureViewDimension::D2,
+                        multisampled: false,
+                    },
+                    count: None,
+                },
+                wgpu::BindGroupLayoutEntry {
+                    binding: 1,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                    count: None,
+                },
+            ],
+        })
+}
+
+/// The textures that materials use; by texture of the world, which of them; how many are missing.
+fn load_textures(
+    gpu: &Gpu,
+    world: &World,
+    looks: &[Look],
+) -> Result<(Vec<wgpu::BindGroup>, Vec<u32>, u32), RenderError> {
+    let layout = texture_layout(gpu);
+    let white = image::RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
+    let repeat = [wgpu::AddressMode::Repeat; 2];
+    let mut groups = vec![texture_group(gpu, &layout, &[white], repeat)?];
+    let mut texture_of = vec![0; world.textures.len()];
+    let mut n_missing = 0;
+    for look in looks {
+        let Some(t) = look.texture else { continue };
+        if texture_of.get(t as usize).is_none_or(|&g| g != 0) {
+            continue;
+        }
+        match decode(world, t) {
+            Some(picture) => {
+                texture_of[t as usize] = groups.len() as u32;
+                let wrap = wrapping(world, t);
+                groups.push(texture_group(gpu, &layout, &picture.levels, wrap)?);
+            }
+            None => n_missing += 1,
+        }
+    }
+    Ok((groups, texture_of, n_missing))
+}
+
+fn texture_group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    levels: &[image::RgbaImage],
+    wrap: [wgpu::AddressMode; 2],
+) -> Result<wgpu::BindGroup, RenderError> {
+    let (width, height) = levels[0].dimensions();
+    Gpu::check(
+        "a texture's side",
+        width.max(height).into(),
+        gpu.device.limits().max_texture_dimension_2d,
+    )?;
+    let size = wgpu::Extent3d {
+        width,
+        height,
+        depth_or_array_layers: 1,
+    };
+    let texels: Vec<u8> = levels
+        .iter()
+        .flat_map(|l| l.as_raw().iter().copied())
+        .collect();
+    let texture = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some("base color"),
+            size,
+            mip_level_count: levels.len() as u32,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8UnormSrgb,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::MipMajor,
+        &texels,
+    );
+    let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        address_mode_u: wrap[0],
+        address_mode_v: wrap[1],
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        ..wgpu::SamplerDescriptor::default()
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("base color"),
+        layout,
+        entries: &[
+            wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&view),
+            },
+            wgpu::BindGroupEntry {
+                binding: 1,
+                resource: wgpu::BindingResource::Sampler(&sampler),
+            },
+        ],
+    }))
+}

@@ -1,0 +1,104 @@
+// From surfaces to the picture: dark corners, sky, heat of overdraw.
+
+@group(1) @binding(0) var color: texture_2d<f32>;
+@group(1) @binding(1) var depth: texture_depth_2d;
+
+@vertex
+fn whole(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
+    // One triangle around the screen.
+    return vec4(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+fn depth_at(p: vec2<i32>) -> f32 {
+    let limit = vec2<i32>(globals.size.xy) - 1;
+    return textureLoad(depth, clamp(p, vec2(0), limit), 0);
+}
+
+// Where a pixel's surface is, relative to the camera.
+fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
+    let uv = (vec2<f32>(p) + 0.5) * globals.size.zw;
+    let q = globals.relative_from_clip * vec4(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0, z, 1.0);
+    return q.xyz / q.w;
+}
+
+const SAMPLES: i32 = 20;
+// How far corners darken. [Units: wu]
+const REACH: f32 = 0.6;
+
+// Ambient occlusion from depths alone, after McGuire et al., "The Alchemy Screen-Space Ambient
+// Obscurance Algorithm" (HPG 2011), section 2.
+fn open_sky(p: vec2<i32>, at: vec3<f32>, z: f32) -> f32 {
+    // Of the two neighbors along an axis, the one on the same surface.
+    let left = point_at(p + vec2(-1, 0), depth_at(p + vec2(-1, 0)));
+    let right = point_at(p + vec2(1, 0), depth_at(p + vec2(1, 0)));
+    let above = point_at(p + vec2(0, -1), depth_at(p + vec2(0, -1)));
+    let below = point_at(p + vec2(0, 1), depth_at(p + vec2(0, 1)));
+    var dx = right - at;
+    if distance(left, at) < distance(right, at) { dx = at - left; }
+    var dy = above - at;
+    if distance(below, at) < distance(above, at) { dy = at - below; }
+    let normal = normalize(cross(dx, dy));
+    // How many pixels the reach is, here.
+    let clip = globals.clip_from_relative * vec4(at, 1.0);
+    let scale = length(vec3(
+        globals.clip_from_relative[0].y,
+        globals.clip_from_relative[1].y,
+        globals.clip_from_relative[2].y,
+    ));
+    let radius = clamp(0.5 * globals.size.y * scale * REACH / clip.w, 3.0, 0.2 * globals.size.y);
+    // Turned differently in each pixel of a block: noise finer than the eye, the same in each frame.
+    let noise = fract(52.9829189 * fract(dot(vec2<f32>(p), vec2(0.06711056, 0.00583715))));
+    var sum = 0.0;
+    for (var i = 0; i < SAMPLES; i++) {
+        let share = (f32(i) + 0.5) / f32(SAMPLES);
+        let angle = (noise + f32(i) * 0.381966) * 6.2831853;
+        let offset = vec2<i32>(vec2(cos(angle), sin(angle)) * radius * share);
+        let zq = depth_at(p + offset);
+        if zq <= 0.0 { continue; }
+        let v = point_at(p + offset, zq) - at;
+        let d2 = dot(v, v);
+        let near = max(1.0 - d2 / (REACH * REACH), 0.0);
+        sum += near * max(dot(v, normal) - 0.006 - 0.002 * clip.w, 0.0) * inverseSqrt(d2 + 1e-4);
+    }
+    return clamp(1.0 - 1.7 * sum / f32(SAMPLES), 0.0, 1.0);
+}
+
+fn sky(p: vec2<i32>) -> vec3<f32> {
+    if globals.eye.w > 0.5 {
+        return vec3(0.93, 0.94, 0.96);
+    }
+    let ray = normalize(point_at(p, 0.5));
+    let t = clamp(ray.y, -0.15, 1.0);
+    if t < 0.0 {
+        return mix(vec3(0.78, 0.83, 0.90), vec3(0.52, 0.52, 0.50), min(-t / 0.12, 1.0));
+    }
+    return mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(t));
+}
+
+// Black, blue, red, yellow, white.
+fn heat(n: f32) -> vec3<f32> {
+    let t = clamp(n / 16.0, 0.0, 1.0) * 4.0;
+    let a = mix(vec3(0.0), vec3(0.05, 0.08, 0.5), min(t, 1.0));
+    let b = mix(a, vec3(0.75, 0.08, 0.15), clamp(t - 1.0, 0.0, 1.0));
+    let c = mix(b, vec3(1.0, 0.75, 0.1), clamp(t - 2.0, 0.0, 1.0));
+    return mix(c, vec3(1.0), clamp(t - 3.0, 0.0, 1.0));
+}
+
+@fragment
+fn finish(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
+    let p = vec2<i32>(clip.xy);
+    let drawn = textureLoad(color, p, 0);
+    if globals.style.x == 2u {
+        return vec4(heat(drawn.a * 255.0 / 8.0), 1.0);
+    }
+    let z = depth_at(p);
+    // Nothing is as far as the far end: the sky is.
+    if z <= 0.0 {
+        return vec4(sky(p), 1.0);
+    }
+    var c = drawn.rgb;
+    if globals.style.y != 0u {
+        c *= open_sky(p, point_at(p, z), z);
+    }
+    return vec4(c, 1.0);
+}

@@ -1,0 +1,277 @@
+//! All that it takes to draw one world, put together.
+
+use enfilade_cpg::World;
+use enfilade_runtime::{Sight, SightState, View, Viewer};
+
+use crate::camera::Camera;
+use crate::gpu::{Gpu, RenderError};
+use crate::ids::IdPicture;
+use crate::list::{DrawList, Lister};
+use crate::marks::Mark;
+use crate::picture::Picture;
+use crate::renderer::{Frame, Renderer, Stage, Style};
+use crate::scene::GpuWorld;
+
+/// What of a world is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Culling {
+    /// All of it.
+    Everything,
+    /// What meets the view frustum.
+    Frustum,
+    /// What is seen through portals.
+    #[default]
+    Portals,
+}
+
+/// What frames that nobody looks at are drawn to.
+pub struct Target {
+    view: wgpu::TextureView,
+    size: [u32; 2],
+}
+
+/// An adapter, a world on it, and what answers what is seen of it.
+pub struct Studio {
+    /// The adapter.
+    pub gpu: Gpu,
+    /// The world on it.
+    pub world: GpuWorld,
+    /// What the viewer asks.
+    pub sight: Sight,
+    /// Which portals are open.
+    pub state: SightState,
+    /// Who asks.
+    pub viewer: Viewer,
+    renderer: Renderer,
+    stage: Stage,
+    lister: Lister,
+}
+
+impl Studio {
+    /// Puts a world on an adapter.
+    ///
+    /// # Errors
+    ///
+    /// A world that breaks invariants, or is larger than the adapter's limits.
+    pub fn new(gpu: Gpu, world: &World) -> Result<Self, RenderError> {
+        Self::with_format(gpu, world, wgpu::TextureFormat::Rgba8UnormSrgb)
+    }
+
+    /// The same for a window, whose pictures are of `format`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::new`].
+    pub fn with_format(
+        gpu: Gpu,
+        world: &World,
+        format: wgpu::TextureFormat,
+    ) -> Result<Self, RenderError> {
+        let sight = Sight::build(world)?;
+        let on_gpu = GpuWorld::load(&gpu, world, &sight)?;
+        let mut renderer = Renderer::with_format(&gpu, format);
+        let mut lister = Lister::new();
+        let all = lister.everything(&on_gpu, &sight, [0.0; 3]);
+        let stage = renderer.set_stage(&gpu, &on_gpu, all);
+        Ok(Self {
+            state: SightState::new(&sight),
+            viewer: Viewer::new(&sight),
+            gpu,
+            world: on_gpu,
+            sight,
+            renderer,
+            stage,
+            lister,
+        })
+    }
+
+    /// What is drawn of a view.
+    pub fn list(
+        &mut self,
+        view: &View,
+        eye: [f32; 3],
+        culling: Culling,
+        size: [u32; 2],
+    ) -> &DrawList {
+        let (world, sight) = (&self.world, &self.sight);
+        match culling {
+            Culling::Everything => self.lister.everything(world, sight, eye),
+            Culling::Frustum => {
+                let seen = self.viewer.see_through_walls(sight, view);
+                self.lister.seen(world, sight, &seen, eye, None)
+            }
+            Culling::Portals => {
+                let seen = self.viewer.see(sight, &self.state, view);
+                self.lister.seen(world, sight, &seen, eye, Some(size))
+            }
+        }
+    }
+
+    /// The same, to keep: until it is [given back](Studio::give_list), so that nothing is allocated.
+    pub fn take_list(
+        &mut self,
+        view: &View,
+        eye: [f32; 3],
+        culling: Culling,
+        size: [u32; 2],
+    ) -> DrawList {
+        self.list(view, eye, culling, size);
+        self.lister.take()
+    }
+
+    /// Gives the buffers of a list back.
+    pub fn give_list(&mut self, list: DrawList) {
+        self.lister.give(list);
+    }
+
+    /// A target of the studio's format, for frames that nobody looks at.
+    ///
+    /// # Errors
+    ///
+    /// A size beyond the adapter's limit.
+    pub fn target(&self, size: [u32; 2]) -> Result<Target, RenderError> {
+        let limit = self.gpu.device.limits().max_texture_dimension_2d;
+        Gpu::check("a side of the picture", size[0].max(size[1]).into(), limit)?;
+        let texture = crate::renderer::texture(
+            &self.gpu,
+            "target",
+            size,
+            self.renderer.format(),
+            wgpu::TextureUsages::COPY_SRC,
+        );
+        Ok(Target {
+            view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            size,
+        })
+    }
+
+    /// Draws a frame to a target.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::draw`].
+    pub fn draw_to(&mut self, frame: &Frame<'_>, target: &Target) -> Result<(), RenderError> {
+        self.draw(frame, &target.view, target.size)
+    }
+
+    /// A picture from a camera, with marks over it.
+    ///
+    /// # Errors
+    ///
+    /// A camera that looks nowhere; a size beyond the adapter's limit; a device that was lost.
+    pub fn picture(
+        &mut self,
+        camera: &Camera,
+        culling: Culling,
+        style: Style,
+        marks: &[Mark],
+        size: [u32; 2],
+    ) -> Result<Picture, RenderError> {
+        let aspect = size[0] as f32 / size[1] as f32;
+        let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
+        let list = self.list(&view, camera.eye, culling, size).clone();
+        self.picture_of(
+            &Frame {
+                projection,
+                list: &list,
+                style,
+                marks,
+            },
+            size,
+        )
+    }
+
+    /// A picture of a frame of one's own.
+    ///
+    /// # Errors
+    ///
+    /// A size beyond the adapter's limit; a device that was lost.
+    pub fn picture_of(
+        &mut self,
+        frame: &Frame<'_>,
+        size: [u32; 2],
+    ) -> Result<Picture, RenderError> {
+        self.renderer
+            .picture(&self.gpu, &self.world, &self.stage, frame, size)
+    }
+
+    /// Draws a frame to a texture of the studio's format.
+    ///
+    /// # Errors
+    ///
+    /// A size beyond the adapter's limit.
+    pub fn draw(
+        &mut self,
+        frame: &Frame<'_>,
+        output: &wgpu::TextureView,
+        size: [u32; 2],
+    ) -> Result<(), RenderError> {
+        self.renderer
+            .draw(&self.gpu, &self.world, &self.stage, frame, output, size)
+    }
+
+    /// Pictures of numbers from a camera: what hides, and the nearest that does not.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::picture`].
+    pub fn ids(
+        &mut self,
+        camera: &Camera,
+        culling: Culling,
+        size: [u32; 2],
+    ) -> Result<[IdPicture; 2], RenderError> {
+        let aspect = size[0] as f32 / size[1] as f32;
+        let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
+        let list = self.list(&view, camera.eye, culling, size).clone();
+        self.renderer.ids(
+            &self.gpu,
+            &self.world,
+            &self.stage,
+            &projection,
+            &list,
+            size,
+        )
+    }
+
+    /// Chunks and details colored by why they are drawn, for pictures that explain what is culled.
+    pub fn explained(&mut self, view: &View) -> DrawList {
+        use crate::list::Reason;
+        use std::collections::BTreeSet;
+        let sets = |seen: enfilade_runtime::Seen<'_>| -> [BTreeSet<u32>; 2] {
+            [
+                seen.chunks().iter().map(|c| c.0).collect(),
+                seen.details().iter().map(|d| d.0).collect(),
+            ]
+        };
+        let occlusion = self.viewer.options_mut().occlusion;
+        self.viewer.options_mut().occlusion = true;
+        let seen = sets(self.viewer.see(&self.sight, &self.state, view));
+        self.viewer.options_mut().occlusion = false;
+        let behind = sets(self.viewer.see(&self.sight, &self.state, view));
+        self.viewer.options_mut().occlusion = occlusion;
+        let in_view = sets(self.viewer.see_through_walls(&self.sight, view));
+        let all = [
+            (0..self.world.chunks.len() as u32).collect(),
+            (0..self.world.details.len() as u32).collect(),
+        ];
+        let none = [BTreeSet::new(), BTreeSet::new()];
+        let mut out = DrawList::default();
+        let steps = [
+            (Reason::Seen, &seen, &none),
+            (Reason::Occluded, &behind, &seen),
+            (Reason::BehindWalls, &in_view, &behind),
+            (Reason::OutOfView, &all, &in_view),
+        ];
+        for (reason, these, without) in steps {
+            let left = |k: usize| these[k].iter().filter(move |i| !without[k].contains(i));
+            let chunks = left(0).map(|&c| enfilade_runtime::ChunkId(c));
+            let details = left(1).map(|&d| enfilade_runtime::DetailId(d));
+            let list = self
+                .lister
+                .chosen(&self.world, &self.sight, chunks, details, reason);
+            out.append(list);
+        }
+        out
+    }
+}

@@ -1,0 +1,238 @@
+//! Pictures on the software adapter, which is the same on every machine.
+
+use std::collections::BTreeSet;
+
+use enfilade_cpg::{PortalId, World};
+use enfilade_geom::scene::{Material, Texture};
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, Frame, Gpu, GpuWorld, Mark, Paint, RenderError, Shape, Shown,
+    Studio, Style,
+};
+use enfilade_runtime::Sight;
+use enfilade_testkit::{GridParams, Rng, room_grid};
+
+const SIZE: [u32; 2] = [96, 64];
+
+/// No test here passes without an adapter: what draws nothing has shown nothing.
+fn gpu() -> Gpu {
+    Gpu::open(&AdapterChoice::Software)
+        .unwrap_or_else(|why| panic!("these tests draw with software, and there is none: {why}"))
+}
+
+fn grid() -> World {
+    room_grid(&GridParams::offices(60, 3))
+}
+
+/// A camera in a room of the grid.
+fn camera(rng: &mut Rng, world: &World) -> Camera {
+    let cells = &world.graph.cells;
+    let indoors: Vec<_> = cells.iter().filter(|c| !c.outdoor).collect();
+    let [low, high] = indoors[rng.below(indoors.len())].aabb;
+    let t = [0, 1, 2].map(|_| rng.range(0.1, 0.9) as f32);
+    let angle = rng.range(0.0, std::f64::consts::TAU);
+    Camera {
+        eye: [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * t[k]),
+        toward: [
+            angle.cos() as f32,
+            rng.range(-0.4, 0.4) as f32,
+            angle.sin() as f32,
+        ],
+        fov_y: rng.range(0.5, 1.8) as f32,
+    }
+}
+
+/// Pixels that differ with and without portals; with `close`, after that portal is closed behind the
+/// back of the picture without culling.
+fn n_lost(studio: &mut Studio, world: &World, views: usize, seed: u64) -> usize {
+    let mut rng = Rng::new(seed);
+    let mut lost = 0;
+    for _ in 0..views {
+        let camera = camera(&mut rng, world);
+        let whole = studio.ids(&camera, Culling::Everything, SIZE).unwrap();
+        let culled = studio.ids(&camera, Culling::Portals, SIZE).unwrap();
+        for (a, b) in whole.iter().zip(&culled) {
+            lost += a.difference(b).lost.len();
+        }
+    }
+    lost
+}
+
+#[test]
+fn culling_by_portals_changes_no_pixel() {
+    let world = grid();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    // Of 370,000 pixels, a few may lie on an edge to what no room sees, and adapters round there: the
+    // command's own test judges such pixels by exact rays. Whoever loses a triangle loses more.
+    let n = n_lost(&mut studio, &world, 60, 1);
+    assert!(n < 4, "{n} pixels");
+}
+
+#[test]
+fn a_traversal_that_loses_a_room_is_noticed() {
+    let world = grid();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    for p in 0..world.graph.portals.len() as u32 {
+        studio.state.close(PortalId(p));
+    }
+    assert!(n_lost(&mut studio, &world, 20, 1) > 100);
+}
+
+#[test]
+fn portals_draw_less_than_the_frustum_and_that_less_than_everything() {
+    let world = grid();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let mut rng = Rng::new(5);
+    let mut sums = [0; 3];
+    for _ in 0..20 {
+        let camera = camera(&mut rng, &world);
+        let view = camera.view(1.5).unwrap();
+        let modes = [Culling::Everything, Culling::Frustum, Culling::Portals];
+        let n = modes.map(|m| studio.list(&view, camera.eye, m, SIZE).n_triangles());
+        assert!(n[0] >= n[1] && n[1] >= n[2] && n[2] > 0, "{n:?}");
+        assert_eq!(n[0], studio.world.n_triangles());
+        for (sum, n) in sums.iter_mut().zip(n) {
+            *sum += n;
+        }
+    }
+    assert!(sums[2] * 3 < sums[1], "{sums:?}");
+}
+
+#[test]
+fn the_same_camera_gives_the_same_picture_and_another_another() {
+    let world = grid();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let mut rng = Rng::new(2);
+    let (a, b) = (camera(&mut rng, &world), camera(&mut rng, &world));
+    let mut draw = |c: &Camera, culling| {
+        studio
+            .picture(c, culling, Style::default(), &[], SIZE)
+            .unwrap()
+    };
+    let first = draw(&a, Culling::Portals);
+    assert_ne!(first, draw(&b, Culling::Portals));
+    assert_eq!(first, draw(&a, Culling::Portals));
+    assert_eq!(first, draw(&a, Culling::Everything), "colors as well");
+    let colors: BTreeSet<_> = first.rgba.chunks_exact(4).collect();
+    assert!(colors.len() > 4, "{} colors", colors.len());
+}
+
+#[test]
+fn paints_marks_and_explanations_change_what_is_seen() {
+    let world = grid();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let camera = camera(&mut Rng::new(2), &world);
+    let mut draw = |paint, marks: &[Mark]| {
+        let style = Style {
+            paint,
+            ..Style::default()
+        };
+        studio
+            .picture(&camera, Culling::Portals, style, marks, SIZE)
+            .unwrap()
+    };
+    let lit = draw(Paint::Lit, &[]);
+    assert_ne!(lit, draw(Paint::Cells, &[]));
+    assert_ne!(lit, draw(Paint::Overdraw, &[]));
+    let mark = Mark {
+        shape: Shape::Rectangle([-0.5, -0.5, 0.5, 0.5]),
+        color: [1.0, 0.0, 0.0, 1.0],
+        width: 3.0,
+        on_top: true,
+    };
+    let marked = draw(Paint::Lit, &[mark]);
+    assert_eq!(marked.pixel(SIZE[0] / 2, SIZE[1] / 4), [255, 0, 0, 255]);
+    assert_eq!(marked.pixel(1, 1), lit.pixel(1, 1));
+    let view = camera.view(1.5).unwrap();
+    let list = studio.explained(&view);
+    assert_eq!(
+        list.n_triangles(),
+        studio.world.n_triangles(),
+        "each once, whatever the reason"
+    );
+    let frame = Frame {
+        projection: camera.projection(1.5).unwrap(),
+        list: &list,
+        style: Style::default(),
+        marks: &[],
+    };
+    studio.picture_of(&frame, SIZE).unwrap();
+}
+
+#[test]
+fn a_world_without_anything_is_sky() {
+    let mut studio = Studio::new(gpu(), &World::default()).unwrap();
+    let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
+    let [solid, glass] = studio.ids(&camera, Culling::Portals, SIZE).unwrap();
+    assert!(
+        solid
+            .pixels
+            .iter()
+            .chain(&glass.pixels)
+            .all(|p| p.0 == Shown::Sky)
+    );
+    studio
+        .picture(&camera, Culling::Portals, Style::default(), &[], SIZE)
+        .unwrap();
+}
+
+#[test]
+fn eyes_outside_and_in_walls_see_all_that_a_picture_without_culling_shows() {
+    let world = grid();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let [low, high] = studio.world.bounds();
+    let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
+    for out in [0.5, 3.0, 40.0] {
+        let camera = Camera::looking_at([high[0] + out, center[1], high[2] + out], center);
+        let whole = studio.ids(&camera, Culling::Everything, SIZE).unwrap();
+        let culled = studio.ids(&camera, Culling::Portals, SIZE).unwrap();
+        assert_eq!(whole[0].difference(&culled[0]).lost, []);
+        assert!(whole[0].pixels.iter().any(|p| p.0 != Shown::Sky));
+    }
+}
+
+#[test]
+fn missing_pictures_are_counted_and_drawn_without() {
+    let mut world = grid();
+    world.textures.push(Texture::default());
+    world.materials.push(Material {
+        gltf: r#"{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}"#.into(),
+        base_color: [0.2, 0.4, 0.6, 1.0],
+        ..Material::default()
+    });
+    let material = world.materials.len() as u32 - 1;
+    for batch in &mut world.batches {
+        batch.primitive.material = Some(material);
+    }
+    let gpu = gpu();
+    let sight = Sight::build(&world).unwrap();
+    let loaded = GpuWorld::load(&gpu, &world, &sight).unwrap();
+    assert_eq!(loaded.n_missing_pictures(), 1);
+}
+
+#[test]
+fn what_cannot_be_is_an_error_that_says_what_to_do() {
+    let found = Gpu::open(&AdapterChoice::Named("no such adapter".into()));
+    let Err(why @ RenderError::NoSuchAdapter { .. }) = found else {
+        panic!("{found:?}");
+    };
+    assert!(why.to_string().contains("no such adapter"), "{why}");
+    assert!(
+        RenderError::NoAdapter
+            .to_string()
+            .contains("apt-get install")
+    );
+    let mut studio = Studio::new(gpu(), &grid()).unwrap();
+    let camera = Camera::looking_at([1.0, 1.0, 1.0], [2.0, 1.0, 1.0]);
+    let mut draw =
+        |camera, size| studio.picture(camera, Culling::Portals, Style::default(), &[], size);
+    assert!(matches!(
+        draw(&camera, [1 << 20, 4]),
+        Err(RenderError::TooLarge { .. })
+    ));
+    let nowhere = Camera {
+        toward: [0.0; 3],
+        ..camera
+    };
+    assert!(matches!(draw(&nowhere, SIZE), Err(RenderError::Camera(_))));
+    draw(&camera, SIZE).unwrap();
+}
