@@ -56,12 +56,17 @@ impl<'a> BakeContext<'a> {
 
     /// Ends the stage under way and begins the next.
     pub(crate) fn stage(&self, index: usize) -> Result<(), BakeError> {
+        self.stage_of(&STAGES, index)
+    }
+
+    /// The same, for a bake with stages of its own.
+    pub(crate) fn stage_of(&self, stages: &[&'static str], index: usize) -> Result<(), BakeError> {
         self.end_stage();
         if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Err(BakeError::Cancelled);
         }
-        self.progress.stage(STAGES[index], index, STAGES.len());
-        *self.running.lock().expect("no panic holds it") = Some((STAGES[index], Instant::now()));
+        self.progress.stage(stages[index], index, stages.len());
+        *self.running.lock().expect("no panic holds it") = Some((stages[index], Instant::now()));
         Ok(())
     }
 

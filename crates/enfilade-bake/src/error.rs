@@ -45,6 +45,9 @@ pub enum BakeError {
         /// Width of the narrowest opening that must be found. [Units: wu]
         min_opening: f64,
     },
+    /// The scene has no tetrahedra.
+    #[error(transparent)]
+    Tetrahedra(#[from] crate::delaunay::DelaunayError),
     /// The caller asked to stop.
     #[error("cancelled")]
     Cancelled,

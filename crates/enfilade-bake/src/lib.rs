@@ -9,6 +9,7 @@ pub mod bsp;
 pub mod complex;
 mod config;
 mod context;
+pub mod delaunay;
 mod error;
 mod join;
 pub mod pipeline;

@@ -1,5 +1,6 @@
 //! `enfilade bake`: a scene becomes a world.
 
+pub(crate) mod delaunay;
 pub(crate) mod settings;
 
 use std::io::{self, IsTerminal, Write};
@@ -7,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::bake::bsp::{bake_bsp, find_leak};
+use enfilade::bake::delaunay::bake_delaunay;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
@@ -55,17 +57,21 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let scene = &imported.scene;
     refuse_leak(scene, options)?;
     let (method, reason) = method_for(scene, options.method);
-    writeln!(io::stderr(), "method {method}: {reason}")?;
-    let threads = options.threads.map(usize::from);
-    let baked = if method == "bsp" {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.unwrap_or(0))
-            .build()?;
-        let bar = BakeBar::new(scene, config);
-        pool.install(|| bake_bsp(scene, &settings.bsp, &BakeContext::new(&bar, None)))?
-    } else {
-        bake_scene(scene, config, threads)?
-    };
+    writeln!(io::stderr(), "method {}: {reason}", method.name())?;
+    let bar = BakeBar::new(scene, config);
+    let ctx = BakeContext::new(&bar, None);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads.map_or(0, usize::from))
+        .build()?;
+    let baked = match method {
+        Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
+        Builder::Bsp => pool.install(|| bake_bsp(scene, &settings.bsp, &ctx)),
+        Builder::Delaunay => {
+            let config = options.delaunay.resolve(config)?;
+            pool.install(|| bake_delaunay(scene, &config, &ctx))
+        }
+    }?;
+    drop(bar);
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
@@ -80,17 +86,37 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The method that is asked for or fits the input, and why.
-fn method_for(scene: &Scene, asked: settings::Method) -> (&'static str, String) {
+/// What finds the cells.
+#[derive(Clone, Copy, PartialEq)]
+enum Builder {
+    Watershed,
+    Bsp,
+    Delaunay,
+}
+
+impl Builder {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Watershed => "watershed",
+            Self::Bsp => "bsp",
+            Self::Delaunay => "delaunay",
+        }
+    }
+}
+
+/// The builder that is asked for or fits the input, and why.
+fn method_for(scene: &Scene, asked: settings::Method) -> (Builder, String) {
+    let asked_for = |builder| (builder, "asked for".to_owned());
     match asked {
-        settings::Method::Watershed => ("watershed", "asked for".to_owned()),
-        settings::Method::Bsp => ("bsp", "asked for".to_owned()),
+        settings::Method::Watershed => asked_for(Builder::Watershed),
+        settings::Method::Bsp => asked_for(Builder::Bsp),
+        settings::Method::Delaunay => asked_for(Builder::Delaunay),
         settings::Method::Auto if scene.solids.is_empty() => (
-            "watershed",
+            Builder::Watershed,
             "the structure is triangles, which may have cracks".to_owned(),
         ),
         settings::Method::Auto => (
-            "bsp",
+            Builder::Bsp,
             format!("the structure is made of {} brushes", scene.solids.len()),
         ),
     }
@@ -184,10 +210,13 @@ const LEAKS_SHOWN: usize = 10;
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
     let mut err = io::stderr().lock();
     let [nx, ny, nz] = baked.dims;
-    if nx > 0 {
+    let wanted = if nx > 0 {
         writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
-    }
-    let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
+        config.voxel.unwrap_or(config.min_opening / 6.0)
+    } else {
+        writeln!(err, "surface points {:.3} m apart", baked.voxel)?;
+        f64::INFINITY
+    };
     // The grid grows its voxels by tenths, if at all.
     if baked.voxel > wanted * 1.05 {
         writeln!(

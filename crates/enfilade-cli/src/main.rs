@@ -7,6 +7,7 @@ mod bake;
 mod bench;
 mod bench_bsp;
 mod cameras;
+mod decimate;
 mod demo;
 mod exact;
 mod inspect;
@@ -42,6 +43,7 @@ struct Cli {
 enum Command {
     Bake(bake::Bake),
     Bench(bench::Bench),
+    Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Edit(simplify::Edit),
     Inspect(inspect::Inspect),
@@ -61,6 +63,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(args) => bake::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Edit(args) => simplify::run_edit(&args),
         Command::Inspect(args) => inspect::run(&args),

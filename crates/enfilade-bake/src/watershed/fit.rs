@@ -57,7 +57,20 @@ pub fn fit_screen(
         .iter()
         .map(|&f| face_center(grid, f))
         .collect();
-    let bounds = Aabb::of_points(&centers).expanded(OFFSET + MARGIN);
+    fit_screen_at(&centers, grid.voxel, opening, regions, triangles, near)
+}
+
+/// Fits a screen to an opening for which points `spacing` apart stand; its faces are not asked.
+#[must_use]
+pub fn fit_screen_at(
+    centers: &[DVec3],
+    spacing: f64,
+    opening: &Opening,
+    regions: [u32; 2],
+    triangles: &[Triangle],
+    near: &dyn Fn(&Aabb) -> Vec<u32>,
+) -> Screen {
+    let bounds = Aabb::of_points(centers).expanded(OFFSET + MARGIN);
     let around: Vec<Triangle> = near(&bounds)
         .iter()
         .map(|&t| triangles[t as usize])
@@ -67,7 +80,7 @@ pub fn fit_screen(
     for normals in candidate_normals(opening, &around) {
         for normal in normals {
             for plane in candidate_planes(opening, normal, &around) {
-                let section = free_section(&plane, &centers, &around, grid.voxel);
+                let section = free_section(&plane, centers, &around, spacing);
                 let better = best
                     .as_ref()
                     .is_none_or(|b| section.cost(opening) < b.cost(opening) - 1e-9);
@@ -80,8 +93,7 @@ pub fn fit_screen(
             break;
         }
     }
-    let section =
-        best.unwrap_or_else(|| free_section(&opening.plane, &centers, &around, grid.voxel));
+    let section = best.unwrap_or_else(|| free_section(&opening.plane, centers, &around, spacing));
     Screen {
         regions,
         winding: section.winding(),

@@ -16,7 +16,7 @@ mod stairs;
 mod voids;
 
 pub use closures::{bounds_of, closure_triangles, flood_closures};
-pub use fit::{Screen, fit_screen};
+pub use fit::{Screen, fit_screen, fit_screen_at};
 pub use hollow::hollow_regions;
 pub use lids::{Lids, find_lids};
 pub use regions::{

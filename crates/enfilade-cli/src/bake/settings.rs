@@ -45,12 +45,14 @@ pub(crate) struct SceneOptions {
 pub(crate) struct BakeOptions {
     /// Files whose objects are all detail: furniture, door leaves, plants.
     #[arg(long, value_name = "FILE")]
-    pub(super) detail: Vec<PathBuf>,
+    pub(crate) detail: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) scene: SceneOptions,
     /// How cells are found.
     #[arg(long, value_enum, default_value_t = Method::Auto)]
     pub(super) method: Method,
+    #[command(flatten)]
+    pub(crate) delaunay: super::delaunay::DelaunayOptions,
     /// Where to write the way out of a map that leaks, as lines of `x y z` in meters.
     #[arg(long, value_name = "FILE.pts")]
     pub(super) leak: Option<PathBuf>,
@@ -98,6 +100,8 @@ pub(super) enum Method {
     Watershed,
     /// Binary space partition and separators, for brushes and clean architectural models.
     Bsp,
+    /// Tetrahedra between the surfaces, decimated; for caves and other irregular scenes.
+    Delaunay,
 }
 
 /// The longest voxel and the widest "narrowest opening": past it no room is left to find.
@@ -367,14 +371,14 @@ fn resolve_bsp(options: &BakeOptions, table: BspTable) -> anyhow::Result<BspConf
 const MERGE_BELOW: f64 = 50.0;
 
 /// Everything that a bake is told, resolved.
-pub(super) struct Resolved {
-    pub(super) import: ImportOptions,
-    pub(super) watershed: BakeConfig,
-    pub(super) bsp: BspConfig,
+pub(crate) struct Resolved {
+    pub(crate) import: ImportOptions,
+    pub(crate) watershed: BakeConfig,
+    pub(crate) bsp: BspConfig,
 }
 
 /// Command line and settings file, resolved.
-pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
+pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let file = options.scene.file()?;
     let import_options = options.scene.resolve_with(&file);
     let mut config = BakeConfig {

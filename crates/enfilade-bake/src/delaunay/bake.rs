@@ -1,0 +1,234 @@
+//! The bake with tetrahedra: scene → tetrahedra → cells → rooms → screens → cell complex → world.
+
+use enfilade_cpg::{Provenance, Statistics};
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Bvh, Triangle};
+
+use super::decimate::{Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together};
+use super::rooms::find_rooms;
+use super::space::{Space, divide};
+use crate::assemble::{Parts, assemble};
+use crate::complex::{ComplexInput, LabelSettings, build_complex};
+use crate::join::join_unparted;
+use crate::pipeline::{input_hash, structural_triangles};
+use crate::watershed::{bounds_of, closure_triangles, find_stairs};
+use crate::{BakeConfig, BakeContext, BakeError, BakeOutput};
+
+/// The stages, as progress shows them.
+const STAGES: [&str; 6] = [
+    "tetrahedra",
+    "decimation",
+    "fit screens",
+    "cell complex",
+    "cells and portals",
+    "hand out geometry",
+];
+
+/// Settings of a bake with tetrahedra; the defaults are meant for everything.
+#[derive(Clone, Debug, Default)]
+pub struct DelaunayConfig {
+    /// What it shares with the watershed: the narrowest opening, the least radius of a room, how
+    /// much of an opening a door leaf must fill.
+    pub common: BakeConfig,
+    /// How portals are weighed.
+    pub weight: Weight,
+    /// The weight at which decimation stops; `None` for the weight's own. [Limit: above 0]
+    pub stop: Option<f64>,
+    /// What a person decided.
+    pub choices: Choices,
+}
+
+/// The state of decimation, for a person to look at and to overrule.
+pub struct Session {
+    /// The tetrahedra and the ways between them.
+    pub space: Space,
+    /// Cells before the first step.
+    pub cells: Cells,
+    /// The steps.
+    pub decimation: Decimation,
+    bounds_rooms: Vec<Triangle>,
+    closures: Vec<Triangle>,
+    bvh: Bvh,
+}
+
+impl Session {
+    /// Divides the air of a scene and decimates.
+    ///
+    /// # Errors
+    /// When there is nothing structural, a coordinate is out of limits, or the caller cancels.
+    pub fn begin(
+        scene: &Scene,
+        config: &DelaunayConfig,
+        context: &BakeContext<'_>,
+    ) -> Result<Self, BakeError> {
+        context.stage_of(&STAGES, 0)?;
+        let (sources, triangles) = structural_triangles(scene);
+        if triangles.is_empty() {
+            return Err(BakeError::NothingStructural {
+                n_objects: scene.objects.len(),
+            });
+        }
+        let opening = config.common.min_opening;
+        if !(opening > 0.0 && opening.is_finite()) {
+            return Err(BakeError::Setting {
+                name: "min_opening",
+                value: opening.to_string(),
+                limit: "a number above 0",
+            });
+        }
+        // Stairs stand in rooms and bound none.
+        let is_stair = find_stairs(&sources, &triangles);
+        let mut walls: Vec<Triangle> = triangles
+            .iter()
+            .zip(&is_stair)
+            .filter(|t| !t.1)
+            .map(|t| *t.0)
+            .collect();
+        // What is nothing but stairs has no others to stand in.
+        if walls.is_empty() {
+            walls.clone_from(&triangles);
+        }
+        let closures = closure_triangles(scene);
+        let bvh = Bvh::build(&walls);
+        // Three points across the narrowest opening.
+        let space = divide(&walls, &closures, &bvh, opening / 3.0)?;
+        context.stage_of(&STAGES, 1)?;
+        let cells = flow_together(&space);
+        let mut session = Self {
+            space,
+            cells,
+            decimation: Decimation {
+                n_cells: 0,
+                steps: Vec::new(),
+                stop: 0,
+            },
+            bounds_rooms: walls,
+            closures,
+            bvh,
+        };
+        session.decimate(config);
+        Ok(session)
+    }
+
+    /// Decimates anew, after other choices or with another weight or stop. Takes milliseconds.
+    pub fn decimate(&mut self, config: &DelaunayConfig) {
+        let stop = config.stop.unwrap_or_else(|| default_stop(config.weight));
+        self.decimation = decimate(
+            &self.space,
+            &self.cells,
+            config.weight,
+            stop,
+            config.common.merge.min_radius,
+            &config.choices,
+        );
+    }
+}
+
+/// Finds the rooms and doorways of a scene by tetrahedra.
+///
+/// Deterministic on any number of threads. About `O(n log n)` in the points that stand for the
+/// surfaces, and in triangles.
+///
+/// # Errors
+/// When there is nothing structural, a setting or coordinate is out of limits, or the caller cancels.
+pub fn bake_delaunay(
+    scene: &Scene,
+    config: &DelaunayConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    let session = Session::begin(scene, config, context)?;
+    bake_session(scene, &session, session.decimation.stop, config, context)
+}
+
+/// Makes a world of the rooms that are left after the first `n_steps` of a session's decimation.
+///
+/// # Errors
+/// When the caller cancels.
+pub fn bake_session(
+    scene: &Scene,
+    session: &Session,
+    n_steps: usize,
+    config: &DelaunayConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    context.stage_of(&STAGES, 2)?;
+    let (sources, triangles) = structural_triangles(scene);
+    let bvh = Bvh::build(&triangles);
+    let merge = &config.common.merge;
+    let rooms = find_rooms(
+        &session.space,
+        &session.cells,
+        &session.decimation.after(n_steps),
+        &session.bounds_rooms,
+        &session.bvh,
+        &session.closures,
+        merge.min_radius,
+    );
+    context.stage_of(&STAGES, 3)?;
+    let windings: Vec<_> = rooms.screens.iter().map(|s| s.winding.clone()).collect();
+    let bounds = bounds_of(&triangles);
+    let complex = build_complex(&ComplexInput {
+        triangles: &triangles,
+        screens: &windings,
+        bounds: bounds.expanded(1.0),
+    });
+    context.stage_of(&STAGES, 4)?;
+    let mut votes = rooms.votes;
+    let mut partition = complex.partition(&votes, &LabelSettings::default());
+    while join_unparted(&partition, &mut votes, &mut []) {
+        partition = complex.partition(&votes, &LabelSettings::default());
+    }
+    let outward = complex.opening_tolerance();
+    let counts = [
+        (
+            "input_triangles",
+            (sources.len() + scene.triangle_sources(Role::Detail).count()) as f64,
+        ),
+        ("structural_triangles", sources.len() as f64),
+        ("tetrahedra", session.space.delaunay.n_finite as f64),
+        ("spacing", session.space.spacing),
+        ("steps", n_steps as f64),
+        ("screens", rooms.screens.len() as f64),
+        ("leaves", complex.n_leaves() as f64),
+        ("leaks", partition.leaks.len() as f64),
+    ];
+    drop(complex);
+    context.stage_of(&STAGES, 5)?;
+    let leaks = partition.leaks.clone();
+    let mut settings = config.common.to_settings();
+    settings.insert("weight".to_owned(), format!("{:?}", config.weight));
+    settings.insert(
+        "stop".to_owned(),
+        config
+            .stop
+            .unwrap_or_else(|| default_stop(config.weight))
+            .to_string(),
+    );
+    let world = assemble(&Parts {
+        scene,
+        sources: &sources,
+        triangles: &triangles,
+        bvh: &bvh,
+        partition,
+        screens: &rooms.screens,
+        outward,
+        closed_share: merge.closed_share,
+        provenance: Provenance {
+            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
+            method: "delaunay".to_owned(),
+            input_hash: input_hash(&triangles, &settings),
+            settings,
+        },
+        statistics: Statistics {
+            counts: counts.map(|(k, v)| (k.to_owned(), v)).into(),
+        },
+    });
+    context.end_stage();
+    Ok(BakeOutput {
+        world,
+        voxel: session.space.spacing,
+        dims: [0; 3],
+        times: context.times(),
+        leaks,
+    })
+}

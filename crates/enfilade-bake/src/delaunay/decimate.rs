@@ -1,0 +1,425 @@
+//! Decimation: tetrahedra become cells, cells become rooms, one portal at a time.
+//!
+//! Gjørup 1999, §4.1.4 and §4.2.3: every pair of neighbors has a weight, the pair of least weight
+//! becomes one cell, and so on. His two weights are here beside ours:
+//!
+//! | weight | is | source |
+//! | --- | --- | --- |
+//! | [`Weight::Aspect`] | largest projected cell ÷ portal | §4.1.4 |
+//! | [`Weight::SizeCorrected`] | the same ÷ square root of the projected cell | §4.3.2 |
+//! | [`Weight::ScaleFree`] | radius of the lesser cell's largest ball ÷ that of the ball that passes | ours |
+//!
+//! His first slips through doors where cells begin alike, his second depends on the model's scale,
+//! and both leave spikes for the end (§4.3.2, §4.3.3). A ratio of two radii has no scale, a
+//! tetrahedron in the middle of a room has the same ball as its neighbors, and a spike has none, so
+//! it goes first. Doors come out at 1.8 and more, alcoves and bulges below 1.5.
+//!
+//! It goes in two rounds. The first joins what flows into one another, by radius, in one sweep over
+//! all links: millions of tetrahedra become a few cells a room ([`Cells`]). The second is Gjørup's,
+//! with a heap, and is recorded down to the last portal ([`Decimation`]), so that a person can go
+//! forwards and back, and overrule it.
+//!
+//! Ties are broken by the numbers of tetrahedra, which depend on coordinates only. `O(n log n)`.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+
+use enfilade_geom::{Aabb, DVec3};
+
+use super::space::Space;
+
+/// Two cells whose lesser ball is hardly larger than what passes between them are parts of one
+/// bulge: differences this small come from where points happen to be sampled.
+const FLOWS: f64 = 1.05;
+
+/// The cell around the scene.
+pub const OUTDOOR_CELL: u32 = 0;
+
+/// How the quality of a portal is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Weight {
+    /// Gjørup's ratio of areas.
+    Aspect,
+    /// Gjørup's ratio corrected by size; depends on the unit.
+    SizeCorrected,
+    /// Ratio of radii; above 1.
+    #[default]
+    ScaleFree,
+}
+
+/// Cells before decimation, and how they meet.
+pub struct Cells {
+    /// Cell of each finite tetrahedron.
+    pub cell_of_tetrahedron: Vec<u32>,
+    /// Radius of the largest ball in each cell. [Units: wu]
+    pub radii: Vec<f64>,
+    /// Box of each cell. [Units: wu]
+    pub boxes: Vec<Aabb>,
+    /// Where two cells meet, lesser number first.
+    pub portals: BTreeMap<(u32, u32), CellPortal>,
+}
+
+/// Where two cells meet.
+#[derive(Clone, Debug)]
+pub struct CellPortal {
+    /// Radius of the widest ball that passes. [Units: wu]
+    pub radius: f64,
+    /// Sum of the facets' area normals, from the lesser to the greater cell. [Units: wu²]
+    pub vector: DVec3,
+    /// Links of the space.
+    pub links: Vec<u32>,
+}
+
+struct Sets(Vec<u32>);
+
+impl Sets {
+    fn find(&mut self, mut x: u32) -> u32 {
+        while self.0[x as usize] != x {
+            self.0[x as usize] = self.0[self.0[x as usize] as usize];
+            x = self.0[x as usize];
+        }
+        x
+    }
+}
+
+/// Joins tetrahedra that flow into one another to cells. Outdoors is [`OUTDOOR_CELL`].
+#[must_use]
+pub fn flow_together(space: &Space) -> Cells {
+    let n = space.radii.len();
+    let mut sets = Sets((0..n as u32).collect());
+    let mut radius = space.radii.clone();
+    let mut outdoors: Option<u32> = None;
+    for t in (0..n as u32).filter(|&t| space.radii[t as usize] == f64::INFINITY) {
+        let first = *outdoors.get_or_insert(t);
+        sets.0[t as usize] = first;
+    }
+    let mut order: Vec<u32> = (0..space.links.len() as u32).collect();
+    order.sort_unstable_by(|&a, &b| {
+        let (p, q) = (
+            space.links[a as usize].radius,
+            space.links[b as usize].radius,
+        );
+        q.total_cmp(&p).then(a.cmp(&b))
+    });
+    for l in order {
+        let link = &space.links[l as usize];
+        let [a, b] = link.tetrahedra.map(|t| sets.find(t));
+        let (ra, rb) = (radius[a as usize], radius[b as usize]);
+        if a == b || ra.min(rb) > FLOWS * link.radius {
+            continue;
+        }
+        let (low, high) = (a.min(b), a.max(b));
+        sets.0[high as usize] = low;
+        radius[low as usize] = ra.max(rb);
+    }
+    let mut number: BTreeMap<u32, u32> = BTreeMap::new();
+    if let Some(t) = outdoors {
+        number.insert(sets.find(t), OUTDOOR_CELL);
+    }
+    let mut cells = Cells {
+        cell_of_tetrahedron: vec![0; n],
+        radii: vec![f64::INFINITY],
+        boxes: vec![Aabb::EMPTY],
+        portals: BTreeMap::new(),
+    };
+    for t in 0..n as u32 {
+        let root = sets.find(t);
+        let next = cells.radii.len() as u32;
+        let cell = *number.entry(root).or_insert(next);
+        if cell == next {
+            cells.radii.push(radius[root as usize]);
+            cells.boxes.push(Aabb::EMPTY);
+        }
+        cells.cell_of_tetrahedron[t as usize] = cell;
+        let b = &mut cells.boxes[cell as usize];
+        *b = space
+            .delaunay
+            .corners(t)
+            .iter()
+            .fold(*b, |b, &p| b.including(p));
+    }
+    for (l, link) in space.links.iter().enumerate() {
+        let [a, b] = link
+            .tetrahedra
+            .map(|t| cells.cell_of_tetrahedron[t as usize]);
+        if a == b {
+            continue;
+        }
+        let portal = cells
+            .portals
+            .entry((a.min(b), a.max(b)))
+            .or_insert(CellPortal {
+                radius: 0.0,
+                vector: DVec3::ZERO,
+                links: Vec::new(),
+            });
+        portal.radius = portal.radius.max(link.radius);
+        let normal = enfilade_geom::triangle_area_normal(&space.facet(link)) * 0.5;
+        portal.vector += if a < b { normal } else { -normal };
+        portal.links.push(l as u32);
+    }
+    cells
+}
+
+/// One step: two cells become one, which keeps the lesser number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The cell that stays.
+    pub into: u32,
+    /// The cell that is gone.
+    pub from: u32,
+    /// What the portal between them weighed.
+    pub weight: f64,
+    /// Middle of that portal. [Units: wu]
+    pub position: DVec3,
+}
+
+/// What a person decided, by places. A choice concerns the portals within [`Choices::REACH`] of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choices {
+    /// Portals here stay, whatever they weigh. [Units: wu]
+    pub keep: Vec<DVec3>,
+    /// Portals here go first. [Units: wu]
+    pub join: Vec<DVec3>,
+}
+
+impl Choices {
+    /// How far from a portal's middle a choice may lie. [Units: wu]
+    pub const REACH: f64 = 0.5;
+
+    fn at(&self, p: DVec3) -> Option<bool> {
+        let near = |q: &DVec3| q.distance(p) <= Self::REACH;
+        if self.keep.iter().any(near) {
+            Some(true)
+        } else if self.join.iter().any(near) {
+            Some(false)
+        } else {
+            None
+        }
+    }
+}
+
+/// A decimation on record, from the cells of [`flow_together`] down to one cell a connected part.
+pub struct Decimation {
+    /// Number of cells before the first step.
+    pub n_cells: usize,
+    /// The steps, in order.
+    pub steps: Vec<Step>,
+    /// After how many steps it stops by itself.
+    pub stop: usize,
+}
+
+/// The weight at which decimation stops by itself, for [`Weight::ScaleFree`] and, as Gjørup suggests
+/// (§4.3.1), for his ratio. The size-corrected weight has no natural stop.
+#[must_use]
+pub fn default_stop(weight: Weight) -> f64 {
+    match weight {
+        Weight::Aspect => 3.0,
+        Weight::SizeCorrected => 1.0,
+        Weight::ScaleFree => 1.5,
+    }
+}
+
+struct Candidate {
+    weight: f64,
+    pair: (u32, u32),
+    version: u32,
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // The heap gives the greatest first; least weight first, then least numbers.
+        other
+            .weight
+            .total_cmp(&self.weight)
+            .then(other.pair.cmp(&self.pair))
+            .then(other.version.cmp(&self.version))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+struct Live {
+    radius: f64,
+    vector: DVec3,
+    center: DVec3,
+    n: f64,
+    /// A person wants it to stay; two cells with such a portal among theirs never join.
+    stays: bool,
+    /// A person wants it to go.
+    goes: bool,
+    version: u32,
+}
+
+/// Removes portals, least weight first, and records each step.
+///
+/// A cell in which no ball of `min_radius` fits is a crevice: it joins the neighbor that it opens to
+/// most before anything else is decided, choices excepted.
+#[must_use]
+pub fn decimate(
+    space: &Space,
+    cells: &Cells,
+    weight: Weight,
+    stop: f64,
+    min_radius: f64,
+    choices: &Choices,
+) -> Decimation {
+    let n = cells.radii.len();
+    let mut radius = cells.radii.clone();
+    let mut boxes = cells.boxes.clone();
+    let mut neighbors = vec![BTreeSet::new(); n];
+    let mut portals: BTreeMap<(u32, u32), Live> = BTreeMap::new();
+    for (&(a, b), portal) in &cells.portals {
+        neighbors[a as usize].insert(b);
+        neighbors[b as usize].insert(a);
+        let middle = |&l: &u32| space.facet(&space.links[l as usize]).iter().sum::<DVec3>() / 3.0;
+        let center = portal.links.iter().map(middle).sum::<DVec3>();
+        let choice = choices.at(center / portal.links.len() as f64);
+        portals.insert(
+            (a, b),
+            Live {
+                radius: portal.radius,
+                vector: portal.vector,
+                center,
+                n: portal.links.len() as f64,
+                stays: choice == Some(true),
+                goes: choice == Some(false),
+                version: 0,
+            },
+        );
+    }
+    let weigh = |portal: &Live, pair: (u32, u32), radius: &[f64], boxes: &[Aabb]| -> f64 {
+        let (a, b) = (pair.0 as usize, pair.1 as usize);
+        if portal.stays || choices.at(portal.center / portal.n) == Some(true) {
+            return f64::INFINITY;
+        }
+        // The middle of a portal moves as others join it: what was shown is what was meant.
+        if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
+            return -2.0;
+        }
+        let least = radius[a].min(radius[b]);
+        if least < min_radius {
+            // Widest opening first among crevices.
+            return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
+        }
+        if weight == Weight::ScaleFree {
+            return least / portal.radius.max(1e-9);
+        }
+        let area = portal.vector.length().max(1e-9);
+        let projected = |b: &Aabb| {
+            let s = b.size().max(DVec3::ZERO);
+            let n = (portal.vector / area).abs();
+            n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
+        };
+        let largest = projected(&boxes[a]).max(projected(&boxes[b]));
+        let aspect = largest / area;
+        match weight {
+            Weight::Aspect => aspect,
+            _ => aspect / largest.sqrt(),
+        }
+    };
+    let mut queue: BinaryHeap<Candidate> = portals
+        .iter()
+        .map(|(&pair, p)| Candidate {
+            weight: weigh(p, pair, &radius, &boxes),
+            pair,
+            version: 0,
+        })
+        .collect();
+    let mut steps: Vec<Step> = Vec::new();
+    let mut stop_at = None;
+    while let Some(c) = queue.pop() {
+        let Some(portal) = portals.get(&c.pair).filter(|p| p.version == c.version) else {
+            continue;
+        };
+        if c.weight > stop && stop_at.is_none() {
+            stop_at = Some(steps.len());
+        }
+        let (into, from) = c.pair;
+        steps.push(Step {
+            into,
+            from,
+            weight: c.weight,
+            position: portal.center / portal.n,
+        });
+        portals.remove(&c.pair);
+        radius[into as usize] = radius[into as usize].max(radius[from as usize]);
+        boxes[into as usize] = boxes[into as usize].union(boxes[from as usize]);
+        neighbors[into as usize].remove(&from);
+        for other in std::mem::take(&mut neighbors[from as usize]) {
+            if other == into {
+                continue;
+            }
+            neighbors[other as usize].remove(&from);
+            neighbors[other as usize].insert(into);
+            neighbors[into as usize].insert(other);
+            let old = portals
+                .remove(&(from.min(other), from.max(other)))
+                .expect("neighbors have a portal");
+            // Vectors point from the lesser to the greater number.
+            let sign = if (from < other) == (into < other) {
+                1.0
+            } else {
+                -1.0
+            };
+            let pair = (into.min(other), into.max(other));
+            let live = portals.entry(pair).or_insert(Live {
+                radius: 0.0,
+                vector: DVec3::ZERO,
+                center: DVec3::ZERO,
+                n: 0.0,
+                stays: false,
+                goes: false,
+                version: 0,
+            });
+            live.radius = live.radius.max(old.radius);
+            live.vector += old.vector * sign;
+            live.center += old.center;
+            live.n += old.n;
+            live.stays |= old.stays;
+            live.goes |= old.goes;
+        }
+        for &other in &neighbors[into as usize] {
+            let pair = (into.min(other), into.max(other));
+            let live = portals.get_mut(&pair).expect("neighbors have a portal");
+            // Unlike any version of this pair before, since steps only grow in number.
+            live.version = steps.len() as u32;
+            queue.push(Candidate {
+                weight: weigh(live, pair, &radius, &boxes),
+                pair,
+                version: live.version,
+            });
+        }
+    }
+    Decimation {
+        n_cells: n,
+        stop: stop_at.unwrap_or(steps.len()),
+        steps,
+    }
+}
+
+impl Decimation {
+    /// The cell that each cell of the beginning belongs to after the first `n` steps.
+    #[must_use]
+    pub fn after(&self, n: usize) -> Vec<u32> {
+        let mut parent: Vec<u32> = (0..self.n_cells as u32).collect();
+        for s in self.steps.iter().take(n) {
+            parent[s.from as usize] = s.into;
+        }
+        // A cell is gone before the one that it went into: follow to the end.
+        let mut sets = Sets(parent);
+        (0..self.n_cells as u32).map(|c| sets.find(c)).collect()
+    }
+}

@@ -1,0 +1,30 @@
+//! The Delaunay builder: tetrahedra between the surfaces, put together to rooms.
+//!
+//! Gjørup, "Portal techniques for large interactive worlds" (1999), chapter 4. As with the
+//! watershed, what comes out are screens and votes, and the cell complex makes them exact.
+//!
+//! | stage | file | source |
+//! | --- | --- | --- |
+//! | tetrahedra of points | `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
+//! | air, and ways through it | `space` | §4.2.1, §4.2.2; Dey, Giesen & Goswami 2003 |
+//! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
+//! | screens and votes | `rooms` | ours |
+
+mod bake;
+mod decimate;
+mod order;
+mod predicate;
+mod rooms;
+mod space;
+mod tetrahedra;
+
+#[cfg(test)]
+mod tests;
+
+pub use bake::{DelaunayConfig, Session, bake_delaunay, bake_session};
+pub use decimate::{
+    CellPortal, Cells, Choices, Decimation, OUTDOOR_CELL, Step, Weight, decimate, default_stop,
+    flow_together,
+};
+pub use space::{Link, Space, divide};
+pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};
