@@ -65,8 +65,11 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
     if worlds.is_empty() {
         bail!("a world is needed, or --tower ROOMS");
     }
-    table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | triangles drawn | draws | ms on the processor |".into());
-    table.push("| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |".into());
+    table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | ms of all threads | the same to frustum culling | triangles drawn | draws | ms to hand in |".into());
+    table.push(
+        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+            .into(),
+    );
     let mut adapter = String::new();
     for (name, mut world) in worlds {
         if let Some(total) = args.total {
@@ -80,7 +83,7 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
             bail!("{name}: no room to walk in");
         }
         let target = studio.target(args.size)?;
-        let mut frustum = f64::NAN;
+        let mut frustum = [f64::NAN; 2];
         let modes = [
             ("by frustum culling", Culling::Frustum),
             ("everything", Culling::Everything),
@@ -96,17 +99,19 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
             let cameras: Vec<Camera> = cameras.iter().copied().step_by(step).collect();
             let run = walk(&mut studio, &cameras, culling, args, &target)?;
             if culling == Culling::Frustum {
-                frustum = run.mean();
+                frustum = [run.mean(), run.threads];
             }
             let n = run.seconds.len() as f64;
             let all = studio.world.n_triangles() as f64;
             let ms = |x: f64| format!("{:.2}", x * 1e3);
             lines.push(format!(
-                "| {name} | {all} | {label} | {} | {} | {} | {:.2} | {:.2} % | {:.0} | {} |",
+                "| {name} | {all} | {label} | {} | {} | {} | {:.2} | {} | {:.2} | {:.2} % | {:.0} | {} |",
                 ms(run.seconds.iter().copied().fold(f64::INFINITY, f64::min)),
                 ms(run.mean()),
                 ms(run.seconds.iter().copied().fold(0.0, f64::max)),
-                frustum / run.mean(),
+                frustum[0] / run.mean(),
+                ms(run.threads),
+                frustum[1] / run.threads,
                 run.triangles / n / all * 100.0,
                 run.draws / n,
                 ms(run.processor / n),
@@ -127,7 +132,10 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
 #[derive(Default)]
 struct Run {
     seconds: Vec<f64>,
+    /// Of the thread that hands frames in.
     processor: f64,
+    /// Of all threads, a frame; what other programs take does not count.
+    threads: f64,
     triangles: f64,
     draws: f64,
 }
@@ -157,6 +165,7 @@ fn walk(
     // Buffers grow and pipelines are built in frames that do not count.
     let warm = cameras.iter().take(3).map(|c| (c, false));
     let mut last = Instant::now();
+    let mut threads = f64::NAN;
     for (camera, counts) in warm.chain(cameras.iter().map(|c| (c, true))) {
         let begin = Instant::now();
         let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
@@ -174,6 +183,7 @@ fn walk(
             studio.gpu.wait()?;
             pending.clear();
             last = Instant::now();
+            threads = thread_seconds();
         } else {
             if pending.len() > IN_FLIGHT
                 && let Some(mark) = pending.pop_front()
@@ -194,7 +204,23 @@ fn walk(
     if let Some(seconds) = run.seconds.last_mut() {
         *seconds += last.elapsed().as_secs_f64();
     }
+    run.threads = (thread_seconds() - threads) / run.seconds.len().max(1) as f64;
     Ok(run)
+}
+
+/// What all threads of this process have computed so far, on Linux; elsewhere not a number. [Units: s]
+fn thread_seconds() -> f64 {
+    let Ok(text) = std::fs::read_to_string("/proc/self/stat") else {
+        return f64::NAN;
+    };
+    // After the name, which may hold anything: `utime` and `stime`, in hundredths.
+    let after = text.rsplit(')').next().unwrap_or_default();
+    let mut fields = after.split_whitespace().skip(11);
+    let mut ticks = || fields.next()?.parse::<f64>().ok();
+    match (ticks(), ticks()) {
+        (Some(user), Some(system)) => (user + system) / 100.0,
+        _ => f64::NAN,
+    }
 }
 
 /// Places one object in each room, all alike, until the world has about `total` triangles.

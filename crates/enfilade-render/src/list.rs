@@ -26,6 +26,9 @@ pub enum Reason {
     Occluded = 3,
 }
 
+/// The number of an instance; what is above tells why it is drawn.
+pub(crate) const INSTANCE_MASK: u32 = 0x0fff_ffff;
+
 /// Pixels of a picture: `[x, y, width, height]`.
 pub(crate) type Scissor = [u32; 4];
 
