@@ -7,8 +7,8 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Studio,
-    Style,
+    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Sparing,
+    Studio, Style,
 };
 use serde_json::json;
 
@@ -65,6 +65,16 @@ pub(crate) struct Render {
     /// Portals that are closed, by number.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     close: Vec<u32>,
+    /// Portals that cover fewer pixels are not looked through: the mean color of the cell behind stands
+    /// in for it.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    stop: f32,
+    /// Nothing stands in for what --stop leaves out.
+    #[arg(long, requires = "stop")]
+    stop_at_nothing: bool,
+    /// Objects in cells that are seen through fewer pixels are not drawn.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    objects: f32,
     /// No shadows and no dark corners: quicker.
     #[arg(long)]
     plain: bool,
@@ -150,6 +160,12 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         studio.state.close(PortalId(p));
     }
+    // Pictures are drawn at twice their size: four pixels for one.
+    studio.sparing = Sparing {
+        stop_below: args.stop * 4.0,
+        stop_at_nothing: args.stop_at_nothing,
+        objects_below: args.objects * 4.0,
+    };
     let cameras = match (given, args.walk, args.eye.zip(args.look)) {
         (Some(path), ..) => path,
         (_, Some(n), _) => walk_cameras(&world, &studio.sight, n, fov),

@@ -42,6 +42,7 @@ pub(crate) enum Shading {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Variant {
     pub(crate) shading: Shading,
+    pub(crate) is_smooth: bool,
     pub(crate) casts_shadows: bool,
     pub(crate) explains: bool,
     /// Whether it draws to the output, or to what is made a picture of later.
@@ -358,6 +359,7 @@ impl Pipelines {
                 depth: Some((writes, NEARER)),
                 constants: &[
                     ("CASTS_SHADOWS", number(variant.casts_shadows)),
+                    ("IS_SMOOTH", number(variant.is_smooth)),
                     ("EXPLAINS", number(variant.explains)),
                 ],
             },

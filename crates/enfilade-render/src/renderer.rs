@@ -355,7 +355,14 @@ impl Renderer {
         self.write_globals(gpu, stage, &frame.projection, &frame.style, size);
         let list = frame.list;
         self.write_instances(gpu, world, list);
+        let stand_ins: Vec<Mark> = list
+            .stand_ins
+            .iter()
+            .map(|&(portal, cell)| world.stand_in(portal, cell))
+            .collect();
+        let [behind, _] = crate::marks::corners(&stand_ins, &frame.projection, size);
         let [hidden, on_top] = crate::marks::corners(frame.marks, &frame.projection, size);
+        let hidden = [behind, hidden].concat();
         let n_hidden = hidden.len() as u32;
         let marks = [hidden, on_top].concat();
         self.marks.write(gpu, bytemuck::cast_slice(&marks));
@@ -382,12 +389,12 @@ impl Renderer {
         });
         pass.set_bind_group(0, &stage.world, &[]);
         set_buffers(&mut pass, world, &self.instances);
-        draw_runs(&mut pass, world, &list.opaque, size, |f| {
-            self.pipelines.surface(shadings.of_finish(f))
+        draw_runs(&mut pass, world, &list.opaque, size, |run| {
+            self.pipelines.surface(shadings.opaque(run))
         });
         if shadings.is_count {
-            draw_runs(&mut pass, world, &list.transparent, size, |f| {
-                self.pipelines.surface(shadings.of_finish(f))
+            draw_runs(&mut pass, world, &list.transparent, size, |run| {
+                self.pipelines.surface(shadings.opaque(run))
             });
         }
         if in_two {
@@ -421,8 +428,8 @@ impl Renderer {
         if !list.transparent.is_empty() && !shadings.is_count {
             pass.set_bind_group(0, &stage.world, &[]);
             set_buffers(&mut pass, world, &self.instances);
-            draw_runs(&mut pass, world, &list.transparent, size, |_| {
-                self.pipelines.surface(shadings.glass())
+            draw_runs(&mut pass, world, &list.transparent, size, |run| {
+                self.pipelines.surface(shadings.glass(run))
             });
         }
         if !marks.is_empty() {
@@ -560,10 +567,11 @@ impl Shadings {
         }
     }
 
-    fn variant(&self, shading: Shading, is_last: bool) -> Variant {
+    fn variant(&self, shading: Shading, is_smooth: bool, is_last: bool) -> Variant {
         if self.is_count {
             return Variant {
                 shading: Shading::Count,
+                is_smooth: false,
                 casts_shadows: false,
                 explains: false,
                 is_last: false,
@@ -571,23 +579,24 @@ impl Shadings {
         }
         Variant {
             shading,
+            is_smooth,
             casts_shadows: self.casts_shadows,
             explains: self.explains,
             is_last,
         }
     }
 
-    fn of_finish(&self, finish: Finish) -> Variant {
-        let shading = match finish {
+    fn opaque(&self, run: &Run) -> Variant {
+        let shading = match run.finish {
             Finish::Plain if !self.has_cut => Shading::Plain,
             Finish::Textured if !self.has_cut => Shading::Textured,
             _ => Shading::Masked,
         };
-        self.variant(shading, self.is_last)
+        self.variant(shading, run.is_smooth, self.is_last)
     }
 
-    fn glass(&self) -> Variant {
-        self.variant(Shading::Glass, true)
+    fn glass(&self, run: &Run) -> Variant {
+        self.variant(Shading::Glass, run.is_smooth, true)
     }
 
     /// Makes those that a list needs.
@@ -597,31 +606,31 @@ impl Shadings {
         };
         let mut last = None;
         for run in &list.opaque {
-            if last != Some(run.finish) {
-                last = Some(run.finish);
-                prepare(self.of_finish(run.finish));
+            if last != Some((run.finish, run.is_smooth)) {
+                last = Some((run.finish, run.is_smooth));
+                prepare(self.opaque(run));
             }
         }
-        if !list.transparent.is_empty() {
-            prepare(self.glass());
+        for run in &list.transparent {
+            prepare(self.glass(run));
         }
     }
 }
 
-/// Draws runs, changing pipelines, textures and scissors only where they differ. `surface` by finish.
+/// Draws runs, changing pipelines, textures and scissors only where they differ. `surface` by run.
 fn draw_runs<'p>(
     pass: &mut wgpu::RenderPass<'_>,
     world: &GpuWorld,
     runs: &[Run],
     size: [u32; 2],
-    surface: impl Fn(Finish) -> Option<&'p wgpu::RenderPipeline>,
+    surface: impl Fn(&Run) -> Option<&'p wgpu::RenderPipeline>,
 ) {
-    let (mut texture, mut scissor, mut finish) = (u32::MAX, None, None);
+    let (mut texture, mut scissor, mut kind) = (u32::MAX, None, None);
     pass.set_scissor_rect(0, 0, size[0], size[1]);
     for run in runs {
-        if finish != Some(run.finish) {
-            finish = Some(run.finish);
-            if let Some(pipeline) = surface(run.finish) {
+        if kind != Some((run.finish, run.is_smooth)) {
+            kind = Some((run.finish, run.is_smooth));
+            if let Some(pipeline) = surface(run) {
                 pass.set_pipeline(pipeline);
             }
         }
@@ -673,6 +682,16 @@ pub(crate) fn read_texture(
         },
     );
     gpu.queue.submit([encoder.finish()]);
+    let mapped = map_bytes(gpu, &buffer)?;
+    let mut out = Vec::with_capacity((row * height) as usize);
+    for line in mapped.chunks_exact(stride as usize) {
+        out.extend_from_slice(&line[..row as usize]);
+    }
+    Ok(out)
+}
+
+/// The bytes of a buffer, once all that was submitted is done.
+pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
     let lost = |why: String| RenderError::Lost(why);
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
@@ -687,9 +706,5 @@ pub(crate) fn read_texture(
     let mapped = buffer
         .get_mapped_range(..)
         .map_err(|why| lost(why.to_string()))?;
-    let mut out = Vec::with_capacity((row * height) as usize);
-    for line in mapped.chunks_exact(stride as usize) {
-        out.extend_from_slice(&line[..row as usize]);
-    }
-    Ok(out)
+    Ok(mapped.to_vec())
 }

@@ -4,13 +4,14 @@
 //! detail meshes after them, each mesh once. What is drawn is a list of ranges, so that neighboring
 //! chunks join to one draw whatever room they belong to.
 
-use enfilade_cpg::{CellId, World};
+use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
 use glam::{Mat4, Vec3};
 use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
+use crate::marks::{Mark, Shape};
 use crate::materials::{Look, decode, wrapping};
 
 /// A corner of a triangle, 40 bytes. The shader that draws ids reads it as ten words.
@@ -72,6 +73,8 @@ pub(crate) struct Span {
     /// Index into [`GpuWorld::textures`].
     pub(crate) texture: u32,
     pub(crate) finish: Finish,
+    /// Whether its corners have normals.
+    pub(crate) is_smooth: bool,
     pub(crate) is_transparent: bool,
 }
 
@@ -85,9 +88,11 @@ pub(crate) enum Finish {
 }
 
 /// A placed detail object, as drawn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Placed {
     pub(crate) mesh: u32,
+    /// Those that it stands in.
+    pub(crate) cells: Vec<CellId>,
     pub(crate) center: Vec3,
     /// Of a sphere that holds it. [Units: wu]
     pub(crate) radius: f32,
@@ -114,6 +119,10 @@ pub struct GpuWorld {
     pub(crate) details: Vec<Placed>,
     /// Least and greatest corner of all that is drawn. [Units: wu]
     pub(crate) bounds: [Vec3; 2],
+    /// By portal: its outline. [Units: wu]
+    pub(crate) outlines: Vec<Vec<[f32; 3]>>,
+    /// By cell: the color of what stands in for it far away, lit.
+    pub(crate) cell_looks: Vec<[f32; 3]>,
     pub(crate) n_triangles: u64,
     n_missing_pictures: u32,
 }
@@ -203,6 +212,7 @@ impl Filling<'_> {
             } else {
                 Finish::Plain
             },
+            is_smooth: primitive.normals.len() == primitive.positions.len(),
             is_transparent: look.is_transparent,
         }
     }
@@ -257,9 +267,36 @@ impl GpuWorld {
             meshes,
             details,
             bounds,
+            outlines: world
+                .graph
+                .portals
+                .iter()
+                .map(|p| p.outline.clone())
+                .collect(),
+            cell_looks: filling.cell_looks(),
             n_triangles: sight.n_triangles(),
             n_missing_pictures,
         })
+    }
+
+    /// What is drawn in a portal instead of what is behind it.
+    pub(crate) fn stand_in(&self, portal: PortalId, cell: CellId) -> Mark {
+        let [r, g, b] = self
+            .cell_looks
+            .get(cell.0 as usize)
+            .copied()
+            .unwrap_or_default();
+        Mark {
+            shape: Shape::Area(
+                self.outlines
+                    .get(portal.0 as usize)
+                    .cloned()
+                    .unwrap_or_default(),
+            ),
+            color: [r, g, b, 1.0],
+            width: 0.0,
+            on_top: false,
+        }
     }
 
     /// Triangles of structure and placed objects.
@@ -312,6 +349,34 @@ impl Filling<'_> {
             .collect()
     }
 
+    /// The mean color of what is seen of each cell's surfaces, by area, in the light of the sky.
+    fn cell_looks(&self) -> Vec<[f32; 3]> {
+        const SKY: f32 = 0.55;
+        let mut sums = vec![[0.0; 4]; self.world.graph.cells.len()];
+        for batch in &self.world.batches {
+            let color = self.look(&batch.primitive).base_color;
+            let corner = |i: u32| Vec3::from(batch.primitive.positions[i as usize]);
+            let triangles = batch.primitive.indices.chunks_exact(3);
+            let area: f32 = triangles
+                .map(|t| {
+                    let [a, b, c] = [t[0], t[1], t[2]].map(corner);
+                    (b - a).cross(c - a).length() * 0.5
+                })
+                .sum();
+            for cell in &batch.cells {
+                if let Some(sum) = sums.get_mut(cell.0 as usize) {
+                    for k in 0..3 {
+                        sum[k] += color[k] * area;
+                    }
+                    sum[3] += area;
+                }
+            }
+        }
+        let mean =
+            |s: [f32; 4]| [0, 1, 2].map(|k| SKY * if s[3] > 0.0 { s[k] / s[3] } else { 0.8 });
+        sums.into_iter().map(mean).collect()
+    }
+
     fn add_meshes(&mut self) -> Vec<Vec<Span>> {
         let meshes = &self.world.detail_meshes;
         meshes
@@ -355,6 +420,7 @@ fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
         let is_empty = low.x > high.x;
         details.push(Placed {
             mesh: detail.mesh,
+            cells: detail.cells.clone(),
             center: if is_empty {
                 m.w_axis.truncate()
             } else {

@@ -5,6 +5,8 @@
 // than all else. For the same reason whatever is the same along a surface comes with its corners.
 
 override CASTS_SHADOWS: bool = false;
+// Whether corners have normals.
+override IS_SMOOTH: bool = false;
 // Whether cells, or the reasons why something is drawn, may give the color.
 override EXPLAINS: bool = false;
 
@@ -17,7 +19,6 @@ override EXPLAINS: bool = false;
 
 struct Corner {
     @location(0) position: vec3<f32>,
-    // w: 0 where there is none.
     @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
     // The material's times the corner's own.
@@ -37,7 +38,7 @@ struct Surface {
     @builtin(position) clip: vec4<f32>,
     // To the camera's place.
     @location(0) relative: vec3<f32>,
-    @location(1) normal: vec4<f32>,
+    @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
     @location(3) color: vec4<f32>,
     @location(4) @interpolate(flat) emissive: vec4<f32>,
@@ -50,14 +51,15 @@ fn corner(in: Corner) -> Surface {
     var out: Surface;
     out.relative = place(in.position, in.row_x, in.row_y, in.row_z) - globals.origin.xyz;
     out.clip = to_clip(out.relative);
-    let n = in.normal.xyz;
-    // By the cofactors: the inverse transposed, but for a factor.
-    out.normal = vec4(
-        dot(cross(in.row_y.xyz, in.row_z.xyz), n),
-        dot(cross(in.row_z.xyz, in.row_x.xyz), n),
-        dot(cross(in.row_x.xyz, in.row_y.xyz), n),
-        in.normal.w,
-    );
+    if IS_SMOOTH {
+        let n = in.normal.xyz;
+        // By the cofactors: the inverse transposed, but for a factor.
+        out.normal = vec3(
+            dot(cross(in.row_y.xyz, in.row_z.xyz), n),
+            dot(cross(in.row_z.xyz, in.row_x.xyz), n),
+            dot(cross(in.row_x.xyz, in.row_y.xyz), n),
+        );
+    }
     out.uv = in.uv;
     out.color = in.color;
     out.emissive = in.emissive;
@@ -94,10 +96,12 @@ fn shaded(in: Surface, texel: vec4<f32>) -> vec4<f32> {
     // From an eye at the camera's place, or along parallel lines.
     let eye = (globals.eye.xyz - globals.origin.xyz) - in.relative * (1.0 - globals.eye.w);
     let toward_eye = normalize(eye);
-    let flat_normal = cross(dpdx(in.relative), dpdy(in.relative));
-    var normal = select(flat_normal, in.normal.xyz, in.normal.w != 0.0);
-    let length = length(normal);
-    normal = select(vec3(0.0, 1.0, 0.0), normal / length, length > 1e-20);
+    var normal = in.normal;
+    if !IS_SMOOTH {
+        normal = cross(dpdx(in.relative), dpdy(in.relative));
+    }
+    // None at all of a sliver, or where a file says so: then only the sky's light is left.
+    normal *= inverseSqrt(max(dot(normal, normal), 1e-30));
     // What is seen of a surface is the side towards the eye.
     var facing = dot(normal, toward_eye);
     normal = select(normal, -normal, facing < 0.0);
@@ -130,7 +134,7 @@ fn shaded(in: Surface, texel: vec4<f32>) -> vec4<f32> {
 
 // Bright is compressed rather than cut off.
 fn toned(c: vec3<f32>) -> vec3<f32> {
-    return c / (1.0 + 0.28 * c);
+    return c * (1.0 / (1.0 + 0.28 * max(c.r, max(c.g, c.b))));
 }
 
 fn is_above_cut(in: Surface) -> bool {
