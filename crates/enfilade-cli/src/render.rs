@@ -160,12 +160,6 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         studio.state.close(PortalId(p));
     }
-    // Pictures are drawn at twice their size: four pixels for one.
-    studio.sparing = Sparing {
-        stop_below: args.stop * 4.0,
-        stop_at_nothing: args.stop_at_nothing,
-        objects_below: args.objects * 4.0,
-    };
     let cameras = match (given, args.walk, args.eye.zip(args.look)) {
         (Some(path), ..) => path,
         (_, Some(n), _) => walk_cameras(&world, &studio.sight, n, fov),
@@ -194,6 +188,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     for (i, camera) in cameras.iter().enumerate() {
         let picture = smooth(args.size, |size| {
+            // As many pixels for one as pictures are drawn larger.
+            let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
+            studio.sparing = Sparing {
+                stop_below: args.stop * scale,
+                stop_at_nothing: args.stop_at_nothing,
+                objects_below: args.objects * scale,
+            };
             if args.above {
                 above(&mut studio, &world, camera, args.cut, size)
             } else {

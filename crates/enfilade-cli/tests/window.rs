@@ -26,6 +26,8 @@ impl Display {
     fn open() -> Self {
         let mut server = Command::new("Xvfb")
             .args([
+                // Else it starts anew when the first tool to look has gone, and takes the window along.
+                "-noreset",
                 "-displayfd",
                 "1",
                 "-screen",
@@ -103,6 +105,10 @@ impl Viewer {
         Self { process, said }
     }
 
+    fn heard(&self) -> Vec<String> {
+        self.said.try_iter().collect()
+    }
+
     fn wait_to_hear(&self, words: &str) {
         let end = Instant::now() + PATIENCE;
         let mut all = String::new();
@@ -171,7 +177,7 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
             std::env::var_os("ENFILADE_NEEDS_WINDOW").is_none(),
             "Xvfb or xdotool is missing"
         );
-        println!("skipped: no Xvfb and xdotool, which the window is tried with");
+        eprintln!("skipped: no Xvfb and xdotool, which the window is tried with");
         return;
     }
     let dir = folder();
@@ -179,7 +185,7 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     fs::write(dir.join("world.glb"), encode_glb(&world).unwrap()).unwrap();
     let eye = before_a_doorway(&world).map(|x| x.to_string()).join(",");
     let display = Display::open();
-    let viewer = Viewer::open(&display, &dir, &["--eye", &eye, "--record", "walk.txt"]);
+    let mut viewer = Viewer::open(&display, &dir, &["--eye", &eye, "--record", "walk.txt"]);
     let end = Instant::now() + PATIENCE;
     while !display.tool(&[
         "search",
@@ -188,7 +194,10 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
         "enfilade",
         "windowfocus",
     ]) {
-        assert!(Instant::now() < end, "no window came");
+        if let Some(status) = viewer.process.try_wait().expect("it is ours") {
+            panic!("it ended at once, {status}: {:?}", viewer.heard());
+        }
+        assert!(Instant::now() < end, "no window: {:?}", viewer.heard());
         sleep(Duration::from_millis(100));
     }
     let key = |name: &str| assert!(display.tool(&["key", name]));
