@@ -376,10 +376,8 @@ pub(crate) fn above(
     let frame = Frame {
         projection,
         list: &list,
-        style: Style {
-            paint: Paint::Cells,
-            ..style
-        },
+        // What is drawn looks as it does; a floor of many rooms has no one cell's color.
+        style,
         marks: &marks,
     };
     Ok(studio.picture_of(&frame, size)?)
