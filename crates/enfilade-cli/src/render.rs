@@ -7,8 +7,8 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Studio,
-    Style,
+    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Sparing,
+    Studio, Style,
 };
 use serde_json::json;
 
@@ -65,6 +65,16 @@ pub(crate) struct Render {
     /// Portals that are closed, by number.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     close: Vec<u32>,
+    /// Portals that cover fewer pixels are not looked through: the mean color of the cell behind stands
+    /// in for it.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    stop: f32,
+    /// Nothing stands in for what --stop leaves out.
+    #[arg(long, requires = "stop")]
+    stop_at_nothing: bool,
+    /// Objects in cells that are seen through fewer pixels are not drawn.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    objects: f32,
     /// No shadows and no dark corners: quicker.
     #[arg(long)]
     plain: bool,
@@ -178,6 +188,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     for (i, camera) in cameras.iter().enumerate() {
         let picture = smooth(args.size, |size| {
+            // As many pixels for one as pictures are drawn larger.
+            let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
+            studio.sparing = Sparing {
+                stop_below: args.stop * scale,
+                stop_at_nothing: args.stop_at_nothing,
+                objects_below: args.objects * scale,
+            };
             if args.above {
                 above(&mut studio, &world, camera, args.cut, size)
             } else {
@@ -306,6 +323,14 @@ pub(crate) fn above(
         on_top: true,
     };
     let mut marks = Vec::new();
+    // Walls along the view have no side to be seen by: their edges where they are cut.
+    for segment in section(world, cut) {
+        marks.push(line(
+            Shape::Line(segment),
+            [0.03, 0.03, 0.04, 1.0],
+            width * 0.6,
+        ));
+    }
     for p in seen.portals() {
         let outline = world.graph.portals[p.0 as usize].outline.clone();
         marks.push(line(Shape::Outline(outline), [1.0, 0.42, 0.0, 1.0], width));
@@ -359,11 +384,32 @@ pub(crate) fn above(
     let frame = Frame {
         projection,
         list: &list,
-        style: Style {
-            paint: Paint::Cells,
-            ..style
-        },
+        // What is drawn looks as it does; a floor of many rooms has no one cell's color.
+        style,
         marks: &marks,
     };
     Ok(studio.picture_of(&frame, size)?)
+}
+
+/// Where a level plane cuts the structure.
+fn section(world: &World, height: f32) -> Vec<[[f32; 3]; 2]> {
+    let mut out = Vec::new();
+    for batch in &world.batches {
+        let p = &batch.primitive;
+        for t in p.indices.chunks_exact(3) {
+            let corners = [0, 1, 2].map(|k| p.positions[t[k] as usize]);
+            let mut ends = Vec::new();
+            for k in 0..3 {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                if (a[1] < height) != (b[1] < height) {
+                    let s = (height - a[1]) / (b[1] - a[1]);
+                    ends.push([0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * s));
+                }
+            }
+            if let [a, b] = ends[..] {
+                out.push([a, b]);
+            }
+        }
+    }
+    out
 }
