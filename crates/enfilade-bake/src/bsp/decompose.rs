@@ -8,14 +8,18 @@ use crate::assemble::{Parts, assemble};
 use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
 use crate::pipeline::{input_hash, structural_triangles};
 use crate::simplify::{SimplifySettings, simplify};
-use crate::watershed::{OUTDOORS, Screen, bounds_of};
+use crate::watershed::{
+    MergeSettings, OUTDOORS, Screen, bounds_of, closure_triangles, find_stairs, slab_heights,
+};
 use crate::{BakeContext, BakeError, BakeOutput};
 
 use super::cells::{self, Cells, NO_CELL};
-use super::{Bsp, BspInput, Guide, Heuristic, leak, separator, shape, split};
+use super::inside::Soup;
+use super::rooms::{self, Evidence};
+use super::{Bsp, BspInput, Guide, Heuristic, arrange, leak, separator, shape, split};
 
 /// Settings of a bake by binary space partition.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct BspConfig {
     /// How planes are chosen.
     pub heuristic: Heuristic,
@@ -23,6 +27,20 @@ pub struct BspConfig {
     pub guide: Guide,
     /// Bounds on the cells, and what a cell costs. Cells above the upper bound are split.
     pub simplify: SimplifySettings,
+    /// How cells become rooms by the shape of their openings, the same as in the watershed builder;
+    /// `None` keeps every separator, as the paper does.
+    pub rooms: Option<MergeSettings>,
+}
+
+impl Default for BspConfig {
+    fn default() -> Self {
+        Self {
+            heuristic: Heuristic::default(),
+            guide: Guide::default(),
+            simplify: SimplifySettings::default(),
+            rooms: Some(MergeSettings::default()),
+        }
+    }
 }
 
 /// Finds rooms and doorways of a scene by binary space partition and separators.
@@ -46,16 +64,43 @@ pub fn bake_bsp(
         });
     }
     let bvh = Bvh::build(&triangles);
-    let bsp = Bsp::build(
-        &input_of(scene, &triangles, &leak::inside_of(scene)),
+    // Stairs stand in rooms and bound none; brushes say by their class what is detail.
+    let is_stair = if scene.solids.is_empty() {
+        find_stairs(&sources, &triangles)
+    } else {
+        vec![false; triangles.len()]
+    };
+    let of_kind = |stairs: bool| -> Vec<Triangle> {
+        let all = triangles.iter().zip(&is_stair);
+        all.filter(|t| *t.1 == stairs).map(|t| *t.0).collect()
+    };
+    let (walls, stairs) = (of_kind(false), of_kind(true));
+    let mut bsp = Bsp::build(
+        &input_of(scene, &walls, &leak::inside_of(scene)),
         config.heuristic,
         &config.guide,
     );
     let counts = bsp.counts();
-    let parted = cells::part(&bsp, separator::find(&bsp));
-    let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+    let (parted, shapes) = if let Some(settings) = &config.rooms {
+        arrange::refine(&mut bsp, settings);
+        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+        let evidence = Evidence {
+            shapes: &shapes,
+            closures: &Bvh::build(&closure_triangles(scene)),
+            slabs: &slab_heights(&walls),
+        };
+        let parted = rooms::part(&bsp, separator::find(&bsp), &evidence, settings);
+        (parted, shapes)
+    } else {
+        let parted = cells::part(&bsp, separator::find(&bsp));
+        (parted, shape::shapes(&bsp.tree, &bsp.tolerance))
+    };
     let mut screens = screens_of(&bsp, &parted);
     let mut votes = Votes::of(&bsp, &parted, &shapes);
+    if !stairs.is_empty() {
+        let matter = Soup::of(&stairs);
+        votes.0.retain(|v| !matter.is_inside(v.point));
+    }
     let n_before = parted.n_cells;
     let n_separators = parted.separators.len();
     if let Some(bound) = config.simplify.max_cost {
@@ -71,12 +116,16 @@ pub fn bake_bsp(
         bounds: bounds_of(&triangles).expanded(1.0),
     });
     context.stage(6)?;
-    // A cell of the tree is a cell whatever its size: what is too small is the simplifier's to say.
-    let settings = LabelSettings {
-        min_volume: 0.0,
-        min_room: 0.0,
-        dominance: 1.0,
-        strong_share: 0.2,
+    let settings = if scene.solids.is_empty() {
+        LabelSettings::default()
+    } else {
+        // A cell of the tree is a cell whatever its size: what is too small is the simplifier's to say.
+        LabelSettings {
+            min_volume: 0.0,
+            min_room: 0.0,
+            dominance: 1.0,
+            strong_share: 0.2,
+        }
     };
     let partition = complex.partition(&votes.0, &settings);
     let outward = complex.opening_tolerance();
@@ -140,6 +189,7 @@ impl BspConfig {
             "bsp.heuristic".to_owned(),
             format!("{:?}", self.heuristic).to_lowercase(),
         );
+        out.insert("bsp.rooms".to_owned(), self.rooms.is_some().to_string());
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
         out.insert("bsp.grid".to_owned(), number(self.guide.grid));
         out.insert("bsp.tetrahedra".to_owned(), number(self.guide.tetrahedra));

@@ -19,11 +19,14 @@
 //! leaves but from [`crate::complex`], which takes the separators as screens and the cells as votes, so
 //! that a separator that rounding spoils costs a room and never a promise.
 
+mod arrange;
 mod cells;
 mod decompose;
 mod guide;
+mod inside;
 mod leak;
 mod portals;
+mod rooms;
 mod separator;
 mod shape;
 mod split;
@@ -165,6 +168,9 @@ impl Bsp {
                     });
                     is_inside
                 });
+            } else if !input.triangles.is_empty() {
+                let soup = inside::Soup::of(input.triangles);
+                settle(&mut tree, &tolerance, true, &|p| soup.is_inside(p));
             }
             let mut bsp = Self {
                 portals: portals::leaf_portals(&tree, &tolerance),

@@ -10,6 +10,7 @@ use anyhow::Context;
 use enfilade::bake::BakeConfig;
 use enfilade::bake::bsp::{BspConfig, Guide, Heuristic};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
+use enfilade::bake::watershed::MergeSettings;
 use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{ImportOptions, RoleRules, Up};
 use serde::de::{Deserialize, Deserializer, Error};
@@ -248,6 +249,8 @@ struct ConfigFile {
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct BspTable {
+    /// Whether the shape of openings makes rooms of cells.
+    rooms: Option<bool>,
     heuristic: Option<HeuristicName>,
     grid: Option<Length>,
     tetrahedra: Option<Length>,
@@ -300,18 +303,23 @@ impl ConfigFile {
 }
 
 /// What the partition is told, resolved.
-fn resolve_bsp(options: &BakeOptions, table: BspTable) -> anyhow::Result<BspConfig> {
+fn resolve_bsp(
+    options: &BakeOptions,
+    table: BspTable,
+    merge: &MergeSettings,
+) -> anyhow::Result<BspConfig> {
     let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
         let normal = DVec3::new(nx, ny, nz).try_normalize();
         let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
         Ok(Plane::through(DVec3::new(x, y, z), normal))
     };
+    let is_by_shape = table.rooms.unwrap_or(true);
     let simplify = SimplifySettings {
         min_cost: options
             .min_cost
             .map(f64::from)
             .or(table.min_cost.map(|v| v.0))
-            .unwrap_or(MERGE_BELOW),
+            .unwrap_or(if is_by_shape { 0.0 } else { MERGE_BELOW }),
         max_cost: options
             .max_cost
             .map(f64::from)
@@ -359,6 +367,7 @@ fn resolve_bsp(options: &BakeOptions, table: BspTable) -> anyhow::Result<BspConf
                 .collect(),
         },
         simplify,
+        rooms: is_by_shape.then(|| merge.clone()),
     })
 }
 
@@ -406,8 +415,8 @@ pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     }
     Ok(Resolved {
         import: import_options,
+        bsp: resolve_bsp(options, file.bsp, &config.merge)?,
         watershed: config,
-        bsp: resolve_bsp(options, file.bsp)?,
     })
 }
 
