@@ -133,15 +133,16 @@ impl Lattice {
         })
     }
 
-    /// Measures the opening of the portals that `is_seed` names, of this area, between the cells whose
-    /// leaves `in_cell` tells (0 and 1; anything else is neither). Cell 0 may be without end.
+    /// Measures the opening of the portals that `is_seed` names, of this area, between the two sides
+    /// whose leaves `in_side` tells (0 and 1; anything else is neither), given whether a leaf is met
+    /// before (0) or behind (1) the plane. One side may be without end.
     fn section(
         &self,
         bsp: &Bsp,
         area: f64,
         is_seed: &dyn Fn(u32) -> bool,
-        in_cell: &dyn Fn(u32) -> u8,
-        is_endless: bool,
+        in_side: &dyn Fn(usize, u32) -> u8,
+        endless: Option<usize>,
         settings: &MergeSettings,
     ) -> Section {
         let seeds: Vec<bool> = self
@@ -155,11 +156,15 @@ impl Lattice {
         let unit = self.step * self.step;
         // Once both are this large, it is a pinch whatever else there is.
         let enough = area / (settings.threshold * unit);
-        let smaller = |best: [usize; 2]| if is_endless { best[1] } else { best[0].min(best[1]) };
-        for slice in (0..self.slices.len()).map(|k| self.slice(bsp, k, settings)) {
-            let of: Vec<u8> = slice
+        let smaller = |best: [usize; 2]| match endless {
+            Some(side) => best[1 - side],
+            None => best[0].min(best[1]),
+        };
+        for k in 0..self.slices.len() {
+            let of: Vec<u8> = self
+                .slice(bsp, k, settings)
                 .iter()
-                .map(|&l| if l == NONE { 2 } else { in_cell(l) })
+                .map(|&l| if l == NONE { 2 } else { in_side(k % 2, l) })
                 .collect();
             for c in 0..2 {
                 let mut inside: Vec<bool> = of.iter().map(|&o| usize::from(o) == c).collect();
@@ -197,8 +202,8 @@ fn contains(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
 /// sections beside it is larger than it is, all open space taken together.
 pub(super) fn may_be_pinch(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> bool {
     let lattice = Lattice::of(bsp, s, settings);
-    let all = |_: u32| 1;
-    let section = lattice.section(bsp, s.area, &|_| true, &all, true, settings);
+    let all = |_: usize, _: u32| 1;
+    let section = lattice.section(bsp, s.area, &|_| true, &all, Some(0), settings);
     section.ratio < settings.wall_threshold
 }
 
@@ -240,13 +245,6 @@ pub(super) fn part(
     evidence: &Evidence<'_>,
     settings: &MergeSettings,
 ) -> Cells {
-    if std::env::var("DBG").is_ok() {
-        for sp in &separators {
-                let pts = || sp.portals.iter().flat_map(|&c| &bsp.portals[c as usize].points);
-                let m = pts().copied().sum::<DVec3>() / pts().count() as f64;
-            eprintln!("sep area {:.2} at {:.2} n {:.2} may {}", sp.area, m, bsp.tree.planes[sp.plane as usize].normal, may_be_pinch(bsp, sp, settings));
-        }
-    }
     let kept: Vec<Separator> = separators
         .into_par_iter()
         .filter(|s| may_be_pinch(bsp, s, settings))
@@ -286,19 +284,10 @@ pub(super) fn part(
     merger.find_openings();
     for storeys_apart in [true, false] {
         merger.storeys_apart = storeys_apart;
+        merger.run_separators();
         merger.run();
     }
     merger.absorb_passages();
-    if std::env::var("DBG").is_ok() {
-        for (&pair, os) in &merger.openings {
-            for o in os {
-                let c = kept[o.0 as usize].portals[o.1[0] as usize];
-                let pts = &bsp.portals[c as usize].points;
-                let m = pts.iter().sum::<DVec3>() / pts.len() as f64;
-                eprintln!("pair {pair:?} pinch {:.2} area {:.2} closed {:.2} at {:.2} n {:.2}", merger.pinch(pair), merger.area(o), merger.closed_share(o), m, bsp.tree.planes[kept[o.0 as usize].plane as usize].normal);
-            }
-        }
-    }
     let cell_of: Vec<u32> = (0..n_cells as u32).map(|c| merger.find(c)).collect();
     let openings = std::mem::take(&mut merger.openings);
     drop(merger);
@@ -475,23 +464,99 @@ impl Merger<'_> {
                     return 0.0;
                 }
                 let is_seed = |k: u32| places.binary_search(&k).is_ok();
-                let in_cell = |leaf: u32| match self.cell_of(leaf) {
+                let in_side = |_: usize, leaf: u32| match self.cell_of(leaf) {
                     c if c == pair.0 => 0,
                     c if c == pair.1 => 1,
                     _ => 2,
                 };
-                let is_endless = pair.0 == self.outer;
-                let lattice = &self.lattices[*s as usize];
-                let mut found =
-                    lattice.section(self.bsp, area, &is_seed, &in_cell, is_endless, self.settings);
-                if is_endless {
-                    found.ratio *= self.settings.outdoor_gain;
-                }
-                let wall = (found.wall / self.settings.wall_rim).min(1.0);
-                let (open, walled) = (self.settings.threshold, self.settings.wall_threshold);
-                found.ratio / (open + (walled - open) * wall)
+                let endless = (pair.0 == self.outer).then_some(0);
+                self.measure(*s, area, &is_seed, &in_side, endless)
             })
             .fold(0.0, f64::max)
+    }
+
+    fn measure(
+        &self,
+        separator: u32,
+        area: f64,
+        is_seed: &dyn Fn(u32) -> bool,
+        in_side: &dyn Fn(usize, u32) -> u8,
+        endless: Option<usize>,
+    ) -> f64 {
+        let lattice = &self.lattices[separator as usize];
+        let settings = self.settings;
+        let mut found = lattice.section(self.bsp, area, is_seed, in_side, endless, settings);
+        if endless.is_some() {
+            found.ratio *= settings.outdoor_gain;
+        }
+        let wall = (found.wall / settings.wall_rim).min(1.0);
+        let (open, walled) = (settings.threshold, settings.wall_threshold);
+        found.ratio / (open + (walled - open) * wall)
+    }
+
+    /// Cells before and behind each portal of a separator that still parts two.
+    fn sides(&self, separator: u32) -> Vec<(u32, [u32; 2])> {
+        let portals = &self.separators[separator as usize].portals;
+        let cells = |(k, &p): (usize, &u32)| {
+            let cells = self.bsp.portals[p as usize].leaves.map(|l| self.cell_of(l));
+            (cells[0] != cells[1]).then_some((k as u32, cells))
+        };
+        portals.iter().enumerate().filter_map(cells).collect()
+    }
+
+    /// How little of a pinch a separator is as a whole, whatever cuts the space on either side of it;
+    /// and how old its cells are.
+    fn pinch_of_separator(&self, separator: u32) -> (f64, u64) {
+        let sides = self.sides(separator);
+        if sides.is_empty() {
+            return (0.0, 0);
+        }
+        let of_side = |i: usize| -> BTreeSet<u32> { sides.iter().map(|s| s.1[i]).collect() };
+        let cells = [of_side(0), of_side(1)];
+        let all = cells.iter().flatten();
+        let age = all.map(|&c| u64::from(self.version[c as usize])).sum();
+        let places: Vec<u32> = sides.iter().map(|s| s.0).collect();
+        let opening = (separator, places);
+        let apart = self.storeys_apart && self.lies_in_slab(separator);
+        if apart || self.closed_share(&opening) >= self.settings.closed_share {
+            return (0.0, age);
+        }
+        let is_seed = |k: u32| opening.1.binary_search(&k).is_ok();
+        let in_side = |side: usize, leaf: u32| {
+            if cells[side].contains(&self.cell_of(leaf)) {
+                side as u8
+            } else {
+                2
+            }
+        };
+        let endless = (0..2).find(|&i| cells[i].contains(&self.outer));
+        let area = self.area(&opening);
+        (self.measure(separator, area, &is_seed, &in_side, endless), age)
+    }
+
+    /// Takes whole separators away, least pinched first: what crosses a separator cuts it in pieces
+    /// that are narrow by themselves, and would be a way through it.
+    fn run_separators(&mut self) {
+        let weigh = |merger: &Self, s: u32| {
+            let (pinch, age) = merger.pinch_of_separator(s);
+            (pinch >= 1.0).then_some((pinch.to_bits(), std::cmp::Reverse(s), age))
+        };
+        let n = self.separators.len() as u32;
+        let all: Vec<_> = (0..n).into_par_iter().filter_map(|s| weigh(self, s)).collect();
+        let mut queue: BinaryHeap<_> = all.into();
+        while let Some((_, std::cmp::Reverse(s), age)) = queue.pop() {
+            let now = weigh(self, s);
+            if now.is_none_or(|n| n.2 != age) {
+                queue.extend(now);
+                continue;
+            }
+            for (_, [a, b]) in self.sides(s) {
+                let pair = self.ordered(self.find(a), self.find(b));
+                if pair.0 != pair.1 {
+                    self.merge(pair);
+                }
+            }
+        }
     }
 
     /// Openings that touch each other in an edge are one that bends: its area is the length of the
@@ -565,14 +630,6 @@ impl Merger<'_> {
             if now != top.versions {
                 queue.extend(Some(candidate(self, top.pair)).filter(joins));
                 continue;
-            }
-            if std::env::var("DBG").is_ok() {
-                for o in &self.openings[&top.pair] {
-                    let c = self.separators[o.0 as usize].portals[o.1[0] as usize];
-                    let pts = &self.bsp.portals[c as usize].points;
-                    let m = pts.iter().sum::<DVec3>() / pts.len() as f64;
-                    eprintln!("merge {:?} pinch {:.2} area {:.2} closed {:.2} at {:.2} n {:.2}", top.pair, top.pinch, self.area(o), self.closed_share(o), m, self.bsp.tree.planes[self.separators[o.0 as usize].plane as usize].normal);
-                }
             }
             let changed = self.merge(top.pair);
             let weighed: Vec<Candidate> = changed.par_iter().map(|&p| candidate(self, p)).collect();
