@@ -51,16 +51,17 @@ pub(crate) fn bench_bsp(
     for path in scenes {
         let imported = import(std::slice::from_ref(path), &[], &options)?;
         let scene = &imported.scene;
-        let triangles: Vec<Triangle> = if scene.solids.is_empty() {
+        let (triangles, objects): (Vec<Triangle>, Vec<u32>) = if scene.solids.is_empty() {
             let sources = scene.triangle_sources(Role::Structural);
-            sources.map(|s| scene.world_triangle(s)).collect()
+            sources.map(|s| (scene.world_triangle(s), s.object)).unzip()
         } else {
-            Vec::new()
+            (Vec::new(), Vec::new())
         };
         let entities = scene.entities.iter().filter(|e| e.object.is_none());
         let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
         let input = BspInput {
             triangles: &triangles,
+            objects: &objects,
             solids: &scene.solids,
             inside: &inside,
         };

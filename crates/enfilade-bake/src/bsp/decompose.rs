@@ -75,8 +75,14 @@ pub fn bake_bsp(
         all.filter(|t| *t.1 == stairs).map(|t| *t.0).collect()
     };
     let (walls, stairs) = (of_kind(false), of_kind(true));
+    let objects: Vec<u32> = sources
+        .iter()
+        .zip(&is_stair)
+        .filter(|s| !*s.1)
+        .map(|s| s.0.object)
+        .collect();
     let mut bsp = Bsp::build(
-        &input_of(scene, &walls, &leak::inside_of(scene)),
+        &input_of(scene, &walls, &objects, &leak::inside_of(scene)),
         config.heuristic,
         &config.guide,
     );
@@ -98,7 +104,7 @@ pub fn bake_bsp(
     let mut screens = screens_of(&bsp, &parted);
     let mut votes = Votes::of(&bsp, &parted, &shapes);
     if !stairs.is_empty() {
-        let matter = Soup::of(&stairs);
+        let matter = Soup::of(&stairs, &[]);
         votes.0.retain(|v| !matter.is_inside(v.point));
     }
     let n_before = parted.n_cells;
@@ -203,6 +209,7 @@ impl BspConfig {
 pub(super) fn input_of<'a>(
     scene: &'a Scene,
     triangles: &'a [Triangle],
+    objects: &'a [u32],
     inside: &'a [DVec3],
 ) -> BspInput<'a> {
     let is_brushes = !scene.solids.is_empty()
@@ -213,6 +220,7 @@ pub(super) fn input_of<'a>(
             .all(|o| o.reason.starts_with("map: "));
     BspInput {
         triangles,
+        objects,
         solids: if is_brushes { &scene.solids } else { &[] },
         inside: if is_brushes { inside } else { &[] },
     }

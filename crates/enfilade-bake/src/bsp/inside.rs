@@ -1,11 +1,13 @@
 //! Whether a point is in matter, where matter is no list of solids but triangles.
 //!
 //! Walls, slabs and columns are modeled as closed surfaces that overlap each other, so neither the
-//! surface next to a point nor the parity of crossings tells. The number of surfaces that a ray leaves
-//! less those it enters is the winding number of a closed mesh, and stays right where closed meshes
-//! overlap. Where a surface has holes rays disagree, and the majority of them decides.
+//! surface next to a point nor the parity of crossings tells. The number of surfaces of one object that a
+//! ray leaves less those it enters is the object's winding number. Objects are asked one by one, so that a
+//! ceiling that is a mere sheet says nothing of the wall beside it; where an object has holes, rays
+//! disagree, and the majority of them decides.
 
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use smallvec::SmallVec;
 
 /// Directions that no wall of a building runs along; an odd number, so that there is a majority.
 const DIRECTIONS: [[f64; 3]; 7] = [
@@ -19,31 +21,45 @@ const DIRECTIONS: [[f64; 3]; 7] = [
 ];
 
 /// Triangles that are asked what lies within them.
-pub(super) struct Soup(Bvh);
+pub(super) struct Soup<'a> {
+    bvh: Bvh,
+    /// Which object each is part of; none says that all are of one.
+    objects: &'a [u32],
+}
 
-impl Soup {
-    pub(super) fn of(triangles: &[Triangle]) -> Self {
-        Self(Bvh::build(triangles))
+impl<'a> Soup<'a> {
+    pub(super) fn of(triangles: &[Triangle], objects: &'a [u32]) -> Self {
+        Self {
+            bvh: Bvh::build(triangles),
+            objects,
+        }
     }
 
-    /// Whether most rays from `p` leave more surfaces than they enter.
+    /// Whether there is an object of which most rays from `p` leave more surfaces than they enter.
     pub(super) fn is_inside(&self, p: DVec3) -> bool {
-        let mut n_inside = 0;
-        for (i, direction) in DIRECTIONS.into_iter().enumerate() {
+        let mut n_inside: SmallVec<[(u32, usize); 8]> = SmallVec::new();
+        for direction in DIRECTIONS {
             let ray = Ray {
                 origin: p,
                 direction: DVec3::from(direction),
                 t_max: f64::INFINITY,
             };
-            let mut winding = 0;
-            self.0.for_each_hit(&ray, |h| winding += if h.front { -1 } else { 1 });
-            n_inside += usize::from(winding > 0);
-            let (half, left) = (DIRECTIONS.len() / 2, DIRECTIONS.len() - 1 - i);
-            if n_inside > half || n_inside + left <= half {
-                break;
+            let mut hits: SmallVec<[(u32, i32); 32]> = SmallVec::new();
+            self.bvh.for_each_hit(&ray, |h| {
+                let object = self.objects.get(h.triangle as usize).copied().unwrap_or(0);
+                hits.push((object, if h.front { -1 } else { 1 }));
+            });
+            hits.sort_unstable();
+            for of_one in hits.chunk_by(|a, b| a.0 == b.0) {
+                if of_one.iter().map(|h| h.1).sum::<i32>() > 0 {
+                    match n_inside.iter_mut().find(|n| n.0 == of_one[0].0) {
+                        Some(n) => n.1 += 1,
+                        None => n_inside.push((of_one[0].0, 1)),
+                    }
+                }
             }
         }
-        n_inside > DIRECTIONS.len() / 2
+        n_inside.iter().any(|n| n.1 > DIRECTIONS.len() / 2)
     }
 }
 
@@ -90,7 +106,11 @@ mod tests {
                 all.extend(boxed(min, max));
             }
         }
-        for soup in [Soup::of(&all), Soup::of(&all[1..])] {
+        // And a sheet in mid-air that faces the floor, as ceilings are modeled.
+        let sheet = [[-9.0, 3.9, -9.0], [20.0, 3.9, -9.0], [-9.0, 3.9, 20.0]].map(DVec3::from);
+        all.push(sheet);
+        let objects: Vec<u32> = (0..all.len() as u32).map(|t| t / 12).collect();
+        for soup in [Soup::of(&all, &objects), Soup::of(&all[1..], &objects[1..])] {
             for k in 0..1000 {
                 // A lattice off the walls' faces.
                 let p = DVec3::new(

@@ -87,6 +87,8 @@ impl Tolerance {
 pub struct BspInput<'a> {
     /// Surfaces where there are no solids: triangles, solid behind, empty before. [Units: wu]
     pub triangles: &'a [Triangle],
+    /// The object of each triangle, to tell what is inside one; empty where all are one.
+    pub objects: &'a [u32],
     /// Brushes; where there are some, they are the surfaces.
     pub solids: &'a [ConvexSolid],
     /// Points known to be inside, such as those of entities; with solids, what they cannot reach is
@@ -169,7 +171,7 @@ impl Bsp {
                     is_inside
                 });
             } else if !input.triangles.is_empty() {
-                let soup = inside::Soup::of(input.triangles);
+                let soup = inside::Soup::of(input.triangles, input.objects);
                 settle(&mut tree, &tolerance, true, &|p| soup.is_inside(p));
             }
             let mut bsp = Self {

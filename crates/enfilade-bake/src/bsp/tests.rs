@@ -50,6 +50,7 @@ fn bsp_of(solids: &[ConvexSolid], inside: &[DVec3], heuristic: Heuristic, guide:
     Bsp::build(
         &BspInput {
             triangles: &[],
+            objects: &[],
             solids,
             inside,
         },
