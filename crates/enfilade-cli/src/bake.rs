@@ -62,7 +62,12 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
             .num_threads(threads.unwrap_or(0))
             .build()?;
         let bar = BakeBar::new(scene, config);
-        pool.install(|| bake_bsp(scene, &settings.bsp, &BakeContext::new(&bar, None)))?
+        let mut config = settings.bsp.clone();
+        if settings.merges_brushes_only && scene.solids.is_empty() {
+            // A room of a building has few triangles; the shape of its openings says that it is one.
+            config.simplify.min_cost = 0.0;
+        }
+        pool.install(|| bake_bsp(scene, &config, &BakeContext::new(&bar, None)))?
     } else {
         bake_scene(scene, config, threads)?
     };

@@ -68,7 +68,13 @@ pub(super) fn refine(bsp: &mut Bsp, settings: &MergeSettings) {
 }
 
 /// What of a polygon in `plane` lies within open leaves and in no node's plane.
-fn sections(bsp: &Bsp, child: i32, plane: u32, points: &[enfilade_geom::DVec3], out: &mut Vec<LeafPortal>) {
+fn sections(
+    bsp: &Bsp,
+    child: i32,
+    plane: u32,
+    points: &[enfilade_geom::DVec3],
+    out: &mut Vec<LeafPortal>,
+) {
     if child < 0 {
         let leaf = leaf_index(child);
         if bsp.is_open[leaf as usize] && poly::width(points) > bsp.tolerance.width {
@@ -85,7 +91,11 @@ fn sections(bsp: &Bsp, child: i32, plane: u32, points: &[enfilade_geom::DVec3], 
         // Its portals are there already.
         return;
     }
-    match poly::split(points, &bsp.tree.planes[node.plane as usize], bsp.tolerance.plane) {
+    match poly::split(
+        points,
+        &bsp.tree.planes[node.plane as usize],
+        bsp.tolerance.plane,
+    ) {
         Sides::On => {}
         Sides::Front => sections(bsp, node.children[0], plane, points, out),
         Sides::Back => sections(bsp, node.children[1], plane, points, out),

@@ -19,7 +19,7 @@ use super::rooms::{self, Evidence};
 use super::{Bsp, BspInput, Guide, Heuristic, arrange, leak, separator, shape, split};
 
 /// Settings of a bake by binary space partition.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct BspConfig {
     /// How planes are chosen.
     pub heuristic: Heuristic,
@@ -27,20 +27,23 @@ pub struct BspConfig {
     pub guide: Guide,
     /// Bounds on the cells, and what a cell costs. Cells above the upper bound are split.
     pub simplify: SimplifySettings,
-    /// How cells become rooms by the shape of their openings, the same as in the watershed builder;
-    /// `None` keeps every separator, as the paper does.
-    pub rooms: Option<MergeSettings>,
+    /// Whether cells become rooms by the shape of the openings between them.
+    pub rooms: Rooms,
+    /// What that goes by: the same settings as in the watershed builder.
+    pub merge: MergeSettings,
 }
 
-impl Default for BspConfig {
-    fn default() -> Self {
-        Self {
-            heuristic: Heuristic::default(),
-            guide: Guide::default(),
-            simplify: SimplifySettings::default(),
-            rooms: Some(MergeSettings::default()),
-        }
-    }
+/// Which separators are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rooms {
+    /// Those of [`Rooms::Always`] where structure is triangles, those of [`Rooms::Never`] where it is
+    /// brushes: a level is a chain of passages as wide as what they join, and would be one room.
+    #[default]
+    Auto,
+    /// Those that are narrower than what lies beside them.
+    Always,
+    /// All that cross no other (Lefebvre & Hornus 2003, §2.1 step 2).
+    Never,
 }
 
 /// Finds rooms and doorways of a scene by binary space partition and separators.
@@ -87,7 +90,12 @@ pub fn bake_bsp(
         &config.guide,
     );
     let counts = bsp.counts();
-    let (parted, shapes) = if let Some(settings) = &config.rooms {
+    let by_shape = match config.rooms {
+        Rooms::Auto => scene.solids.is_empty(),
+        rooms => rooms == Rooms::Always,
+    };
+    let (parted, shapes) = if by_shape {
+        let settings = &config.merge;
         arrange::refine(&mut bsp, settings);
         let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
         let evidence = Evidence {
@@ -195,7 +203,10 @@ impl BspConfig {
             "bsp.heuristic".to_owned(),
             format!("{:?}", self.heuristic).to_lowercase(),
         );
-        out.insert("bsp.rooms".to_owned(), self.rooms.is_some().to_string());
+        out.insert(
+            "bsp.rooms".to_owned(),
+            format!("{:?}", self.rooms).to_lowercase(),
+        );
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
         out.insert("bsp.grid".to_owned(), number(self.guide.grid));
         out.insert("bsp.tetrahedra".to_owned(), number(self.guide.tetrahedra));

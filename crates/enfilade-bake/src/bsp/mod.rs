@@ -12,6 +12,10 @@
 //! | 1: portals of the leaves | `portals` |
 //! | 2: separators, valid and invalid | `separator` |
 //! | 3: cells, crossing separators | `cells` |
+//! | separators that the arrangement would have shown (§3.0.2) | `arrange` |
+//! | rooms: separators that are a pinch, in buildings | `rooms` |
+//! | matter, where surfaces are triangles | `inside` |
+//! | 4: cells above the bound | `split` |
 //! | leaks, as a path | `leak` |
 //!
 //! Where it departs from the paper: with brushes, the surface of their union is made first and what
@@ -35,7 +39,7 @@ mod tree;
 
 use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding};
 
-pub use decompose::{BspConfig, bake_bsp};
+pub use decompose::{BspConfig, Rooms, bake_bsp};
 pub use guide::Guide;
 pub use leak::{LeakPath, find_leak};
 

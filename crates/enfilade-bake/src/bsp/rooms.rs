@@ -127,7 +127,11 @@ impl Lattice {
                         return NONE;
                     }
                     let leaf = bsp.tree.leaf_of(p);
-                    if bsp.is_open[leaf as usize] { leaf } else { NONE }
+                    if bsp.is_open[leaf as usize] {
+                        leaf
+                    } else {
+                        NONE
+                    }
                 })
                 .collect()
         })
@@ -254,7 +258,9 @@ pub(super) fn part(
         .par_iter()
         .map(|s| Lattice::of(bsp, s, settings))
         .collect();
-    let outer_leaf = bsp.tree.leaf_of(bsp.tree.bounds.min + bsp.tree.bounds.size() * 1e-4);
+    let outer_leaf = bsp
+        .tree
+        .leaf_of(bsp.tree.bounds.min + bsp.tree.bounds.size() * 1e-4);
     let mut merger = Merger {
         bsp,
         settings,
@@ -346,11 +352,21 @@ fn closed_shares(
         let plane = &bsp.tree.planes[s.plane as usize];
         let (u, v) = plane.basis();
         let off = plane.normal * CLOSURE_REACH;
-        let all = || s.portals.iter().flat_map(|&p| &bsp.portals[p as usize].points);
+        let all = || {
+            s.portals
+                .iter()
+                .flat_map(|&p| &bsp.portals[p as usize].points)
+        };
         let low = |d: DVec3| all().map(|p| d.dot(*p)).fold(f64::MAX, f64::min) - settings.surround;
         let base = plane.normal * -plane.d + u * low(u) + v * low(v);
-        for (k, &n) in lattice.portal_at.iter().enumerate().filter(|(_, n)| **n != NONE) {
-            let [i, j] = [k % lattice.side[0], k / lattice.side[0]].map(|t| t as f64 * lattice.step);
+        for (k, &n) in lattice
+            .portal_at
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| **n != NONE)
+        {
+            let [i, j] =
+                [k % lattice.side[0], k / lattice.side[0]].map(|t| t as f64 * lattice.step);
             let p = base + u * i + v * j;
             let slot = &mut hits[n as usize];
             slot[0] += u32::from(closures.any_hit(p - off, p + off, |_| false));
@@ -419,7 +435,10 @@ impl Merger<'_> {
                 }
             }
             for (pair, places) in by_pair {
-                self.openings.entry(pair).or_default().push((i as u32, places));
+                self.openings
+                    .entry(pair)
+                    .or_default()
+                    .push((i as u32, places));
                 self.neighbors[pair.0 as usize].insert(pair.1);
                 self.neighbors[pair.1 as usize].insert(pair.0);
             }
@@ -531,7 +550,10 @@ impl Merger<'_> {
         };
         let endless = (0..2).find(|&i| cells[i].contains(&self.outer));
         let area = self.area(&opening);
-        (self.measure(separator, area, &is_seed, &in_side, endless), age)
+        (
+            self.measure(separator, area, &is_seed, &in_side, endless),
+            age,
+        )
     }
 
     /// Takes whole separators away, least pinched first: what crosses a separator cuts it in pieces
@@ -542,7 +564,10 @@ impl Merger<'_> {
             (pinch >= 1.0).then_some((pinch.to_bits(), std::cmp::Reverse(s), age))
         };
         let n = self.separators.len() as u32;
-        let all: Vec<_> = (0..n).into_par_iter().filter_map(|s| weigh(self, s)).collect();
+        let all: Vec<_> = (0..n)
+            .into_par_iter()
+            .filter_map(|s| weigh(self, s))
+            .collect();
         let mut queue: BinaryHeap<_> = all.into();
         while let Some((_, std::cmp::Reverse(s), age)) = queue.pop() {
             let now = weigh(self, s);
@@ -567,7 +592,8 @@ impl Merger<'_> {
         let eps = 4.0 * self.bsp.tolerance.plane;
         let portals = |o: &'a Opening| {
             let all = &self.separators[o.0 as usize].portals;
-            o.1.iter().map(move |&k| &self.bsp.portals[all[k as usize] as usize])
+            o.1.iter()
+                .map(move |&k| &self.bsp.portals[all[k as usize] as usize])
         };
         let boxes: Vec<Aabb> = openings
             .iter()
@@ -582,7 +608,10 @@ impl Merger<'_> {
                     });
                 if touches {
                     let (from, to) = (group[i], group[j]);
-                    group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+                    group
+                        .iter_mut()
+                        .filter(|g| **g == from)
+                        .for_each(|g| *g = to);
                 }
             }
         }
@@ -599,7 +628,8 @@ impl Merger<'_> {
                 })
                 .sum();
             let flat = |i: usize| self.area(&openings[i]);
-            if let Some(i) = members().max_by(|&i, &j| flat(i).total_cmp(&flat(j)).then(j.cmp(&i))) {
+            if let Some(i) = members().max_by(|&i, &j| flat(i).total_cmp(&flat(j)).then(j.cmp(&i)))
+            {
                 out.push((vector.length().max(flat(i)), &openings[i]));
             }
         }
@@ -648,7 +678,10 @@ impl Merger<'_> {
             if c == a {
                 continue;
             }
-            let moved = self.openings.remove(&self.ordered(b, c)).unwrap_or_default();
+            let moved = self
+                .openings
+                .remove(&self.ordered(b, c))
+                .unwrap_or_default();
             let pair = self.ordered(a, c);
             let all = self.openings.entry(pair).or_default();
             for (s, places) in moved {
@@ -683,7 +716,11 @@ impl Merger<'_> {
         let mut order: Vec<u32> = (0..self.parent.len() as u32)
             .filter(|&c| self.find(c) == c && c != self.outer)
             .collect();
-        order.sort_by(|&a, &b| volumes[a as usize].total_cmp(&volumes[b as usize]).then(a.cmp(&b)));
+        order.sort_by(|&a, &b| {
+            volumes[a as usize]
+                .total_cmp(&volumes[b as usize])
+                .then(a.cmp(&b))
+        });
         for c in order {
             if self.find(c) != c {
                 continue;
@@ -701,7 +738,11 @@ impl Merger<'_> {
                 }
                 let key = (shut < self.settings.closed_share * open, open - shut, n);
                 let is_better = |h: &(bool, f64, u32)| {
-                    key.0.cmp(&h.0).then(key.1.total_cmp(&h.1)).then(h.2.cmp(&n)).is_gt()
+                    key.0
+                        .cmp(&h.0)
+                        .then(key.1.total_cmp(&h.1))
+                        .then(h.2.cmp(&n))
+                        .is_gt()
                 };
                 if home.as_ref().is_none_or(is_better) {
                     home = Some(key);
@@ -717,4 +758,3 @@ impl Merger<'_> {
         }
     }
 }
-

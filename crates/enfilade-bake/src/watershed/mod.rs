@@ -19,11 +19,11 @@ pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen};
 pub use hollow::hollow_regions;
 pub use lids::{Lids, find_lids};
-pub(crate) use regions::{connected_count, rim_share};
 pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,
 };
+pub(crate) use regions::{connected_count, rim_share};
 pub use rims::rim_caps;
 pub use slabs::{cut_at_slabs, slab_heights};
 pub use stairs::find_stairs;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
-use enfilade::bake::bsp::{BspConfig, Guide, Heuristic};
+use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
 use enfilade::bake::watershed::MergeSettings;
 use enfilade::geom::{Aabb, DVec3, Plane};
@@ -58,7 +58,8 @@ pub(crate) struct BakeOptions {
     /// Go on although the map leaks.
     #[arg(long)]
     pub(super) allow_leak: bool,
-    /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50].
+    /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50 in
+    /// levels of brushes, 0 elsewhere].
     #[arg(long, value_name = "N")]
     min_cost: Option<u32>,
     /// With `--method bsp`: cells of more triangles are cut, and none is merged to more.
@@ -313,13 +314,12 @@ fn resolve_bsp(
         let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
         Ok(Plane::through(DVec3::new(x, y, z), normal))
     };
-    let is_by_shape = table.rooms.unwrap_or(true);
     let simplify = SimplifySettings {
         min_cost: options
             .min_cost
             .map(f64::from)
             .or(table.min_cost.map(|v| v.0))
-            .unwrap_or(if is_by_shape { 0.0 } else { MERGE_BELOW }),
+            .unwrap_or(MERGE_BELOW),
         max_cost: options
             .max_cost
             .map(f64::from)
@@ -367,7 +367,12 @@ fn resolve_bsp(
                 .collect(),
         },
         simplify,
-        rooms: is_by_shape.then(|| merge.clone()),
+        rooms: match table.rooms {
+            None => Rooms::Auto,
+            Some(true) => Rooms::Always,
+            Some(false) => Rooms::Never,
+        },
+        merge: merge.clone(),
     })
 }
 
@@ -380,6 +385,8 @@ pub(super) struct Resolved {
     pub(super) import: ImportOptions,
     pub(super) watershed: BakeConfig,
     pub(super) bsp: BspConfig,
+    /// Nothing was said of what cells are merged below: that is for levels of brushes alone.
+    pub(super) merges_brushes_only: bool,
 }
 
 /// Command line and settings file, resolved.
@@ -415,6 +422,7 @@ pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     }
     Ok(Resolved {
         import: import_options,
+        merges_brushes_only: options.min_cost.is_none() && file.bsp.min_cost.is_none(),
         bsp: resolve_bsp(options, file.bsp, &config.merge)?,
         watershed: config,
     })
