@@ -59,7 +59,7 @@ pub fn bake_bsp(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     // 1. Leaves and their portals; separators; cells.
-    context.stage(4)?;
+    context.bsp_stage(0)?;
     let (sources, triangles) = structural_triangles(scene);
     if triangles.is_empty() {
         return Err(BakeError::NothingStructural {
@@ -90,6 +90,7 @@ pub fn bake_bsp(
         &config.guide,
     );
     let counts = bsp.counts();
+    context.bsp_stage(1)?;
     let by_shape = match config.rooms {
         Rooms::Auto => scene.solids.is_empty(),
         rooms => rooms == Rooms::Always,
@@ -122,14 +123,14 @@ pub fn bake_bsp(
     }
 
     // 2. The complex makes it exact.
-    context.stage(5)?;
+    context.bsp_stage(2)?;
     let windings: Vec<Winding> = screens.iter().map(|s| s.winding.clone()).collect();
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         screens: &windings,
         bounds: bounds_of(&triangles).expanded(1.0),
     });
-    context.stage(6)?;
+    context.bsp_stage(3)?;
     let settings = if scene.solids.is_empty() {
         LabelSettings::default()
     } else {
@@ -163,7 +164,7 @@ pub fn bake_bsp(
     drop(complex);
 
     // 3. Geometry to the cells that see it, and cells within their bounds.
-    context.stage(7)?;
+    context.bsp_stage(4)?;
     let leaks = partition.leaks.clone();
     let settings = config.to_settings();
     let world = assemble(&Parts {

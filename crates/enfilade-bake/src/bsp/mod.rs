@@ -249,6 +249,15 @@ impl Bsp {
         }
     }
 
+    /// The separators that part cells once those that cross others are gone, each as places in
+    /// [`Bsp::portals`].
+    #[must_use]
+    pub fn separators(&self) -> Vec<Vec<usize>> {
+        let parted = cells::part(self, separator::find(self));
+        let portals = |s: separator::Separator| s.portals.iter().map(|&p| p as usize).collect();
+        parted.separators.into_iter().map(portals).collect()
+    }
+
     /// The way out that a point inside has, if there are solids and it has one.
     #[must_use]
     pub fn leak(&self) -> Option<&LeakPath> {

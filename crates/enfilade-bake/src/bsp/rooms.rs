@@ -118,7 +118,7 @@ impl Lattice {
     fn slice(&self, bsp: &Bsp, k: usize, settings: &MergeSettings) -> &[u32] {
         self.slices[k].get_or_init(|| {
             let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
-            let off = self.across[2] * if k % 2 == 0 { off } else { -off };
+            let off = self.across[2] * if k.is_multiple_of(2) { off } else { -off };
             (0..self.side[0] * self.side[1])
                 .map(|n| {
                     let (i, j) = ((n % self.side[0]) as f64, (n / self.side[0]) as f64);
