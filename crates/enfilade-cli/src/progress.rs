@@ -4,7 +4,7 @@ use std::io::{IsTerminal, stderr};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use enfilade::bake::{BakeConfig, BakeContext, Progress};
+use enfilade::bake::{BakeConfig, Progress};
 use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -267,6 +267,8 @@ fn work_of(scene: &Scene, config: &BakeConfig) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use enfilade::bake::BakeContext;
+
     use super::*;
 
     fn of_stages(expected: &[f64]) -> TimeLeft {
