@@ -39,9 +39,32 @@ pub(crate) const STAGES: [&str; 8] = [
     "hand out geometry",
 ];
 
+/// The stages of a bake by partition.
+const BSP_STAGES: [&str; 5] = [
+    "tree",
+    "separators",
+    "cell complex",
+    "cells and portals",
+    "hand out geometry",
+];
+
+/// The stages of a bake by tetrahedra.
+const DELAUNAY_STAGES: [&str; 6] = [
+    "tetrahedra",
+    "decimation",
+    "fit screens",
+    "cell complex",
+    "cells and portals",
+    "hand out geometry",
+];
+
 impl<'a> BakeContext<'a> {
     /// The names of the stages, in order, as [`Progress::stage`] hears them.
     pub const STAGES: &'static [&'static str] = &STAGES;
+    /// The same of a bake by binary space partition.
+    pub const BSP_STAGES: &'static [&'static str] = &BSP_STAGES;
+    /// The same of a bake by Delaunay tetrahedra.
+    pub const DELAUNAY_STAGES: &'static [&'static str] = &DELAUNAY_STAGES;
 
     /// A context that tells `progress` and stops when `cancel` becomes true.
     #[must_use]
@@ -59,8 +82,17 @@ impl<'a> BakeContext<'a> {
         self.stage_of(&STAGES, index)
     }
 
-    /// The same, for a bake with stages of its own.
-    pub(crate) fn stage_of(&self, stages: &[&'static str], index: usize) -> Result<(), BakeError> {
+    /// The same among the stages of a bake by partition.
+    pub(crate) fn bsp_stage(&self, index: usize) -> Result<(), BakeError> {
+        self.stage_of(&BSP_STAGES, index)
+    }
+
+    /// The same among the stages of a bake by tetrahedra.
+    pub(crate) fn delaunay_stage(&self, index: usize) -> Result<(), BakeError> {
+        self.stage_of(&DELAUNAY_STAGES, index)
+    }
+
+    fn stage_of(&self, stages: &[&'static str], index: usize) -> Result<(), BakeError> {
         self.end_stage();
         if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Err(BakeError::Cancelled);

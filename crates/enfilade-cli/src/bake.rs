@@ -58,14 +58,21 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     refuse_leak(scene, options)?;
     let (method, reason) = method_for(scene, options.method);
     writeln!(io::stderr(), "method {}: {reason}", method.name())?;
-    let bar = BakeBar::new(scene, config);
+    let bar = BakeBar::new(scene, config, method.stages());
     let ctx = BakeContext::new(&bar, None);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(options.threads.map_or(0, usize::from))
         .build()?;
     let baked = match method {
         Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
-        Builder::Bsp => pool.install(|| bake_bsp(scene, &settings.bsp, &ctx)),
+        Builder::Bsp => {
+            let mut config = settings.bsp.clone();
+            if settings.merges_brushes_only && scene.solids.is_empty() {
+                // A room of a building has few triangles; the shape of its openings says that it is one.
+                config.simplify.min_cost = 0.0;
+            }
+            pool.install(|| bake_bsp(scene, &config, &ctx))
+        }
         Builder::Delaunay => {
             let config = options.delaunay.resolve(config)?;
             pool.install(|| bake_delaunay(scene, &config, &ctx))
@@ -100,6 +107,14 @@ impl Builder {
             Self::Watershed => "watershed",
             Self::Bsp => "bsp",
             Self::Delaunay => "delaunay",
+        }
+    }
+
+    fn stages(self) -> &'static [&'static str] {
+        match self {
+            Self::Watershed => BakeContext::STAGES,
+            Self::Bsp => BakeContext::BSP_STAGES,
+            Self::Delaunay => BakeContext::DELAUNAY_STAGES,
         }
     }
 }
@@ -176,7 +191,7 @@ pub(crate) fn bake_scene(
     config: &BakeConfig,
     threads: Option<usize>,
 ) -> anyhow::Result<BakeOutput> {
-    let bar = BakeBar::new(scene, config);
+    let bar = BakeBar::new(scene, config, BakeContext::STAGES);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .build()?;

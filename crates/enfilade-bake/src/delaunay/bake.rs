@@ -14,16 +14,6 @@ use crate::pipeline::{input_hash, structural_triangles};
 use crate::watershed::{bounds_of, closure_triangles, find_stairs};
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput};
 
-/// The stages, as progress shows them.
-const STAGES: [&str; 6] = [
-    "tetrahedra",
-    "decimation",
-    "fit screens",
-    "cell complex",
-    "cells and portals",
-    "hand out geometry",
-];
-
 /// Settings of a bake with tetrahedra; the defaults are meant for everything.
 #[derive(Clone, Debug, Default)]
 pub struct DelaunayConfig {
@@ -61,7 +51,7 @@ impl Session {
         config: &DelaunayConfig,
         context: &BakeContext<'_>,
     ) -> Result<Self, BakeError> {
-        context.stage_of(&STAGES, 0)?;
+        context.delaunay_stage(0)?;
         let (sources, triangles) = structural_triangles(scene);
         if triangles.is_empty() {
             return Err(BakeError::NothingStructural {
@@ -92,7 +82,7 @@ impl Session {
         let bvh = Bvh::build(&walls);
         // Three points across the narrowest opening.
         let space = divide(&walls, &closures, &bvh, opening / 3.0)?;
-        context.stage_of(&STAGES, 1)?;
+        context.delaunay_stage(1)?;
         let cells = flow_together(&space);
         let mut session = Self {
             space,
@@ -151,7 +141,7 @@ pub fn bake_session(
     config: &DelaunayConfig,
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
-    context.stage_of(&STAGES, 2)?;
+    context.delaunay_stage(2)?;
     let (sources, triangles) = structural_triangles(scene);
     let bvh = Bvh::build(&triangles);
     let merge = &config.common.merge;
@@ -164,7 +154,7 @@ pub fn bake_session(
         &session.closures,
         merge.min_radius,
     );
-    context.stage_of(&STAGES, 3)?;
+    context.delaunay_stage(3)?;
     let windings: Vec<_> = rooms.screens.iter().map(|s| s.winding.clone()).collect();
     let bounds = bounds_of(&triangles);
     let complex = build_complex(&ComplexInput {
@@ -172,7 +162,7 @@ pub fn bake_session(
         screens: &windings,
         bounds: bounds.expanded(1.0),
     });
-    context.stage_of(&STAGES, 4)?;
+    context.delaunay_stage(4)?;
     let mut votes = rooms.votes;
     let mut partition = complex.partition(&votes, &LabelSettings::default());
     while join_unparted(&partition, &mut votes, &mut []) {
@@ -193,7 +183,7 @@ pub fn bake_session(
         ("leaks", partition.leaks.len() as f64),
     ];
     drop(complex);
-    context.stage_of(&STAGES, 5)?;
+    context.delaunay_stage(5)?;
     let leaks = partition.leaks.clone();
     let mut settings = config.common.to_settings();
     settings.insert("weight".to_owned(), format!("{:?}", config.weight));
