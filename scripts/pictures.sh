@@ -7,15 +7,19 @@ enfilade=${1:-target/release/enfilade}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$enfilade" demo -o "$work" > "$work/said"
+# A corridor of offices says more than a house of few rooms.
+cargo run -q --release -p enfilade-testkit --example generate -- tower --rooms 64 -o "$work/tower" > "$work/said"
+"$enfilade" bake "$work/tower/scene.glb" --detail "$work/tower/detail.glb" -o "$work/tower.glb" > "$work/said" 2>&1
 draw() {
-    name=$1
-    shift
-    "$enfilade" render "$work/world.glb" -o "docs/images/$name.png" --adapter software "$@"
+    world=$1
+    name=$2
+    shift 2
+    "$enfilade" render "$work/$world.glb" -o "docs/images/$name.png" --adapter software "$@"
 }
-# The sitting room, through its doors.
-inside="--eye 1.1,1.6,7.4 --look 6.5,1.25,3.2"
+# In the corridor, through its doors.
+inside="--eye 14.71,4.80,7.65 --look 13.79,4.72,8.03"
 # shellcheck disable=SC2086
-draw portals $inside --portals --size 1200x675
+draw tower portals $inside --portals --size 1200x675
 # shellcheck disable=SC2086
-draw above $inside --above --size 1200x675
-draw house --eye 19,8.5,17 --look 5.5,2.6,4 --size 1200x675
+draw tower above $inside --above --size 1200x675
+draw world house --eye 19,8.5,17 --look 5.5,2.6,4 --size 1200x675

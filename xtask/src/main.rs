@@ -3,6 +3,7 @@
 //! `test` is what decides whether a change may land; `score` and `bench` print the tables of
 //! `docs/benchmarks/`.
 
+mod apt;
 mod bench;
 mod check;
 mod score;

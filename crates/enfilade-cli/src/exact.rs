@@ -1,19 +1,17 @@
 //! `verify --views`: pictures with and without culling, compared pixel by pixel.
 
-mod oracle;
-
 use std::fmt;
 use std::path::PathBuf;
 
 use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Gpu, LostPixel, Mark, Picture, Shape, Shown, Studio, Style,
+    AdapterChoice, Camera, Culling, Gpu, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio,
+    Style,
 };
 use enfilade_testkit::Rng;
 use serde::Serialize;
 
-use self::oracle::Oracle;
 use crate::cameras::random_camera;
 use crate::output::write_atomically;
 use crate::progress::StageBar;

@@ -7,8 +7,8 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Studio,
-    Style,
+    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Sparing,
+    Studio, Style,
 };
 use serde_json::json;
 
@@ -65,6 +65,16 @@ pub(crate) struct Render {
     /// Portals that are closed, by number.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     close: Vec<u32>,
+    /// Portals that cover fewer pixels are not looked through: the mean color of the cell behind stands
+    /// in for it.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    stop: f32,
+    /// Nothing stands in for what --stop leaves out.
+    #[arg(long, requires = "stop")]
+    stop_at_nothing: bool,
+    /// Objects in cells that are seen through fewer pixels are not drawn.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    objects: f32,
     /// No shadows and no dark corners: quicker.
     #[arg(long)]
     plain: bool,
@@ -178,6 +188,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     for (i, camera) in cameras.iter().enumerate() {
         let picture = smooth(args.size, |size| {
+            // As many pixels for one as pictures are drawn larger.
+            let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
+            studio.sparing = Sparing {
+                stop_below: args.stop * scale,
+                stop_at_nothing: args.stop_at_nothing,
+                objects_below: args.objects * scale,
+            };
             if args.above {
                 above(&mut studio, &world, camera, args.cut, size)
             } else {
@@ -359,10 +376,8 @@ pub(crate) fn above(
     let frame = Frame {
         projection,
         list: &list,
-        style: Style {
-            paint: Paint::Cells,
-            ..style
-        },
+        // What is drawn looks as it does; a floor of many rooms has no one cell's color.
+        style,
         marks: &marks,
     };
     Ok(studio.picture_of(&frame, size)?)

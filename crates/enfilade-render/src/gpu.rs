@@ -191,7 +191,7 @@ impl Gpu {
             adapter: name.clone(),
             why,
         };
-        if limits.max_storage_buffers_per_shader_stage < 4 {
+        if limits.max_storage_buffers_per_shader_stage < 2 {
             return Err(broken(
                 "its shaders read no storage buffers, which drawing needs".into(),
             ));

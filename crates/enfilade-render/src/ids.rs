@@ -116,16 +116,14 @@ impl Renderer {
     ) -> Result<[IdPicture; 2], RenderError> {
         self.resize(gpu, size)?;
         self.write_globals(gpu, stage, projection, &Style::default(), size);
-        self.instances
-            .write(gpu, bytemuck::cast_slice(&list.instances));
+        self.write_instances(gpu, world, list);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("ids"),
             layout: &self.layouts.ids,
             entries: &[
                 bound(0, &self.globals),
-                bound(3, &world.instances),
-                bound(6, &world.corners),
-                bound(7, &world.indices),
+                bound(1, &world.corners),
+                bound(2, &world.indices),
             ],
         });
         let target = || texture(gpu, "ids", size, ID, wgpu::TextureUsages::COPY_SRC);

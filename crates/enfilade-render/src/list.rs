@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use enfilade_cpg::CellId;
+use enfilade_cpg::{CellId, PortalId};
 use enfilade_runtime::{ChunkId, DetailId, Seen, Sight};
 use glam::Vec3;
 
@@ -26,6 +26,9 @@ pub enum Reason {
     Occluded = 3,
 }
 
+/// The number of an instance; what is above tells why it is drawn.
+pub(crate) const INSTANCE_MASK: u32 = 0x0fff_ffff;
+
 /// Pixels of a picture: `[x, y, width, height]`.
 pub(crate) type Scissor = [u32; 4];
 
@@ -36,10 +39,25 @@ pub(crate) struct Run {
     pub(crate) n: u32,
     pub(crate) texture: u32,
     pub(crate) finish: Finish,
+    /// Whether corners have normals.
+    pub(crate) is_smooth: bool,
     /// Into [`DrawList::instances`].
     pub(crate) instances: Range<u32>,
     /// `None` for the whole picture.
     pub(crate) scissor: Option<Scissor>,
+}
+
+/// What far away rooms are spared: both change pictures, and are off unless asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sparing {
+    /// A portal that covers fewer pixels is not looked through: a polygon of its outline, in the mean
+    /// color of the cell behind, stands in for that. [Units: px²]
+    pub stop_below: f32,
+    /// Whether nothing stands in for it.
+    pub stop_at_nothing: bool,
+    /// Objects of cells that are seen through fewer pixels are not drawn; their walls are.
+    /// [Units: px²]
+    pub objects_below: f32,
 }
 
 /// What one frame draws, and in which order.
@@ -50,6 +68,8 @@ pub struct DrawList {
     pub(crate) transparent: Vec<Run>,
     /// The number of each instance drawn, and why in its highest four bits. Structure is number 0.
     pub(crate) instances: Vec<u32>,
+    /// What stands in for what is not drawn.
+    pub(crate) stand_ins: Vec<(PortalId, CellId)>,
     n_triangles: u64,
 }
 
@@ -66,6 +86,12 @@ impl DrawList {
         self.opaque.len() + self.transparent.len()
     }
 
+    /// Portals drawn as a polygon each instead of what is behind them.
+    #[must_use]
+    pub fn stand_ins(&self) -> &[(PortalId, CellId)] {
+        &self.stand_ins
+    }
+
     /// Adds what another list draws, after what this one does.
     pub fn append(&mut self, other: &Self) {
         let base = self.instances.len() as u32;
@@ -74,15 +100,25 @@ impl DrawList {
             instances: run.instances.start + base..run.instances.end + base,
             ..run.clone()
         };
+        self.stand_ins.extend_from_slice(&other.stand_ins);
         self.opaque.extend(other.opaque.iter().map(moved));
         self.transparent.extend(other.transparent.iter().map(moved));
         self.n_triangles += other.n_triangles;
+    }
+
+    /// Nothing yet, with structure to be drawn as its only instance.
+    pub(crate) fn of_structure() -> Self {
+        Self {
+            instances: vec![0],
+            ..Self::default()
+        }
     }
 
     fn clear(&mut self) {
         self.opaque.clear();
         self.transparent.clear();
         self.instances.clear();
+        self.stand_ins.clear();
         self.n_triangles = 0;
     }
 }
@@ -107,6 +143,7 @@ fn push_run(runs: &mut Vec<Run>, run: Run) {
         && last.first + last.n == run.first
         && last.texture == run.texture
         && last.finish == run.finish
+        && last.is_smooth == run.is_smooth
         && last.instances == run.instances
         && last.scissor == run.scissor
     {
@@ -152,6 +189,7 @@ impl Lister {
         seen: &Seen<'_>,
         eye: [f32; 3],
         size: Option<[u32; 2]>,
+        sparing: &Sparing,
     ) -> &DrawList {
         let is_flat = seen.visits().iter().all(|v| v.face == 0);
         let size =
@@ -180,11 +218,20 @@ impl Lister {
             }
             self.chunks.push((rank.1, c.0));
         }
-        self.details.extend(
-            seen.details()
-                .iter()
-                .map(|d| (world.details[d.0 as usize].mesh, d.0)),
-        );
+        for d in seen.details() {
+            let placed = &world.details[d.0 as usize];
+            if let Some(size) = size.filter(|_| sparing.objects_below > 0.0) {
+                let pixels = self.scissor(&placed.cells, size);
+                let n = pixels.map_or(0.0, |[.., w, h]| w as f32 * h as f32);
+                if n < sparing.objects_below {
+                    continue;
+                }
+            }
+            self.details.push((placed.mesh, d.0));
+        }
+        if !sparing.stop_at_nothing {
+            self.list.stand_ins.extend_from_slice(seen.stopped());
+        }
         self.finish(world, sight, eye, size)
     }
 
@@ -272,6 +319,7 @@ impl Lister {
                 n: span.n,
                 texture: span.texture,
                 finish: span.finish,
+                is_smooth: span.is_smooth,
                 instances: 0..1,
                 scissor,
             };
@@ -302,6 +350,7 @@ impl Lister {
                     n: span.n,
                     texture: span.texture,
                     finish: span.finish,
+                    is_smooth: span.is_smooth,
                     instances,
                     scissor: None,
                 };

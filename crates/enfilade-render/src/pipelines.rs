@@ -1,7 +1,10 @@
-//! Pipelines and layouts: made once for an adapter and a format of picture.
+//! Pipelines and layouts: for an adapter and a format of picture. Those of surfaces are made when the
+//! first frame needs them: each leaves out what its frames do without.
+
+use std::collections::BTreeMap;
 
 use crate::gpu::Gpu;
-use crate::scene::{CORNER_LAYOUT, texture_layout};
+use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
 
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -10,26 +13,56 @@ pub(crate) const ID: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
 pub(crate) struct Layouts {
-    /// Globals, parts, materials, instances, shadow map and its sampler.
+    /// Globals, cell colors by part, shadow map and its sampler.
     pub(crate) world: wgpu::BindGroupLayout,
-    /// Globals, instances, corners, indices.
+    /// A base color texture.
+    texture: wgpu::BindGroupLayout,
+    /// Globals, corners, indices.
     pub(crate) ids: wgpu::BindGroupLayout,
-    /// Globals, instances.
-    pub(crate) shadow: wgpu::BindGroupLayout,
     /// Globals.
     pub(crate) globals: wgpu::BindGroupLayout,
     /// Color and depth.
     pub(crate) post: wgpu::BindGroupLayout,
 }
 
+/// How surfaces are shaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Shading {
+    Plain,
+    Textured,
+    /// With holes.
+    Masked,
+    /// Seen through.
+    Glass,
+    /// How many times each pixel is drawn.
+    Count,
+}
+
+/// What pipelines of surfaces differ in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Variant {
+    pub(crate) shading: Shading,
+    pub(crate) is_smooth: bool,
+    pub(crate) casts_shadows: bool,
+    pub(crate) explains: bool,
+    /// Whether it draws to the output, or to what is made a picture of later.
+    pub(crate) is_last: bool,
+}
+
 pub(crate) struct Pipelines {
-    /// By [`Finish`](crate::scene::Finish).
-    pub(crate) surfaces: [wgpu::RenderPipeline; 3],
-    pub(crate) count: wgpu::RenderPipeline,
-    pub(crate) glass: wgpu::RenderPipeline,
+    surface: wgpu::ShaderModule,
+    output: wgpu::TextureFormat,
+    surfaces: BTreeMap<Variant, wgpu::RenderPipeline>,
     pub(crate) id: wgpu::RenderPipeline,
     pub(crate) shadow: wgpu::RenderPipeline,
+    /// Surfaces from the camera, depth alone.
+    pub(crate) depth: wgpu::RenderPipeline,
+    /// Outlines of portals that depth is asked about.
+    pub(crate) outline: wgpu::RenderPipeline,
+    pub(crate) sky: wgpu::RenderPipeline,
+    /// Dark corners.
     pub(crate) post: wgpu::RenderPipeline,
+    pub(crate) heat_map: wgpu::RenderPipeline,
     /// Marks that surfaces hide.
     pub(crate) marks: wgpu::RenderPipeline,
     /// Marks that nothing hides.
@@ -55,7 +88,7 @@ fn storage(binding: u32) -> wgpu::BindGroupLayoutEntry {
         has_dynamic_offset: false,
         min_binding_size: None,
     };
-    entry(binding, wgpu::ShaderStages::VERTEX_FRAGMENT, ty)
+    entry(binding, wgpu::ShaderStages::VERTEX, ty)
 }
 
 fn uniform(binding: u32) -> wgpu::BindGroupLayoutEntry {
@@ -94,26 +127,15 @@ impl Layouts {
                 &[
                     uniform(0),
                     storage(1),
-                    storage(2),
-                    storage(3),
-                    texture(4, depth),
-                    entry(5, wgpu::ShaderStages::FRAGMENT, compare),
+                    texture(2, depth),
+                    entry(3, wgpu::ShaderStages::FRAGMENT, compare),
                 ],
             ),
-            ids: layout("ids", &[uniform(0), storage(3), storage(6), storage(7)]),
-            shadow: layout("shadow", &[uniform(0), storage(3)]),
+            texture: texture_layout(gpu),
+            ids: layout("ids", &[uniform(0), storage(1), storage(2)]),
             globals: layout("globals", &[uniform(0)]),
             post: layout("post", &[texture(0, unfiltered), texture(1, depth)]),
         }
-    }
-}
-
-/// Which number of [`crate::list::DrawList::instances`] is drawn.
-const fn instance_layout(attributes: &[wgpu::VertexAttribute]) -> wgpu::VertexBufferLayout<'_> {
-    wgpu::VertexBufferLayout {
-        array_stride: 4,
-        step_mode: wgpu::VertexStepMode::Instance,
-        attributes,
     }
 }
 
@@ -121,6 +143,13 @@ const MARK_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout 
     array_stride: 32,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4],
+};
+
+/// Corners of outlines, relative to nothing: the world's. [Units: wu]
+const OUTLINE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: 12,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![0 => Float32x3],
 };
 
 /// What one pipeline differs from others in.
@@ -134,6 +163,8 @@ struct Kind<'a> {
     buffers: &'a [wgpu::VertexBufferLayout<'a>],
     target: Option<(wgpu::TextureFormat, Option<wgpu::BlendState>)>,
     depth: Option<(bool, wgpu::CompareFunction)>,
+    /// Constants of the shader.
+    constants: &'a [(&'a str, f64)],
 }
 
 fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
@@ -151,6 +182,10 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
         blend,
         write_mask: wgpu::ColorWrites::ALL,
     })];
+    let compilation_options = wgpu::PipelineCompilationOptions {
+        constants: kind.constants,
+        ..wgpu::PipelineCompilationOptions::default()
+    };
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(kind.label),
@@ -158,7 +193,7 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
             vertex: wgpu::VertexState {
                 module: kind.module,
                 entry_point: Some(kind.vertex),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: compilation_options.clone(),
                 buffers: &buffers,
             },
             // Both sides of all: models of buildings seldom say which one is meant.
@@ -174,7 +209,7 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
             fragment: kind.fragment.map(|fragment| wgpu::FragmentState {
                 module: kind.module,
                 entry_point: Some(fragment),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options,
                 targets: if kind.target.is_some() { &targets } else { &[] },
             }),
             multiview_mask: None,
@@ -182,117 +217,158 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
         })
 }
 
+const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
+
 impl Pipelines {
     pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, output: wgpu::TextureFormat) -> Self {
-        let module = |label, source: &str| {
+        let module = |label, source: &[&str]| {
+            let source = [&[COMMON], source].concat().concat();
             gpu.device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
                     label: Some(label),
-                    source: wgpu::ShaderSource::Wgsl([COMMON, source].concat().into()),
+                    source: wgpu::ShaderSource::Wgsl(source.into()),
                 })
         };
-        let surface = module("surface", include_str!("shaders/surface.wgsl"));
-        let ids = module("ids", include_str!("shaders/ids.wgsl"));
-        let depth = module("depth", include_str!("shaders/depth.wgsl"));
-        let post = module("post", include_str!("shaders/post.wgsl"));
-        let lines = module("lines", include_str!("shaders/lines.wgsl"));
-        let texture = texture_layout(gpu);
-        let instance_at = |location| {
-            [wgpu::VertexAttribute {
-                format: wgpu::VertexFormat::Uint32,
-                offset: 0,
-                shader_location: location,
-            }]
-        };
-        let (after_corner, alone) = (instance_at(5), instance_at(0));
-        let drawn = [CORNER_LAYOUT, instance_layout(&after_corner)];
-        let add = wgpu::BlendComponent {
-            src_factor: wgpu::BlendFactor::One,
-            dst_factor: wgpu::BlendFactor::One,
-            operation: wgpu::BlendOperation::Add,
-        };
-        let add = wgpu::BlendState {
-            color: add,
-            alpha: add,
-        };
-        let over = wgpu::BlendState::ALPHA_BLENDING;
-        let nearer = wgpu::CompareFunction::Greater;
+        let surface = module("surface", &[include_str!("shaders/surface.wgsl")]);
+        let ids = module("ids", &[include_str!("shaders/ids.wgsl")]);
+        let depth = module("depth", &[include_str!("shaders/depth.wgsl")]);
+        let sky = include_str!("shaders/sky.wgsl");
+        let post = module("post", &[sky, include_str!("shaders/post.wgsl")]);
+        let lines = module("lines", &[include_str!("shaders/lines.wgsl")]);
+        let drawn = [CORNER_LAYOUT, INSTANCE_LAYOUT];
+        let at_least = wgpu::CompareFunction::GreaterEqual;
         let base = Kind {
-            label: "surface",
-            module: &surface,
-            vertex: "corner",
-            fragment: Some("plain"),
-            layouts: &[&layouts.world, &texture],
+            label: "depth",
+            module: &depth,
+            vertex: "from_eye",
+            fragment: None,
+            layouts: &[&layouts.globals],
             buffers: &drawn,
-            target: Some((COLOR, None)),
-            depth: Some((true, nearer)),
+            target: None,
+            depth: Some((true, NEARER)),
+            constants: &[],
         };
         let marks = Kind {
             label: "marks",
             module: &lines,
+            vertex: "corner",
             fragment: Some("mark"),
-            layouts: &[&layouts.globals],
             buffers: &[MARK_LAYOUT],
-            target: Some((output, Some(over))),
-            depth: Some((false, wgpu::CompareFunction::GreaterEqual)),
+            target: Some((output, Some(wgpu::BlendState::ALPHA_BLENDING))),
+            depth: Some((false, at_least)),
             ..base
+        };
+        let post = Kind {
+            label: "post",
+            module: &post,
+            vertex: "whole",
+            fragment: Some("finish"),
+            layouts: &[&layouts.globals, &layouts.post],
+            buffers: &[],
+            target: Some((output, None)),
+            depth: None,
+            constants: &[],
         };
         let make = |kind| pipeline(gpu, &kind);
         Self {
-            count: make(Kind {
-                label: "count",
-                fragment: Some("count"),
-                target: Some((COLOR, Some(add))),
-                ..base
-            }),
-            glass: make(Kind {
-                label: "glass",
-                fragment: Some("glass"),
-                target: Some((output, Some(over))),
-                depth: Some((false, nearer)),
-                ..base
-            }),
             id: make(Kind {
                 label: "id",
                 module: &ids,
+                vertex: "corner",
                 fragment: Some("id"),
                 layouts: &[&layouts.ids],
-                buffers: &[instance_layout(&alone)],
+                buffers: &[INSTANCE_LAYOUT],
                 target: Some((ID, None)),
                 ..base
             }),
             shadow: make(Kind {
                 label: "shadow",
-                module: &depth,
-                fragment: None,
-                layouts: &[&layouts.shadow],
-                target: None,
+                vertex: "from_sun",
                 depth: Some((true, wgpu::CompareFunction::Less)),
                 ..base
             }),
-            post: make(Kind {
-                label: "post",
-                module: &post,
-                vertex: "whole",
-                fragment: Some("finish"),
-                layouts: &[&layouts.globals, &layouts.post],
-                buffers: &[],
-                target: Some((output, None)),
-                depth: None,
+            outline: make(Kind {
+                label: "outline",
+                vertex: "outline",
+                buffers: &[OUTLINE_LAYOUT],
+                depth: Some((false, at_least)),
+                ..base
             }),
+            depth: make(base),
+            sky: make(Kind {
+                label: "sky",
+                fragment: Some("open_air"),
+                layouts: &[&layouts.globals],
+                // At depth 0: where nothing was drawn.
+                depth: Some((false, at_least)),
+                ..post
+            }),
+            heat_map: make(Kind {
+                label: "heat map",
+                fragment: Some("heat_map"),
+                ..post
+            }),
+            post: make(post),
             marks_on_top: make(Kind {
                 label: "marks on top",
                 depth: Some((false, wgpu::CompareFunction::Always)),
                 ..marks
             }),
             marks: make(marks),
-            surfaces: ["plain", "textured", "masked"].map(|fragment| {
-                make(Kind {
-                    label: fragment,
-                    fragment: Some(fragment),
-                    ..base
-                })
-            }),
+            surface,
+            output,
+            surfaces: BTreeMap::new(),
         }
+    }
+
+    /// Makes a pipeline, unless it is there.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, layouts: &Layouts, variant: Variant) {
+        if self.surfaces.contains_key(&variant) {
+            return;
+        }
+        let add = wgpu::BlendComponent {
+            src_factor: wgpu::BlendFactor::One,
+            dst_factor: wgpu::BlendFactor::One,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let (fragment, blend, writes) = match variant.shading {
+            Shading::Plain => ("plain", None, true),
+            Shading::Textured => ("textured", None, true),
+            Shading::Masked => ("masked", None, true),
+            Shading::Glass => ("glass", Some(wgpu::BlendState::ALPHA_BLENDING), false),
+            Shading::Count => {
+                let both = wgpu::BlendState {
+                    color: add,
+                    alpha: add,
+                };
+                ("count", Some(both), true)
+            }
+        };
+        let format = if variant.is_last { self.output } else { COLOR };
+        let number = |b: bool| f64::from(u8::from(b));
+        let made = pipeline(
+            gpu,
+            &Kind {
+                label: fragment,
+                module: &self.surface,
+                vertex: "corner",
+                fragment: Some(fragment),
+                layouts: &[&layouts.world, &layouts.texture],
+                buffers: &[CORNER_LAYOUT, INSTANCE_LAYOUT],
+                target: Some((format, blend)),
+                depth: Some((writes, NEARER)),
+                constants: &[
+                    ("CASTS_SHADOWS", number(variant.casts_shadows)),
+                    ("IS_SMOOTH", number(variant.is_smooth)),
+                    ("EXPLAINS", number(variant.explains)),
+                ],
+            },
+        );
+        self.surfaces.insert(variant, made);
+    }
+
+    /// A pipeline that was [prepared](Pipelines::prepare).
+    pub(crate) fn surface(&self, variant: Variant) -> Option<&wgpu::RenderPipeline> {
+        self.surfaces.get(&variant)
     }
 }

@@ -7,8 +7,8 @@ use crate::gpu::{Gpu, RenderError};
 use crate::list::{DrawList, Run};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::pipelines::{COLOR, DEPTH, Layouts, Pipelines};
-use crate::scene::GpuWorld;
+use crate::pipelines::{COLOR, DEPTH, Layouts, Pipelines, Shading, Variant};
+use crate::scene::{Finish, GpuWorld, Instance};
 
 /// Side of the sun's picture of the world, in texels.
 const SHADOW_SIDE: u32 = 4096;
@@ -122,6 +122,8 @@ pub struct Renderer {
     pub(crate) pipelines: Pipelines,
     pub(crate) globals: wgpu::Buffer,
     pub(crate) instances: Grown,
+    /// What is written to it, kept from frame to frame.
+    drawn: Vec<Instance>,
     pub(crate) marks: Grown,
     pub(crate) targets: Option<Targets>,
     shadow_map: wgpu::TextureView,
@@ -175,6 +177,7 @@ impl Renderer {
                 mapped_at_creation: false,
             }),
             instances: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
+            drawn: Vec::new(),
             marks: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
             targets: None,
             shadow_map: shadow_map.create_view(&wgpu::TextureViewDescriptor::default()),
@@ -198,15 +201,13 @@ impl Renderer {
                 layout: &self.layouts.world,
                 entries: &[
                     bound(0, &self.globals),
-                    bound(1, &world.parts),
-                    bound(2, &world.materials),
-                    bound(3, &world.instances),
+                    bound(1, &world.cell_colors),
                     wgpu::BindGroupEntry {
-                        binding: 4,
+                        binding: 2,
                         resource: wgpu::BindingResource::TextureView(&self.shadow_map),
                     },
                     wgpu::BindGroupEntry {
-                        binding: 5,
+                        binding: 3,
                         resource: wgpu::BindingResource::Sampler(&self.shadow_sampler),
                     },
                 ],
@@ -231,13 +232,8 @@ impl Renderer {
     fn draw_shadows(&mut self, gpu: &Gpu, world: &GpuWorld, stage: &Stage, all: &DrawList) {
         let projection = Projection::parallel([0.0; 3], [0.0, -1.0, 0.0], 1.0, 1.0, 1.0);
         self.write_globals(gpu, stage, &projection, &Style::default(), [1, 1]);
-        self.instances
-            .write(gpu, bytemuck::cast_slice(&all.instances));
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shadow"),
-            layout: &self.layouts.shadow,
-            entries: &[bound(0, &self.globals), bound(3, &world.instances)],
-        });
+        self.write_instances(gpu, world, all);
+        let group = self.globals_group(gpu);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -257,6 +253,24 @@ impl Renderer {
         gpu.queue.submit([encoder.finish()]);
     }
 
+    pub(crate) fn globals_group(&self, gpu: &Gpu) -> wgpu::BindGroup {
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("globals"),
+            layout: &self.layouts.globals,
+            entries: &[bound(0, &self.globals)],
+        })
+    }
+
+    /// Where what a list draws stands, in its order.
+    pub(crate) fn write_instances(&mut self, gpu: &Gpu, world: &GpuWorld, list: &DrawList) {
+        self.drawn.clear();
+        self.drawn.extend(list.instances.iter().map(|&key| {
+            let number = (key & crate::list::INSTANCE_MASK) as usize;
+            world.instances[number].drawn(key)
+        }));
+        self.instances.write(gpu, bytemuck::cast_slice(&self.drawn));
+    }
+
     pub(crate) fn write_globals(
         &self,
         gpu: &Gpu,
@@ -266,11 +280,6 @@ impl Renderer {
         size: [u32; 2],
     ) {
         let [w, h] = size.map(|n| n as f32);
-        let paint = match style.paint {
-            Paint::Lit => 0,
-            Paint::Cells => 1,
-            Paint::Overdraw => 2,
-        };
         let globals = Globals {
             clip_from_relative: projection.clip_from_relative.to_cols_array_2d(),
             relative_from_clip: projection.clip_from_relative.inverse().to_cols_array_2d(),
@@ -282,12 +291,7 @@ impl Renderer {
                 .to_array(),
             sun: self.sun.extend(stage.texel).to_array(),
             size: [w, h, 1.0 / w, 1.0 / h],
-            style: [
-                paint,
-                u32::from(style.dark_corners),
-                u32::from(style.shadows),
-                0,
-            ],
+            style: [u32::from(style.paint == Paint::Cells), 0, 0, 0],
         };
         gpu.queue
             .write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
@@ -350,86 +354,94 @@ impl Renderer {
         self.resize(gpu, size)?;
         self.write_globals(gpu, stage, &frame.projection, &frame.style, size);
         let list = frame.list;
-        self.instances
-            .write(gpu, bytemuck::cast_slice(&list.instances));
+        self.write_instances(gpu, world, list);
+        let stand_ins: Vec<Mark> = list
+            .stand_ins
+            .iter()
+            .map(|&(portal, cell)| world.stand_in(portal, cell))
+            .collect();
+        let [behind, _] = crate::marks::corners(&stand_ins, &frame.projection, size);
         let [hidden, on_top] = crate::marks::corners(frame.marks, &frame.projection, size);
+        let hidden = [behind, hidden].concat();
         let n_hidden = hidden.len() as u32;
         let marks = [hidden, on_top].concat();
         self.marks.write(gpu, bytemuck::cast_slice(&marks));
-        let is_count = frame.style.paint == Paint::Overdraw;
-        let globals = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("globals"),
-            layout: &self.layouts.globals,
-            entries: &[bound(0, &self.globals)],
-        });
+        let globals = self.globals_group(gpu);
+        let shadings = Shadings::of(frame);
+        shadings.prepare(self, gpu, list);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let Some(targets) = &self.targets else {
             return Ok(());
         };
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("surfaces"),
-                color_attachments: &[Some(color_attachment(
-                    &targets.color,
-                    Some(wgpu::Color::TRANSPARENT),
-                ))],
-                depth_stencil_attachment: Some(depth_attachment(&targets.depth, Some(0.0))),
-                ..wgpu::RenderPassDescriptor::default()
+        // What darkens corners or counts needs the whole picture; else all is drawn in one go.
+        let in_two = !shadings.is_last;
+        let first = if in_two { &targets.color } else { output };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("surfaces"),
+            color_attachments: &[Some(color_attachment(
+                first,
+                Some(wgpu::Color::TRANSPARENT),
+            ))],
+            depth_stencil_attachment: Some(depth_attachment(&targets.depth, Some(0.0))),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_bind_group(0, &stage.world, &[]);
+        set_buffers(&mut pass, world, &self.instances);
+        draw_runs(&mut pass, world, &list.opaque, size, |run| {
+            self.pipelines.surface(shadings.opaque(run))
+        });
+        if shadings.is_count {
+            draw_runs(&mut pass, world, &list.transparent, size, |run| {
+                self.pipelines.surface(shadings.opaque(run))
             });
-            pass.set_bind_group(0, &stage.world, &[]);
-            set_buffers(&mut pass, world, &self.instances);
-            if is_count {
-                pass.set_pipeline(&self.pipelines.count);
-                draw_runs(&mut pass, world, &list.opaque, size, None);
-                draw_runs(&mut pass, world, &list.transparent, size, None);
-            } else {
-                // A cut makes holes in everything.
-                let [plain, textured, masked] = &self.pipelines.surfaces;
-                let surfaces = if frame.style.cut_above < f32::INFINITY {
-                    [masked; 3]
-                } else {
-                    [plain, textured, masked]
-                };
-                draw_runs(&mut pass, world, &list.opaque, size, Some(surfaces));
-            }
         }
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        if in_two {
+            drop(pass);
+            let mut picture = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("picture"),
                 color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
                 ..wgpu::RenderPassDescriptor::default()
             });
-            pass.set_pipeline(&self.pipelines.post);
-            pass.set_bind_group(0, &globals, &[]);
-            pass.set_bind_group(1, &targets.post, &[]);
-            pass.draw(0..3, 0..1);
-        }
-        let has_glass = !list.transparent.is_empty() && !is_count;
-        if has_glass || !marks.is_empty() {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            picture.set_pipeline(if shadings.is_count {
+                &self.pipelines.heat_map
+            } else {
+                &self.pipelines.post
+            });
+            picture.set_bind_group(0, &globals, &[]);
+            picture.set_bind_group(1, &targets.post, &[]);
+            picture.draw(0..3, 0..1);
+            drop(picture);
+            pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("glass"),
                 color_attachments: &[Some(color_attachment(output, None))],
                 depth_stencil_attachment: Some(depth_attachment(&targets.depth, None)),
                 ..wgpu::RenderPassDescriptor::default()
             });
-            if has_glass {
-                pass.set_pipeline(&self.pipelines.glass);
-                pass.set_bind_group(0, &stage.world, &[]);
-                set_buffers(&mut pass, world, &self.instances);
-                draw_runs(&mut pass, world, &list.transparent, size, None);
-                pass.set_scissor_rect(0, 0, size[0], size[1]);
-            }
-            if !marks.is_empty() {
-                pass.set_bind_group(0, &globals, &[]);
-                pass.set_vertex_buffer(0, self.marks.buffer.slice(..));
-                pass.set_pipeline(&self.pipelines.marks);
-                pass.draw(0..n_hidden, 0..1);
-                pass.set_pipeline(&self.pipelines.marks_on_top);
-                pass.draw(n_hidden..marks.len() as u32, 0..1);
-            }
+        } else {
+            pass.set_scissor_rect(0, 0, size[0], size[1]);
+            pass.set_pipeline(&self.pipelines.sky);
+            pass.set_bind_group(0, &globals, &[]);
+            pass.draw(0..3, 0..1);
         }
+        if !list.transparent.is_empty() && !shadings.is_count {
+            pass.set_bind_group(0, &stage.world, &[]);
+            set_buffers(&mut pass, world, &self.instances);
+            draw_runs(&mut pass, world, &list.transparent, size, |run| {
+                self.pipelines.surface(shadings.glass(run))
+            });
+        }
+        if !marks.is_empty() {
+            pass.set_scissor_rect(0, 0, size[0], size[1]);
+            pass.set_bind_group(0, &globals, &[]);
+            pass.set_vertex_buffer(0, self.marks.buffer.slice(..));
+            pass.set_pipeline(&self.pipelines.marks);
+            pass.draw(0..n_hidden, 0..1);
+            pass.set_pipeline(&self.pipelines.marks_on_top);
+            pass.draw(n_hidden..marks.len() as u32, 0..1);
+        }
+        drop(pass);
         gpu.queue.submit([encoder.finish()]);
         Ok(())
     }
@@ -525,29 +537,102 @@ pub(crate) fn depth_attachment(
     }
 }
 
-fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Grown) {
+pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Grown) {
     pass.set_index_buffer(world.indices.slice(..), wgpu::IndexFormat::Uint32);
     pass.set_vertex_buffer(0, world.corners.slice(..));
     pass.set_vertex_buffer(1, instances.buffer.slice(..));
 }
 
-/// Draws runs, changing pipelines, textures and scissors only where they differ. `surfaces` by
-/// finish; `None` for what the pass draws with already.
-fn draw_runs(
+/// Which pipelines a frame draws with.
+struct Shadings {
+    is_count: bool,
+    is_last: bool,
+    casts_shadows: bool,
+    explains: bool,
+    /// A cut makes holes in everything.
+    has_cut: bool,
+}
+
+impl Shadings {
+    fn of(frame: &Frame<'_>) -> Self {
+        let style = &frame.style;
+        let is_count = style.paint == Paint::Overdraw;
+        let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
+        Self {
+            is_count,
+            is_last: !is_count && !style.dark_corners,
+            casts_shadows: style.shadows,
+            explains: style.paint == Paint::Cells || frame.list.instances.iter().any(is_reasoned),
+            has_cut: style.cut_above < f32::INFINITY,
+        }
+    }
+
+    fn variant(&self, shading: Shading, is_smooth: bool, is_last: bool) -> Variant {
+        if self.is_count {
+            return Variant {
+                shading: Shading::Count,
+                is_smooth: false,
+                casts_shadows: false,
+                explains: false,
+                is_last: false,
+            };
+        }
+        Variant {
+            shading,
+            is_smooth,
+            casts_shadows: self.casts_shadows,
+            explains: self.explains,
+            is_last,
+        }
+    }
+
+    fn opaque(&self, run: &Run) -> Variant {
+        let shading = match run.finish {
+            Finish::Plain if !self.has_cut => Shading::Plain,
+            Finish::Textured if !self.has_cut => Shading::Textured,
+            _ => Shading::Masked,
+        };
+        self.variant(shading, run.is_smooth, self.is_last)
+    }
+
+    fn glass(&self, run: &Run) -> Variant {
+        self.variant(Shading::Glass, run.is_smooth, true)
+    }
+
+    /// Makes those that a list needs.
+    fn prepare(&self, renderer: &mut Renderer, gpu: &Gpu, list: &DrawList) {
+        let mut prepare = |variant| {
+            renderer.pipelines.prepare(gpu, &renderer.layouts, variant);
+        };
+        let mut last = None;
+        for run in &list.opaque {
+            if last != Some((run.finish, run.is_smooth)) {
+                last = Some((run.finish, run.is_smooth));
+                prepare(self.opaque(run));
+            }
+        }
+        for run in &list.transparent {
+            prepare(self.glass(run));
+        }
+    }
+}
+
+/// Draws runs, changing pipelines, textures and scissors only where they differ. `surface` by run.
+fn draw_runs<'p>(
     pass: &mut wgpu::RenderPass<'_>,
     world: &GpuWorld,
     runs: &[Run],
     size: [u32; 2],
-    surfaces: Option<[&wgpu::RenderPipeline; 3]>,
+    surface: impl Fn(&Run) -> Option<&'p wgpu::RenderPipeline>,
 ) {
-    let (mut texture, mut scissor, mut finish) = (u32::MAX, None, None);
+    let (mut texture, mut scissor, mut kind) = (u32::MAX, None, None);
     pass.set_scissor_rect(0, 0, size[0], size[1]);
     for run in runs {
-        if let Some(surfaces) = surfaces
-            && finish != Some(run.finish)
-        {
-            finish = Some(run.finish);
-            pass.set_pipeline(surfaces[run.finish as usize]);
+        if kind != Some((run.finish, run.is_smooth)) {
+            kind = Some((run.finish, run.is_smooth));
+            if let Some(pipeline) = surface(run) {
+                pass.set_pipeline(pipeline);
+            }
         }
         if run.texture != texture {
             texture = run.texture;
@@ -597,6 +682,16 @@ pub(crate) fn read_texture(
         },
     );
     gpu.queue.submit([encoder.finish()]);
+    let mapped = map_bytes(gpu, &buffer)?;
+    let mut out = Vec::with_capacity((row * height) as usize);
+    for line in mapped.chunks_exact(stride as usize) {
+        out.extend_from_slice(&line[..row as usize]);
+    }
+    Ok(out)
+}
+
+/// The bytes of a buffer, once all that was submitted is done.
+pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
     let lost = |why: String| RenderError::Lost(why);
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
@@ -611,9 +706,5 @@ pub(crate) fn read_texture(
     let mapped = buffer
         .get_mapped_range(..)
         .map_err(|why| lost(why.to_string()))?;
-    let mut out = Vec::with_capacity((row * height) as usize);
-    for line in mapped.chunks_exact(stride as usize) {
-        out.extend_from_slice(&line[..row as usize]);
-    }
-    Ok(out)
+    Ok(mapped.to_vec())
 }

@@ -4,23 +4,30 @@
 //! detail meshes after them, each mesh once. What is drawn is a list of ranges, so that neighboring
 //! chunks join to one draw whatever room they belong to.
 
-use enfilade_cpg::{CellId, World};
+use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
 use glam::{Mat4, Vec3};
 use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
+use crate::marks::{Mark, Shape};
 use crate::materials::{Look, decode, wrapping};
 
-/// A corner of a triangle, 32 bytes. The shader that draws ids reads it as eight words.
+/// A corner of a triangle, 40 bytes. The shader that draws ids reads it as ten words.
+///
+/// What a material says comes with each corner: to look it up by pixel costs software more than light
+/// does.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Corner {
     position: [f32; 3],
     normal: [i8; 4],
     uv: [f32; 2],
-    color: [u8; 4],
+    /// The material's times the corner's own; 16 bits, for dark ones.
+    color: [u16; 4],
+    /// Light of its own, and the least alpha that is drawn.
+    emissive: [u8; 4],
     part: u32,
 }
 
@@ -28,30 +35,35 @@ pub(crate) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     array_stride: size_of::<Corner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![
-        0 => Float32x3, 1 => Snorm8x4, 2 => Float32x2, 3 => Unorm8x4, 4 => Uint32
+        0 => Float32x3, 1 => Snorm8x4, 2 => Float32x2, 3 => Unorm16x4, 4 => Unorm8x4, 5 => Uint32
     ],
 };
 
+/// Where something stands, 56 bytes: structure, or a detail object.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Part {
-    material: u32,
+pub(crate) struct Instance {
+    rows: [[f32; 4]; 3],
+    /// Its number and the reason why it is drawn, as in [`crate::DrawList`].
+    key: u32,
+    /// Color of its cell.
     color: u32,
 }
 
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Material {
-    base_color: [f32; 4],
-    emissive: [f32; 4],
+impl Instance {
+    /// The same, drawn for a reason.
+    pub(crate) fn drawn(self, key: u32) -> Self {
+        Self { key, ..self }
+    }
 }
 
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Instance {
-    rows: [[f32; 4]; 3],
-    color: [u32; 4],
-}
+pub(crate) const INSTANCE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Instance>() as u64,
+    step_mode: wgpu::VertexStepMode::Instance,
+    attributes: &wgpu::vertex_attr_array![
+        6 => Float32x4, 7 => Float32x4, 8 => Float32x4, 9 => Uint32x2
+    ],
+};
 
 /// Triangles that are drawn alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +73,8 @@ pub(crate) struct Span {
     /// Index into [`GpuWorld::textures`].
     pub(crate) texture: u32,
     pub(crate) finish: Finish,
+    /// Whether its corners have normals.
+    pub(crate) is_smooth: bool,
     pub(crate) is_transparent: bool,
 }
 
@@ -74,9 +88,11 @@ pub(crate) enum Finish {
 }
 
 /// A placed detail object, as drawn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Placed {
     pub(crate) mesh: u32,
+    /// Those that it stands in.
+    pub(crate) cells: Vec<CellId>,
     pub(crate) center: Vec3,
     /// Of a sphere that holds it. [Units: wu]
     pub(crate) radius: f32,
@@ -86,9 +102,10 @@ pub(crate) struct Placed {
 pub struct GpuWorld {
     pub(crate) corners: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
-    pub(crate) parts: wgpu::Buffer,
-    pub(crate) materials: wgpu::Buffer,
-    pub(crate) instances: wgpu::Buffer,
+    /// By part: the color of its cell.
+    pub(crate) cell_colors: wgpu::Buffer,
+    /// By number of an instance: 0 for structure, then objects.
+    pub(crate) instances: Vec<Instance>,
     /// Base color textures; the first is white.
     pub(crate) textures: Vec<wgpu::BindGroup>,
     /// By chunk of the sight.
@@ -102,6 +119,10 @@ pub struct GpuWorld {
     pub(crate) details: Vec<Placed>,
     /// Least and greatest corner of all that is drawn. [Units: wu]
     pub(crate) bounds: [Vec3; 2],
+    /// By portal: its outline. [Units: wu]
+    pub(crate) outlines: Vec<Vec<[f32; 3]>>,
+    /// By cell: the color of what stands in for it far away, lit.
+    pub(crate) cell_looks: Vec<[f32; 3]>,
     pub(crate) n_triangles: u64,
     n_missing_pictures: u32,
 }
@@ -134,22 +155,24 @@ struct Filling<'w> {
     texture_of: Vec<u32>,
     corners: Vec<Corner>,
     indices: Vec<u32>,
-    parts: Vec<Part>,
+    cell_colors: Vec<u32>,
 }
 
 impl Filling<'_> {
-    fn look(&self, primitive: &Primitive) -> (u32, Look) {
+    fn look(&self, primitive: &Primitive) -> Look {
         // The last stands for none.
         let none = self.looks.len() - 1;
         let at = primitive.material.map_or(none, |m| m as usize).min(none);
-        (at as u32, self.looks[at])
+        self.looks[at]
     }
 
     /// Adds a primitive's triangles, by `order` of its positions; returns where they stand.
     fn add(&mut self, primitive: &Primitive, order: &[u32], color: u32) -> Span {
-        let (material, look) = self.look(primitive);
-        let part = self.parts.len() as u32;
-        self.parts.push(Part { material, color });
+        let look = self.look(primitive);
+        let part = self.cell_colors.len() as u32;
+        self.cell_colors.push(color);
+        let [r, g, b] = look.emissive;
+        let emissive = [r, g, b, look.cutoff].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
         let uvs = primitive.uvs.get(look.uv_set);
         let base = self.corners.len() as u32;
         for (i, &position) in primitive.positions.iter().enumerate() {
@@ -162,7 +185,11 @@ impl Filling<'_> {
                 position,
                 normal,
                 uv: uvs.and_then(|u| u.get(i)).copied().unwrap_or_default(),
-                color: color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8),
+                color: [0, 1, 2, 3].map(|k| {
+                    let c = color[k] * look.base_color[k];
+                    (c.clamp(0.0, 1.0) * 65535.0).round() as u16
+                }),
+                emissive,
                 part,
             });
         }
@@ -185,6 +212,7 @@ impl Filling<'_> {
             } else {
                 Finish::Plain
             },
+            is_smooth: primitive.normals.len() == primitive.positions.len(),
             is_transparent: look.is_transparent,
         }
     }
@@ -208,7 +236,7 @@ impl GpuWorld {
             texture_of,
             corners: Vec::new(),
             indices: Vec::new(),
-            parts: Vec::new(),
+            cell_colors: Vec::new(),
         };
         let batches = filling.add_batches(sight);
         let meshes = filling.add_meshes();
@@ -222,14 +250,6 @@ impl GpuWorld {
                 ..batches[c.batch as usize]
             })
             .collect();
-        let materials: Vec<Material> = filling
-            .looks
-            .iter()
-            .map(|l| Material {
-                base_color: l.base_color,
-                emissive: [l.emissive[0], l.emissive[1], l.emissive[2], l.cutoff],
-            })
-            .collect();
         let bounds = bounds_of(world, &details);
         let storage = wgpu::BufferUsages::STORAGE;
         let buffer = |what, bytes: &[u8], usage| make_buffer(gpu, what, bytes, usage);
@@ -238,9 +258,8 @@ impl GpuWorld {
         Ok(Self {
             corners: buffer("the world's corners", corners, wgpu::BufferUsages::VERTEX)?,
             indices: buffer("the world's indices", indices, wgpu::BufferUsages::INDEX)?,
-            parts: buffer("parts", bytemuck::cast_slice(&filling.parts), storage)?,
-            materials: buffer("materials", bytemuck::cast_slice(&materials), storage)?,
-            instances: buffer("placed objects", bytemuck::cast_slice(&instances), storage)?,
+            cell_colors: buffer("parts", bytemuck::cast_slice(&filling.cell_colors), storage)?,
+            instances,
             textures,
             chunks,
             batch_of: sight.chunks().iter().map(|c| c.batch).collect(),
@@ -248,9 +267,36 @@ impl GpuWorld {
             meshes,
             details,
             bounds,
+            outlines: world
+                .graph
+                .portals
+                .iter()
+                .map(|p| p.outline.clone())
+                .collect(),
+            cell_looks: filling.cell_looks(),
             n_triangles: sight.n_triangles(),
             n_missing_pictures,
         })
+    }
+
+    /// What is drawn in a portal instead of what is behind it.
+    pub(crate) fn stand_in(&self, portal: PortalId, cell: CellId) -> Mark {
+        let [r, g, b] = self
+            .cell_looks
+            .get(cell.0 as usize)
+            .copied()
+            .unwrap_or_default();
+        Mark {
+            shape: Shape::Area(
+                self.outlines
+                    .get(portal.0 as usize)
+                    .cloned()
+                    .unwrap_or_default(),
+            ),
+            color: [r, g, b, 1.0],
+            width: 0.0,
+            on_top: false,
+        }
     }
 
     /// Triangles of structure and placed objects.
@@ -303,6 +349,34 @@ impl Filling<'_> {
             .collect()
     }
 
+    /// The mean color of what is seen of each cell's surfaces, by area, in the light of the sky.
+    fn cell_looks(&self) -> Vec<[f32; 3]> {
+        const SKY: f32 = 0.55;
+        let mut sums = vec![[0.0; 4]; self.world.graph.cells.len()];
+        for batch in &self.world.batches {
+            let color = self.look(&batch.primitive).base_color;
+            let corner = |i: u32| Vec3::from(batch.primitive.positions[i as usize]);
+            let triangles = batch.primitive.indices.chunks_exact(3);
+            let area: f32 = triangles
+                .map(|t| {
+                    let [a, b, c] = [t[0], t[1], t[2]].map(corner);
+                    (b - a).cross(c - a).length() * 0.5
+                })
+                .sum();
+            for cell in &batch.cells {
+                if let Some(sum) = sums.get_mut(cell.0 as usize) {
+                    for k in 0..3 {
+                        sum[k] += color[k] * area;
+                    }
+                    sum[3] += area;
+                }
+            }
+        }
+        let mean =
+            |s: [f32; 4]| [0, 1, 2].map(|k| SKY * if s[3] > 0.0 { s[k] / s[3] } else { 0.8 });
+        sums.into_iter().map(mean).collect()
+    }
+
     fn add_meshes(&mut self) -> Vec<Vec<Span>> {
         let meshes = &self.world.detail_meshes;
         meshes
@@ -323,14 +397,16 @@ fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
             [0.0, 1.0, 0.0, 0.0],
             [0.0, 0.0, 1.0, 0.0],
         ],
-        color: [packed([0.35; 3]); 4],
+        key: 0,
+        color: packed([0.35; 3]),
     }];
     let mut details = Vec::new();
     for detail in &world.details {
         let m = Mat4::from_cols_array(&detail.transform);
         instances.push(Instance {
             rows: [m.row(0), m.row(1), m.row(2)].map(|r| r.to_array()),
-            color: [color_of(&detail.cells); 4],
+            key: 0,
+            color: color_of(&detail.cells),
         });
         let mut low = Vec3::INFINITY;
         let mut high = Vec3::NEG_INFINITY;
@@ -344,6 +420,7 @@ fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
         let is_empty = low.x > high.x;
         details.push(Placed {
             mesh: detail.mesh,
+            cells: detail.cells.clone(),
             center: if is_empty {
                 m.w_axis.truncate()
             } else {

@@ -6,7 +6,7 @@ use enfilade_runtime::{Sight, SightState, View, Viewer};
 use crate::camera::Camera;
 use crate::gpu::{Gpu, RenderError};
 use crate::ids::IdPicture;
-use crate::list::{DrawList, Lister};
+use crate::list::{DrawList, Lister, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::renderer::{Frame, Renderer, Stage, Style};
@@ -42,9 +42,11 @@ pub struct Studio {
     pub state: SightState,
     /// Who asks.
     pub viewer: Viewer,
-    renderer: Renderer,
-    stage: Stage,
-    lister: Lister,
+    /// What far away rooms are spared, where portals cull. Off unless set.
+    pub sparing: Sparing,
+    pub(crate) renderer: Renderer,
+    pub(crate) stage: Stage,
+    pub(crate) lister: Lister,
 }
 
 impl Studio {
@@ -76,6 +78,7 @@ impl Studio {
         Ok(Self {
             state: SightState::new(&sight),
             viewer: Viewer::new(&sight),
+            sparing: Sparing::default(),
             gpu,
             world: on_gpu,
             sight,
@@ -98,11 +101,20 @@ impl Studio {
             Culling::Everything => self.lister.everything(world, sight, eye),
             Culling::Frustum => {
                 let seen = self.viewer.see_through_walls(sight, view);
-                self.lister.seen(world, sight, &seen, eye, None)
+                let sparing = Sparing::default();
+                self.lister.seen(world, sight, &seen, eye, None, &sparing)
             }
             Culling::Portals => {
+                let pixels = (size[0] as f32 * size[1] as f32).max(1.0);
+                let options = self.viewer.options_mut();
+                let before = options.min_share;
+                options.min_share = self.sparing.stop_below / pixels;
                 let seen = self.viewer.see(sight, &self.state, view);
-                self.lister.seen(world, sight, &seen, eye, Some(size))
+                let list = self
+                    .lister
+                    .seen(world, sight, &seen, eye, Some(size), &self.sparing);
+                self.viewer.options_mut().min_share = before;
+                list
             }
         }
     }

@@ -367,6 +367,12 @@ impl Region {
         size.x * size.y / own.max(1e-12) - 1.0
     }
 
+    /// Of its rectangle in the screen's.
+    pub(crate) fn share(&self) -> f64 {
+        let size = (self.max.min(DVec2::ONE) - self.min.max(DVec2::NEG_ONE)).max(DVec2::ZERO);
+        size.x * size.y * 0.25
+    }
+
     /// The rectangle around both, without edges.
     pub(crate) fn rectangle_around(&self, other: &Self) -> Self {
         let (min, max) = (self.min.min(other.min), self.max.max(other.max));

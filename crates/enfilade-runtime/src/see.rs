@@ -50,6 +50,10 @@ pub struct SeeOptions {
     pub occlusion: bool,
     /// Portals clipped at most; after that, all cells within reach count as visible.
     pub max_clips: u32,
+    /// A portal whose rectangle is less than this share of the screen is not followed but listed in
+    /// [`Seen::stopped`], for something cheaper to stand in for what is behind it (Gjørup 1999, section
+    /// 2.3.2; Dirkse 2002, section 4.1.1). [Limit: 0 to 1; only at 0 are answers supersets]
+    pub min_share: f32,
 }
 
 impl Default for SeeOptions {
@@ -58,6 +62,7 @@ impl Default for SeeOptions {
             narrowing: Narrowing::PolygonOf(8),
             occlusion: true,
             max_clips: 20_000,
+            min_share: 0.0,
         }
     }
 }
@@ -94,12 +99,13 @@ struct Mark {
 /// Asks what one eye sees, frame by frame; keeps its buffers, so that nothing is allocated once they
 /// have grown to what the world's views need.
 ///
-/// Memory: 16 bytes a cell, 4 bytes a portal, chunk and detail.
+/// Memory: 16 bytes a cell, 8 bytes a portal, 4 bytes a chunk and detail.
 pub struct Viewer {
     options: SeeOptions,
     marks: Vec<Mark>,
     cell_stamps: Vec<u32>,
     portal_stamps: Vec<u32>,
+    stop_stamps: Vec<u32>,
     item_stamps: Vec<u32>,
     face_stamp: u32,
     frame_stamp: u32,
@@ -131,6 +137,7 @@ impl Viewer {
             marks: vec![mark; sight.n_cells()],
             cell_stamps: vec![0; sight.n_cells()],
             portal_stamps: vec![0; sight.n_portals()],
+            stop_stamps: vec![0; sight.n_portals()],
             item_stamps: vec![0; sight.chunks.len() + sight.details.len()],
             face_stamp: 0,
             frame_stamp: 0,
@@ -236,6 +243,7 @@ impl Viewer {
         out.planes.clear();
         out.cells.clear();
         out.portals.clear();
+        out.stopped.clear();
         out.chunks.clear();
         out.details.clear();
         out.n_triangles = 0;
@@ -243,6 +251,7 @@ impl Viewer {
         if self.frame_stamp == u32::MAX {
             self.cell_stamps.fill(0);
             self.portal_stamps.fill(0);
+            self.stop_stamps.fill(0);
             self.item_stamps.fill(0);
             self.frame_stamp = 0;
         }
@@ -485,6 +494,10 @@ impl Asking<'_, '_> {
                 )
             }
         };
+        if narrowed.share() < f64::from(self.viewer.options.min_share) {
+            self.add_stop(exit);
+            return;
+        }
         // A plane so near says nothing, and its turning sense may be noise.
         let beyond = (ahead > 16.0 * tolerance).then_some((normal, ahead));
         self.add_portal(exit.portal);
@@ -632,6 +645,15 @@ impl Asking<'_, '_> {
         if *stamp != self.viewer.frame_stamp {
             *stamp = self.viewer.frame_stamp;
             self.viewer.out.portals.push(PortalId(portal));
+        }
+    }
+
+    fn add_stop(&mut self, exit: &Exit) {
+        let stamp = &mut self.viewer.stop_stamps[exit.portal as usize];
+        if *stamp != self.viewer.frame_stamp {
+            *stamp = self.viewer.frame_stamp;
+            let stop = (PortalId(exit.portal), CellId(exit.to));
+            self.viewer.out.stopped.push(stop);
         }
     }
 

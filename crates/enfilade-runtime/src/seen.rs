@@ -51,6 +51,7 @@ pub(crate) struct Lists {
     pub(crate) planes: Vec<[f32; 4]>,
     pub(crate) cells: Vec<CellId>,
     pub(crate) portals: Vec<PortalId>,
+    pub(crate) stopped: Vec<(PortalId, CellId)>,
     pub(crate) chunks: Vec<ChunkId>,
     pub(crate) details: Vec<DetailId>,
     pub(crate) n_triangles: u64,
@@ -108,6 +109,13 @@ impl<'a> Seen<'a> {
     #[must_use]
     pub fn portals(&self) -> &'a [PortalId] {
         &self.lists.portals
+    }
+
+    /// The portals that cover less than [`SeeOptions::min_share`](crate::SeeOptions::min_share) of the
+    /// screen, each once, with the cell behind: which may be visible through another portal.
+    #[must_use]
+    pub fn stopped(&self) -> &'a [(PortalId, CellId)] {
+        &self.lists.stopped
     }
 
     /// The visible chunks of structural batches, each once, by cells near to far.

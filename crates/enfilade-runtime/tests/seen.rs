@@ -540,3 +540,39 @@ fn a_round_window_of_a_thousand_corners() {
         assert_eq!(viewer.see(&sight, &state, &view).cells().len(), 1);
     }
 }
+
+#[test]
+fn portals_of_a_small_share_are_listed_and_not_followed() {
+    let world = room_grid(&GridParams::offices(100, 3));
+    let sight = Sight::build(&world).unwrap();
+    let state = SightState::new(&sight);
+    let (mut whole, mut stopping) = (Viewer::new(&sight), Viewer::new(&sight));
+    let mut rng = Rng::new(3);
+    let (mut n_stopped, mut n_spared) = (0, 0);
+    for i in 0..60 {
+        let eye = eye_in(&world, &mut rng, i);
+        let view = Camera::random(&mut rng, eye).view();
+        stopping.options_mut().min_share = 0.0;
+        assert!(stopping.see(&sight, &state, &view).stopped().is_empty());
+        stopping.options_mut().min_share = 0.02;
+        let all = whole.see(&sight, &state, &view);
+        let some = stopping.see(&sight, &state, &view);
+        let cells: BTreeSet<CellId> = all.cells().iter().copied().collect();
+        assert!(some.cells().iter().all(|c| cells.contains(c)), "view {i}");
+        // What is visible is seen, or behind a portal that is named.
+        let behind: BTreeSet<CellId> = some.stopped().iter().map(|s| s.1).collect();
+        assert!(some.cells().len() == cells.len() || !behind.is_empty());
+        for &(portal, cell) in some.stopped() {
+            assert!(world.graph.portals[portal.0 as usize].cells.contains(&cell));
+            assert!(all.portals().contains(&portal), "view {i}");
+        }
+        // No visit is smaller.
+        for v in some.visits().iter().filter(|v| v.via.is_some()) {
+            let [l, b, r, t] = v.rectangle;
+            assert!((r - l) * (t - b) * 0.25 >= 0.02 * 0.999, "view {i}: {v:?}");
+        }
+        n_stopped += some.stopped().len();
+        n_spared += cells.len() - some.cells().len();
+    }
+    assert!(n_stopped > 10 && n_spared > 10, "{n_stopped} {n_spared}");
+}

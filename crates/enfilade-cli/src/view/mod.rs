@@ -12,7 +12,9 @@ use anyhow::{Context, anyhow};
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
-use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Studio, Style};
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Shape, Studio, Style,
+};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, KeyEvent, MouseButton, WindowEvent};
@@ -270,7 +272,7 @@ impl App<'_> {
             KeyCode::F5 => {
                 if let Some(path) = open.recorded.take() {
                     write_atomically(&self.args.record, path_text(&path).as_bytes())?;
-                    open.shown.message = format!("wrote {}", self.args.record.display());
+                    open.say(format!("wrote {}", self.args.record.display()));
                 }
             }
             KeyCode::F12 => open.shot(self.args, &self.world)?,
@@ -293,16 +295,16 @@ impl App<'_> {
             ..camera
         };
         let Some((portal, _)) = portal_looked_at(&self.world, &self.lines, &ray) else {
-            open.shown.message = "no portal there".into();
+            open.say("no portal there".into());
             return;
         };
         if open.closed.remove(&portal) {
             open.studio.state.open(portal);
-            open.shown.message = format!("portal {} is open", portal.0);
+            open.say(format!("portal {} is open", portal.0));
         } else {
             open.closed.insert(portal);
             open.studio.state.close(portal);
-            open.shown.message = format!("portal {} is closed", portal.0);
+            open.say(format!("portal {} is closed", portal.0));
         }
     }
 
@@ -333,6 +335,12 @@ impl App<'_> {
 }
 
 impl Open {
+    /// In the window, and on standard error for who comes back to the terminal.
+    fn say(&mut self, message: String) {
+        eprintln!("enfilade: {message}");
+        self.shown.message = message;
+    }
+
     fn resize(&mut self, size: PhysicalSize<u32>) {
         let limit = self.studio.gpu.device.limits().max_texture_dimension_2d;
         self.config.width = size.width.clamp(1, limit);
@@ -395,11 +403,10 @@ impl Open {
         };
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
-        let marks = if self.shown.portals {
-            portal_marks(&mut self.studio, world, camera, size)?
-        } else {
-            Vec::new()
-        };
+        let mut marks = self.leaves(world);
+        if self.shown.portals {
+            marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
+        }
         let list = self.studio.take_list(&view, camera.eye, self.culling, size);
         let output = target
             .texture
@@ -435,6 +442,20 @@ impl Open {
         Ok(())
     }
 
+    /// What fills the portals that are closed: else one would see the sky through them.
+    fn leaves(&self, world: &World) -> Vec<Mark> {
+        let portals = &world.graph.portals;
+        let closed = self.closed.iter();
+        closed
+            .map(|p| Mark {
+                shape: Shape::Area(portals[p.0 as usize].outline.clone()),
+                color: [0.23, 0.13, 0.07, 1.0],
+                width: 0.0,
+                on_top: false,
+            })
+            .collect()
+    }
+
     /// A picture of the world as it is shown now, without the panel.
     fn shot(&mut self, args: &View, world: &World) -> anyhow::Result<()> {
         self.n_shots += 1;
@@ -453,9 +474,10 @@ impl Open {
             studio.state.close(p);
         }
         let size = [self.config.width, self.config.height];
-        let picture = studio.picture(&camera, self.culling, self.style(), &[], size)?;
+        let leaves = self.leaves(world);
+        let picture = studio.picture(&camera, self.culling, self.style(), &leaves, size)?;
         write_atomically(&to, &picture.to_png()?)?;
-        self.shown.message = format!("wrote {}", to.display());
+        self.say(format!("wrote {}", to.display()));
         Ok(())
     }
 }

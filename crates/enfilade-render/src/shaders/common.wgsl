@@ -1,4 +1,4 @@
-// What every shader knows of a frame and a world.
+// What every shader knows of a frame.
 
 struct Globals {
     clip_from_relative: mat4x4<f32>,
@@ -13,50 +13,22 @@ struct Globals {
     sun: vec4<f32>,
     // Width, height, 1 / width, 1 / height.
     size: vec4<f32>,
-    // Paint, whether corners are darkened, whether the sun casts shadows.
+    // x: 1 where surfaces are painted by cell.
     style: vec4<u32>,
 }
 
-struct Part {
-    material: u32,
-    color: u32,
-}
-
-struct Material {
-    base_color: vec4<f32>,
-    // w: least alpha that is drawn.
-    emissive: vec4<f32>,
-}
-
-struct Instance {
-    // Rows of the map from mesh to world.
-    rows: array<vec4<f32>, 3>,
-    // x: color of its cell.
-    color: vec4<u32>,
-}
-
 @group(0) @binding(0) var<uniform> globals: Globals;
-@group(0) @binding(1) var<storage, read> parts: array<Part>;
-@group(0) @binding(2) var<storage, read> materials: array<Material>;
-@group(0) @binding(3) var<storage, read> instances: array<Instance>;
-
-const PAINT_LIT: u32 = 0u;
-const PAINT_CELLS: u32 = 1u;
-const PAINT_OVERDRAW: u32 = 2u;
 
 // The number of an instance; what is above tells why it is drawn.
 const INSTANCE_MASK: u32 = 0x0fffffffu;
 
-fn place(instance: u32, p: vec3<f32>) -> vec3<f32> {
-    // Structure is in the world already: not a bit of it may change.
-    if (instance & INSTANCE_MASK) == 0u {
-        return p;
-    }
-    let i = instances[instance & INSTANCE_MASK];
+// From a mesh to the world. Structure is there already, and comes with the identity: to multiply by
+// ones and to add zeros changes no bit of it.
+fn place(p: vec3<f32>, row_x: vec4<f32>, row_y: vec4<f32>, row_z: vec4<f32>) -> vec3<f32> {
     let q = vec4(p, 1.0);
-    return vec3(dot(i.rows[0], q), dot(i.rows[1], q), dot(i.rows[2], q));
+    return vec3(dot(row_x, q), dot(row_y, q), dot(row_z, q));
 }
 
-fn to_clip(world: vec3<f32>) -> vec4<f32> {
-    return globals.clip_from_relative * vec4(world - globals.origin.xyz, 1.0);
+fn to_clip(relative: vec3<f32>) -> vec4<f32> {
+    return globals.clip_from_relative * vec4(relative, 1.0);
 }

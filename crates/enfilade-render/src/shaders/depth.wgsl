@@ -1,6 +1,24 @@
-// The sun's picture of the world: depth alone.
+// Depth alone: the sun's picture of the world, and what hides portals.
+
+struct Corner {
+    @location(0) position: vec3<f32>,
+    @location(6) row_x: vec4<f32>,
+    @location(7) row_y: vec4<f32>,
+    @location(8) row_z: vec4<f32>,
+}
 
 @vertex
-fn corner(@location(0) position: vec3<f32>, @location(5) instance: u32) -> @builtin(position) vec4<f32> {
-    return globals.shadow_from_world * vec4(place(instance, position), 1.0);
+fn from_sun(in: Corner) -> @builtin(position) vec4<f32> {
+    return globals.shadow_from_world * vec4(place(in.position, in.row_x, in.row_y, in.row_z), 1.0);
+}
+
+@vertex
+fn from_eye(in: Corner) -> @builtin(position) vec4<f32> {
+    return to_clip(place(in.position, in.row_x, in.row_y, in.row_z) - globals.origin.xyz);
+}
+
+// Of an outline, by its corners alone.
+@vertex
+fn outline(@location(0) position: vec3<f32>) -> @builtin(position) vec4<f32> {
+    return to_clip(position - globals.origin.xyz);
 }

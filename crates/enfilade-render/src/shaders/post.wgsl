@@ -1,24 +1,11 @@
-// From surfaces to the picture: dark corners, sky, heat of overdraw.
+// From surfaces to the picture where that takes all of them: dark corners, heat of overdraw.
 
 @group(1) @binding(0) var color: texture_2d<f32>;
 @group(1) @binding(1) var depth: texture_depth_2d;
 
-@vertex
-fn whole(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
-    // One triangle around the screen.
-    return vec4(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
-
 fn depth_at(p: vec2<i32>) -> f32 {
     let limit = vec2<i32>(globals.size.xy) - 1;
     return textureLoad(depth, clamp(p, vec2(0), limit), 0);
-}
-
-// Where a pixel's surface is, relative to the camera.
-fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
-    let uv = (vec2<f32>(p) + 0.5) * globals.size.zw;
-    let q = globals.relative_from_clip * vec4(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0, z, 1.0);
-    return q.xyz / q.w;
 }
 
 const SAMPLES: i32 = 20;
@@ -63,18 +50,6 @@ fn open_sky(p: vec2<i32>, at: vec3<f32>, z: f32) -> f32 {
     return clamp(1.0 - 1.7 * sum / f32(SAMPLES), 0.0, 1.0);
 }
 
-fn sky(p: vec2<i32>) -> vec3<f32> {
-    if globals.eye.w > 0.5 {
-        return vec3(0.93, 0.94, 0.96);
-    }
-    let ray = normalize(point_at(p, 0.5));
-    let t = clamp(ray.y, -0.15, 1.0);
-    if t < 0.0 {
-        return mix(vec3(0.78, 0.83, 0.90), vec3(0.52, 0.52, 0.50), min(-t / 0.12, 1.0));
-    }
-    return mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(t));
-}
-
 // Black, blue, red, yellow, white.
 fn heat(n: f32) -> vec3<f32> {
     let t = clamp(n / 16.0, 0.0, 1.0) * 4.0;
@@ -85,20 +60,19 @@ fn heat(n: f32) -> vec3<f32> {
 }
 
 @fragment
+fn heat_map(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
+    let drawn = textureLoad(color, vec2<i32>(clip.xy), 0);
+    return vec4(heat(drawn.a * 255.0 / 8.0), 1.0);
+}
+
+@fragment
 fn finish(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     let p = vec2<i32>(clip.xy);
-    let drawn = textureLoad(color, p, 0);
-    if globals.style.x == 2u {
-        return vec4(heat(drawn.a * 255.0 / 8.0), 1.0);
-    }
     let z = depth_at(p);
     // Nothing is as far as the far end: the sky is.
     if z <= 0.0 {
         return vec4(sky(p), 1.0);
     }
-    var c = drawn.rgb;
-    if globals.style.y != 0u {
-        c *= open_sky(p, point_at(p, z), z);
-    }
-    return vec4(c, 1.0);
+    let drawn = textureLoad(color, p, 0);
+    return vec4(drawn.rgb * open_sky(p, point_at(p, z), z), 1.0);
 }

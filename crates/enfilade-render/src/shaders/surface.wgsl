@@ -1,52 +1,73 @@
 // Surfaces as they look: textures, sun, sky.
+//
+// What a frame does without is left out of the shader, not skipped by a branch: software that shades
+// eight pixels at a time takes both ways of each branch, and nine shadow samples for nothing cost more
+// than all else. For the same reason whatever is the same along a surface comes with its corners.
 
-@group(0) @binding(4) var shadow_map: texture_depth_2d;
-@group(0) @binding(5) var shadow_sampler: sampler_comparison;
+override CASTS_SHADOWS: bool = false;
+// Whether corners have normals.
+override IS_SMOOTH: bool = false;
+// Whether cells, or the reasons why something is drawn, may give the color.
+override EXPLAINS: bool = false;
+
+// By part: the color of its cell.
+@group(0) @binding(1) var<storage, read> cell_colors: array<u32>;
+@group(0) @binding(2) var shadow_map: texture_depth_2d;
+@group(0) @binding(3) var shadow_sampler: sampler_comparison;
 @group(1) @binding(0) var base_texture: texture_2d<f32>;
 @group(1) @binding(1) var base_sampler: sampler;
 
 struct Corner {
     @location(0) position: vec3<f32>,
-    // w: 0 where there is none.
     @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
+    // The material's times the corner's own.
     @location(3) color: vec4<f32>,
-    @location(4) part: u32,
-    @location(5) instance: u32,
+    // w: least alpha that is drawn.
+    @location(4) emissive: vec4<f32>,
+    @location(5) part: u32,
+    // Rows of the map from mesh to world.
+    @location(6) row_x: vec4<f32>,
+    @location(7) row_y: vec4<f32>,
+    @location(8) row_z: vec4<f32>,
+    // Number and reason; color of its cell.
+    @location(9) key: vec2<u32>,
 }
 
 struct Surface {
     @builtin(position) clip: vec4<f32>,
-    @location(0) world: vec3<f32>,
-    @location(1) normal: vec4<f32>,
+    // To the camera's place.
+    @location(0) relative: vec3<f32>,
+    @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
     @location(3) color: vec4<f32>,
-    @location(4) @interpolate(flat) part: u32,
-    @location(5) @interpolate(flat) instance: u32,
+    @location(4) @interpolate(flat) emissive: vec4<f32>,
+    // Color of its cell, reason.
+    @location(5) @interpolate(flat) explained: vec2<u32>,
 }
 
 @vertex
 fn corner(in: Corner) -> Surface {
     var out: Surface;
-    out.world = place(in.instance, in.position);
-    out.clip = to_clip(out.world);
-    out.normal = in.normal;
-    let i = in.instance & INSTANCE_MASK;
-    if i != 0u {
-        let rows = instances[i].rows;
+    out.relative = place(in.position, in.row_x, in.row_y, in.row_z) - globals.origin.xyz;
+    out.clip = to_clip(out.relative);
+    if IS_SMOOTH {
         let n = in.normal.xyz;
         // By the cofactors: the inverse transposed, but for a factor.
-        let m = vec3(
-            dot(cross(rows[1].xyz, rows[2].xyz), n),
-            dot(cross(rows[2].xyz, rows[0].xyz), n),
-            dot(cross(rows[0].xyz, rows[1].xyz), n),
+        out.normal = vec3(
+            dot(cross(in.row_y.xyz, in.row_z.xyz), n),
+            dot(cross(in.row_z.xyz, in.row_x.xyz), n),
+            dot(cross(in.row_x.xyz, in.row_y.xyz), n),
         );
-        out.normal = vec4(m, in.normal.w);
     }
     out.uv = in.uv;
     out.color = in.color;
-    out.part = in.part;
-    out.instance = in.instance;
+    out.emissive = in.emissive;
+    if EXPLAINS {
+        let is_structure = (in.key.x & INSTANCE_MASK) == 0u;
+        let cell = select(in.key.y, cell_colors[in.part], is_structure);
+        out.explained = vec2(cell, in.key.x >> 28u);
+    }
     return out;
 }
 
@@ -57,9 +78,6 @@ fn unpacked(c: u32) -> vec3<f32> {
 
 // 1 in the sun, 0 in the shade.
 fn sunlit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
-    if globals.style.z == 0u {
-        return 1.0;
-    }
     let lifted = world + normal * globals.sun.w * 2.0;
     let q = globals.shadow_from_world * vec4(lifted, 1.0);
     let uv = vec2(0.5 + 0.5 * q.x, 0.5 - 0.5 * q.y);
@@ -75,55 +93,56 @@ fn sunlit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
 }
 
 fn shaded(in: Surface, texel: vec4<f32>) -> vec4<f32> {
-    let eye = select(globals.eye.xyz - in.world, globals.eye.xyz - globals.origin.xyz, globals.eye.w > 0.5);
+    // From an eye at the camera's place, or along parallel lines.
+    let eye = (globals.eye.xyz - globals.origin.xyz) - in.relative * (1.0 - globals.eye.w);
     let toward_eye = normalize(eye);
-    let relative = in.world - globals.origin.xyz;
-    let flat_normal = cross(dpdx(relative), dpdy(relative));
-    var normal = select(flat_normal, in.normal.xyz, in.normal.w != 0.0);
-    let length = length(normal);
-    normal = select(vec3(0.0, 1.0, 0.0), normal / length, length > 1e-20);
+    var normal = in.normal;
+    if !IS_SMOOTH {
+        normal = cross(dpdx(in.relative), dpdy(in.relative));
+    }
+    // None at all of a sliver, or where a file says so: then only the sky's light is left.
+    normal *= inverseSqrt(max(dot(normal, normal), 1e-30));
     // What is seen of a surface is the side towards the eye.
-    normal = select(normal, -normal, dot(normal, toward_eye) < 0.0);
+    var facing = dot(normal, toward_eye);
+    normal = select(normal, -normal, facing < 0.0);
+    facing = abs(facing);
 
-    let material = materials[parts[in.part].material];
-    var base = material.base_color * in.color * texel;
-    var emissive = material.emissive.rgb;
-    let i = in.instance & INSTANCE_MASK;
-    let reason = in.instance >> 28u;
-    if globals.style.x == PAINT_CELLS || reason != 0u {
-        var cell = parts[in.part].color;
-        if i != 0u {
-            cell = instances[i].color.x;
+    var base = in.color * texel;
+    var emissive = in.emissive.rgb;
+    if EXPLAINS {
+        let reason = in.explained.y;
+        if globals.style.x != 0u || reason != 0u {
+            base = vec4(unpacked(in.explained.x), base.a);
+            emissive = vec3(0.0);
+            // Why it is not drawn: out of view, behind no open portals, behind an occluder.
+            if reason == 1u { base = vec4(0.10, 0.10, 0.11, base.a); }
+            if reason == 2u { base = vec4(0.42, 0.10, 0.07, base.a); }
+            if reason == 3u { base = vec4(0.62, 0.36, 0.05, base.a); }
         }
-        base = vec4(unpacked(cell), base.a);
-        emissive = vec3(0.0);
-        // Why it is not drawn: out of view, behind no open portals, behind an occluder.
-        if reason == 1u { base = vec4(0.10, 0.10, 0.11, base.a); }
-        if reason == 2u { base = vec4(0.42, 0.10, 0.07, base.a); }
-        if reason == 3u { base = vec4(0.62, 0.36, 0.05, base.a); }
     }
     // The sky above, the ground's reflection below; walls by where they face, so that corners show.
     let up = normal.y * 0.5 + 0.5;
     let ambient = mix(vec3(0.30, 0.28, 0.26), vec3(0.50, 0.54, 0.60), up)
         * (0.90 + 0.10 * normal.x - 0.06 * normal.z);
-    let fill = 0.16 * max(dot(normal, toward_eye), 0.0);
-    let sun = max(dot(normal, globals.sun.xyz), 0.0);
-    var light = ambient + vec3(fill);
-    if sun > 0.0 {
-        light += vec3(1.25, 1.13, 0.92) * sun * sunlit(in.world, normal);
+    var sun = max(dot(normal, globals.sun.xyz), 0.0);
+    if CASTS_SHADOWS {
+        sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
+    let light = ambient + vec3(0.16 * facing) + vec3(1.25, 1.13, 0.92) * sun;
     return vec4(base.rgb * light + emissive, base.a);
 }
 
 // Bright is compressed rather than cut off.
 fn toned(c: vec3<f32>) -> vec3<f32> {
-    return c / (1.0 + 0.28 * c);
+    return c * (1.0 / (1.0 + 0.28 * max(c.r, max(c.g, c.b))));
+}
+
+fn is_above_cut(in: Surface) -> bool {
+    return in.relative.y + globals.origin.y > globals.origin.w;
 }
 
 fn cut(in: Surface, texel: vec4<f32>) {
-    let material = materials[parts[in.part].material];
-    let alpha = material.base_color.a * in.color.a * texel.a;
-    if in.world.y > globals.origin.w || alpha < material.emissive.w {
+    if is_above_cut(in) || in.color.a * texel.a < in.emissive.w {
         discard;
     }
 }
@@ -145,22 +164,23 @@ fn textured(in: Surface) -> @location(0) vec4<f32> {
 @fragment
 fn masked(in: Surface) -> @location(0) vec4<f32> {
     let texel = textureSample(base_texture, base_sampler, in.uv);
+    let c = shaded(in, texel);
     cut(in, texel);
-    return vec4(toned(shaded(in, texel).rgb), 1.0);
+    return vec4(toned(c.rgb), 1.0);
 }
 
 @fragment
 fn glass(in: Surface) -> @location(0) vec4<f32> {
     let texel = textureSample(base_texture, base_sampler, in.uv);
-    cut(in, texel);
     let c = shaded(in, texel);
+    cut(in, texel);
     return vec4(toned(c.rgb), c.a);
 }
 
 // A step of brightness for each time that a pixel is drawn.
 @fragment
 fn count(in: Surface) -> @location(0) vec4<f32> {
-    if in.world.y > globals.origin.w {
+    if is_above_cut(in) {
         discard;
     }
     return vec4(8.0 / 255.0);

@@ -6,17 +6,21 @@
 //! in 64-bit arithmetic: it is lost unless the ray, moved by less than a 64th of a pixel, says that
 //! what was drawn is right.
 
-use enfilade::cpg::World;
-use enfilade::geom::scene::Primitive;
-use enfilade::geom::{Bvh, DMat4, DVec3, Ray, Triangle};
-use enfilade::runtime::Sight;
-use enfilade_render::{Camera, Shown};
+use enfilade_cpg::World;
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{Bvh, DMat4, DVec3, Ray, Triangle};
+use enfilade_runtime::Sight;
+
+use crate::camera::Camera;
+use crate::ids::Shown;
 
 /// How far a sight line is moved, in pixels: a little over what adapters round by.
 const NUDGE: f64 = 1.0 / 64.0;
 
 /// The triangles of a world, those that hide and those that do not.
-pub(super) struct Oracle {
+///
+/// Memory: some 200 bytes a triangle. A question takes microseconds.
+pub struct Oracle {
     solid: Bvh,
     transparent: Bvh,
     /// By triangle of each: what a picture calls it.
@@ -30,8 +34,9 @@ fn dvec(p: [f32; 3]) -> DVec3 {
 }
 
 impl Oracle {
-    /// `sight` numbers the triangles as pictures do.
-    pub(super) fn new(world: &World, sight: &Sight) -> Self {
+    /// Of a world; `sight`, which was made of the same, numbers the triangles as pictures do.
+    #[must_use]
+    pub fn new(world: &World, sight: &Sight) -> Self {
         let mut triangles: [Vec<Triangle>; 2] = [Vec::new(), Vec::new()];
         let mut keys: [Vec<Shown>; 2] = [Vec::new(), Vec::new()];
         let mut add = |primitive: &Primitive,
@@ -92,7 +97,8 @@ impl Oracle {
     }
 
     /// Whether an eye is so near to a surface that the near plane cuts it.
-    pub(super) fn is_at_surface(&self, eye: [f32; 3]) -> bool {
+    #[must_use]
+    pub fn is_at_surface(&self, eye: [f32; 3]) -> bool {
         let near = f64::from(Camera::NEAR) * 8.0;
         [&self.solid, &self.transparent]
             .iter()
@@ -100,8 +106,10 @@ impl Oracle {
     }
 
     /// Whether what is drawn at a pixel, `found` meters away along the view direction (infinity for
-    /// the sky), is right but for less than a 64th of a pixel.
-    pub(super) fn is_right(
+    /// the sky), is right but for less than a 64th of a pixel. `at` is column and row of a picture of
+    /// `size`; transparent surfaces are asked of apart from those that hide.
+    #[must_use]
+    pub fn is_right(
         &self,
         camera: &Camera,
         at: [u32; 2],
@@ -135,7 +143,8 @@ impl Oracle {
     /// Whether `shown` is what an exact ray through the middle of the pixel meets first, or among several
     /// in one place; and so at two or more places a 64th of a pixel away. What is seen at the middle
     /// alone is seen through a gap that comes of rounding corners to 32 bits.
-    pub(super) fn is_met(
+    #[must_use]
+    pub fn is_met(
         &self,
         camera: &Camera,
         at: [u32; 2],
@@ -227,7 +236,7 @@ fn ray_through(camera: &Camera, at: [u32; 2], nudge: [f64; 2], size: [u32; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade::cpg::Batch;
+    use enfilade_cpg::Batch;
 
     /// A wall 5 m ahead, from x = 0 on to the right.
     fn wall() -> World {

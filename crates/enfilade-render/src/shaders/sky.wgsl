@@ -1,0 +1,30 @@
+// The sky, and the triangle around the screen that it is painted with.
+
+@vertex
+fn whole(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
+    // As far as can be: depth 0.
+    return vec4(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+// Where a pixel's surface is, relative to the camera.
+fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
+    let uv = (vec2<f32>(p) + 0.5) * globals.size.zw;
+    let q = globals.relative_from_clip * vec4(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0, z, 1.0);
+    return q.xyz / q.w;
+}
+
+fn sky(p: vec2<i32>) -> vec3<f32> {
+    if globals.eye.w > 0.5 {
+        return vec3(0.93, 0.94, 0.96);
+    }
+    let ray = normalize(point_at(p, 0.5));
+    let t = clamp(ray.y, -0.15, 1.0);
+    let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.52, 0.52, 0.50), min(-t / 0.12, 1.0));
+    let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
+    return select(above, below, t < 0.0);
+}
+
+@fragment
+fn open_air(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
+    return vec4(sky(vec2<i32>(clip.xy)), 1.0);
+}
