@@ -314,7 +314,9 @@ mod tests {
 
     #[test]
     fn every_stage_of_every_bake_has_a_measured_cost() {
-        let of_others = BakeContext::BSP_STAGES.iter().chain(BakeContext::DELAUNAY_STAGES);
+        let of_others = BakeContext::BSP_STAGES
+            .iter()
+            .chain(BakeContext::DELAUNAY_STAGES);
         for stage in BakeContext::STAGES.iter().chain(of_others) {
             assert_ne!(cost(stage), cost("no such stage"), "{stage}");
         }
