@@ -245,7 +245,7 @@ fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
         });
         assert!(joins, "{name}: nothing touches where separator {k} was");
     }
-    println!("{name}: {} separators hold", separators.len());
+    eprintln!("{name}: {} separators hold", separators.len());
 }
 
 #[test]
@@ -262,7 +262,7 @@ fn separators_of_levels_end_on_solids_and_each_parts_two_cells() {
     maps.retain(|p| p.extension().is_some_and(|e| e == "map"));
     maps.sort();
     if maps.is_empty() {
-        println!("skipped: no maps in {}", scenes.display());
+        eprintln!("skipped: no maps in {}", scenes.display());
     }
     for map in &maps {
         let imported = import(std::slice::from_ref(map), &[], &ImportOptions::default()).unwrap();
