@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::World;
+use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
-use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::import;
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
