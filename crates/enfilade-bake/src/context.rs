@@ -39,9 +39,20 @@ pub(crate) const STAGES: [&str; 8] = [
     "hand out geometry",
 ];
 
+/// The stages of a bake by partition.
+const BSP_STAGES: [&str; 5] = [
+    "tree",
+    "separators",
+    "cell complex",
+    "cells and portals",
+    "hand out geometry",
+];
+
 impl<'a> BakeContext<'a> {
     /// The names of the stages, in order, as [`Progress::stage`] hears them.
     pub const STAGES: &'static [&'static str] = &STAGES;
+    /// The same of a bake by binary space partition.
+    pub const BSP_STAGES: &'static [&'static str] = &BSP_STAGES;
 
     /// A context that tells `progress` and stops when `cancel` becomes true.
     #[must_use]
@@ -56,12 +67,21 @@ impl<'a> BakeContext<'a> {
 
     /// Ends the stage under way and begins the next.
     pub(crate) fn stage(&self, index: usize) -> Result<(), BakeError> {
+        self.stage_of(&STAGES, index)
+    }
+
+    /// The same among the stages of a bake by partition.
+    pub(crate) fn bsp_stage(&self, index: usize) -> Result<(), BakeError> {
+        self.stage_of(&BSP_STAGES, index)
+    }
+
+    fn stage_of(&self, stages: &[&'static str], index: usize) -> Result<(), BakeError> {
         self.end_stage();
         if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Err(BakeError::Cancelled);
         }
-        self.progress.stage(STAGES[index], index, STAGES.len());
-        *self.running.lock().expect("no panic holds it") = Some((STAGES[index], Instant::now()));
+        self.progress.stage(stages[index], index, stages.len());
+        *self.running.lock().expect("no panic holds it") = Some((stages[index], Instant::now()));
         Ok(())
     }
 

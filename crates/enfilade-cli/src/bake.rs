@@ -61,8 +61,13 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.unwrap_or(0))
             .build()?;
-        let bar = BakeBar::new(scene, config);
-        pool.install(|| bake_bsp(scene, &settings.bsp, &BakeContext::new(&bar, None)))?
+        let bar = BakeBar::new(scene, config, BakeContext::BSP_STAGES);
+        let mut config = settings.bsp.clone();
+        if settings.merges_brushes_only && scene.solids.is_empty() {
+            // A room of a building has few triangles; the shape of its openings says that it is one.
+            config.simplify.min_cost = 0.0;
+        }
+        pool.install(|| bake_bsp(scene, &config, &BakeContext::new(&bar, None)))?
     } else {
         bake_scene(scene, config, threads)?
     };
@@ -150,7 +155,7 @@ pub(crate) fn bake_scene(
     config: &BakeConfig,
     threads: Option<usize>,
 ) -> anyhow::Result<BakeOutput> {
-    let bar = BakeBar::new(scene, config);
+    let bar = BakeBar::new(scene, config, BakeContext::STAGES);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .build()?;

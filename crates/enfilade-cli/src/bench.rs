@@ -35,9 +35,15 @@ enum What {
         /// All heuristics, not only the default.
         #[arg(long)]
         heuristics: bool,
-        /// Bake to the end, cells merged up to 50 triangles.
+        /// Bake to the end, cells merged up to the threshold.
         #[arg(long)]
         bake: bool,
+        /// Merging threshold in triangles.
+        #[arg(long, default_value_t = 50.0)]
+        min_cost: f64,
+        /// Polygons of generated clinics, e.g. 11600,50000,200000; prints the growth between them.
+        #[arg(long, value_delimiter = ',')]
+        clinic: Vec<usize>,
     },
     /// Simplifier: expected triangles by either metric at the same number of portals.
     Simplify {
@@ -102,7 +108,15 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             scenes,
             heuristics,
             bake,
-        } => bench_bsp(&mut table, scenes, *heuristics, *bake)?,
+            min_cost,
+            clinic,
+        } => bench_bsp(
+            &mut table,
+            scenes,
+            clinic,
+            *heuristics,
+            bake.then_some(*min_cost),
+        )?,
         What::Simplify { worlds } => bench_simplify(&mut table, worlds)?,
         What::See {
             scenes,

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use enfilade::bake::bsp::{Bsp, BspConfig, BspInput, Guide, Heuristic, bake_bsp};
 use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings, expected_cost, simplify};
 use enfilade::bake::{BakeContext, Silent};
-use enfilade::geom::scene::Role;
+use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
+use enfilade_testkit::clinic;
 
 use crate::world::read_world;
 
@@ -35,79 +36,112 @@ const HEURISTICS: [(&str, Heuristic); 4] = [
     ("max-ortho", Heuristic::MaxOrtho),
 ];
 
+/// One line a scene and heuristic; with a threshold each is baked to the end, cells merged up to it.
 pub(crate) fn bench_bsp(
     table: &mut Vec<String>,
-    scenes: &[PathBuf],
+    paths: &[PathBuf],
+    clinics: &[usize],
     all: bool,
-    bake: bool,
+    min_cost: Option<f64>,
 ) -> anyhow::Result<()> {
     table.push(
         "| scene | heuristic | polygons in | BSP s | polygons out | splits | leaves | portals | grouping s | \
-         valid | crossing | separators | cells before | cells | final portals |"
+         valid | crossing | separators | cells before | cells | fewer | final portals | fewer |"
             .into(),
     );
-    table.push("| --- | --- |".to_owned() + &" ---: |".repeat(13));
+    table.push("| --- | --- |".to_owned() + &" ---: |".repeat(15));
     let options = ImportOptions::default();
-    for path in scenes {
+    for path in paths {
         let imported = import(std::slice::from_ref(path), &[], &options)?;
-        let scene = &imported.scene;
-        let triangles: Vec<Triangle> = if scene.solids.is_empty() {
-            let sources = scene.triangle_sources(Role::Structural);
-            sources.map(|s| scene.world_triangle(s)).collect()
-        } else {
-            Vec::new()
-        };
-        let entities = scene.entities.iter().filter(|e| e.object.is_none());
-        let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
-        let input = BspInput {
-            triangles: &triangles,
-            solids: &scene.solids,
-            inside: &inside,
-        };
-        for (heuristic_name, heuristic) in HEURISTICS.into_iter().take(if all { 4 } else { 1 }) {
-            let start = cpu_seconds();
-            let bsp = Bsp::build(&input, heuristic, &Guide::default());
-            let built = cpu_seconds();
-            let found = bsp.grouping();
-            let grouped = cpu_seconds();
-            let c = bsp.counts();
-            let (cells, portals) = if bake {
-                let config = BspConfig {
-                    heuristic,
-                    simplify: SimplifySettings {
-                        min_cost: 50.0,
-                        ..SimplifySettings::default()
-                    },
-                    ..BspConfig::default()
-                };
-                let world = bake_bsp(scene, &config, &BakeContext::new(&Silent, None))?.world;
-                let (cells, portals) = (world.graph.cells.len(), world.graph.portals.len());
-                (cells.to_string(), portals.to_string())
-            } else {
-                ("-".to_owned(), "-".to_owned())
-            };
-            table.push(format!(
-                "| {} | {heuristic_name} | {} | {:.2} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {cells} | {portals} |",
-                name(path),
-                c.n_polygons,
-                built - start,
-                c.n_pieces,
-                c.n_splits,
-                c.n_leaves,
-                c.n_portals,
-                grouped - built,
-                found.n_valid,
-                found.n_crossing,
-                found.n_separators,
-                found.n_cells,
-            ));
-            if let Some(leak) = bsp.leak() {
-                let n = leak.points.len();
-                table.push(format!("{} leaks, by a path of {n} points", name(path)));
-            }
-        }
+        measure(table, &name(path), &imported.scene, all, min_cost)?;
+    }
+    let mut sizes: Vec<(f64, f64)> = Vec::new();
+    for &n in clinics {
+        sizes.push(measure(table, "clinic", &clinic(n, 1), all, min_cost)?);
+    }
+    for w in sizes.windows(2) {
+        let [(n, s), (m, t)] = [w[0], w[1]];
+        let exponent = (t / s).ln() / (m / n).ln();
+        table.push(format!(
+            "{n:.0} → {m:.0} polygons: time grows with power {exponent:.2}"
+        ));
     }
     Ok(())
+}
+
+/// Adds the lines of a scene; its polygons and the seconds of the last one's tree and grouping.
+fn measure(
+    table: &mut Vec<String>,
+    name: &str,
+    scene: &Scene,
+    all: bool,
+    min_cost: Option<f64>,
+) -> anyhow::Result<(f64, f64)> {
+    let (triangles, objects): (Vec<Triangle>, Vec<u32>) = if scene.solids.is_empty() {
+        let sources = scene.triangle_sources(Role::Structural);
+        sources.map(|s| (scene.world_triangle(s), s.object)).unzip()
+    } else {
+        (Vec::new(), Vec::new())
+    };
+    let entities = scene.entities.iter().filter(|e| e.object.is_none());
+    let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
+    let input = BspInput {
+        triangles: &triangles,
+        objects: &objects,
+        solids: &scene.solids,
+        inside: &inside,
+    };
+    let mut size = (0.0, 0.0);
+    for (heuristic_name, heuristic) in HEURISTICS.into_iter().take(if all { 4 } else { 1 }) {
+        let start = cpu_seconds();
+        let bsp = Bsp::build(&input, heuristic, &Guide::default());
+        let built = cpu_seconds();
+        let found = bsp.grouping();
+        let grouped = cpu_seconds();
+        let c = bsp.counts();
+        size = (c.n_polygons as f64, grouped - start);
+        let last = if let Some(min_cost) = min_cost {
+            let config = BspConfig {
+                heuristic,
+                simplify: SimplifySettings {
+                    min_cost,
+                    ..SimplifySettings::default()
+                },
+                ..BspConfig::default()
+            };
+            let world = bake_bsp(scene, &config, &BakeContext::new(&Silent, None))?.world;
+            let fewer = |n: usize, of: usize| 100.0 * (1.0 - n as f64 / of.max(1) as f64);
+            let (cells, portals) = (world.graph.cells.len(), world.graph.portals.len());
+            format!(
+                "{cells} | {:.1} % | {portals} | {:.1} %",
+                fewer(cells, c.n_leaves),
+                fewer(portals, c.n_portals)
+            )
+        } else {
+            "- | - | - | -".to_owned()
+        };
+        table.push(format!(
+            "| {name} | {heuristic_name} | {} | {:.2} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {last} |",
+            c.n_polygons,
+            built - start,
+            c.n_pieces,
+            c.n_splits,
+            c.n_leaves,
+            c.n_portals,
+            grouped - built,
+            found.n_valid,
+            found.n_crossing,
+            found.n_separators,
+            found.n_cells,
+        ));
+        if let Some(leak) = bsp.leak() {
+            table.push(format!(
+                "{name} leaks, by a path of {} points",
+                leak.points.len()
+            ));
+        }
+    }
+    Ok(size)
 }
 
 /// Expected triangles a view before and after, by both metrics, at the same share of portals.

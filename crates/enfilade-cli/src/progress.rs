@@ -4,7 +4,7 @@ use std::io::{IsTerminal, stderr};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use enfilade::bake::{BakeConfig, BakeContext, Progress};
+use enfilade::bake::{BakeConfig, Progress};
 use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -71,6 +71,8 @@ fn cost(stage: &str) -> [f64; 2] {
         "flood" => [0.04, 0.0],
         "merge basins" => [0.055, 0.0],
         "fit screens" => [0.03, 0.002],
+        "tree" => [0.0, 0.08],
+        "separators" => [0.0, 0.2],
         "cell complex" => [0.0, 0.015],
         "cells and portals" => [0.001, 0.012],
         "hand out geometry" => [0.0, 0.001],
@@ -162,7 +164,7 @@ impl BakeBar {
     const CELLS: usize = 30;
 
     /// A bar for a bake of `scene`; it shows nothing where standard error is no terminal.
-    pub(crate) fn new(scene: &Scene, config: &BakeConfig) -> Self {
+    pub(crate) fn new(scene: &Scene, config: &BakeConfig, stages: &[&str]) -> Self {
         let now = Instant::now();
         let is_shown = stderr().is_terminal();
         let (n_voxels, n_triangles) = if is_shown {
@@ -171,7 +173,7 @@ impl BakeBar {
             (0.0, 0.0)
         };
         let state = Arc::new(Mutex::new(Clock {
-            left: TimeLeft::new(BakeContext::STAGES, n_voxels, n_triangles),
+            left: TimeLeft::new(stages, n_voxels, n_triangles),
             began: now,
             stage_began: now,
         }));
@@ -265,6 +267,8 @@ fn work_of(scene: &Scene, config: &BakeConfig) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use enfilade::bake::BakeContext;
+
     use super::*;
 
     fn of_stages(expected: &[f64]) -> TimeLeft {
@@ -307,8 +311,8 @@ mod tests {
     }
 
     #[test]
-    fn every_stage_of_a_bake_has_a_measured_cost() {
-        for stage in BakeContext::STAGES {
+    fn every_stage_of_either_bake_has_a_measured_cost() {
+        for stage in BakeContext::STAGES.iter().chain(BakeContext::BSP_STAGES) {
             assert_ne!(cost(stage), cost("no such stage"), "{stage}");
         }
         let t = TimeLeft::new(BakeContext::STAGES, 0.0, 0.0);

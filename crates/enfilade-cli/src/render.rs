@@ -323,6 +323,14 @@ pub(crate) fn above(
         on_top: true,
     };
     let mut marks = Vec::new();
+    // Walls along the view have no side to be seen by: their edges where they are cut.
+    for segment in section(world, cut) {
+        marks.push(line(
+            Shape::Line(segment),
+            [0.03, 0.03, 0.04, 1.0],
+            width * 0.6,
+        ));
+    }
     for p in seen.portals() {
         let outline = world.graph.portals[p.0 as usize].outline.clone();
         marks.push(line(Shape::Outline(outline), [1.0, 0.42, 0.0, 1.0], width));
@@ -381,4 +389,27 @@ pub(crate) fn above(
         marks: &marks,
     };
     Ok(studio.picture_of(&frame, size)?)
+}
+
+/// Where a level plane cuts the structure.
+fn section(world: &World, height: f32) -> Vec<[[f32; 3]; 2]> {
+    let mut out = Vec::new();
+    for batch in &world.batches {
+        let p = &batch.primitive;
+        for t in p.indices.chunks_exact(3) {
+            let corners = [0, 1, 2].map(|k| p.positions[t[k] as usize]);
+            let mut ends = Vec::new();
+            for k in 0..3 {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                if (a[1] < height) != (b[1] < height) {
+                    let s = (height - a[1]) / (b[1] - a[1]);
+                    ends.push([0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * s));
+                }
+            }
+            if let [a, b] = ends[..] {
+                out.push([a, b]);
+            }
+        }
+    }
+    out
 }

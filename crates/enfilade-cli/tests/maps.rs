@@ -173,3 +173,125 @@ fn a_broken_map_is_refused_with_its_place() {
     );
     assert!(!Path::new(&world).exists());
 }
+
+/// Each portal's polygon, each separator's portals, and what is solid.
+fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
+    use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
+    use enfilade::geom::{Aabb, BoxTree, ConvexSolid, DVec3, Winding};
+    let entities = scene.entities.iter().filter(|e| e.object.is_none());
+    let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
+    let input = BspInput {
+        triangles: &[],
+        objects: &[],
+        solids: &scene.solids,
+        inside: &inside,
+    };
+    let bsp = Bsp::build(&input, Heuristic::Default, &Guide::default());
+    let portals: Vec<([u32; 2], Winding)> = bsp.portals().collect();
+    let separators = bsp.separators();
+    let boxes: Vec<Aabb> = scene.solids.iter().map(ConvexSolid::aabb).collect();
+    let tree = BoxTree::new(&boxes);
+    // Brushes meet their neighbors within the tree's tolerance, some hundredths of a millimeter at this
+    // size; corners that rounding moved may stray by a few of those.
+    let eps = 1e-3;
+    let is_on_solid = |p: DVec3| {
+        let mut found = false;
+        tree.for_each_in_box(&Aabb::new(p, p).expanded(eps), |i| {
+            found |= scene.solids[i as usize].contains(p, -eps);
+        });
+        found
+    };
+    for s in &separators {
+        for &p in s {
+            let points = &portals[p].1.points;
+            for (i, &a) in points.iter().enumerate() {
+                let b = points[(i + 1) % points.len()];
+                for k in 0..=8 {
+                    let at = a.lerp(b, f64::from(k) / 8.0);
+                    let on_own = || {
+                        s.iter()
+                            .any(|&o| o != p && portals[o].1.contains_in_plane(at, eps))
+                    };
+                    assert!(is_on_solid(at) || on_own(), "{name}: {at} is on nothing");
+                }
+            }
+        }
+    }
+    // Joins leaves across all portals but some; the root of a set is its least leaf.
+    let n_leaves = portals.iter().flat_map(|p| p.0).max().unwrap_or(0) as usize + 1;
+    let of_separator: std::collections::BTreeSet<usize> =
+        separators.iter().flatten().copied().collect();
+    let mut set: Vec<usize> = (0..n_leaves).collect();
+    fn root(set: &mut [usize], mut x: usize) -> usize {
+        while set[x] != x {
+            set[x] = set[set[x]];
+            x = set[x];
+        }
+        x
+    }
+    for (i, (leaves, _)) in portals.iter().enumerate() {
+        if !of_separator.contains(&i) {
+            let [a, b] = leaves.map(|l| root(&mut set, l as usize));
+            set[a.max(b)] = a.min(b);
+        }
+    }
+    for (k, s) in separators.iter().enumerate() {
+        let joins = s.iter().any(|&p| {
+            portals[p]
+                .0
+                .map(|l| root(&mut set, l as usize))
+                .windows(2)
+                .any(|w| w[0] != w[1])
+        });
+        assert!(joins, "{name}: nothing touches where separator {k} was");
+    }
+    println!("{name}: {} separators hold", separators.len());
+}
+
+#[test]
+fn separators_of_levels_end_on_solids_and_each_parts_two_cells() {
+    use enfilade::import::{ImportOptions, import};
+    check_separators("clinic", &enfilade_testkit::clinic(4000, 3));
+    let scenes = std::env::var_os("ENFILADE_SCENES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
+        PathBuf::from,
+    );
+    let mut maps: Vec<PathBuf> = std::fs::read_dir(scenes.join("quake"))
+        .map(|dir| dir.filter_map(|e| Some(e.ok()?.path())).collect())
+        .unwrap_or_default();
+    maps.retain(|p| p.extension().is_some_and(|e| e == "map"));
+    maps.sort();
+    if maps.is_empty() {
+        println!("skipped: no maps in {}", scenes.display());
+    }
+    for map in &maps {
+        let imported = import(std::slice::from_ref(map), &[], &ImportOptions::default()).unwrap();
+        check_separators(&map.file_stem().unwrap().to_string_lossy(), &imported.scene);
+    }
+}
+
+#[test]
+fn a_brush_that_stands_twice_changes_nothing_but_its_own_line() {
+    let folder = Folder::new("twice");
+    let (input, world) = (folder.path("twice.map"), folder.path("w.glb"));
+    let inspect = |text: &str| {
+        std::fs::write(&input, text).unwrap();
+        let out = enfilade(&["bake", &input, "-o", &world]);
+        assert!(out.status.success(), "{}", self::text(&out.stderr));
+        assert!(
+            enfilade(&["verify", &world, "--rays", "20000"])
+                .status
+                .success()
+        );
+        let out = enfilade(&["inspect", "--json", &world]);
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        let n = |of: &str| json[of].as_array().unwrap().len();
+        (n("cells"), n("portals"))
+    };
+    let (once, wall) = (map(-16), boxed([128, 0, 0], [144, 48, 96]));
+    // The same brush again, and one that shares a face's plane with it and reaches further.
+    let again = wall.clone() + &boxed([128, 0, -8], [144, 40, 96]);
+    let twice = once.replacen(&wall, &(wall.clone() + &again), 1);
+    assert_ne!(once, twice);
+    assert_eq!(inspect(&once), inspect(&twice));
+}

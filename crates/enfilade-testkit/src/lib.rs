@@ -15,6 +15,7 @@
 //! ```
 
 mod cave;
+mod clinic;
 pub mod furniture;
 mod gjorup;
 mod graphs;
@@ -34,6 +35,7 @@ mod truth;
 mod truth_json;
 
 pub use cave::cave;
+pub use clinic::clinic;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use graphs::{GridParams, courtyard, room_grid};
 pub use house::furnished_house;

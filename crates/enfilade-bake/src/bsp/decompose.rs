@@ -8,11 +8,15 @@ use crate::assemble::{Parts, assemble};
 use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
 use crate::pipeline::{input_hash, structural_triangles};
 use crate::simplify::{SimplifySettings, simplify};
-use crate::watershed::{OUTDOORS, Screen, bounds_of};
+use crate::watershed::{
+    MergeSettings, OUTDOORS, Screen, bounds_of, closure_triangles, find_stairs, slab_heights,
+};
 use crate::{BakeContext, BakeError, BakeOutput};
 
 use super::cells::{self, Cells, NO_CELL};
-use super::{Bsp, BspInput, Guide, Heuristic, leak, separator, shape, split};
+use super::inside::Soup;
+use super::rooms::{self, Evidence};
+use super::{Bsp, BspInput, Guide, Heuristic, arrange, leak, separator, shape, split};
 
 /// Settings of a bake by binary space partition.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +27,23 @@ pub struct BspConfig {
     pub guide: Guide,
     /// Bounds on the cells, and what a cell costs. Cells above the upper bound are split.
     pub simplify: SimplifySettings,
+    /// Whether cells become rooms by the shape of the openings between them.
+    pub rooms: Rooms,
+    /// What that goes by: the same settings as in the watershed builder.
+    pub merge: MergeSettings,
+}
+
+/// Which separators are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rooms {
+    /// Those of [`Rooms::Always`] where structure is triangles, those of [`Rooms::Never`] where it is
+    /// brushes: a level is a chain of passages as wide as what they join, and would be one room.
+    #[default]
+    Auto,
+    /// Those that are narrower than what lies beside them.
+    Always,
+    /// All that cross no other (Lefebvre & Hornus 2003, §2.1 step 2).
+    Never,
 }
 
 /// Finds rooms and doorways of a scene by binary space partition and separators.
@@ -38,7 +59,7 @@ pub fn bake_bsp(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     // 1. Leaves and their portals; separators; cells.
-    context.stage(4)?;
+    context.bsp_stage(0)?;
     let (sources, triangles) = structural_triangles(scene);
     if triangles.is_empty() {
         return Err(BakeError::NothingStructural {
@@ -46,16 +67,55 @@ pub fn bake_bsp(
         });
     }
     let bvh = Bvh::build(&triangles);
-    let bsp = Bsp::build(
-        &input_of(scene, &triangles, &leak::inside_of(scene)),
+    // Stairs stand in rooms and bound none; brushes say by their class what is detail.
+    let is_stair = if scene.solids.is_empty() {
+        find_stairs(&sources, &triangles)
+    } else {
+        vec![false; triangles.len()]
+    };
+    let of_kind = |stairs: bool| -> Vec<Triangle> {
+        let all = triangles.iter().zip(&is_stair);
+        all.filter(|t| *t.1 == stairs).map(|t| *t.0).collect()
+    };
+    let (walls, stairs) = (of_kind(false), of_kind(true));
+    let objects: Vec<u32> = sources
+        .iter()
+        .zip(&is_stair)
+        .filter(|s| !*s.1)
+        .map(|s| s.0.object)
+        .collect();
+    let mut bsp = Bsp::build(
+        &input_of(scene, &walls, &objects, &leak::inside_of(scene)),
         config.heuristic,
         &config.guide,
     );
     let counts = bsp.counts();
-    let parted = cells::part(&bsp, separator::find(&bsp));
-    let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+    context.bsp_stage(1)?;
+    let by_shape = match config.rooms {
+        Rooms::Auto => scene.solids.is_empty(),
+        rooms => rooms == Rooms::Always,
+    };
+    let (parted, shapes) = if by_shape {
+        let settings = &config.merge;
+        arrange::refine(&mut bsp, settings);
+        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+        let evidence = Evidence {
+            shapes: &shapes,
+            closures: &Bvh::build(&closure_triangles(scene)),
+            slabs: &slab_heights(&walls),
+        };
+        let parted = rooms::part(&bsp, separator::find(&bsp), &evidence, settings);
+        (parted, shapes)
+    } else {
+        let parted = cells::part(&bsp, separator::find(&bsp));
+        (parted, shape::shapes(&bsp.tree, &bsp.tolerance))
+    };
     let mut screens = screens_of(&bsp, &parted);
     let mut votes = Votes::of(&bsp, &parted, &shapes);
+    if !stairs.is_empty() {
+        let matter = Soup::of(&stairs, &[]);
+        votes.0.retain(|v| !matter.is_inside(v.point));
+    }
     let n_before = parted.n_cells;
     let n_separators = parted.separators.len();
     if let Some(bound) = config.simplify.max_cost {
@@ -63,20 +123,24 @@ pub fn bake_bsp(
     }
 
     // 2. The complex makes it exact.
-    context.stage(5)?;
+    context.bsp_stage(2)?;
     let windings: Vec<Winding> = screens.iter().map(|s| s.winding.clone()).collect();
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         screens: &windings,
         bounds: bounds_of(&triangles).expanded(1.0),
     });
-    context.stage(6)?;
-    // A cell of the tree is a cell whatever its size: what is too small is the simplifier's to say.
-    let settings = LabelSettings {
-        min_volume: 0.0,
-        min_room: 0.0,
-        dominance: 1.0,
-        strong_share: 0.2,
+    context.bsp_stage(3)?;
+    let settings = if scene.solids.is_empty() {
+        LabelSettings::default()
+    } else {
+        // A cell of the tree is a cell whatever its size: what is too small is the simplifier's to say.
+        LabelSettings {
+            min_volume: 0.0,
+            min_room: 0.0,
+            dominance: 1.0,
+            strong_share: 0.2,
+        }
     };
     let partition = complex.partition(&votes.0, &settings);
     let outward = complex.opening_tolerance();
@@ -100,7 +164,7 @@ pub fn bake_bsp(
     drop(complex);
 
     // 3. Geometry to the cells that see it, and cells within their bounds.
-    context.stage(7)?;
+    context.bsp_stage(4)?;
     let leaks = partition.leaks.clone();
     let settings = config.to_settings();
     let world = assemble(&Parts {
@@ -140,6 +204,10 @@ impl BspConfig {
             "bsp.heuristic".to_owned(),
             format!("{:?}", self.heuristic).to_lowercase(),
         );
+        out.insert(
+            "bsp.rooms".to_owned(),
+            format!("{:?}", self.rooms).to_lowercase(),
+        );
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
         out.insert("bsp.grid".to_owned(), number(self.guide.grid));
         out.insert("bsp.tetrahedra".to_owned(), number(self.guide.tetrahedra));
@@ -153,6 +221,7 @@ impl BspConfig {
 pub(super) fn input_of<'a>(
     scene: &'a Scene,
     triangles: &'a [Triangle],
+    objects: &'a [u32],
     inside: &'a [DVec3],
 ) -> BspInput<'a> {
     let is_brushes = !scene.solids.is_empty()
@@ -163,6 +232,7 @@ pub(super) fn input_of<'a>(
             .all(|o| o.reason.starts_with("map: "));
     BspInput {
         triangles,
+        objects,
         solids: if is_brushes { &scene.solids } else { &[] },
         inside: if is_brushes { inside } else { &[] },
     }

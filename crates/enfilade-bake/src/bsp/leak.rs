@@ -126,6 +126,7 @@ pub fn find_leak(scene: &Scene) -> Option<LeakPath> {
     }
     let input = BspInput {
         triangles: &[],
+        objects: &[],
         solids,
         inside: &inside,
     };

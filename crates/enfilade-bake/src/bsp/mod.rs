@@ -12,6 +12,10 @@
 //! | 1: portals of the leaves | `portals` |
 //! | 2: separators, valid and invalid | `separator` |
 //! | 3: cells, crossing separators | `cells` |
+//! | separators that the arrangement would have shown (§3.0.2) | `arrange` |
+//! | rooms: separators that are a pinch, in buildings | `rooms` |
+//! | matter, where surfaces are triangles | `inside` |
+//! | 4: cells above the bound | `split` |
 //! | leaks, as a path | `leak` |
 //!
 //! Where it departs from the paper: with brushes, the surface of their union is made first and what
@@ -19,11 +23,14 @@
 //! leaves but from [`crate::complex`], which takes the separators as screens and the cells as votes, so
 //! that a separator that rounding spoils costs a room and never a promise.
 
+mod arrange;
 mod cells;
 mod decompose;
 mod guide;
+mod inside;
 mod leak;
 mod portals;
+mod rooms;
 mod separator;
 mod shape;
 mod split;
@@ -32,7 +39,7 @@ mod tree;
 
 use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding};
 
-pub use decompose::{BspConfig, bake_bsp};
+pub use decompose::{BspConfig, Rooms, bake_bsp};
 pub use guide::Guide;
 pub use leak::{LeakPath, find_leak};
 
@@ -84,6 +91,8 @@ impl Tolerance {
 pub struct BspInput<'a> {
     /// Surfaces where there are no solids: triangles, solid behind, empty before. [Units: wu]
     pub triangles: &'a [Triangle],
+    /// The object of each triangle, to tell what is inside one; empty where all are one.
+    pub objects: &'a [u32],
     /// Brushes; where there are some, they are the surfaces.
     pub solids: &'a [ConvexSolid],
     /// Points known to be inside, such as those of entities; with solids, what they cannot reach is
@@ -165,6 +174,9 @@ impl Bsp {
                     });
                     is_inside
                 });
+            } else if !input.triangles.is_empty() {
+                let soup = inside::Soup::of(input.triangles, input.objects);
+                settle(&mut tree, &tolerance, true, &|p| soup.is_inside(p));
             }
             let mut bsp = Self {
                 portals: portals::leaf_portals(&tree, &tolerance),
@@ -235,6 +247,15 @@ impl Bsp {
             n_separators: cells.separators.len(),
             n_cells: cells.n_cells,
         }
+    }
+
+    /// The separators that part cells once those that cross others are gone, each as places in
+    /// [`Bsp::portals`].
+    #[must_use]
+    pub fn separators(&self) -> Vec<Vec<usize>> {
+        let parted = cells::part(self, separator::find(self));
+        let portals = |s: separator::Separator| s.portals.iter().map(|&p| p as usize).collect();
+        parted.separators.into_iter().map(portals).collect()
     }
 
     /// The way out that a point inside has, if there are solids and it has one.

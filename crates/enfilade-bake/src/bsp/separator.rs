@@ -238,6 +238,15 @@ fn shared(a: DVec3, b: DVec3, other: &[DVec3], eps: f64) -> Option<Interval> {
     })
 }
 
+/// Whether two polygons have a part of an edge in common, whichever way each turns.
+pub(super) fn touch(a: &[DVec3], b: &[DVec3], eps: f64) -> bool {
+    let n = a.len();
+    (0..n).any(|i| {
+        let (p, q) = (a[i], a[(i + 1) % n]);
+        p.distance(q) > 4.0 * eps && (shared(p, q, b, eps).or(shared(q, p, b, eps))).is_some()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

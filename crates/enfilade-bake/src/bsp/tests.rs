@@ -50,6 +50,7 @@ fn bsp_of(solids: &[ConvexSolid], inside: &[DVec3], heuristic: Heuristic, guide:
     Bsp::build(
         &BspInput {
             triangles: &[],
+            objects: &[],
             solids,
             inside,
         },
@@ -331,12 +332,77 @@ fn worlds_keep_their_promises_whatever_the_settings() {
 #[test]
 fn rooms_of_a_row_are_found_and_large_ones_are_cut() {
     let scene = scene_of(&row(3), &[INSIDE]);
-    let world = baked(&scene, &BspConfig::default());
-    assert_eq!(world.graph.cells.len(), 5);
-    assert_eq!(world.graph.portals.len(), 4);
+    let count = |config: &BspConfig| {
+        let g = baked(&scene, config).graph;
+        (g.cells.len(), g.portals.len())
+    };
+    // Every separator: both faces of each wall, the doorway between them a cell.
+    assert_eq!(count(&BspConfig::default()), (5, 4));
+    // By their shape: a doorway is part of a room.
+    let by_shape = BspConfig {
+        rooms: Rooms::Always,
+        ..BspConfig::default()
+    };
+    assert_eq!(count(&by_shape), (3, 2));
     let mut config = BspConfig::default();
     config.simplify.max_cost = Some(8.0);
-    assert!(baked(&scene, &config).graph.cells.len() > 5);
+    assert!(count(&config).0 > 5);
+}
+
+#[test]
+fn a_building_of_overlapping_walls_has_a_cell_a_room_however_it_is_turned() {
+    // Walls that run into each other and into the slabs, as triangles that nobody knows to be solids.
+    let mut solids = row(3);
+    solids.push(boxed([-0.3, -0.3, -0.4], [13.4, 3.2, 0.0]));
+    solids.push(boxed([4.1, -0.2, 3.0], [4.3, 3.3, 4.4]));
+    for turn in [0.0, 0.3, 1.1_f64] {
+        let mut scene = scene_of(&solids, &[]);
+        scene.solids.clear();
+        scene.objects[0].transform = DMat4::from_rotation_y(turn);
+        let g = baked(&scene, &BspConfig::default()).graph;
+        let rooms: Vec<f64> = g
+            .cells
+            .iter()
+            .filter(|c| !c.outdoor)
+            .map(|c| c.volume.into())
+            .collect();
+        assert_eq!(rooms.len(), 3, "{turn}: {rooms:?}");
+        // 4 × 3 × 4 m each, and two doorways of 1 m³ that are part of a room beside them.
+        assert!(
+            rooms.iter().all(|v| (47.9..50.1).contains(v)),
+            "{turn}: {rooms:?}"
+        );
+        assert_eq!(g.portals.len(), 2, "{turn}");
+    }
+}
+
+#[test]
+fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
+    // Guides along the jambs and the lintel leave no cut in the planes of the walls.
+    let guide = Guide {
+        boxes: vec![Aabb::new(
+            DVec3::new(-0.1, 0.0, 1.0),
+            DVec3::new(8.6, 2.0, 2.0),
+        )],
+        ..Guide::default()
+    };
+    let mut bsp = bsp_of(&row(2), &[INSIDE], Heuristic::Default, &guide);
+    let faces = |bsp: &Bsp| {
+        let at = |s: &separator::Separator, x: f64| {
+            let plane = &bsp.tree.planes[s.plane as usize];
+            plane.normal.x.abs() == 1.0
+                && plane.signed_distance(DVec3::new(x, 0.0, 0.0)).abs() < 1e-3
+        };
+        let found = separator::find(bsp);
+        [4.0, 4.5].map(|x| {
+            found
+                .iter()
+                .any(|s| at(s, x) && (s.area - 2.0).abs() < 1e-6)
+        })
+    };
+    assert_eq!(faces(&bsp), [false; 2], "the guide hides them");
+    arrange::refine(&mut bsp, &crate::watershed::MergeSettings::default());
+    assert_eq!(faces(&bsp), [true; 2]);
 }
 
 #[test]

@@ -23,6 +23,7 @@ pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,
 };
+pub(crate) use regions::{connected_count, rim_share};
 pub use rims::rim_caps;
 pub use slabs::{cut_at_slabs, slab_heights};
 pub use stairs::find_stairs;

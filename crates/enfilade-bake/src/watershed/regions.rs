@@ -542,7 +542,7 @@ impl Merger<'_> {
 }
 
 /// Share of the rim of `mask` (what lies within two steps of it) where `is_wall` holds.
-fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
+pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
     let (mut rim, mut wall) = (0_usize, 0_usize);
     for j in 0..side[1] {
         for i in 0..side[0] {
@@ -561,7 +561,7 @@ fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -
 
 /// Points of `inside` (a lattice `side` wide and high) that hang together with a seed. Uses up
 /// `inside`. What lies behind a wall beside the opening is no part of the section at the opening.
-fn connected_count(
+pub(crate) fn connected_count(
     inside: &mut [bool],
     side: [usize; 2],
     seeds: &[bool],

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
-use enfilade::bake::bsp::{BspConfig, Guide, Heuristic};
+use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
+use enfilade::bake::watershed::MergeSettings;
 use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{ImportOptions, RoleRules, Up};
 use serde::de::{Deserialize, Deserializer, Error};
@@ -57,7 +58,8 @@ pub(crate) struct BakeOptions {
     /// Go on although the map leaks.
     #[arg(long)]
     pub(super) allow_leak: bool,
-    /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50].
+    /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50 in
+    /// levels of brushes, 0 elsewhere].
     #[arg(long, value_name = "N")]
     min_cost: Option<u32>,
     /// With `--method bsp`: cells of more triangles are cut, and none is merged to more.
@@ -248,6 +250,8 @@ struct ConfigFile {
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct BspTable {
+    /// Whether the shape of openings makes rooms of cells.
+    rooms: Option<bool>,
     heuristic: Option<HeuristicName>,
     grid: Option<Length>,
     tetrahedra: Option<Length>,
@@ -300,7 +304,11 @@ impl ConfigFile {
 }
 
 /// What the partition is told, resolved.
-fn resolve_bsp(options: &BakeOptions, table: BspTable) -> anyhow::Result<BspConfig> {
+fn resolve_bsp(
+    options: &BakeOptions,
+    table: BspTable,
+    merge: &MergeSettings,
+) -> anyhow::Result<BspConfig> {
     let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
         let normal = DVec3::new(nx, ny, nz).try_normalize();
         let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
@@ -359,6 +367,12 @@ fn resolve_bsp(options: &BakeOptions, table: BspTable) -> anyhow::Result<BspConf
                 .collect(),
         },
         simplify,
+        rooms: match table.rooms {
+            None => Rooms::Auto,
+            Some(true) => Rooms::Always,
+            Some(false) => Rooms::Never,
+        },
+        merge: merge.clone(),
     })
 }
 
@@ -371,6 +385,8 @@ pub(super) struct Resolved {
     pub(super) import: ImportOptions,
     pub(super) watershed: BakeConfig,
     pub(super) bsp: BspConfig,
+    /// Nothing was said of what cells are merged below: that is for levels of brushes alone.
+    pub(super) merges_brushes_only: bool,
 }
 
 /// Command line and settings file, resolved.
@@ -406,8 +422,9 @@ pub(super) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     }
     Ok(Resolved {
         import: import_options,
+        merges_brushes_only: options.min_cost.is_none() && file.bsp.min_cost.is_none(),
+        bsp: resolve_bsp(options, file.bsp, &config.merge)?,
         watershed: config,
-        bsp: resolve_bsp(options, file.bsp)?,
     })
 }
 

@@ -477,7 +477,8 @@ impl Open {
         let leaves = self.leaves(world);
         let picture = studio.picture(&camera, self.culling, self.style(), &leaves, size)?;
         write_atomically(&to, &picture.to_png()?)?;
-        self.say(format!("wrote {}", to.display()));
+        let [drawn, ..] = self.shown.counts;
+        self.say(format!("wrote {}, {drawn} triangles", to.display()));
         Ok(())
     }
 }

@@ -1,0 +1,150 @@
+//! Openings in the plane of a wall that the tree did not cut along that plane.
+//!
+//! A tree that has cut a doorway out by the planes of its jambs and lintel has no reason left to cut it by
+//! the plane of the wall's face, and the separator there is missed. Lefebvre & Hornus 2003 (§3.0.2) say
+//! that the arrangement of all planes would show them all, and that it is too large. It need not be made:
+//! the section of a surface's plane with the open leaves, around its surfaces, is tried for separators
+//! as if it were portals, and only the leaves under those that hold are cut.
+//!
+//! Time: each plane visits the leaves around its own surfaces, near-linear where they are spread out.
+
+use enfilade_geom::Aabb;
+use rayon::prelude::*;
+
+use crate::complex::poly::{self, Poly, Sides};
+use crate::watershed::MergeSettings;
+
+use super::portals::{LeafPortal, leaf_portals};
+use super::tree::{Node, Tree, leaf_index};
+use super::{Bsp, rooms, separator};
+
+/// Cuts the leaves where a surface's plane closes an opening that is narrower than what lies beside it.
+pub(super) fn refine(bsp: &mut Bsp, settings: &MergeSettings) {
+    let mut around: Vec<Aabb> = vec![Aabb::EMPTY; bsp.tree.planes.len()];
+    for f in &bsp.surfaces {
+        let b = &mut around[f.plane as usize];
+        *b = b.union(Aabb::of_points(&f.points));
+    }
+    let n_portals = bsp.portals.len();
+    let trial: Vec<LeafPortal> = around
+        .par_iter()
+        .enumerate()
+        .filter(|(_, b)| !b.is_empty())
+        .flat_map_iter(|(plane, b)| {
+            let mut out = Vec::new();
+            let bounds = b.expanded(settings.surround);
+            if let Some(section) =
+                poly::section_of_box(&bsp.tree.planes[plane], &bounds, bsp.tolerance.cut)
+            {
+                sections(bsp, bsp.tree.root, plane as u32, &section, &mut out);
+            }
+            out
+        })
+        .collect();
+    bsp.portals.extend(trial);
+    let cuts: Vec<(u32, Poly)> = separator::find(bsp)
+        .into_par_iter()
+        .filter(|s| s.portals.iter().any(|&p| p as usize >= n_portals))
+        .filter(|s| rooms::may_be_pinch(bsp, s, settings))
+        .flat_map_iter(|s| {
+            let is_trial = move |p: &u32| *p as usize >= n_portals;
+            s.portals.into_iter().filter(is_trial)
+        })
+        .map(|p| {
+            let p = &bsp.portals[p as usize];
+            (p.plane, p.points.clone())
+        })
+        .collect();
+    bsp.portals.truncate(n_portals);
+    if cuts.is_empty() {
+        return;
+    }
+    for (plane, points) in cuts {
+        let (root, eps) = (bsp.tree.root, bsp.tolerance.cut);
+        bsp.tree.root = cut(&mut bsp.tree, &mut bsp.is_open, root, plane, &points, eps);
+    }
+    bsp.portals = leaf_portals(&bsp.tree, &bsp.tolerance);
+    bsp.drop_closed_portals();
+}
+
+/// What of a polygon in `plane` lies within open leaves and in no node's plane.
+fn sections(
+    bsp: &Bsp,
+    child: i32,
+    plane: u32,
+    points: &[enfilade_geom::DVec3],
+    out: &mut Vec<LeafPortal>,
+) {
+    if child < 0 {
+        let leaf = leaf_index(child);
+        if bsp.is_open[leaf as usize] && poly::width(points) > bsp.tolerance.width {
+            out.push(LeafPortal {
+                leaves: [leaf; 2],
+                plane,
+                points: points.into(),
+            });
+        }
+        return;
+    }
+    let node = &bsp.tree.nodes[child as usize];
+    if node.plane == plane {
+        // Its portals are there already.
+        return;
+    }
+    match poly::split(
+        points,
+        &bsp.tree.planes[node.plane as usize],
+        bsp.tolerance.plane,
+    ) {
+        Sides::On => {}
+        Sides::Front => sections(bsp, node.children[0], plane, points, out),
+        Sides::Back => sections(bsp, node.children[1], plane, points, out),
+        Sides::Both(a, b) => {
+            sections(bsp, node.children[0], plane, &a, out);
+            sections(bsp, node.children[1], plane, &b, out);
+        }
+    }
+}
+
+/// Cuts the leaves that a polygon passes through by its plane; returns what `child` has become.
+fn cut(
+    tree: &mut Tree,
+    is_open: &mut Vec<bool>,
+    child: i32,
+    plane: u32,
+    points: &[enfilade_geom::DVec3],
+    eps: f64,
+) -> i32 {
+    if child < 0 {
+        let leaf = leaf_index(child) as usize;
+        if !is_open[leaf] {
+            return child;
+        }
+        let new = tree.contents.len() as i32;
+        tree.contents.push(tree.contents[leaf]);
+        is_open.push(true);
+        tree.nodes.push(Node {
+            plane,
+            children: [child, -1 - new],
+            on_start: tree.on_plane.len() as u32,
+        });
+        return tree.nodes.len() as i32 - 1;
+    }
+    let node = tree.nodes[child as usize];
+    if node.plane == plane {
+        return child;
+    }
+    let parts = match poly::split(points, &tree.planes[node.plane as usize], eps) {
+        Sides::On => [None, None],
+        Sides::Front => [Some(points.into()), None],
+        Sides::Back => [None, Some(points.into())],
+        Sides::Both(a, b) => [Some(a), Some(b)],
+    };
+    for (side, part) in parts.into_iter().enumerate() {
+        if let Some(part) = part {
+            let now = cut(tree, is_open, node.children[side], plane, &part, eps);
+            tree.nodes[child as usize].children[side] = now;
+        }
+    }
+    child
+}

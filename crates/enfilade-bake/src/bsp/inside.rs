@@ -1,0 +1,127 @@
+//! Whether a point is in matter, where matter is no list of solids but triangles.
+//!
+//! Walls, slabs and columns are modeled as closed surfaces that overlap each other, so neither the
+//! surface next to a point nor the parity of crossings tells. The number of surfaces of one object that a
+//! ray leaves less those it enters is the object's winding number. Objects are asked one by one, so that a
+//! ceiling that is a mere sheet says nothing of the wall beside it; where an object has holes, rays
+//! disagree, and the majority of them decides.
+
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use smallvec::SmallVec;
+
+/// Directions that no wall of a building runs along; an odd number, so that there is a majority.
+const DIRECTIONS: [[f64; 3]; 7] = [
+    [0.831, 0.417, 0.368],
+    [-0.771, 0.213, 0.600],
+    [0.117, -0.901, 0.418],
+    [-0.293, 0.911, -0.290],
+    [0.513, 0.329, -0.793],
+    [-0.619, -0.447, -0.646],
+    [0.377, -0.353, 0.856],
+];
+
+/// Triangles that are asked what lies within them.
+pub(super) struct Soup<'a> {
+    bvh: Bvh,
+    /// Which object each is part of; none says that all are of one.
+    objects: &'a [u32],
+}
+
+impl<'a> Soup<'a> {
+    pub(super) fn of(triangles: &[Triangle], objects: &'a [u32]) -> Self {
+        Self {
+            bvh: Bvh::build(triangles),
+            objects,
+        }
+    }
+
+    /// Whether there is an object of which most rays from `p` leave more surfaces than they enter.
+    pub(super) fn is_inside(&self, p: DVec3) -> bool {
+        let mut n_inside: SmallVec<[(u32, usize); 8]> = SmallVec::new();
+        for direction in DIRECTIONS {
+            let ray = Ray {
+                origin: p,
+                direction: DVec3::from(direction),
+                t_max: f64::INFINITY,
+            };
+            let mut hits: SmallVec<[(u32, i32); 32]> = SmallVec::new();
+            self.bvh.for_each_hit(&ray, |h| {
+                let object = self.objects.get(h.triangle as usize).copied().unwrap_or(0);
+                hits.push((object, if h.front { -1 } else { 1 }));
+            });
+            hits.sort_unstable();
+            for of_one in hits.chunk_by(|a, b| a.0 == b.0) {
+                if of_one.iter().map(|h| h.1).sum::<i32>() > 0 {
+                    match n_inside.iter_mut().find(|n| n.0 == of_one[0].0) {
+                        Some(n) => n.1 += 1,
+                        None => n_inside.push((of_one[0].0, 1)),
+                    }
+                }
+            }
+        }
+        n_inside.iter().any(|n| n.1 > DIRECTIONS.len() / 2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A closed box, seen from outside.
+    fn boxed(min: DVec3, max: DVec3) -> Vec<Triangle> {
+        let at = |i: usize| {
+            DVec3::new(
+                if i & 1 == 0 { min.x } else { max.x },
+                if i & 2 == 0 { min.y } else { max.y },
+                if i & 4 == 0 { min.z } else { max.z },
+            )
+        };
+        let quads = [
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+        ];
+        quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .map(|t| t.map(at))
+            .collect()
+    }
+
+    #[test]
+    fn overlapping_boxes_are_matter_and_what_they_enclose_is_air() {
+        // Four walls and two slabs that run into each other at every edge, and a missing triangle.
+        let mut all = Vec::new();
+        for axis in 0..3 {
+            for side in 0..2 {
+                let (mut min, mut max) = (DVec3::splat(-1.0), DVec3::splat(5.0));
+                if side == 0 {
+                    max[axis] = 0.0;
+                } else {
+                    min[axis] = 4.0;
+                }
+                all.extend(boxed(min, max));
+            }
+        }
+        // And a sheet in mid-air that faces the floor, as ceilings are modeled.
+        let sheet = [[-9.0, 3.9, -9.0], [20.0, 3.9, -9.0], [-9.0, 3.9, 20.0]].map(DVec3::from);
+        all.push(sheet);
+        let objects: Vec<u32> = (0..all.len() as u32).map(|t| t / 12).collect();
+        for soup in [Soup::of(&all, &objects), Soup::of(&all[1..], &objects[1..])] {
+            for k in 0..1000 {
+                // A lattice off the walls' faces.
+                let p = DVec3::new(
+                    f64::from(k % 10) * 0.6 - 0.73,
+                    f64::from(k / 10 % 10) * 0.6 - 0.77,
+                    f64::from(k / 100) * 0.6 - 0.71,
+                );
+                let is_air = p.cmpgt(DVec3::ZERO).all() && p.cmplt(DVec3::splat(4.0)).all();
+                assert_eq!(soup.is_inside(p), !is_air, "{p}");
+            }
+            assert!(!soup.is_inside(DVec3::splat(7.0)));
+        }
+    }
+}

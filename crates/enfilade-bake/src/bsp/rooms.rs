@@ -1,0 +1,760 @@
+//! From cells to rooms: cells are joined across separators that are no pinch.
+//!
+//! Separators of a building stand in every plane of it: at both faces of a wall, along every pier and
+//! beam. Lefebvre & Hornus 2003 (§3) let a cost bound choose among them; in a building that joins a toilet
+//! to its corridor before it joins the two halves of a hall, for a room has fewer triangles than a stair. So
+//! the watershed's measure is taken here, too (`watershed/regions.rs`): an opening parts two rooms when it
+//! is narrower than the sections of space beside it. It is the same rule with the same settings; sections
+//! are looked up in the tree. Crossing separators need no choosing: all are kept until one is no pinch.
+//!
+//! Time: a look-up in the tree for each of some ten thousand points around a separator, once; each merge
+//! weighs the openings of the merged cell anew.
+
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::sync::OnceLock;
+
+use enfilade_geom::{Aabb, Bvh, DVec3};
+use rayon::prelude::*;
+
+use crate::complex::poly;
+use crate::watershed::{MergeSettings, connected_count, rim_share};
+
+use super::Bsp;
+use super::cells::{self, Cells, NO_CELL};
+use super::separator::{self, Separator};
+use super::shape::Shape;
+
+/// Points of a lattice along its longer side, and its least step. [Units: wu]
+const POINTS: f64 = 40.0;
+const MIN_STEP: f64 = 0.1;
+/// Sections on each side of a separator.
+const SLICES: usize = 6;
+/// A door leaf this near to a separator's plane closes it. [Units: wu]
+const CLOSURE_REACH: f64 = 0.25;
+/// No leaf, no portal.
+const NONE: u32 = u32::MAX;
+
+/// What lies around a separator.
+struct Lattice {
+    side: [usize; 2],
+    step: f64,
+    /// The portal of the separator under each point, by its place in the separator's list.
+    portal_at: Vec<u32>,
+    /// Leaves at each point of the sections; the first, third, … lie on the positive side, outwards.
+    slices: Vec<OnceLock<Vec<u32>>>,
+    base: DVec3,
+    across: [DVec3; 3],
+}
+
+/// How narrow an opening is.
+struct Section {
+    /// Its area by the smaller of the two sections beside it.
+    ratio: f64,
+    /// Share of its rim that is a wall with both cells beside it.
+    wall: f64,
+}
+
+impl Lattice {
+    fn of(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> Self {
+        let plane = &bsp.tree.planes[s.plane as usize];
+        let (u, v) = plane.basis();
+        let polygon = |p: u32| &bsp.portals[p as usize].points;
+        let flat = |p: DVec3| [u.dot(p), v.dot(p)];
+        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for p in s.portals.iter().flat_map(|&p| polygon(p)) {
+            for (k, t) in flat(*p).into_iter().enumerate() {
+                lo[k] = lo[k].min(t);
+                hi[k] = hi[k].max(t);
+            }
+        }
+        for k in 0..2 {
+            lo[k] -= settings.surround;
+            hi[k] += settings.surround;
+        }
+        let step = (f64::max(hi[0] - lo[0], hi[1] - lo[1]) / POINTS).max(MIN_STEP);
+        let side = [0, 1].map(|k| ((hi[k] - lo[k]) / step).ceil() as usize + 1);
+        let base = plane.normal * -plane.d + u * lo[0] + v * lo[1];
+        let at = |i: usize, j: usize| base + u * (i as f64 * step) + v * (j as f64 * step);
+        let mut portal_at = vec![NONE; side[0] * side[1]];
+        for (n, &p) in s.portals.iter().enumerate() {
+            let points = polygon(p);
+            let place = |p: DVec3| {
+                let f = flat(p);
+                [0, 1].map(|k| (f[k] - lo[k]) / step)
+            };
+            let (mut from, mut to) = ([f64::MAX; 2], [f64::MIN; 2]);
+            for &p in points {
+                for (k, t) in place(p).into_iter().enumerate() {
+                    from[k] = from[k].min(t);
+                    to[k] = to[k].max(t);
+                }
+            }
+            for j in from[1].ceil() as usize..=to[1].floor() as usize {
+                for i in from[0].ceil() as usize..=to[0].floor() as usize {
+                    if contains(points, plane.normal, at(i, j)) {
+                        portal_at[j * side[0] + i] = n as u32;
+                    }
+                }
+            }
+            // The smallest has a point, too.
+            let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+            let [i, j] = place(middle).map(|t| t.round() as usize);
+            let slot = &mut portal_at[j * side[0] + i];
+            if *slot == NONE {
+                *slot = n as u32;
+            }
+        }
+        Self {
+            side,
+            step,
+            portal_at,
+            slices: vec![OnceLock::new(); 2 * SLICES],
+            base,
+            across: [u * step, v * step, plane.normal],
+        }
+    }
+
+    /// Leaves at the points of section `k`; looked up when first asked for, as most measures need few.
+    fn slice(&self, bsp: &Bsp, k: usize, settings: &MergeSettings) -> &[u32] {
+        self.slices[k].get_or_init(|| {
+            let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
+            let off = self.across[2] * if k.is_multiple_of(2) { off } else { -off };
+            (0..self.side[0] * self.side[1])
+                .map(|n| {
+                    let (i, j) = ((n % self.side[0]) as f64, (n / self.side[0]) as f64);
+                    let p = self.base + self.across[0] * i + self.across[1] * j + off;
+                    if !bsp.tree.bounds.contains(p) {
+                        return NONE;
+                    }
+                    let leaf = bsp.tree.leaf_of(p);
+                    if bsp.is_open[leaf as usize] {
+                        leaf
+                    } else {
+                        NONE
+                    }
+                })
+                .collect()
+        })
+    }
+
+    /// Measures the opening of the portals that `is_seed` names, of this area, between the two sides
+    /// whose leaves `in_side` tells (0 and 1; anything else is neither), given whether a leaf is met
+    /// before (0) or behind (1) the plane. One side may be without end.
+    fn section(
+        &self,
+        bsp: &Bsp,
+        area: f64,
+        is_seed: &dyn Fn(u32) -> bool,
+        in_side: &dyn Fn(usize, u32) -> u8,
+        endless: Option<usize>,
+        settings: &MergeSettings,
+    ) -> Section {
+        let seeds: Vec<bool> = self
+            .portal_at
+            .iter()
+            .map(|&p| p != NONE && is_seed(p))
+            .collect();
+        let mut beside = [vec![false; seeds.len()], vec![false; seeds.len()]];
+        let mut best = [0_usize; 2];
+        let mut stack = Vec::new();
+        let unit = self.step * self.step;
+        // Once both are this large, it is a pinch whatever else there is.
+        let enough = area / (settings.threshold * unit);
+        let smaller = |best: [usize; 2]| match endless {
+            Some(side) => best[1 - side],
+            None => best[0].min(best[1]),
+        };
+        for k in 0..self.slices.len() {
+            let of: Vec<u8> = self
+                .slice(bsp, k, settings)
+                .iter()
+                .map(|&l| if l == NONE { 2 } else { in_side(k % 2, l) })
+                .collect();
+            for c in 0..2 {
+                let mut inside: Vec<bool> = of.iter().map(|&o| usize::from(o) == c).collect();
+                let count = connected_count(&mut inside, self.side, &seeds, &mut stack, |k| {
+                    beside[c][k] = true;
+                });
+                best[c] = best[c].max(count);
+            }
+            if smaller(best) as f64 > enough {
+                return Section {
+                    ratio: area / (smaller(best) as f64 * unit),
+                    wall: 0.0,
+                };
+            }
+        }
+        let ratio = match smaller(best) {
+            0 => 1.0,
+            n => area / (n as f64 * unit),
+        };
+        let wall = rim_share(&seeds, self.side, |k| beside[0][k] && beside[1][k]);
+        Section { ratio, wall }
+    }
+}
+
+/// Whether a point of the plane lies in a convex polygon that turns about `normal`.
+fn contains(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
+    let n = points.len();
+    (0..n).all(|i| {
+        let (a, b) = (points[i], points[(i + 1) % n]);
+        normal.cross(b - a).dot(p - a) >= 0.0
+    })
+}
+
+/// Whether a separator can be a pinch however space is parted around it: whether the larger of the two
+/// sections beside it is larger than it is, all open space taken together.
+pub(super) fn may_be_pinch(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> bool {
+    let lattice = Lattice::of(bsp, s, settings);
+    let all = |_: usize, _: u32| 1;
+    let section = lattice.section(bsp, s.area, &|_| true, &all, Some(0), settings);
+    section.ratio < settings.wall_threshold
+}
+
+/// What rooms are told from besides the tree.
+pub(super) struct Evidence<'a> {
+    pub(super) shapes: &'a [Option<Shape>],
+    /// Door leaves and panes.
+    pub(super) closures: &'a Bvh,
+    /// Heights at which storeys end, ascending. [Units: wu]
+    pub(super) slabs: &'a [f64],
+}
+
+/// Part of a separator between two cells.
+type Opening = (u32, Vec<u32>);
+
+struct Merger<'a> {
+    bsp: &'a Bsp,
+    settings: &'a MergeSettings,
+    evidence: &'a Evidence<'a>,
+    separators: &'a [Separator],
+    lattices: Vec<Lattice>,
+    /// Share of each separator's portals that closures fill.
+    closed: Vec<Vec<f64>>,
+    /// Areas of their portals.
+    areas: Vec<Vec<f64>>,
+    of_leaf: &'a [u32],
+    parent: Vec<u32>,
+    version: Vec<u32>,
+    outer: u32,
+    neighbors: Vec<BTreeSet<u32>>,
+    openings: BTreeMap<(u32, u32), Vec<Opening>>,
+    storeys_apart: bool,
+}
+
+/// Parts the leaves by those separators that are a pinch, and joins what is too thin to be a room.
+pub(super) fn part(
+    bsp: &Bsp,
+    separators: Vec<Separator>,
+    evidence: &Evidence<'_>,
+    settings: &MergeSettings,
+) -> Cells {
+    let kept: Vec<Separator> = separators
+        .into_par_iter()
+        .filter(|s| may_be_pinch(bsp, s, settings))
+        .collect();
+    let (of_leaf, n_cells) = cells::components(bsp, &kept);
+    let lattices: Vec<Lattice> = kept
+        .par_iter()
+        .map(|s| Lattice::of(bsp, s, settings))
+        .collect();
+    let outer_leaf = bsp
+        .tree
+        .leaf_of(bsp.tree.bounds.min + bsp.tree.bounds.size() * 1e-4);
+    let mut merger = Merger {
+        bsp,
+        settings,
+        evidence,
+        closed: kept
+            .par_iter()
+            .zip(&lattices)
+            .map(|(s, l)| closed_shares(bsp, s, l, evidence.closures, settings))
+            .collect(),
+        areas: kept
+            .iter()
+            .map(|s| {
+                let area = |&p: &u32| poly::area(&bsp.portals[p as usize].points);
+                s.portals.iter().map(area).collect()
+            })
+            .collect(),
+        separators: &kept,
+        lattices,
+        of_leaf: &of_leaf,
+        parent: (0..n_cells as u32).collect(),
+        version: vec![0; n_cells],
+        outer: of_leaf[outer_leaf as usize],
+        neighbors: vec![BTreeSet::new(); n_cells],
+        openings: BTreeMap::new(),
+        storeys_apart: true,
+    };
+    merger.find_openings();
+    for storeys_apart in [true, false] {
+        merger.storeys_apart = storeys_apart;
+        merger.run_separators();
+        merger.run();
+    }
+    merger.absorb_passages();
+    let cell_of: Vec<u32> = (0..n_cells as u32).map(|c| merger.find(c)).collect();
+    let openings = std::mem::take(&mut merger.openings);
+    drop(merger);
+    // Numbered anew in order.
+    let mut number = vec![NONE; n_cells];
+    let mut n = 0;
+    let of_leaf = of_leaf
+        .iter()
+        .map(|&c| {
+            if c == NO_CELL {
+                return NO_CELL;
+            }
+            let slot = &mut number[cell_of[c as usize] as usize];
+            if *slot == NONE {
+                *slot = n;
+                n += 1;
+            }
+            *slot
+        })
+        .collect();
+    let separators = openings
+        .into_values()
+        .flatten()
+        .map(|(s, places)| {
+            let whole = &kept[s as usize];
+            let portals: Vec<u32> = places.iter().map(|&k| whole.portals[k as usize]).collect();
+            Separator {
+                plane: whole.plane,
+                area: portals
+                    .iter()
+                    .map(|&p| poly::area(&bsp.portals[p as usize].points))
+                    .sum(),
+                portals,
+            }
+        })
+        .collect();
+    Cells {
+        of_leaf,
+        n_cells: n as usize,
+        separators,
+        n_crossing: 0,
+        n_useless: 0,
+    }
+}
+
+/// The share of each portal that a door leaf or a pane fills.
+fn closed_shares(
+    bsp: &Bsp,
+    s: &Separator,
+    lattice: &Lattice,
+    closures: &Bvh,
+    settings: &MergeSettings,
+) -> Vec<f64> {
+    let mut hits = vec![[0_u32; 2]; s.portals.len()];
+    if !closures.is_empty() {
+        let plane = &bsp.tree.planes[s.plane as usize];
+        let (u, v) = plane.basis();
+        let off = plane.normal * CLOSURE_REACH;
+        let all = || {
+            s.portals
+                .iter()
+                .flat_map(|&p| &bsp.portals[p as usize].points)
+        };
+        let low = |d: DVec3| all().map(|p| d.dot(*p)).fold(f64::MAX, f64::min) - settings.surround;
+        let base = plane.normal * -plane.d + u * low(u) + v * low(v);
+        for (k, &n) in lattice
+            .portal_at
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| **n != NONE)
+        {
+            let [i, j] =
+                [k % lattice.side[0], k / lattice.side[0]].map(|t| t as f64 * lattice.step);
+            let p = base + u * i + v * j;
+            let slot = &mut hits[n as usize];
+            slot[0] += u32::from(closures.any_hit(p - off, p + off, |_| false));
+            slot[1] += 1;
+        }
+    }
+    hits.iter()
+        .map(|[h, n]| f64::from(*h) / f64::from((*n).max(1)))
+        .collect()
+}
+
+/// A pair that waits to be merged; least pinched first, ties by number.
+#[derive(PartialEq)]
+struct Candidate {
+    pinch: f64,
+    pair: (u32, u32),
+    versions: (u32, u32),
+}
+impl Eq for Candidate {}
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.pinch
+            .total_cmp(&other.pinch)
+            .then_with(|| other.pair.cmp(&self.pair))
+            .then_with(|| other.versions.cmp(&self.versions))
+    }
+}
+
+impl Merger<'_> {
+    fn find(&self, mut c: u32) -> u32 {
+        while self.parent[c as usize] != c {
+            c = self.parent[c as usize];
+        }
+        c
+    }
+
+    fn cell_of(&self, leaf: u32) -> u32 {
+        match self.of_leaf[leaf as usize] {
+            NO_CELL => NO_CELL,
+            c => self.find(c),
+        }
+    }
+
+    /// The outdoors first, then the lesser number.
+    fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
+        if b == self.outer || (a != self.outer && b < a) {
+            (b, a)
+        } else {
+            (a, b)
+        }
+    }
+
+    fn find_openings(&mut self) {
+        for (i, s) in self.separators.iter().enumerate() {
+            let mut by_pair: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+            for (k, &p) in s.portals.iter().enumerate() {
+                let [a, b] = self.bsp.portals[p as usize].leaves.map(|l| self.cell_of(l));
+                if a != b {
+                    let pair = self.ordered(a, b);
+                    by_pair.entry(pair).or_default().push(k as u32);
+                }
+            }
+            for (pair, places) in by_pair {
+                self.openings
+                    .entry(pair)
+                    .or_default()
+                    .push((i as u32, places));
+                self.neighbors[pair.0 as usize].insert(pair.1);
+                self.neighbors[pair.1 as usize].insert(pair.0);
+            }
+        }
+    }
+
+    fn area(&self, (s, places): &Opening) -> f64 {
+        let areas = &self.areas[*s as usize];
+        places.iter().map(|&k| areas[k as usize]).sum()
+    }
+
+    fn closed_share(&self, (s, places): &Opening) -> f64 {
+        let (areas, closed) = (&self.areas[*s as usize], &self.closed[*s as usize]);
+        let sum: f64 = places
+            .iter()
+            .map(|&k| areas[k as usize] * closed[k as usize])
+            .sum();
+        sum / self.area(&(*s, places.clone())).max(1e-9)
+    }
+
+    fn lies_in_slab(&self, s: u32) -> bool {
+        let plane = &self.bsp.tree.planes[self.separators[s as usize].plane as usize];
+        let height = -plane.d * plane.normal.y;
+        plane.normal.y.abs() > 0.9 && self.evidence.slabs.iter().any(|h| (h - height).abs() < 0.2)
+    }
+
+    /// How little of a pinch the openings between two cells are; 1 and more joins them.
+    fn pinch(&self, pair: (u32, u32)) -> f64 {
+        let Some(openings) = self.openings.get(&pair) else {
+            return 0.0;
+        };
+        // Largest first; two are enough: a third between the same two is smaller still.
+        let mut groups = self.together(pair, openings);
+        groups.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+        groups
+            .into_iter()
+            .take(2)
+            .map(|(area, o)| {
+                let (s, places) = o;
+                let apart = self.storeys_apart && self.lies_in_slab(*s);
+                if apart || self.closed_share(o) >= self.settings.closed_share {
+                    return 0.0;
+                }
+                let is_seed = |k: u32| places.binary_search(&k).is_ok();
+                let in_side = |_: usize, leaf: u32| match self.cell_of(leaf) {
+                    c if c == pair.0 => 0,
+                    c if c == pair.1 => 1,
+                    _ => 2,
+                };
+                let endless = (pair.0 == self.outer).then_some(0);
+                self.measure(*s, area, &is_seed, &in_side, endless)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    fn measure(
+        &self,
+        separator: u32,
+        area: f64,
+        is_seed: &dyn Fn(u32) -> bool,
+        in_side: &dyn Fn(usize, u32) -> u8,
+        endless: Option<usize>,
+    ) -> f64 {
+        let lattice = &self.lattices[separator as usize];
+        let settings = self.settings;
+        let mut found = lattice.section(self.bsp, area, is_seed, in_side, endless, settings);
+        if endless.is_some() {
+            found.ratio *= settings.outdoor_gain;
+        }
+        let wall = (found.wall / settings.wall_rim).min(1.0);
+        let (open, walled) = (settings.threshold, settings.wall_threshold);
+        found.ratio / (open + (walled - open) * wall)
+    }
+
+    /// Cells before and behind each portal of a separator that still parts two.
+    fn sides(&self, separator: u32) -> Vec<(u32, [u32; 2])> {
+        let portals = &self.separators[separator as usize].portals;
+        let cells = |(k, &p): (usize, &u32)| {
+            let cells = self.bsp.portals[p as usize].leaves.map(|l| self.cell_of(l));
+            (cells[0] != cells[1]).then_some((k as u32, cells))
+        };
+        portals.iter().enumerate().filter_map(cells).collect()
+    }
+
+    /// How little of a pinch a separator is as a whole, whatever cuts the space on either side of it;
+    /// and how old its cells are.
+    fn pinch_of_separator(&self, separator: u32) -> (f64, u64) {
+        let sides = self.sides(separator);
+        if sides.is_empty() {
+            return (0.0, 0);
+        }
+        let of_side = |i: usize| -> BTreeSet<u32> { sides.iter().map(|s| s.1[i]).collect() };
+        let cells = [of_side(0), of_side(1)];
+        let all = cells.iter().flatten();
+        let age = all.map(|&c| u64::from(self.version[c as usize])).sum();
+        let places: Vec<u32> = sides.iter().map(|s| s.0).collect();
+        let opening = (separator, places);
+        let apart = self.storeys_apart && self.lies_in_slab(separator);
+        if apart || self.closed_share(&opening) >= self.settings.closed_share {
+            return (0.0, age);
+        }
+        let is_seed = |k: u32| opening.1.binary_search(&k).is_ok();
+        let in_side = |side: usize, leaf: u32| {
+            if cells[side].contains(&self.cell_of(leaf)) {
+                side as u8
+            } else {
+                2
+            }
+        };
+        let endless = (0..2).find(|&i| cells[i].contains(&self.outer));
+        let area = self.area(&opening);
+        (
+            self.measure(separator, area, &is_seed, &in_side, endless),
+            age,
+        )
+    }
+
+    /// Takes whole separators away, least pinched first: what crosses a separator cuts it in pieces
+    /// that are narrow by themselves, and would be a way through it.
+    fn run_separators(&mut self) {
+        let weigh = |merger: &Self, s: u32| {
+            let (pinch, age) = merger.pinch_of_separator(s);
+            (pinch >= 1.0).then_some((pinch.to_bits(), std::cmp::Reverse(s), age))
+        };
+        let n = self.separators.len() as u32;
+        let all: Vec<_> = (0..n)
+            .into_par_iter()
+            .filter_map(|s| weigh(self, s))
+            .collect();
+        let mut queue: BinaryHeap<_> = all.into();
+        while let Some((_, std::cmp::Reverse(s), age)) = queue.pop() {
+            let now = weigh(self, s);
+            if now.is_none_or(|n| n.2 != age) {
+                queue.extend(now);
+                continue;
+            }
+            for (_, [a, b]) in self.sides(s) {
+                let pair = self.ordered(self.find(a), self.find(b));
+                if pair.0 != pair.1 {
+                    self.merge(pair);
+                }
+            }
+        }
+    }
+
+    /// Openings that touch each other in an edge are one that bends: its area is the length of the
+    /// vector area. Each with the largest flat part of it.
+    fn together<'a>(&self, pair: (u32, u32), openings: &'a [Opening]) -> Vec<(f64, &'a Opening)> {
+        let n = openings.len();
+        let mut group: Vec<usize> = (0..n).collect();
+        let eps = 4.0 * self.bsp.tolerance.plane;
+        let portals = |o: &'a Opening| {
+            let all = &self.separators[o.0 as usize].portals;
+            o.1.iter()
+                .map(move |&k| &self.bsp.portals[all[k as usize] as usize])
+        };
+        let boxes: Vec<Aabb> = openings
+            .iter()
+            .map(|o| Aabb::of_points(portals(o).flat_map(|p| &p.points)).expanded(eps))
+            .collect();
+        for i in 0..n {
+            for j in 0..i {
+                let touches = group[i] != group[j]
+                    && boxes[i].overlaps(&boxes[j])
+                    && portals(&openings[i]).any(|p| {
+                        portals(&openings[j]).any(|q| separator::touch(&p.points, &q.points, eps))
+                    });
+                if touches {
+                    let (from, to) = (group[i], group[j]);
+                    group
+                        .iter_mut()
+                        .filter(|g| **g == from)
+                        .for_each(|g| *g = to);
+                }
+            }
+        }
+        let mut out: Vec<(f64, &Opening)> = Vec::new();
+        for g in 0..n {
+            let members = || (0..n).filter(|&i| group[i] == g);
+            let vector: DVec3 = members()
+                .flat_map(|i| portals(&openings[i]))
+                .map(|p| {
+                    let normal = self.bsp.tree.planes[p.plane as usize].normal;
+                    let leads_up = self.cell_of(p.leaves[0]) == pair.1;
+                    let area = poly::area(&p.points);
+                    normal * if leads_up { area } else { -area }
+                })
+                .sum();
+            let flat = |i: usize| self.area(&openings[i]);
+            if let Some(i) = members().max_by(|&i, &j| flat(i).total_cmp(&flat(j)).then(j.cmp(&i)))
+            {
+                out.push((vector.length().max(flat(i)), &openings[i]));
+            }
+        }
+        out
+    }
+
+    fn run(&mut self) {
+        let candidate = |merger: &Self, pair: (u32, u32)| Candidate {
+            pinch: merger.pinch(pair),
+            pair,
+            versions: (
+                merger.version[pair.0 as usize],
+                merger.version[pair.1 as usize],
+            ),
+        };
+        let pairs: Vec<(u32, u32)> = self.openings.keys().copied().collect();
+        let weighed: Vec<Candidate> = pairs.par_iter().map(|&p| candidate(self, p)).collect();
+        let joins = |c: &Candidate| c.pinch >= 1.0;
+        let mut queue: BinaryHeap<Candidate> = weighed.into_iter().filter(joins).collect();
+        while let Some(top) = queue.pop() {
+            if !self.openings.contains_key(&top.pair) {
+                continue;
+            }
+            let now = (
+                self.version[top.pair.0 as usize],
+                self.version[top.pair.1 as usize],
+            );
+            if now != top.versions {
+                queue.extend(Some(candidate(self, top.pair)).filter(joins));
+                continue;
+            }
+            let changed = self.merge(top.pair);
+            let weighed: Vec<Candidate> = changed.par_iter().map(|&p| candidate(self, p)).collect();
+            queue.extend(weighed.into_iter().filter(joins));
+        }
+    }
+
+    /// Joins two cells; returns the pairs whose openings have changed.
+    fn merge(&mut self, (a, b): (u32, u32)) -> Vec<(u32, u32)> {
+        self.parent[b as usize] = a;
+        self.version[a as usize] += 1;
+        self.openings.remove(&(a, b));
+        self.neighbors[a as usize].remove(&b);
+        let mut changed = Vec::new();
+        for c in std::mem::take(&mut self.neighbors[b as usize]) {
+            if c == a {
+                continue;
+            }
+            let moved = self
+                .openings
+                .remove(&self.ordered(b, c))
+                .unwrap_or_default();
+            let pair = self.ordered(a, c);
+            let all = self.openings.entry(pair).or_default();
+            for (s, places) in moved {
+                // Parts of one separator are one opening again.
+                if let Some(same) = all.iter_mut().find(|o| o.0 == s) {
+                    same.1.extend(places);
+                    same.1.sort_unstable();
+                } else {
+                    all.push((s, places));
+                }
+            }
+            all.sort_unstable();
+            self.neighbors[c as usize].remove(&b);
+            self.neighbors[c as usize].insert(a);
+            self.neighbors[a as usize].insert(c);
+            changed.push(pair);
+        }
+        changed
+    }
+
+    /// Joins cells that are but the depth of an opening (the way through a wall) to the neighbor that
+    /// is least shut off: they have less depth behind their largest opening than sections are looked
+    /// for, so no section could tell them from the opening itself.
+    fn absorb_passages(&mut self) {
+        let mut volumes = vec![0.0; self.parent.len()];
+        for (leaf, shape) in self.evidence.shapes.iter().enumerate() {
+            let cell = self.cell_of(leaf as u32);
+            if let Some(sum) = volumes.get_mut(cell as usize) {
+                *sum += shape.map_or(0.0, |s| s.volume);
+            }
+        }
+        let mut order: Vec<u32> = (0..self.parent.len() as u32)
+            .filter(|&c| self.find(c) == c && c != self.outer)
+            .collect();
+        order.sort_by(|&a, &b| {
+            volumes[a as usize]
+                .total_cmp(&volumes[b as usize])
+                .then(a.cmp(&b))
+        });
+        for c in order {
+            if self.find(c) != c {
+                continue;
+            }
+            let mut largest = 0.0;
+            let mut home: Option<(bool, f64, u32)> = None;
+            for &n in &self.neighbors[c as usize] {
+                let openings = &self.openings[&self.ordered(c, n)];
+                let (mut open, mut shut) = (0.0, 0.0);
+                for o in openings {
+                    let area = self.area(o);
+                    largest = f64::max(largest, area);
+                    shut += area * self.closed_share(o);
+                    open += area;
+                }
+                let key = (shut < self.settings.closed_share * open, open - shut, n);
+                let is_better = |h: &(bool, f64, u32)| {
+                    key.0
+                        .cmp(&h.0)
+                        .then(key.1.total_cmp(&h.1))
+                        .then(h.2.cmp(&n))
+                        .is_gt()
+                };
+                if home.as_ref().is_none_or(is_better) {
+                    home = Some(key);
+                }
+            }
+            if let Some((.., n)) = home
+                && volumes[c as usize] < self.settings.reach * largest
+            {
+                let pair = self.ordered(c, n);
+                volumes[pair.0 as usize] += volumes[pair.1 as usize];
+                self.merge(pair);
+            }
+        }
+    }
+}
