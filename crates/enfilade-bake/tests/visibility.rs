@@ -98,7 +98,7 @@ impl Grid {
 fn see(graph: &SightGraph, config: &VisConfig) -> VisOutput {
     let mut context = VisContext {
         on_round: &mut |_, _| true,
-        blocker: None,
+        walls: None,
         checkpoint: None,
     };
     see_all(graph, config, &mut context).unwrap()
@@ -185,7 +185,7 @@ fn threads_and_an_early_stop_change_what_they_should() {
     assert_eq!(one, run(8));
     let mut context = VisContext {
         on_round: &mut |_, _| false,
-        blocker: None,
+        walls: None,
         checkpoint: None,
     };
     let stopped = see_all(&graph, &with_evidence(), &mut context).unwrap();
@@ -213,7 +213,7 @@ fn see_in_parts(
             n += 1;
             n <= rounds
         },
-        blocker: None,
+        walls: None,
         checkpoint: Some(VisCheckpoint {
             resume,
             salt: 7,
@@ -275,7 +275,7 @@ fn broken_graphs_are_named_and_odd_ones_are_answered() {
         change(&mut graph.portals[1]);
         let mut context = VisContext {
             on_round: &mut |_, _| true,
-            blocker: None,
+            walls: None,
             checkpoint: None,
         };
         see_all(&graph, &VisConfig::default(), &mut context).unwrap_err()
@@ -319,6 +319,27 @@ fn broken_graphs_are_named_and_odd_ones_are_answered() {
     );
 }
 
+#[test]
+fn settings_that_are_no_distance_are_refused() {
+    let graph = Grid::new(2, 1).graph();
+    for bad in [f64::NAN, -1.0, f64::NEG_INFINITY] {
+        for (far, clearance) in [(Some(bad), None), (None, Some(bad))] {
+            let config = VisConfig {
+                far,
+                clearance,
+                ..VisConfig::default()
+            };
+            let mut context = VisContext {
+                on_round: &mut |_, _| true,
+                walls: None,
+                checkpoint: None,
+            };
+            let refused = see_all(&graph, &config, &mut context);
+            assert!(matches!(refused, Err(VisError::Setting { .. })), "{bad}");
+        }
+    }
+}
+
 /// A body of evidence as a file, with length and check sum as they should be.
 fn pack(body: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
@@ -327,7 +348,7 @@ fn pack(body: &[u8]) -> Vec<u8> {
     let sum = packed.iter().fold(0xcbf2_9ce4_8422_2325_u64, |sum, &b| {
         (sum ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
     });
-    let mut file = b"ENFEVID2".to_vec();
+    let mut file = b"ENFEVID3".to_vec();
     file.extend((body.len() as u64).to_le_bytes());
     file.extend(sum.to_le_bytes());
     file.extend(packed);

@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{
-    Blocker, VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all,
-};
+use enfilade::bake::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
 use enfilade::cpg::wire::decode_glb;
 use enfilade::cpg::{CellSet, SightGraph, SightPortal, World};
-use enfilade::geom::{Bvh, DVec3, Triangle};
+use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
 
 use enfilade_verify::structural_triangles;
@@ -127,14 +125,14 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
 /// What to look through.
 struct Input {
     graph: SightGraph,
-    walls: Option<Bvh>,
+    walls: Option<Vec<Triangle>>,
     world: Option<World>,
     /// Changes with the file.
     hash: u64,
 }
 
 /// Reads a portal file or a world as a graph to look through; with a world, what stands in the way.
-pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Bvh>)> {
+pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Vec<Triangle>>)> {
     let input = read_input(path)?;
     Ok((input.graph, input.walls))
 }
@@ -153,7 +151,7 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
             .collect();
         return Ok(Input {
             graph: SightGraph::of_graph(&world.graph),
-            walls: Some(Bvh::build(&walls)),
+            walls: Some(walls),
             world: Some(world),
             hash,
         });
@@ -230,10 +228,6 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         bar.set(done);
         args.budget.is_none_or(|budget| start.elapsed() < budget)
     };
-    let is_blocked = input
-        .walls
-        .as_ref()
-        .map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
     // A search that cannot be saved goes on; what could not be written is said at its end.
     let mut unsaved = None;
     let mut save = |bytes: Vec<u8>| {
@@ -252,7 +246,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
     };
     let mut context = VisContext {
         on_round: &mut on_round,
-        blocker: is_blocked.as_ref().map(|f| f as Blocker<'_>),
+        walls: input.walls.as_deref(),
         checkpoint,
     };
     let pool = rayon::ThreadPoolBuilder::new()

@@ -73,7 +73,7 @@ fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Vec<CellSet
     let mut on_round = |_, _| start.elapsed() < BUDGET;
     let mut context = VisContext {
         on_round: &mut on_round,
-        blocker: None,
+        walls: None,
         checkpoint: None,
     };
     let graph = SightGraph::of_graph(&world.graph);

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::World;
+use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
-use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::import;
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
-    Blocks, VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
+    VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
     verify_world_with_progress,
 };
 
@@ -181,9 +181,7 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     let (graph, walls) = read_graph(&args.world)?;
     let bytes =
         fs::read(evidence).with_context(|| format!("cannot read {}", evidence.display()))?;
-    let is_blocked = walls.map(|walls| move |a: DVec3, b: DVec3| walls.any_hit(a, b, |_| false));
-    let blocks = is_blocked.as_ref().map(|f| f as Blocks<'_>);
-    let report = verify_evidence(&graph, &bytes, blocks)
+    let report = verify_evidence(&graph, &bytes, walls.as_deref())
         .with_context(|| format!("{} is not accepted", evidence.display()))?;
     let mut out = io::stdout().lock();
     if args.json {
@@ -192,6 +190,7 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
             "proved_pairs": report.n_proved,
             "undecided_pairs": report.n_visible - report.n_proved,
             "hidden_pairs": report.n_hidden,
+            "walled_openings": report.n_walled,
             "lines": report.n_lines,
             "trace_bytes": report.n_trace,
             "clearance": report.clearance,

@@ -402,6 +402,49 @@ fn closed_portals_locked_cells_and_doors_ajar() {
 }
 
 #[test]
+fn an_eye_in_no_cell_sees_every_cell_and_each_object_once() {
+    let world = room_grid(&GridParams {
+        outdoors: false,
+        ..GridParams::offices(30, 4)
+    });
+    assert!(!world.details.is_empty());
+    let sight = Sight::build(&world).unwrap();
+    let state = SightState::new(&sight);
+    let mut viewer = Viewer::new(&sight);
+    let middle = to_dvec(world.graph.cells[0].aabb[0]) + DVec3::splat(0.5);
+    for (eye, is_lost) in [
+        ([-500.0, 1.0, -500.0], true),
+        (middle.as_vec3().to_array(), false),
+    ] {
+        let seen = viewer.see(&sight, &state, &View::around(eye).unwrap());
+        assert_eq!(seen.counts().is_eye_lost, is_lost);
+        let details: BTreeSet<_> = seen.details().iter().map(|d| d.0).collect();
+        assert_eq!(details.len(), seen.details().len(), "an object came twice");
+        if is_lost {
+            assert_eq!(seen.cells().len(), world.graph.cells.len());
+            assert_eq!(details.len(), world.details.len());
+        }
+    }
+}
+
+#[test]
+fn a_door_is_shut_whatever_was_said_of_its_leaf() {
+    let world = room_grid(&GridParams::offices(9, 1));
+    let sight = Sight::build(&world).unwrap();
+    let mut state = SightState::new(&sight);
+    let door = enfilade_cpg::PortalId(0);
+    for _ in 0..9 {
+        state.narrow(door, [1.0, 0.0, 0.0], [0.0; 3]);
+        assert!(state.is_open(door));
+    }
+    state.close(door);
+    state.narrow(door, [0.0, 0.0, 1.0], [0.0; 3]);
+    assert!(!state.is_open(door));
+    state.open(door);
+    assert!(state.is_open(door));
+}
+
+#[test]
 fn empty_and_hostile_worlds() {
     let sight = Sight::build(&World::default()).unwrap();
     let view = View::around([0.0; 3]).unwrap();

@@ -47,7 +47,7 @@ use enfilade_cpg::{GraphError, MAX_REPORTED, World};
 use enfilade_geom::Triangle;
 use rayon::prelude::*;
 
-pub use evidence::{Blocks, EvidenceError, EvidenceReport, verify_evidence};
+pub use evidence::{EvidenceError, EvidenceReport, verify_evidence};
 pub use report::{CompleteCounts, Failure, FailureKind, SealedCounts, VerifyReport};
 pub use subject::{structural_triangles, tolerance};
 pub use views::{Missed, Seer, ViewAnswer, ViewOptions, ViewQuery, ViewReport, verify_views};

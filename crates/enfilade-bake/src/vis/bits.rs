@@ -46,12 +46,45 @@ impl BitTable {
         self.row_mut(row)[column / 64] &= !(1 << (column % 64));
     }
 
+    /// Rows as columns, of a table with so many rows.
+    pub(super) fn transposed(&self, n_rows: usize) -> Self {
+        let mut out = Self::new(self.n_words * 64, n_rows);
+        for first in (0..n_rows).step_by(64) {
+            for word in 0..self.n_words {
+                let mut block = [0; 64];
+                for (k, b) in block.iter_mut().enumerate().take(n_rows - first) {
+                    *b = self.words[(first + k) * self.n_words + word];
+                }
+                transpose_block(&mut block);
+                for (k, &b) in block.iter().enumerate() {
+                    out.words[(word * 64 + k) * out.n_words + first / 64] = b;
+                }
+            }
+        }
+        out
+    }
+
     pub(super) fn words(&self) -> &[u64] {
         &self.words
     }
 
     pub(super) fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
+    }
+}
+
+/// Exchanges halves, then halves of halves, down to single bits. Warren, *Hacker's Delight*, section 7-3.
+fn transpose_block(block: &mut [u64; 64]) {
+    let mut width = 32;
+    let mut mask = u64::MAX >> 32;
+    while width > 0 {
+        for k in (0..64).filter(|k| k & width == 0) {
+            let moved = ((block[k] >> width) ^ block[k + width]) & mask;
+            block[k] ^= moved << width;
+            block[k + width] ^= moved;
+        }
+        width /= 2;
+        mask ^= mask << width;
     }
 }
 
@@ -142,6 +175,23 @@ pub(super) fn meets(a: &[u64], b: &[u64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_turned_twice_is_itself() {
+        let (n_rows, n_columns) = (130, 70);
+        let mut table = BitTable::new(n_rows, n_columns);
+        for i in 0..n_rows {
+            for j in (0..n_columns).filter(|j| (i * i + 3 * j) % 7 < 2) {
+                table.set(i, j);
+            }
+        }
+        let turned = table.transposed(n_rows);
+        for i in 0..n_rows {
+            for j in 0..n_columns {
+                assert_eq!(table.get(i, j), turned.get(j, i), "{i} {j}");
+            }
+        }
+    }
 
     #[test]
     fn ranges_reach_across_words() {

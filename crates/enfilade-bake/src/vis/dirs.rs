@@ -40,6 +40,11 @@ pub(super) struct Dirs {
     pub(super) reverse: Vec<u32>,
     /// By direction, the number of its portal.
     portals: Vec<u32>,
+    /// By direction, what is looked at most, side by side: the ball around it (middle, radius), the plane
+    /// (normal, height half way between `low` and `high`), and where its cell's exits stand in `reverse`.
+    pub(super) balls: Vec<[f64; 4]>,
+    pub(super) planes: Vec<[f64; 4]>,
+    ahead: Vec<[u32; 2]>,
     /// Directions into cell `c` are `into[c]..into[c + 1]`.
     pub(super) into: Vec<u32>,
     /// Corners of each piece, in `points`.
@@ -117,6 +122,17 @@ impl Dirs {
         }
         let reverse = all.iter().map(|dir| place[dir.id as usize ^ 1]).collect();
         let portals = all.iter().map(|dir| dir.id / 2).collect();
+        let four = |v: DVec3, w: f64| [v.x, v.y, v.z, w];
+        let balls = all.iter().map(|dir| four(dir.center, dir.radius)).collect();
+        let middle = |dir: &Dir| (dir.low + dir.high) * 0.5;
+        let planes = all
+            .iter()
+            .map(|dir| four(dir.normal, middle(dir)))
+            .collect();
+        let ahead = all
+            .iter()
+            .map(|dir| [into[dir.to as usize], into[dir.to as usize + 1]])
+            .collect();
         let scale = points
             .iter()
             .map(|p: &DVec3| p.abs().max_element())
@@ -126,6 +142,9 @@ impl Dirs {
             all,
             reverse,
             portals,
+            balls,
+            planes,
+            ahead,
             into,
             pieces,
             points,
@@ -151,6 +170,13 @@ impl Dirs {
         &self.reverse[self.entries(cell)]
     }
 
+    /// The directions out of the cell that a direction leads into.
+    #[inline]
+    pub(super) fn after(&self, dir: usize) -> &[u32] {
+        let [start, end] = self.ahead[dir];
+        &self.reverse[start as usize..end as usize]
+    }
+
     #[inline]
     pub(super) fn winding(&self, dir: usize) -> &[DVec3] {
         let corners = &self.all[dir].corners;
@@ -171,6 +197,7 @@ impl Dirs {
     /// Time: the square of the portals, a few nanoseconds each, plus what is reached times the exits of a cell.
     pub(super) fn might_see(&self, clearance: f64, far: Option<f64>) -> BitTable {
         let past = self.past(clearance);
+        let behind = past.transposed(self.len());
         let n = self.len();
         let mut might = BitTable::new(n, n);
         let n_words = might.n_words().max(1);
@@ -179,7 +206,7 @@ impl Dirs {
             .par_chunks_mut(n_words)
             .enumerate()
             .for_each_init(Flood::default, |flood, (first, row)| {
-                self.flood(first, &past, far, row, flood);
+                self.flood(first, (&past, &behind), far, row, flood);
             });
         self.make_symmetric(&mut might);
         might
@@ -188,13 +215,13 @@ impl Dirs {
     fn flood(
         &self,
         first: usize,
-        past: &BitTable,
+        (past, behind): (&BitTable, &BitTable),
         far: Option<f64>,
         row: &mut [u64],
         Flood { tested, stack }: &mut Flood,
     ) {
         let in_front = past.row(first);
-        let portal = self.portals[first] as usize;
+        let behind = behind.row(self.portals[first] as usize);
         tested.clear();
         tested.resize(row.len(), 0);
         // A line crosses a plane once, so never an opening twice.
@@ -203,7 +230,7 @@ impl Dirs {
         stack.push(first as u32);
         while let Some(at) = stack.pop() {
             let back = self.reverse[at as usize];
-            for &next in self.exits(self.all[at as usize].to) {
+            for &next in self.after(at as usize) {
                 let q = next as usize;
                 if bits::get(tested, q) || next == back {
                     continue;
@@ -211,7 +238,7 @@ impl Dirs {
                 bits::set(tested, q);
                 // It crosses the second from behind.
                 if bits::get(in_front, self.portals[q] as usize)
-                    && past.get(self.reverse[q] as usize, portal)
+                    && bits::get(behind, self.reverse[q] as usize)
                     && self.is_near(first, q, far)
                 {
                     bits::set(row, q);
@@ -222,48 +249,73 @@ impl Dirs {
     }
 
     /// By direction, the portals that reach far enough in front of its plane to let lines with clearance through.
+    ///
+    /// Portals are cut from few planes, so heights are taken once for each normal and serve all that share it.
     fn past(&self, clearance: f64) -> BitTable {
         let n_portals = self.len() / 2;
         let mut of_id = vec![0u32; self.len()];
         for (d, dir) in self.all.iter().enumerate() {
             of_id[dir.id as usize] = d as u32;
         }
-        // The balls around portals settle most pairs; a sweep over these is what takes the time.
-        let balls: Vec<[f64; 4]> = (0..n_portals)
-            .map(|i| {
-                let dir = &self.all[of_id[2 * i] as usize];
-                [dir.center.x, dir.center.y, dir.center.z, dir.radius]
+        let mut by_turn: Vec<u32> = (0..self.len() as u32).collect();
+        let key = |&d: &u32| self.all[d as usize].turn.to_array().map(f64::to_bits);
+        by_turn.sort_by_cached_key(|d| (key(d), *d));
+        let groups: Vec<&[u32]> = by_turn.chunk_by(|a, b| key(a) == key(b)).collect();
+        let rows: Vec<Vec<(u32, Vec<u64>)>> = groups
+            .par_iter()
+            .with_max_len(4)
+            .map_init(Vec::new, |heights, group| {
+                let turn = self.all[group[0] as usize].turn;
+                heights.clear();
+                heights.extend((0..n_portals).map(|i| self.extent(of_id[2 * i] as usize, turn)));
+                let rows = group.iter();
+                rows.map(|&d| (d, self.past_row(d as usize, heights, &of_id, clearance)))
+                    .collect()
             })
             .collect();
         let mut past = BitTable::new(self.len(), n_portals);
-        let n_words = past.n_words().max(1);
-        past.words_mut()
-            .par_chunks_mut(n_words)
-            .enumerate()
-            .for_each(|(d, row)| {
-                let dir = &self.all[d];
-                let [nx, ny, nz] = dir.normal.to_array();
-                for (w, (word, balls)) in row.iter_mut().zip(balls.chunks(64)).enumerate() {
-                    let (mut sure, mut not) = (0, 0);
-                    for (k, [x, y, z, radius]) in balls.iter().enumerate() {
-                        let height = nx * x + ny * y + nz * z - dir.low;
-                        sure |= u64::from(height > *radius) << k;
-                        not |= u64::from(height < -radius) << k;
-                    }
-                    let mut rest = !(sure | not);
-                    if balls.len() < 64 {
-                        rest &= (1 << balls.len()) - 1;
-                    }
-                    while rest != 0 {
-                        let k = rest.trailing_zeros();
-                        rest &= rest - 1;
-                        let other = of_id[2 * (64 * w + k as usize)];
-                        sure |= u64::from(self.is_past(dir, other, clearance)) << k;
-                    }
-                    *word = sure;
-                }
-            });
+        for (d, row) in rows.into_iter().flatten() {
+            past.row_mut(d as usize).copy_from_slice(&row);
+        }
         past
+    }
+
+    /// Least and greatest height of an opening along a direction.
+    fn extent(&self, d: usize, axis: DVec3) -> [f64; 2] {
+        let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
+        for &p in self.winding(d) {
+            let height = axis.dot(p);
+            extent = [extent[0].min(height), extent[1].max(height)];
+        }
+        extent
+    }
+
+    fn past_row(&self, d: usize, heights: &[[f64; 2]], of_id: &[u32], clearance: f64) -> Vec<u64> {
+        let dir = &self.all[d];
+        // Where it has no area, it has no sides.
+        let no_sides = dir.normal == DVec3::ZERO;
+        let is_turned = dir.normal != dir.turn;
+        let words = heights.chunks(64).enumerate().map(|(w, heights)| {
+            let (mut sure, mut perhaps) = (0, 0);
+            for (k, &[low, high]) in heights.iter().enumerate() {
+                let highest = if is_turned { -low } else { high };
+                let reach = highest - dir.low;
+                sure |= u64::from(no_sides || reach > clearance) << k;
+                perhaps |= u64::from(reach > 0.0) << k;
+            }
+            let mut rest = perhaps & !sure;
+            while rest != 0 {
+                let k = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                let [low, high] = heights[k];
+                let highest = if is_turned { -low } else { high };
+                let other = &self.all[of_id[2 * (64 * w + k)] as usize];
+                let need = clearance * sine(dir.normal, other.turn);
+                sure |= u64::from(highest - dir.low > need) << k;
+            }
+            sure
+        });
+        words.collect()
     }
 
     /// A line that leaves the first cell and ends beyond `next` crosses both openings: where the balls around
@@ -276,27 +328,23 @@ impl Dirs {
 
     /// Clears what is not seen both ways.
     pub(super) fn make_symmetric(&self, might: &mut BitTable) {
-        for a in 0..self.len() {
-            let back = self.reverse[a] as usize;
-            let gone: Vec<usize> = bits::ones(might.row(a))
-                .filter(|&b| !might.get(self.reverse[b] as usize, back))
-                .collect();
-            for b in gone {
-                might.clear(a, b);
+        let n = self.len();
+        let seen_by = might.transposed(n);
+        let n_words = might.n_words().max(1);
+        let rows = might.words_mut().par_chunks_mut(n_words).enumerate();
+        rows.for_each(|(a, row)| {
+            let seen_back = seen_by.row(self.reverse[a] as usize);
+            for (i, word) in row.iter_mut().enumerate() {
+                let mut rest = *word;
+                while rest != 0 {
+                    let bit = rest.trailing_zeros() as usize;
+                    rest &= rest - 1;
+                    if !bits::get(seen_back, self.reverse[i * 64 + bit] as usize) {
+                        *word &= !(1 << bit);
+                    }
+                }
             }
-        }
-    }
-
-    /// Whether an opening reaches far enough past the plane of `a` to let lines with clearance through.
-    #[inline]
-    fn is_past(&self, a: &Dir, b: u32, clearance: f64) -> bool {
-        let b = &self.all[b as usize];
-        let corners = &self.points[b.corners.start as usize..b.corners.end as usize];
-        let highest = corners.iter().map(|&p| a.normal.dot(p));
-        let reach = highest.fold(f64::NEG_INFINITY, f64::max) - a.low;
-        reach > clearance
-            || (reach > 0.0 && reach > clearance * sine(a.normal, b.turn))
-            || a.normal == DVec3::ZERO
+        });
     }
 }
 

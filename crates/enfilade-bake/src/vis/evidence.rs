@@ -11,7 +11,7 @@ use super::flow::Shared;
 use super::search::Search;
 use super::{VisConfig, VisError, checkpoint, prove};
 
-const MAGIC: &[u8; 8] = b"ENFEVID2";
+const MAGIC: &[u8; 8] = b"ENFEVID3";
 
 /// Writes down what a search found and why.
 pub(super) fn encode(
@@ -56,6 +56,14 @@ pub(super) fn encode(
         for &d in &line.chain {
             body.extend(search.dirs.all[d as usize].id.to_le_bytes());
         }
+    }
+    body.extend((search.closed.len() as u64).to_le_bytes());
+    for closed in &search.closed {
+        for d in [closed.from, closed.to] {
+            body.extend(search.dirs.all[d as usize].id.to_le_bytes());
+        }
+        body.extend((closed.tree.len() as u32).to_le_bytes());
+        body.extend(&closed.tree);
     }
     body.extend(&trace);
 

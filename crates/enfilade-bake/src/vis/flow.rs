@@ -16,9 +16,8 @@
 use enfilade_geom::DVec3;
 
 use super::bits::{self, BitTable};
-use super::clip::{Arena, Facing, HalfSpace, Poly, Separator, Tolerance, separators};
+use super::clip::{Arena, Facing, Fence, HalfSpace, Poly, Separator, Tolerance, separators};
 use super::dirs::Dirs;
-use super::narrow::reaches;
 use super::rays::{self, Blocker, Line};
 
 /// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
@@ -79,7 +78,10 @@ pub(super) struct Flow {
     /// By depth: the chain's openings as clipped.
     pub(super) chain: Vec<Poly>,
     pub(super) planes: Vec<Separator>,
+    pub(super) fence: Fence,
     walked: Vec<u32>,
+    reached: Vec<u64>,
+    stack: Vec<u32>,
     found: Found,
 }
 
@@ -108,11 +110,35 @@ impl Flow {
         }
         let poly = self.begin(shared, source);
         self.set_reach(0, shared.might.row(source));
+        self.drop_unreached(shared, source);
         if bits::count(&self.wanted) > 0 {
             self.visit(shared, poly);
         }
         self.found.hidden = self.wanted.clone();
         std::mem::take(&mut self.found)
+    }
+
+    /// Drops from reach what no chain of openings that might see each other leads to: other
+    /// searches may have settled it.
+    fn drop_unreached(&mut self, shared: &Shared<'_>, source: usize) {
+        let dirs = shared.dirs;
+        let row = shared.might.row(source);
+        self.reached.clear();
+        self.reached.resize(row.len(), 0);
+        self.stack.push(source as u32);
+        while let Some(at) = self.stack.pop() {
+            let from_here = shared.might.row(at as usize);
+            for &next in dirs.after(at as usize) {
+                let q = next as usize;
+                if bits::get(row, q) && bits::get(from_here, q) && !bits::get(&self.reached, q) {
+                    bits::set(&mut self.reached, q);
+                    self.stack.push(next);
+                }
+            }
+        }
+        for (word, &reached) in self.reach[0].iter_mut().zip(&self.reached) {
+            *word &= reached;
+        }
     }
 
     /// Starts a chain with the whole of an opening.
@@ -345,16 +371,13 @@ impl Flow {
         first_plane: usize,
         depth: usize,
     ) -> bool {
-        let planes = &self.planes[first_plane..];
+        self.fence.set(&self.planes[first_plane..]);
         let mut is_left = false;
         for (i, (word, wanted)) in self.reach[depth].iter_mut().zip(&self.wanted).enumerate() {
             let mut rest = *word & wanted;
             while rest != 0 {
                 let q = i * 64 + rest.trailing_zeros() as usize;
-                if planes
-                    .iter()
-                    .all(|plane| reaches(shared.dirs, q, plane, &shared.tolerance))
-                {
+                if self.fence.admits(shared.dirs, q, &shared.tolerance) {
                     is_left = true;
                 } else {
                     *word &= !(1 << (q % 64));
@@ -385,14 +408,16 @@ impl Flow {
     ) -> Option<(Poly, Poly)> {
         let dirs = shared.dirs;
         let tolerance = &shared.tolerance;
-        let next = &dirs.all[q];
         self.found.effort.clips += 1;
         // A ball around the opening settles most of it without looking at corners.
+        let [x, y, z, radius] = dirs.balls[q];
+        let center = DVec3::new(x, y, z);
         for plane in &self.planes[first_plane..] {
-            if plane.normal.dot(next.center) - plane.front < -next.radius {
+            if plane.normal.dot(center) - plane.front < -radius {
                 return None;
             }
         }
+        let next = &dirs.all[q];
         let mut target = self.arena.push(dirs.winding(q), q as u32);
         let source_front = front_of(dirs, source.dir);
         target = self
@@ -409,7 +434,7 @@ impl Flow {
             .clip(source, back_of(dirs, q), source_turn, tolerance)?;
         for i in first_plane..self.planes.len() {
             let plane = self.planes[i].after();
-            if plane.normal.dot(next.center) - plane.offset < next.radius {
+            if plane.normal.dot(center) - plane.offset < radius {
                 target = self.arena.clip(target, plane, next.turn, tolerance)?;
             }
         }

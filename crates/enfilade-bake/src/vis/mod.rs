@@ -8,6 +8,7 @@
 //! 3. `rays`, `grow`: random lines, and lines turned from those, prove most of what is visible.
 //! 4. `flow`: a search over portal chains settles the rest, chain by chain, by planes, lines and
 //!    splitting. This is the heart; start reading there.
+//! 5. `occlude`: where walls are known, beams settle what they hide inside cells.
 //!
 //! `search` puts them together in rounds, so that results do not depend on threads.
 //!
@@ -23,6 +24,7 @@ mod evidence;
 mod flow;
 mod grow;
 mod narrow;
+mod occlude;
 mod prove;
 mod rays;
 mod search;
@@ -30,21 +32,20 @@ mod search;
 use std::time::{Duration, Instant};
 
 use enfilade_cpg::{CellId, CellSet, SightGraph, SightGraphError};
-use enfilade_geom::DVec3;
-
-pub use rays::Blocker;
+use enfilade_geom::{Bvh, DVec3, Triangle};
 
 use bits::BitTable;
 use dirs::Dirs;
+use occlude::Sheets;
+use rays::Blocker;
 use search::{Rest, Search};
 
 /// Share of the clearance that the search itself uses; a checker's sums may differ in the last digits.
 const KEPT: f64 = 0.9;
 
-/// Lines tried in the end between cells that walls may hide from each other, and how often. Twenty times as many
-/// settle six more of the 386 pairs that 500 leave in a building of 95 rooms.
-const INSIST_LINES: usize = 1000;
-const INSIST_ROUNDS: u64 = 4;
+/// Lines tried between cells that walls may hide from each other, and how often, before each beam is looked at.
+const INSIST_LINES: usize = 50;
+const INSIST_ROUNDS: u64 = 2;
 
 /// How thoroughly to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -147,7 +148,7 @@ pub struct VisContext<'a> {
     /// Hears work done and work in all, weighted by cost, and says whether to go on.
     pub on_round: &'a mut (dyn FnMut(u64, u64) -> bool + Send),
     /// What else blocks sight; without it, a line is free wherever it passes openings.
-    pub blocker: Option<Blocker<'a>>,
+    pub walls: Option<&'a [Triangle]>,
     /// Where to keep what was found, and what to go on from. Not used by [`VisMode::Fast`].
     pub checkpoint: Option<VisCheckpoint<'a>>,
 }
@@ -156,7 +157,7 @@ pub struct VisContext<'a> {
 pub struct VisCheckpoint<'a> {
     /// What was saved before. Refused where the graph or the settings were others.
     pub resume: Option<Vec<u8>>,
-    /// A number that changes with [`VisContext::blocker`].
+    /// A number that changes with [`VisContext::walls`].
     pub salt: u64,
     /// How long to search between saves.
     pub every: Duration,
@@ -183,7 +184,12 @@ pub fn see_all(
     let dirs = Dirs::new(graph);
     let clearance = config.clearance.unwrap_or(1e-8 * dirs.scale);
     // The search keeps more than it promises, so that a checker that rounds otherwise still closes every chain.
-    let mut search = Search::new(&dirs, KEPT * clearance, config.far, context.blocker);
+    let bvh = context.walls.map(Bvh::build);
+    let is_blocked = bvh
+        .as_ref()
+        .map(|bvh| move |a: DVec3, b: DVec3| bvh.any_hit(a, b, |_| false));
+    let blocker = is_blocked.as_ref().map(|f| f as Blocker<'_>);
+    let mut search = Search::new(&dirs, KEPT * clearance, config.far, blocker);
     let n_base = count_all(&search.visible());
     let salt = context.checkpoint.as_ref().map_or(0, |c| c.salt);
     let key = checkpoint::key(graph, config, salt);
@@ -216,8 +222,13 @@ pub fn see_all(
             run(&mut search, config, context, rest, key)
         }
     };
-    if config.mode == VisMode::Exact && is_complete && search.blocker.is_some() {
+    if config.mode == VisMode::Exact
+        && is_complete
+        && let (Some(walls), Some(bvh)) = (context.walls, &bvh)
+    {
         search.insist(INSIST_LINES, INSIST_ROUNDS, &mut *context.on_round);
+        let sheets = Sheets::new(walls, bvh);
+        search.settle_by_walls(&sheets, clearance, &mut *context.on_round);
     }
     let evidence = config
         .has_evidence

@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 
 use super::bits::{self, BitTable};
-use super::clip::{Arena, Separator, Tolerance, separators};
-use super::dirs::{Dirs, sine};
+use super::clip::{Arena, Fence, Separator, Tolerance, separators};
+use super::dirs::Dirs;
 use super::flow::{back_of, facing, front_of};
 
 /// Openings a round; see [`super::search`].
@@ -56,6 +56,7 @@ pub(super) fn narrow_might(
 struct Work {
     arena: Arena,
     planes: Vec<Separator>,
+    fence: Fence,
     allowed: Vec<u64>,
     reached: Vec<u64>,
     stack: Vec<u32>,
@@ -95,6 +96,8 @@ impl Work {
                 tolerance,
                 &mut self.planes,
             );
+            drop_twins(&mut self.planes, tolerance);
+            self.fence.set(&self.planes);
             self.flood(dirs, might, tolerance, (source, pass));
             for (r, &new) in row.iter_mut().zip(&self.reached) {
                 *r |= new;
@@ -120,14 +123,13 @@ impl Work {
         self.allowed.extend(rows.map(|(a, b)| a & b));
         while let Some(at) = self.stack.pop() {
             let from_here = might.row(at as usize);
-            for &next in dirs.exits(dirs.all[at as usize].to) {
+            for &next in dirs.after(at as usize) {
                 let q = next as usize;
                 if !bits::get(&self.allowed, q) || !bits::get(from_here, q) {
                     continue;
                 }
                 bits::clear(&mut self.allowed, q);
-                let mut planes = self.planes.iter();
-                if planes.all(|plane| reaches(dirs, q, plane, tolerance)) {
+                if self.fence.admits(dirs, q, tolerance) {
                     bits::set(&mut self.reached, q);
                     self.stack.push(next);
                 }
@@ -136,16 +138,19 @@ impl Work {
     }
 }
 
-/// Whether an opening reaches in front of a plane.
-#[inline]
-pub(super) fn reaches(dirs: &Dirs, dir: usize, plane: &Separator, tolerance: &Tolerance) -> bool {
-    let opening = &dirs.all[dir];
-    let height = plane.normal.dot(opening.center) - plane.front;
-    if height.abs() > opening.radius {
-        return height > 0.0;
+/// Drops planes that are the same but for rounding: those that hold an edge of each opening.
+fn drop_twins(planes: &mut Vec<Separator>, tolerance: &Tolerance) {
+    let mut i = 0;
+    while i < planes.len() {
+        let plane = planes[i];
+        let is_twin = |other: &Separator| {
+            plane.normal.distance_squared(other.normal) < 1e-24
+                && (plane.front - other.front).abs() < tolerance.rounding
+        };
+        if planes[..i].iter().any(is_twin) {
+            planes.swap_remove(i);
+        } else {
+            i += 1;
+        }
     }
-    let need = tolerance.clearance * sine(plane.normal, opening.turn) - tolerance.outward;
-    dirs.winding(dir)
-        .iter()
-        .any(|&p| plane.normal.dot(p) - plane.front >= need)
 }

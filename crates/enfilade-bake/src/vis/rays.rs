@@ -5,7 +5,7 @@ use enfilade_geom::DVec3;
 use super::dirs::Dirs;
 
 /// Tells whether something solid lies between two points.
-pub type Blocker<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
+pub(super) type Blocker<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
 
 /// A line that proves pairs of cells to see each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,13 +40,14 @@ pub(super) fn walk(
         let back = dirs.reverse[at];
         let mut best = None;
         let mut best_t = f64::INFINITY;
-        for &exit in dirs.exits(dirs.all[at].to) {
-            let dir = &dirs.all[exit as usize];
-            let speed = dir.normal.dot(direction);
+        for &exit in dirs.after(at) {
+            let [x, y, z, middle] = dirs.planes[exit as usize];
+            let normal = DVec3::new(x, y, z);
+            let speed = normal.dot(direction);
             if exit == back || speed <= 0.0 {
                 continue;
             }
-            let exit_t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / speed;
+            let exit_t = (middle - normal.dot(origin)) / speed;
             if exit_t < t || exit_t >= best_t {
                 continue;
             }

@@ -11,6 +11,7 @@ use super::bits::{self, BitTable};
 use super::clip::Tolerance;
 use super::dirs::Dirs;
 use super::flow::{Effort, Flow, Found, Shared};
+use super::occlude::Closed;
 use super::rays::{self, Blocker, Line, Rng};
 
 /// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
@@ -38,6 +39,8 @@ pub(super) struct Search<'a> {
     /// By opening, what was settled as hidden from it beyond the sides of planes.
     pub(super) settled: BitTable,
     pub(super) lines: Vec<Line>,
+    /// Pairs of openings that walls hide from each other.
+    pub(super) closed: Vec<Closed>,
     pub(super) tolerance: Tolerance,
     pub(super) blocker: Option<Blocker<'a>>,
     far: Option<f64>,
@@ -65,6 +68,7 @@ impl<'a> Search<'a> {
             undecided: BitTable::new(n, n),
             settled: BitTable::new(dirs.len(), dirs.len()),
             lines: Vec::new(),
+            closed: Vec::new(),
             tolerance: Tolerance::new(dirs.scale, clearance),
             blocker,
             far,

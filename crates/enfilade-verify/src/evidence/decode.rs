@@ -19,6 +19,8 @@ pub(super) struct Evidence {
     /// By direction, those called hidden that its trace is to show.
     pub(super) claims: Table,
     pub(super) lines: Vec<SightLine>,
+    /// Pairs of openings that walls hide from each other.
+    pub(super) trees: Vec<Tree>,
     pub(super) trace: Vec<u8>,
 }
 
@@ -28,7 +30,14 @@ pub(super) struct SightLine {
     pub(super) chain: Vec<u32>,
 }
 
-const MAGIC: &[u8; 8] = b"ENFEVID2";
+/// How walls close the lines from one opening to another.
+pub(super) struct Tree {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    pub(super) bytes: Vec<u8>,
+}
+
+const MAGIC: &[u8; 8] = b"ENFEVID3";
 /// Deflate cannot do better.
 const MAX_RATIO: u64 = 1032;
 /// Largest clearance, relative to the largest coordinate, that is accepted as a proof.
@@ -56,7 +65,7 @@ pub(super) fn decode(
     let (magic, rest) = head.split_at(8);
     let (size, sum) = rest.split_at(8);
     if magic != MAGIC {
-        return Err(damaged("it does not begin with ENFEVID2"));
+        return Err(damaged("it does not begin with ENFEVID3"));
     }
     let size = u64::from_le_bytes(size.try_into().map_err(|_| damaged("it is too short"))?);
     if size > packed.len() as u64 * MAX_RATIO {
@@ -92,6 +101,11 @@ pub(super) fn decode(
     for _ in 0..n_lines {
         lines.push(reader.line(n)?);
     }
+    let n_trees = reader.u64()?;
+    let mut trees = Vec::new();
+    for _ in 0..n_trees {
+        trees.push(reader.tree(n)?);
+    }
     Ok(Evidence {
         clearance,
         far,
@@ -100,6 +114,7 @@ pub(super) fn decode(
         might,
         claims,
         lines,
+        trees,
         trace: reader.0.to_vec(),
     })
 }
@@ -157,6 +172,18 @@ impl Reader<'_> {
             direction,
             chain,
         })
+    }
+
+    fn tree(&mut self, n: usize) -> Result<Tree, EvidenceError> {
+        let (from, to) = (self.u32()? as usize, self.u32()? as usize);
+        if from.max(to) >= n {
+            return Err(EvidenceError::Damaged(
+                "a tree names no opening of the graph",
+            ));
+        }
+        let len = self.u32()? as usize;
+        let bytes = self.take(len)?.to_vec();
+        Ok(Tree { from, to, bytes })
     }
 
     fn table(&mut self, n: usize) -> Result<Table, EvidenceError> {

@@ -4,13 +4,14 @@
 //! line that crosses the openings one by one, of each two openings called hidden from each other a reason,
 //! and the walk through all portal chains only follows the trace, so that time is bounded by its length.
 
+mod beams;
 mod decode;
 mod lines;
 mod shape;
 mod walk;
 
 use enfilade_cpg::{CellId, CellSet, SightGraph, SightGraphError};
-use enfilade_geom::DVec3;
+use enfilade_geom::{Bvh, DVec3, Triangle};
 use rayon::prelude::*;
 
 use decode::Evidence;
@@ -27,6 +28,8 @@ pub struct EvidenceReport {
     pub n_proved: u64,
     /// Ordered pairs of cells proved hidden.
     pub n_hidden: u64,
+    /// Pairs of openings that walls hide from each other.
+    pub n_walled: u64,
     /// Lines followed.
     pub n_lines: u64,
     /// Bytes of the trace.
@@ -92,11 +95,12 @@ pub enum EvidenceError {
 }
 
 /// Tells whether something solid lies between two points.
-pub type Blocks<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
+type Blocks<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
 
 /// Accepts evidence only if every claim in it holds on this graph.
 ///
-/// `blocks` is what else stops lines, where the scene is known. Safe on hostile bytes: memory is bounded by
+/// `walls` are the triangles that stop lines, where the scene is known, in the order in which the search had them
+/// ([`crate::structural_triangles`] of a world). Safe on hostile bytes: memory is bounded by
 /// the graph and the bytes, time by the trace. Uses the current rayon pool.
 ///
 /// # Errors
@@ -105,15 +109,21 @@ pub type Blocks<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
 pub fn verify_evidence(
     graph: &SightGraph,
     bytes: &[u8],
-    blocks: Option<Blocks<'_>>,
+    walls: Option<&[Triangle]>,
 ) -> Result<EvidenceReport, EvidenceError> {
     graph.validate()?;
     let openings = Openings::new(graph);
     let evidence = decode::decode(graph, &openings, bytes)?;
+    beams::check(&openings, &evidence.trees, evidence.clearance, walls)?;
     check_reasons(&openings, &evidence)?;
     walk::check_trace(&openings, &evidence)?;
 
     let n = graph.n_cells as usize;
+    let bvh = walls.map(Bvh::build);
+    let blocks = bvh
+        .as_ref()
+        .map(|bvh| move |a: DVec3, b: DVec3| bvh.any_hit(a, b, |_| false));
+    let blocks = blocks.as_ref().map(|f| f as Blocks<'_>);
     let proved = lines::check(&openings, &evidence, n, blocks)?;
     let mut cells: Vec<CellSet> = (0..n).map(|_| CellSet::new(n)).collect();
     for (c, set) in cells.iter_mut().enumerate() {
@@ -142,6 +152,7 @@ pub fn verify_evidence(
         n_visible,
         n_proved,
         n_hidden: (n as u64) * (n as u64) - n_visible,
+        n_walled: evidence.trees.len() as u64,
         n_lines: evidence.lines.len() as u64,
         n_trace: evidence.trace.len() as u64,
         clearance: evidence.clearance,
@@ -161,6 +172,11 @@ fn total(what: &'static str, said: u64, found: u64) -> Result<(), EvidenceError>
 /// claimed by a trace.
 fn check_reasons(openings: &Openings, evidence: &Evidence) -> Result<(), EvidenceError> {
     let n = openings.all.len();
+    let mut walled = shape::Table::new(n);
+    for tree in &evidence.trees {
+        walled.set(tree.from, tree.to);
+        walled.set(tree.to ^ 1, tree.from ^ 1);
+    }
     (0..n).into_par_iter().try_for_each(|s| {
         let fail = |to: usize, problem: &'static str| EvidenceError::Hidden {
             from: s,
@@ -197,6 +213,7 @@ fn check_reasons(openings: &Openings, evidence: &Evidence) -> Result<(), Evidenc
                     || t == s ^ 1
                     || evidence.claims.get(s, t)
                     || evidence.claims.get(t ^ 1, s ^ 1)
+                    || walled.get(s, t)
                     || openings.are_apart(s, t, evidence.clearance, evidence.far)
                     || last_fails(openings, evidence, s, t);
                 if !has_reason {

@@ -9,7 +9,7 @@ pub(super) struct Opening {
     pub(super) to: u32,
     pub(super) normal: DVec3,
     pub(super) corners: Vec<DVec3>,
-    pieces: Vec<Vec<DVec3>>,
+    pub(super) pieces: Vec<Vec<DVec3>>,
 }
 
 pub(super) struct Openings {
@@ -78,7 +78,7 @@ impl Openings {
     }
 
     /// Unit normal that the corners of an opening run counter-clockwise about.
-    fn turn(&self, d: usize) -> DVec3 {
+    pub(super) fn turn(&self, d: usize) -> DVec3 {
         if d.is_multiple_of(2) {
             self.all[d].normal
         } else {
@@ -310,6 +310,10 @@ impl Table {
             n_words,
             words: vec![0; n * n_words],
         }
+    }
+
+    pub(super) fn set(&mut self, row: usize, column: usize) {
+        set(&mut self.words[row * self.n_words..], column);
     }
 
     pub(super) fn n_words(&self) -> usize {
