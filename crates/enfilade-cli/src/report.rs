@@ -6,9 +6,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use enfilade::bake::vis::{VisConfig, VisContext, see_all};
 use enfilade::cpg::{CellSet, SightGraph, World};
+use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};
 use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, Style};
 use enfilade_report::{Figure, ReportParts, Table, report_html};
+use enfilade_verify::structural_triangles;
 
 use crate::cameras::{FOV, good_camera, walk_cameras};
 use crate::output::{check_target, write_atomically};
@@ -71,9 +73,13 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
 fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Vec<CellSet>> {
     let start = Instant::now();
     let mut on_round = |_, _| start.elapsed() < BUDGET;
+    let walls: Vec<Triangle> = structural_triangles(world)
+        .into_iter()
+        .map(|(triangle, _)| triangle)
+        .collect();
     let mut context = VisContext {
         on_round: &mut on_round,
-        walls: None,
+        walls: Some(&walls),
         checkpoint: None,
     };
     let graph = SightGraph::of_graph(&world.graph);
