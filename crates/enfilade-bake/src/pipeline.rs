@@ -274,6 +274,27 @@ pub(crate) fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<T
         .unzip()
 }
 
+/// The triangles in an order of their own, each from its least corner on, for builders whose result would
+/// depend on how a file lists them.
+pub(crate) fn in_own_order(triangles: &[Triangle]) -> Vec<Triangle> {
+    let order = |a: &DVec3, b: &DVec3| {
+        let by = |k: usize| a[k].total_cmp(&b[k]);
+        by(0).then_with(|| by(1)).then_with(|| by(2))
+    };
+    let mut out: Vec<Triangle> = triangles
+        .iter()
+        .map(|t| {
+            let least = (0..3).min_by(|&i, &j| order(&t[i], &t[j])).unwrap_or(0);
+            [t[least], t[(least + 1) % 3], t[(least + 2) % 3]]
+        })
+        .collect();
+    out.sort_unstable_by(|a, b| {
+        let by = |k: usize| order(&a[k], &b[k]);
+        by(0).then_with(|| by(1)).then_with(|| by(2))
+    });
+    out
+}
+
 /// The outermost layer of voxels, which the padding keeps empty.
 fn border_of(dims: [usize; 3]) -> BitVolume {
     let [nx, ny, nz] = dims;

@@ -6,6 +6,7 @@ use enfilade_geom::solid::exposed_faces;
 use enfilade_geom::{Aabb, ConvexSolid, DVec3, Plane, Triangle};
 
 use crate::complex::poly::{self, Poly};
+use crate::pipeline::in_own_order;
 
 use super::tree::Fragment;
 use super::{BspInput, Tolerance};
@@ -30,7 +31,7 @@ pub(super) fn gather(input: &BspInput<'_>) -> (Vec<Plane>, Vec<Fragment>, Aabb, 
     let mut planes = PlaneList::new(&tolerance, &bounds);
     let mut fragments = Vec::new();
     if input.solids.is_empty() {
-        for t in &in_any_order(input.triangles) {
+        for t in &in_own_order(input.triangles) {
             planes.add_triangle(t, &mut fragments);
         }
     } else {
@@ -44,27 +45,6 @@ pub(super) fn gather(input: &BspInput<'_>) -> (Vec<Plane>, Vec<Fragment>, Aabb, 
         }
     }
     (planes.planes, fragments, bounds, tolerance)
-}
-
-/// The triangles in an order of their own, each from its least corner on: the tree is the same however a
-/// file lists them.
-fn in_any_order(triangles: &[Triangle]) -> Vec<Triangle> {
-    let order = |a: &DVec3, b: &DVec3| {
-        let by = |k: usize| a[k].total_cmp(&b[k]);
-        by(0).then_with(|| by(1)).then_with(|| by(2))
-    };
-    let mut out: Vec<Triangle> = triangles
-        .iter()
-        .map(|t| {
-            let least = (0..3).min_by(|&i, &j| order(&t[i], &t[j])).unwrap_or(0);
-            [t[least], t[(least + 1) % 3], t[(least + 2) % 3]]
-        })
-        .collect();
-    out.sort_unstable_by(|a, b| {
-        let by = |k: usize| order(&a[k], &b[k]);
-        by(0).then_with(|| by(1)).then_with(|| by(2))
-    });
-    out
 }
 
 /// Distinct planes, found by rounded normal and offset.

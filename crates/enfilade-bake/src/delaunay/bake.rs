@@ -10,7 +10,7 @@ use super::space::{Space, divide};
 use crate::assemble::{Parts, assemble};
 use crate::complex::{ComplexInput, LabelSettings, build_complex};
 use crate::join::join_unparted;
-use crate::pipeline::{input_hash, structural_triangles};
+use crate::pipeline::{in_own_order, input_hash, structural_triangles};
 use crate::watershed::{bounds_of, closure_triangles, find_stairs};
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput};
 
@@ -78,7 +78,8 @@ impl Session {
         if walls.is_empty() {
             walls.clone_from(&triangles);
         }
-        let closures = closure_triangles(scene);
+        let walls = in_own_order(&walls);
+        let closures = in_own_order(&closure_triangles(scene));
         let bvh = Bvh::build(&walls);
         // Three points across the narrowest opening.
         let space = divide(&walls, &closures, &bvh, opening / 3.0)?;

@@ -338,6 +338,9 @@ pub fn decimate(
             version: 0,
         })
         .collect();
+    // What is known of a cell lies in the slot of the one that had more neighbors, so that a hall that takes in
+    // thousands of crevices is not moved each time; `names` are the numbers that steps tell.
+    let mut names: Vec<u32> = (0..n as u32).collect();
     let mut steps: Vec<Step> = Vec::new();
     let mut stop_at = None;
     while let Some(c) = queue.pop() {
@@ -347,17 +350,29 @@ pub fn decimate(
         if c.weight > stop && stop_at.is_none() {
             stop_at = Some(steps.len());
         }
-        let (into, from) = c.pair;
+        let [into, from] = {
+            let (a, b) = c.pair;
+            let count = |x: u32| neighbors[x as usize].len();
+            if count(a) >= count(b) { [a, b] } else { [b, a] }
+        };
+        let [one, other] = [into, from].map(|x| names[x as usize]);
         steps.push(Step {
-            into,
-            from,
+            into: one.min(other),
+            from: one.max(other),
             weight: c.weight,
             position: portal.center / portal.n,
         });
+        names[into as usize] = one.min(other);
         portals.remove(&c.pair);
-        radius[into as usize] = radius[into as usize].max(radius[from as usize]);
-        boxes[into as usize] = boxes[into as usize].union(boxes[from as usize]);
+        let joined_radius = radius[into as usize].max(radius[from as usize]);
+        let joined_box = boxes[into as usize].union(boxes[from as usize]);
+        // The weight of a portal that nothing joined changes with its cells only.
+        let weighs_anew = joined_radius != radius[into as usize]
+            || weight != Weight::ScaleFree && joined_box != boxes[into as usize];
+        radius[into as usize] = joined_radius;
+        boxes[into as usize] = joined_box;
         neighbors[into as usize].remove(&from);
+        let mut touched = Vec::new();
         for other in std::mem::take(&mut neighbors[from as usize]) {
             if other == into {
                 continue;
@@ -365,6 +380,7 @@ pub fn decimate(
             neighbors[other as usize].remove(&from);
             neighbors[other as usize].insert(into);
             neighbors[into as usize].insert(other);
+            touched.push(other);
             let old = portals
                 .remove(&(from.min(other), from.max(other)))
                 .expect("neighbors have a portal");
@@ -391,7 +407,10 @@ pub fn decimate(
             live.stays |= old.stays;
             live.goes |= old.goes;
         }
-        for &other in &neighbors[into as usize] {
+        if weighs_anew {
+            touched = neighbors[into as usize].iter().copied().collect();
+        }
+        for other in touched {
             let pair = (into.min(other), into.max(other));
             let live = portals.get_mut(&pair).expect("neighbors have a portal");
             // Unlike any version of this pair before, since steps only grow in number.
