@@ -14,6 +14,7 @@ use enfilade_testkit::{GridParams, Rng, courtyard, room_grid};
 use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 
 use crate::bench_bsp::{bench_bsp, bench_simplify};
+use crate::bench_builders::bench_builders;
 use crate::cameras::walk;
 use crate::see::Answers;
 use crate::walkthrough::{self, Walkthrough};
@@ -44,6 +45,15 @@ enum What {
         /// Polygons of generated clinics, e.g. 11600,50000,200000; prints the growth between them.
         #[arg(long, value_delimiter = ',')]
         clinic: Vec<usize>,
+    },
+    /// The same scenes through each builder: cells, portals, how far they agree, promises.
+    Builders {
+        /// Scene files, or folders with `scene.glb` and perhaps `detail.glb`.
+        #[arg(required = true)]
+        scenes: Vec<PathBuf>,
+        /// Rays that try the promises of each world.
+        #[arg(long, default_value_t = 100_000)]
+        rays: u64,
     },
     /// Simplifier: expected triangles by either metric at the same number of portals.
     Simplify {
@@ -117,6 +127,7 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             *heuristics,
             bake.then_some(*min_cost),
         )?,
+        What::Builders { scenes, rays } => bench_builders(&mut table, scenes, *rays)?,
         What::Simplify { worlds } => bench_simplify(&mut table, worlds)?,
         What::See {
             scenes,

@@ -14,7 +14,7 @@ use crate::world::read_world;
 
 /// Processor seconds that this process has used so far, all threads together; 0 where the system does
 /// not say.
-fn cpu_seconds() -> f64 {
+pub(crate) fn cpu_seconds() -> f64 {
     let of_task = |entry: std::io::Result<std::fs::DirEntry>| {
         let text = std::fs::read_to_string(entry.ok()?.path().join("schedstat")).ok()?;
         text.split_ascii_whitespace().next()?.parse::<f64>().ok()
@@ -23,7 +23,7 @@ fn cpu_seconds() -> f64 {
     tasks.filter_map(of_task).sum::<f64>() * 1e-9
 }
 
-fn name(path: &Path) -> String {
+pub(crate) fn name(path: &Path) -> String {
     path.file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default()

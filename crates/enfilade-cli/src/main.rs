@@ -6,6 +6,7 @@
 mod bake;
 mod bench;
 mod bench_bsp;
+mod bench_builders;
 mod cameras;
 mod decimate;
 mod demo;

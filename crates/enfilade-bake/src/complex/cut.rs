@@ -16,7 +16,7 @@
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use super::graph::{LeafGraph, NO_SCREEN};
-use super::label::{LeafCells, SOLID, Tally};
+use super::label::{LeafCells, SOLID, Sets, Tally};
 
 /// What a piece of a border costs besides its area. [Units: wu²]
 const PER_FACET: f64 = 0.002;
@@ -67,6 +67,72 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
         }
         for (leaf, to) in moves.drain(..) {
             cells.cell_of_leaf[leaf as usize] = to;
+        }
+    }
+    drop_empty(graph, cells);
+}
+
+/// Gives chips of a cell that hang together with nothing else of it, and are less than `min_volume`, to the cell
+/// that they open to most. [Units: wu³]
+///
+/// Borders that moved can cut a chip off, and a chip has portals all around. O(leaves + facets).
+pub(super) fn absorb_chips(graph: &LeafGraph, cells: &mut LeafCells, min_volume: f64) {
+    let n = cells.cell_of_leaf.len();
+    let mut sets = Sets::new(n);
+    for f in &graph.facets {
+        let [a, b] = f.leaves;
+        let cell = cells.cell_of_leaf[a as usize];
+        if cell != SOLID && cell == cells.cell_of_leaf[b as usize] {
+            sets.join(a, b);
+        }
+    }
+    let mut volume = vec![0.0; n];
+    for leaf in 0..n as u32 {
+        volume[sets.find(leaf) as usize] += graph.volumes[leaf as usize];
+    }
+    let mut largest: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    for leaf in (0..n as u32).filter(|&l| cells.cell_of_leaf[l as usize] != SOLID) {
+        let root = sets.find(leaf);
+        let part = (volume[root as usize], root);
+        let best = largest
+            .entry(cells.cell_of_leaf[leaf as usize])
+            .or_insert(part);
+        // Equal volumes: the least leaf.
+        if part.0 > best.0 || part.0 == best.0 && root < best.1 {
+            *best = part;
+        }
+    }
+    let mut opens_to: BTreeMap<u32, BTreeMap<u32, f64>> = BTreeMap::new();
+    for f in &graph.facets {
+        let [a, b] = f.leaves;
+        for (chip, other) in [(a, b), (b, a)] {
+            let [cell, to] = [chip, other].map(|l| cells.cell_of_leaf[l as usize]);
+            let root = sets.find(chip);
+            if cell != to
+                && cell != SOLID
+                && to != SOLID
+                && largest[&cell].1 != root
+                && volume[root as usize] < min_volume
+            {
+                *opens_to.entry(root).or_default().entry(to).or_default() += f64::from(f.area);
+            }
+        }
+    }
+    if opens_to.is_empty() {
+        return;
+    }
+    let to: BTreeMap<u32, u32> = opens_to
+        .into_iter()
+        .filter_map(|(root, areas)| {
+            let most = areas
+                .into_iter()
+                .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+            Some((root, most.0))
+        })
+        .collect();
+    for leaf in 0..n as u32 {
+        if let Some(&cell) = to.get(&sets.find(leaf)) {
+            cells.cell_of_leaf[leaf as usize] = cell;
         }
     }
     drop_empty(graph, cells);

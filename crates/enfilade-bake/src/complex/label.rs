@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 use rayon::prelude::*;
 
-use super::cut::move_borders;
+use super::cut::{absorb_chips, move_borders};
 use super::graph::{LeafGraph, NO_SCREEN};
 use super::{LabelSettings, Vote};
 
@@ -35,14 +35,14 @@ pub(super) struct LeafCells {
 }
 
 /// Disjoint sets; the root of a set is its least member.
-struct Sets(Vec<u32>);
+pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
-    fn new(n: usize) -> Self {
+    pub(super) fn new(n: usize) -> Self {
         Self((0..n as u32).collect())
     }
 
-    fn find(&mut self, mut x: u32) -> u32 {
+    pub(super) fn find(&mut self, mut x: u32) -> u32 {
         while self.0[x as usize] != x {
             self.0[x as usize] = self.0[self.0[x as usize] as usize];
             x = self.0[x as usize];
@@ -50,7 +50,7 @@ impl Sets {
         x
     }
 
-    fn join(&mut self, a: u32, b: u32) -> u32 {
+    pub(super) fn join(&mut self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.find(a), self.find(b));
         let (low, high) = (a.min(b), a.max(b));
         self.0[high as usize] = low;
@@ -149,6 +149,7 @@ pub(super) fn label_leaves(
     let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
+    absorb_chips(graph, &mut cells, settings.min_volume);
     cells
 }
 
