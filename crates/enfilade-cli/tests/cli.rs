@@ -81,7 +81,7 @@ fn inspect_tells_machines_of_suspected_holes() {
     // Half a rectangle is what a missing triangle leaves.
     world.graph.portals[1].outline = vec![a, b, c];
     world.graph.portals[1].pieces = vec![vec![a, b, c]];
-    world.graph.portals[1].area /= 2.0;
+    world.graph.portals[1].area = 2.0;
     let path = file("holes.glb", &encode_glb(&world).unwrap());
     let done = enfilade(&["inspect", path.to_str().unwrap(), "--json"], "");
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
