@@ -206,26 +206,19 @@ pub fn bake(
     drop(votes);
     let outward = complex.opening_tolerance();
     let counts = [
-        (
-            "input_triangles",
-            (sources.len() + scene.triangle_sources(Role::Detail).count()) as f64,
-        ),
-        ("structural_triangles", sources.len() as f64),
         ("voxel_size", grid.voxel),
         ("voxels", grid.n_voxels() as f64),
         ("occupied_voxels", n_occupied as f64),
         ("basins", n_basins as f64),
         ("screens", screens.len() as f64),
         ("leaves", complex.n_leaves() as f64),
-        ("leaks", partition.leaks.len() as f64),
     ];
     drop(complex);
 
     // 8. Geometry to the cells that see it.
     context.stage(7)?;
     let leaks = partition.leaks.clone();
-    let settings = config.to_settings();
-    let world = assemble(&Parts {
+    let world = Cut {
         scene,
         sources: &sources,
         triangles: &triangles,
@@ -234,16 +227,8 @@ pub fn bake(
         screens: &screens,
         outward,
         closed_share: config.merge.closed_share,
-        provenance: Provenance {
-            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
-            method: "watershed".to_owned(),
-            input_hash: input_hash(&triangles, &settings),
-            settings,
-        },
-        statistics: Statistics {
-            counts: counts.map(|(k, v)| (k.to_owned(), v)).into(),
-        },
-    });
+    }
+    .into_world("watershed", config.to_settings(), &counts);
     context.end_stage();
     Ok(BakeOutput {
         world,
@@ -252,6 +237,55 @@ pub fn bake(
         times: context.times(),
         leaks,
     })
+}
+
+/// A scene in cells, whatever found them: the end that all builders share.
+pub(crate) struct Cut<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) sources: &'a [TriangleSource],
+    pub(crate) triangles: &'a [Triangle],
+    pub(crate) bvh: &'a Bvh,
+    pub(crate) partition: Partition,
+    pub(crate) screens: &'a [Screen],
+    pub(crate) outward: f64,
+    pub(crate) closed_share: f64,
+}
+
+impl Cut<'_> {
+    /// Hands out the geometry, and says how the world came to be.
+    pub(crate) fn into_world(
+        self,
+        method: &str,
+        settings: BTreeMap<String, String>,
+        counts: &[(&str, f64)],
+    ) -> World {
+        let n_detail = self.scene.triangle_sources(Role::Detail).count();
+        let common = [
+            ("input_triangles", (self.sources.len() + n_detail) as f64),
+            ("structural_triangles", self.sources.len() as f64),
+            ("leaks", self.partition.leaks.len() as f64),
+        ];
+        let counts = common.iter().chain(counts);
+        assemble(&Parts {
+            scene: self.scene,
+            sources: self.sources,
+            triangles: self.triangles,
+            bvh: self.bvh,
+            partition: self.partition,
+            screens: self.screens,
+            outward: self.outward,
+            closed_share: self.closed_share,
+            provenance: Provenance {
+                generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
+                method: method.to_owned(),
+                input_hash: input_hash(self.triangles, &settings),
+                settings,
+            },
+            statistics: Statistics {
+                counts: counts.map(|&(k, v)| (k.to_owned(), v)).collect(),
+            },
+        })
+    }
 }
 
 /// Which cells have a portal.
@@ -484,7 +518,7 @@ fn inside_of(stairs: &[Triangle], grid: &Grid, bvh: &Bvh) -> BitVolume {
 }
 
 /// FNV-1a over the triangles and settings, as 16 hexadecimal digits.
-pub(crate) fn input_hash(triangles: &[Triangle], settings: &BTreeMap<String, String>) -> String {
+fn input_hash(triangles: &[Triangle], settings: &BTreeMap<String, String>) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut add = |bytes: &[u8]| {
         for &b in bytes {

@@ -1,8 +1,11 @@
 //! Visibility before run-time, on random grids of rooms, against lines followed by other means.
 
-use std::io::{Read, Write};
+mod common;
+
+use std::io::Read;
 use std::time::Duration;
 
+use common::pack;
 use enfilade_bake::vis::{
     VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, see_all,
 };
@@ -338,21 +341,6 @@ fn settings_that_are_no_distance_are_refused() {
             assert!(matches!(refused, Err(VisError::Setting { .. })), "{bad}");
         }
     }
-}
-
-/// A body of evidence as a file, with length and check sum as they should be.
-fn pack(body: &[u8]) -> Vec<u8> {
-    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-    encoder.write_all(body).unwrap();
-    let packed = encoder.finish().unwrap();
-    let sum = packed.iter().fold(0xcbf2_9ce4_8422_2325_u64, |sum, &b| {
-        (sum ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
-    });
-    let mut file = b"ENFEVID3".to_vec();
-    file.extend((body.len() as u64).to_le_bytes());
-    file.extend(sum.to_le_bytes());
-    file.extend(packed);
-    file
 }
 
 #[test]

@@ -1,7 +1,10 @@
 //! What walls hide inside cells, against lines followed by other means.
 
-use std::io::{Read, Write};
+mod common;
 
+use std::io::Read;
+
+use common::pack;
 use enfilade_bake::vis::{VisConfig, VisContext, VisOutput, see_all};
 use enfilade_cpg::{CellId, CellSet, SightGraph, SightPortal};
 use enfilade_geom::{DVec3, Triangle};
@@ -245,20 +248,6 @@ fn threads_change_nothing() {
     let one = on(1);
     assert_eq!(one, on(2));
     assert_eq!(one, on(8));
-}
-
-fn pack(body: &[u8]) -> Vec<u8> {
-    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-    encoder.write_all(body).unwrap();
-    let packed = encoder.finish().unwrap();
-    let sum = packed.iter().fold(0xcbf2_9ce4_8422_2325_u64, |sum, &b| {
-        (sum ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
-    });
-    let mut file = b"ENFEVID3".to_vec();
-    file.extend((body.len() as u64).to_le_bytes());
-    file.extend(sum.to_le_bytes());
-    file.extend(packed);
-    file
 }
 
 #[test]

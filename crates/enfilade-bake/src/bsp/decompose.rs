@@ -1,12 +1,10 @@
 //! A bake whose portals are the separators of a tree.
 
-use enfilade_cpg::{Provenance, Statistics};
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding};
 
-use crate::assemble::{Parts, assemble};
 use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
-use crate::pipeline::{input_hash, structural_triangles};
+use crate::pipeline::{Cut, structural_triangles};
 use crate::simplify::{SimplifySettings, simplify};
 use crate::watershed::{
     MergeSettings, OUTDOORS, Screen, bounds_of, closure_triangles, find_stairs, slab_heights,
@@ -145,11 +143,6 @@ pub fn bake_bsp(
     let partition = complex.partition(&votes.0, &settings);
     let outward = complex.opening_tolerance();
     let statistics = [
-        (
-            "input_triangles",
-            (sources.len() + scene.triangle_sources(Role::Detail).count()) as f64,
-        ),
-        ("structural_triangles", sources.len() as f64),
         ("bsp_polygons", counts.n_polygons as f64),
         ("bsp_pieces", counts.n_pieces as f64),
         ("bsp_splits", counts.n_splits as f64),
@@ -159,15 +152,13 @@ pub fn bake_bsp(
         ("crossing_separators", parted.n_crossing as f64),
         ("cells_before", n_before as f64),
         ("leaves", complex.n_leaves() as f64),
-        ("leaks", partition.leaks.len() as f64),
     ];
     drop(complex);
 
     // 3. Geometry to the cells that see it, and cells within their bounds.
     context.bsp_stage(4)?;
     let leaks = partition.leaks.clone();
-    let settings = config.to_settings();
-    let world = assemble(&Parts {
+    let world = Cut {
         scene,
         sources: &sources,
         triangles: &triangles,
@@ -176,16 +167,8 @@ pub fn bake_bsp(
         screens: &screens,
         outward,
         closed_share: 1.1,
-        provenance: Provenance {
-            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
-            method: "bsp".to_owned(),
-            input_hash: input_hash(&triangles, &settings),
-            settings,
-        },
-        statistics: Statistics {
-            counts: statistics.map(|(k, v)| (k.to_owned(), v)).into(),
-        },
-    });
+    }
+    .into_world("bsp", config.to_settings(), &statistics);
     let world = simplify(&world, &config.simplify).world;
     context.end_stage();
     Ok(BakeOutput {

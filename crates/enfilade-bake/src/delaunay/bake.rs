@@ -1,16 +1,14 @@
 //! The bake with tetrahedra: scene → tetrahedra → cells → rooms → screens → cell complex → world.
 
-use enfilade_cpg::{Provenance, Statistics};
-use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, Triangle};
 
 use super::decimate::{Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together};
 use super::rooms::find_rooms;
 use super::space::{Space, divide};
-use crate::assemble::{Parts, assemble};
 use crate::complex::{ComplexInput, LabelSettings, build_complex};
 use crate::join::join_unparted;
-use crate::pipeline::{in_own_order, input_hash, structural_triangles};
+use crate::pipeline::{Cut, in_own_order, structural_triangles};
 use crate::watershed::{bounds_of, closure_triangles, find_stairs};
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput};
 
@@ -171,17 +169,11 @@ pub fn bake_session(
     }
     let outward = complex.opening_tolerance();
     let counts = [
-        (
-            "input_triangles",
-            (sources.len() + scene.triangle_sources(Role::Detail).count()) as f64,
-        ),
-        ("structural_triangles", sources.len() as f64),
         ("tetrahedra", session.space.delaunay.n_finite as f64),
         ("spacing", session.space.spacing),
         ("steps", n_steps as f64),
         ("screens", rooms.screens.len() as f64),
         ("leaves", complex.n_leaves() as f64),
-        ("leaks", partition.leaks.len() as f64),
     ];
     drop(complex);
     context.delaunay_stage(5)?;
@@ -195,7 +187,7 @@ pub fn bake_session(
             .unwrap_or_else(|| default_stop(config.weight))
             .to_string(),
     );
-    let world = assemble(&Parts {
+    let world = Cut {
         scene,
         sources: &sources,
         triangles: &triangles,
@@ -204,16 +196,8 @@ pub fn bake_session(
         screens: &rooms.screens,
         outward,
         closed_share: merge.closed_share,
-        provenance: Provenance {
-            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
-            method: "delaunay".to_owned(),
-            input_hash: input_hash(&triangles, &settings),
-            settings,
-        },
-        statistics: Statistics {
-            counts: counts.map(|(k, v)| (k.to_owned(), v)).into(),
-        },
-    });
+    }
+    .into_world("delaunay", settings, &counts);
     context.end_stage();
     Ok(BakeOutput {
         world,
