@@ -92,13 +92,11 @@ pub fn bake(
 
     // 3. Basins, cut where a slab ends a storey.
     context.stage(2)?;
-    let border = border_of(grid.dims);
     let options = WatershedOptions {
         h: config.noise / grid.voxel,
-        outdoors: Some(&border),
+        outdoors: Some(border_of(grid.dims)),
     };
-    let flood = watershed(grid.dims, distances, &options);
-    drop(border);
+    let flood = watershed(grid.dims, distances, options);
     let mut labels = flood.labels;
     let mut peaks: Vec<f32> = std::iter::once(0.0)
         .chain(flood.basins.iter().map(|b| b.peak as f32))
@@ -389,8 +387,12 @@ const UNSURE: f64 = 0.35;
 struct Ballots {
     /// Voxels along each edge of a block.
     block: usize,
-    /// Low and high half of the voxel's index, and its region.
-    cast: Vec<[u32; 3]>,
+    /// Blocks along each axis.
+    dims: [usize; 3],
+    /// Region that each block votes for; 0 is none.
+    region: Vec<u32>,
+    /// Which voxel of the block it is that votes: 17³ of them at most, with 2³² voxels in all.
+    voter: Vec<u16>,
 }
 
 impl Ballots {
@@ -427,44 +429,53 @@ impl Ballots {
         while grid.n_voxels() / (block * block * block) > MAX_VOTES {
             block += 1;
         }
-        let [nx, ny, nz] = grid.dims;
-        let cast = (0..nz.div_ceil(block))
-            .into_par_iter()
-            .flat_map_iter(|bz| {
-                let unsure = &unsure;
-                (0..ny.div_ceil(block)).flat_map(move |by| {
-                    (0..nx.div_ceil(block)).filter_map(move |bx| {
-                        let range = |b: usize, n: usize| b * block..((b + 1) * block).min(n);
-                        for z in range(bz, nz) {
-                            for y in range(by, ny) {
-                                for x in range(bx, nx) {
-                                    let i = grid.index(x, y, z);
-                                    let region = regions.region_of_basin[labels.get(i) as usize];
-                                    if region == 0
-                                        || unsure.get(x, y, z)
-                                        || solid.get(x, y, z)
-                                        || hollow.binary_search(&region).is_ok()
-                                    {
-                                        continue;
-                                    }
-                                    return Some([i as u32, (i as u64 >> 32) as u32, region]);
-                                }
-                            }
-                        }
-                        None
-                    })
-                })
-            })
-            .collect();
-        Self { block, cast }
+        let dims = grid.dims.map(|n| n.div_ceil(block));
+        let n_blocks = dims.iter().product();
+        let mut ballots = Self {
+            block,
+            dims,
+            region: vec![0; n_blocks],
+            voter: vec![0; n_blocks],
+        };
+        let region_of = |[x, y, z]: [usize; 3]| {
+            let region = regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize];
+            let votes = region != 0
+                && !unsure.get(x, y, z)
+                && !solid.get(x, y, z)
+                && hollow.binary_search(&region).is_err();
+            votes.then_some(region)
+        };
+        ballots
+            .region
+            .par_iter_mut()
+            .zip(&mut ballots.voter)
+            .enumerate()
+            .with_min_len(4096)
+            .for_each(|(b, (region, voter))| {
+                let [bx, by, bz] = [b % dims[0], b / dims[0] % dims[1], b / (dims[0] * dims[1])];
+                let found = (0..block * block * block).find_map(|k| {
+                    let at = voter_at([bx, by, bz], block, k);
+                    let is_inside = (0..3).all(|axis| at[axis] < grid.dims[axis]);
+                    is_inside.then(|| region_of(at)).flatten().map(|of| (k, of))
+                });
+                if let Some((k, of)) = found {
+                    (*voter, *region) = (k as u16, of);
+                }
+            });
+        ballots
     }
 
     fn count(self, grid: &Grid) -> Vec<Vote> {
         let weight = (grid.voxel * self.block as f64).powi(3) as f32;
-        self.cast
+        let [nx, ny, _] = self.dims;
+        self.region
             .into_par_iter()
-            .map(|[low, high, label]| {
-                let [x, y, z] = grid.coords((u64::from(high) << 32 | u64::from(low)) as usize);
+            .zip(self.voter)
+            .enumerate()
+            .filter(|(_, (region, _))| *region != 0)
+            .map(|(b, (label, k))| {
+                let at = [b % nx, b / nx % ny, b / (nx * ny)];
+                let [x, y, z] = voter_at(at, self.block, usize::from(k));
                 Vote {
                     point: grid.center(x, y, z),
                     label,
@@ -473,6 +484,12 @@ impl Ballots {
             })
             .collect()
     }
+}
+
+/// Voxel number `k` of a block, along x first.
+fn voter_at(of: [usize; 3], block: usize, k: usize) -> [usize; 3] {
+    let within = [k % block, k / block % block, k / (block * block)];
+    [0, 1, 2].map(|axis| of[axis] * block + within[axis])
 }
 
 /// Voxels that stairs fill: those that they touch, and those between from which one sees backs.
