@@ -18,9 +18,9 @@ use crate::voxel::{
     BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
 };
 use crate::watershed::{
-    Flooded, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
-    find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
-    rim_caps, shallow_voids, slab_heights,
+    Flooded, Frame, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches,
+    cut_at_slabs, find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins,
+    opening_of, rim_caps, shallow_voids, slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -60,12 +60,15 @@ pub fn bake(
             n_objects: scene.objects.len(),
         });
     }
-    let bvh = Bvh::build(&triangles);
-    let grid = config.grid(&bounds_of(&triangles))?;
+    // The voxels lie along the walls, however the building is turned.
+    let frame = Frame::of(&triangles);
+    let turned = frame.triangles_to_grid(&triangles);
+    let bvh = Bvh::build(&turned);
+    let grid = config.grid(&bounds_of(&turned))?;
     // Stairs stand in rooms and bound none.
-    let is_stair = find_stairs(&sources, &triangles);
+    let is_stair = find_stairs(&sources, &turned);
     let part = |stairs: bool| -> Vec<Triangle> {
-        triangles
+        turned
             .iter()
             .zip(&is_stair)
             .filter(|t| *t.1 == stairs)
@@ -74,7 +77,7 @@ pub fn bake(
     };
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
-    let closures = voxelize(&grid, &closure_triangles(scene));
+    let closures = voxelize(&grid, &frame.triangles_to_grid(&closure_triangles(scene)));
     // Where a building has no roof or a tube just ends, a lid or a cap takes its place.
     let lids = find_lids(&grid, &occupied);
     let mut shut = voxelize(&grid, &rim_caps(&walls, config.min_opening.powi(2)));
@@ -137,7 +140,7 @@ pub fn bake(
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
-    let screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
+    let mut screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
     drop((closures, lids));
     let ballots = Ballots::cast(
         &grid,
@@ -151,8 +154,20 @@ pub fn bake(
             regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
         })
     });
-    drop(walls);
-    drop(labels);
+    drop((walls, labels));
+    // From here on all is where the scene has it.
+    for screen in &mut screens {
+        screen.winding = frame.winding_to_scene(&screen.winding);
+    }
+    for (p, _) in &mut voids {
+        *p = frame.to_scene(*p);
+    }
+    let bvh = if frame.is_scene() {
+        bvh
+    } else {
+        Bvh::build(&triangles)
+    };
+    drop(turned);
 
     // 6. Screens and triangles cut space into convex pieces, exactly.
     context.stage(5)?;
@@ -160,12 +175,12 @@ pub fn bake(
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         screens: &windings,
-        bounds: grid.aabb(),
+        bounds: frame.aabb_to_scene(&grid.aabb()),
     });
 
     // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
     context.stage(6)?;
-    let mut votes = ballots.count(&grid);
+    let mut votes = ballots.count(&grid, &frame);
     let mut partition = complex.partition(&votes, &LabelSettings::default());
     while join_unparted(&partition, &mut votes, &mut voids) {
         partition = complex.partition(&votes, &LabelSettings::default());
@@ -205,6 +220,7 @@ pub fn bake(
     let outward = complex.opening_tolerance();
     let counts = [
         ("voxel_size", grid.voxel),
+        ("grid_turn_degrees", frame.degrees()),
         ("voxels", grid.n_voxels() as f64),
         ("occupied_voxels", n_occupied as f64),
         ("basins", n_basins as f64),
@@ -465,7 +481,7 @@ impl Ballots {
         ballots
     }
 
-    fn count(self, grid: &Grid) -> Vec<Vote> {
+    fn count(self, grid: &Grid, frame: &Frame) -> Vec<Vote> {
         let weight = (grid.voxel * self.block as f64).powi(3) as f32;
         let [nx, ny, _] = self.dims;
         self.region
@@ -477,7 +493,7 @@ impl Ballots {
                 let at = [b % nx, b / nx % ny, b / (nx * ny)];
                 let [x, y, z] = voter_at(at, self.block, usize::from(k));
                 Vote {
-                    point: grid.center(x, y, z),
+                    point: frame.to_scene(grid.center(x, y, z)),
                     label,
                     weight,
                 }

@@ -7,6 +7,7 @@
 
 mod closures;
 mod fit;
+mod frame;
 mod hollow;
 mod lids;
 mod regions;
@@ -17,6 +18,7 @@ mod voids;
 
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen, fit_screen_at};
+pub use frame::Frame;
 pub use hollow::hollow_regions;
 pub use lids::{Lids, find_lids};
 pub use regions::{
