@@ -12,6 +12,7 @@ mod hollow;
 mod lids;
 mod regions;
 mod rims;
+mod sections;
 mod slabs;
 mod stairs;
 mod voids;
@@ -25,8 +26,8 @@ pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,
 };
-pub(crate) use regions::{connected_count, rim_share};
 pub use rims::rim_caps;
+pub(crate) use sections::{connected_count, rim_share};
 pub use slabs::{cut_at_slabs, slab_heights};
 pub use stairs::find_stairs;
 pub use voids::shallow_voids;
