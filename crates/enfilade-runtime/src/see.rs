@@ -390,6 +390,8 @@ impl Asking<'_, '_> {
             .for_each_inside(sight.world_root, &planes, |cell, _| {
                 self.cull_whole(cell, NONE);
             });
+        // Where no cell is in the view, the shadows are still those of the last question.
+        self.viewer.shadows.clear();
         self.set_planes(&Region::screen(), None);
         self.cull(sight.unlisted_root);
     }

@@ -427,6 +427,69 @@ fn an_eye_in_no_cell_sees_every_cell_and_each_object_once() {
     }
 }
 
+/// A viewer is asked for one view after the other: what hid something in one has no say in the next.
+#[test]
+fn an_eye_in_no_cell_sees_what_no_cell_lists_whatever_was_asked_before() {
+    let mut world = courtyard(8, true);
+    let middle = DVec3::new(15.0, 1.5, 15.0);
+    let away: Vec<DVec3> = (0..16)
+        .map(|k| f64::from(k) * std::f64::consts::TAU / 16.0)
+        .map(|angle| DVec3::new(angle.cos(), 0.0, angle.sin()))
+        .collect();
+    // A wall across the room on one side of the yard, which throws a shadow there.
+    let mut wall = world.batches[0].clone();
+    wall.cells = vec![CellId(1)];
+    wall.primitive = enfilade_geom::scene::Primitive {
+        positions: [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
+            .map(|[x, y]| [x, y, 10.0])
+            .to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Default::default()
+    };
+    world.batches.push(wall);
+    let first = world.batches.len() as u32;
+    for d in &away {
+        let mut batch = world.batches[0].clone();
+        batch.cells.clear();
+        let corner = |x: f64, y: f64| {
+            let p = middle + *d * 1000.0 + DVec3::new(-d.z * x, y, d.x * x);
+            p.as_vec3().to_array()
+        };
+        batch.primitive = enfilade_geom::scene::Primitive {
+            positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)],
+            indices: vec![0, 1, 2],
+            ..Default::default()
+        };
+        world.batches.push(batch);
+    }
+    let sight = Sight::build(&world).unwrap();
+    let state = SightState::new(&sight);
+    let mut viewer = Viewer::new(&sight);
+    let mut rng = Rng::new(3);
+    let view = |eye: DVec3, toward: DVec3| {
+        let [eye, toward] = [eye, toward].map(|v| v.as_vec3().to_array());
+        View::perspective(eye, toward, [0.0, 1.0, 0.0], 0.5, 1.0).unwrap()
+    };
+    for _ in 0..200 {
+        let inside = DVec3::new(
+            rng.range(0.2, 2.8),
+            rng.range(0.2, 2.8),
+            rng.range(0.2, 29.0),
+        );
+        for (k, d) in away.iter().enumerate() {
+            viewer.see(&sight, &state, &view(inside, *d));
+            let seen = viewer.see(&sight, &state, &view(middle + *d * 900.0, *d));
+            assert!(seen.counts().is_eye_lost);
+            let wanted = first + k as u32;
+            let found = seen
+                .chunks()
+                .iter()
+                .any(|c| sight.chunks()[c.0 as usize].batch == wanted);
+            assert!(found, "triangle {k} after a view from {inside}");
+        }
+    }
+}
+
 #[test]
 fn a_door_is_shut_whatever_was_said_of_its_leaf() {
     let world = room_grid(&GridParams::offices(9, 1));
