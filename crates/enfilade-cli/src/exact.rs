@@ -161,13 +161,25 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
         out.triangles[0] += studio
             .list(&seen, camera.eye, Culling::Portals, asked.size)
             .n_triangles();
-        let mut lost = Vec::new();
+        let mut lost: Vec<LostPixel> = Vec::new();
         for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
             let mut difference = a.difference(b);
             // Each pixel once, though there are two layers of it.
             out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
             out.tied += difference.n_tied;
+            // Where another opaque triangle is shown, and rightly, it hides other things as well.
+            let is_hidden_by_that = |l: &LostPixel| {
+                let [before, now] = [&whole[0], &culled[0]].map(|p| p.at(l.at));
+                layer == 1
+                    && before.0 != now.0
+                    && Camera::distance_of(before.1) <= Camera::distance_of(l.found.1)
+                    && !lost.iter().any(|o| o.at == l.at)
+            };
             difference.lost.retain(|l| {
+                if is_hidden_by_that(l) {
+                    out.edges += 1;
+                    return false;
+                }
                 let drawn = f64::from(Camera::distance_of(l.found.1));
                 let on_edge = oracle.is_right(&camera, l.at, asked.size, drawn, layer == 1);
                 let in_crack = !oracle.is_met(&camera, l.at, asked.size, l.expected.0, layer == 1);

@@ -6,13 +6,14 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::BakeConfig;
+use enfilade::bake::bsp::{BspConfig, bake_bsp};
+use enfilade::bake::{BakeConfig, BakeContext, Silent};
 use enfilade::cpg::{CellId, DetailObject, World};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::{Mesh, Primitive};
 use enfilade::runtime::Sight;
 use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Sparing, Studio, Style};
-use enfilade_testkit::{TowerParams, office_tower};
+use enfilade_testkit::{TowerParams, clinic, office_tower};
 
 use crate::bake::bake_scene;
 use crate::cameras::{FOV, walk_cameras};
@@ -27,6 +28,9 @@ pub(crate) struct Walkthrough {
     /// Rooms of a generated, furnished office tower, baked on the spot.
     #[arg(long, value_name = "ROOMS")]
     tower: Option<usize>,
+    /// A generated clinic of about so many polygons, baked on the spot by its planes.
+    #[arg(long, value_name = "POLYGONS")]
+    clinic: Option<usize>,
     /// Place an object in each room, the same everywhere, of so many triangles that the world has as
     /// many as this.
     #[arg(long, value_name = "TRIANGLES")]
@@ -72,8 +76,14 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
         let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
         worlds.push((format!("office tower of {rooms} rooms"), baked.world));
     }
+    if let Some(polygons) = args.clinic {
+        let scene = clinic(polygons, 1);
+        let context = BakeContext::new(&Silent, None);
+        let baked = bake_bsp(&scene, &BspConfig::default(), &context)?;
+        worlds.push((format!("clinic of {polygons} polygons"), baked.world));
+    }
     if worlds.is_empty() {
-        bail!("a world is needed, or --tower ROOMS");
+        bail!("a world is needed, or --tower ROOMS, or --clinic POLYGONS");
     }
     table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | ms of all threads | the same to frustum culling | triangles drawn | draws | ms to hand in |".into());
     table.push(

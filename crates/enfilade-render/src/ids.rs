@@ -66,6 +66,16 @@ pub struct LostPixel {
 }
 
 impl IdPicture {
+    /// What is shown at a pixel, and at which depth.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such pixel.
+    #[must_use]
+    pub fn at(&self, [x, y]: [u32; 2]) -> (Shown, f32) {
+        self.pixels[y as usize * self.width as usize + x as usize]
+    }
+
     /// Compares what is expected (`self`) with what is found.
     ///
     /// # Panics
