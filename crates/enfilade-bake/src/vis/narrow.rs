@@ -4,12 +4,14 @@
 //! most of its work: the planes that separate an opening from each of its next ones bound all that lies
 //! behind both. (The Quake tools go straight to the search.)
 
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::bits::{self, BitTable};
-use super::clip::{Arena, Fence, Separator, Tolerance, separators};
+use super::clip::{Arena, Tolerance};
 use super::dirs::Dirs;
 use super::flow::{back_of, facing, front_of};
+use super::planes::{Four, admits, pack, separators};
 
 /// Openings a round; see [`super::search`].
 const ROUND: usize = 128;
@@ -55,8 +57,7 @@ pub(super) fn narrow_might(
 #[derive(Default)]
 struct Work {
     arena: Arena,
-    planes: Vec<Separator>,
-    fence: Fence,
+    planes: Vec<Four>,
     allowed: Vec<u64>,
     reached: Vec<u64>,
     stack: Vec<u32>,
@@ -96,8 +97,7 @@ impl Work {
                 tolerance,
                 &mut self.planes,
             );
-            drop_twins(&mut self.planes, tolerance);
-            self.fence.set(&self.planes);
+            pack(&mut self.planes, tolerance);
             self.flood(dirs, might, tolerance, (source, pass));
             for (r, &new) in row.iter_mut().zip(&self.reached) {
                 *r |= new;
@@ -109,6 +109,18 @@ impl Work {
     /// Collects what lies behind `pass` in front of all planes.
     fn flood(
         &mut self,
+        dirs: &Dirs,
+        might: &BitTable,
+        tolerance: &Tolerance,
+        ends: (usize, usize),
+    ) {
+        dispatch!(Level::new(), simd => self.flood_by(simd, dirs, might, tolerance, ends));
+    }
+
+    #[inline(always)]
+    fn flood_by<S: Simd>(
+        &mut self,
+        simd: S,
         dirs: &Dirs,
         might: &BitTable,
         tolerance: &Tolerance,
@@ -129,28 +141,11 @@ impl Work {
                     continue;
                 }
                 bits::clear(&mut self.allowed, q);
-                if self.fence.admits(dirs, q, tolerance) {
+                if admits(simd, &self.planes, dirs, q, tolerance) {
                     bits::set(&mut self.reached, q);
                     self.stack.push(next);
                 }
             }
-        }
-    }
-}
-
-/// Drops planes that are the same but for rounding: those that hold an edge of each opening.
-fn drop_twins(planes: &mut Vec<Separator>, tolerance: &Tolerance) {
-    let mut i = 0;
-    while i < planes.len() {
-        let plane = planes[i];
-        let is_twin = |other: &Separator| {
-            plane.normal.distance_squared(other.normal) < 1e-24
-                && (plane.front - other.front).abs() < tolerance.rounding
-        };
-        if planes[..i].iter().any(is_twin) {
-            planes.swap_remove(i);
-        } else {
-            i += 1;
         }
     }
 }

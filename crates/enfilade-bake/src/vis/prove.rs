@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::bits::{self, BitTable};
 use super::clip::Poly;
 use super::flow::{Flow, Shared};
+use super::planes::is_admitted;
 
 /// Symbols of the trace.
 pub(super) mod symbol {
@@ -197,7 +198,6 @@ impl Flow {
     fn flood_wanted(&mut self, shared: &Shared<'_>, first_plane: usize) -> bool {
         let dirs = shared.dirs;
         let (first, pass) = (self.chain[0].dir as usize, self.chain[1].dir);
-        self.fence.set(&self.planes[first_plane..]);
         let passable = shared.might.row(first);
         let mut reached = vec![0; self.wanted.len()];
         let mut stack = vec![pass];
@@ -210,7 +210,7 @@ impl Flow {
                     && bits::get(row, q)
                     && (is_passable || bits::get(&self.wanted, q))
                     && !bits::get(&reached, q)
-                    && self.fence.admits(dirs, q, &shared.tolerance)
+                    && is_admitted(&self.planes[first_plane..], dirs, q, &shared.tolerance)
                 {
                     bits::set(&mut reached, q);
                     if is_passable {
