@@ -156,13 +156,22 @@ pub(super) fn count(row: &[u64]) -> usize {
     row.iter().map(|w| w.count_ones() as usize).sum()
 }
 
-/// Writes `a & b` and says whether it has a bit in common with `wanted`.
+/// Writes `a & b` where `words` says, and says whether it has a bit there in common with `wanted`.
 #[inline]
-pub(super) fn and_into(out: &mut [u64], a: &[u64], b: &[u64], wanted: &[u64]) -> bool {
+pub(super) fn and_into(
+    words: &[u32],
+    out: &mut [u64],
+    (a, b): (&[u64], &[u64]),
+    wanted: &[u64],
+) -> bool {
+    let n = out.len();
+    let (a, b, wanted) = (&a[..n], &b[..n], &wanted[..n]);
     let mut any = 0;
-    for (((o, &x), &y), &w) in out.iter_mut().zip(a).zip(b).zip(wanted) {
-        *o = x & y;
-        any |= *o & w;
+    for &i in words {
+        let i = i as usize;
+        let both = a[i] & b[i];
+        out[i] = both;
+        any |= both & wanted[i];
     }
     any != 0
 }

@@ -50,6 +50,14 @@ pub(super) struct HalfSpace {
     pub(super) offset: f64,
 }
 
+impl HalfSpace {
+    /// Whether a ball (middle, radius) lies in it.
+    #[inline]
+    pub(super) fn holds(&self, [x, y, z, radius]: [f64; 4]) -> bool {
+        self.normal.dot(DVec3::new(x, y, z)) - self.offset >= radius
+    }
+}
+
 impl Arena {
     #[inline]
     pub(super) fn mark(&self) -> usize {

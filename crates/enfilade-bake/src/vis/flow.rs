@@ -18,7 +18,7 @@ use fearless_simd::{Level, Simd, dispatch};
 
 use super::bits::{self, BitTable};
 use super::clip::{Arena, HalfSpace, Poly, Tolerance};
-use super::dirs::Dirs;
+use super::dirs::{Dirs, Next};
 use super::planes::{Facing, Four, Side, admits, hide, separators};
 use super::rays::{self, Blocker, Line};
 
@@ -29,6 +29,7 @@ const MAX_CHAIN: usize = 512;
 pub(super) struct Shared<'a> {
     pub(super) dirs: &'a Dirs,
     pub(super) might: &'a BitTable,
+    pub(super) next: &'a Next,
     /// Pairs of cells that are decided to be visible.
     pub(super) seen: &'a BitTable,
     pub(super) tolerance: Tolerance,
@@ -75,6 +76,8 @@ pub(super) struct Flow {
     pub(super) arena: Arena,
     /// By depth: what all openings of the chain might see.
     pub(super) reach: Vec<Vec<u64>>,
+    /// Words of the first row of reach that are not zero. The rows of other depths are right in these alone.
+    pub(super) words: Vec<u32>,
     /// The openings still to be settled from this source.
     pub(super) wanted: Vec<u64>,
     /// By depth: the chain's openings as clipped.
@@ -113,6 +116,7 @@ impl Flow {
         self.set_reach(0, shared.might.row(source));
         if self.wanted.iter().any(|&w| w != 0) {
             self.drop_unreached(shared, source);
+            self.find_words();
             self.visit(shared, poly);
         }
         self.found.hidden = self.wanted.clone();
@@ -128,11 +132,9 @@ impl Flow {
         self.reached.resize(row.len(), 0);
         self.stack.push(source as u32);
         while let Some(at) = self.stack.pop() {
-            let from_here = shared.might.row(at as usize);
-            for &next in dirs.after(at as usize) {
+            for next in shared.next.after(dirs, shared.might, at as usize) {
                 let q = next as usize;
-                // The row of `at` last: it is far away in memory.
-                if bits::get(row, q) && !bits::get(&self.reached, q) && bits::get(from_here, q) {
+                if bits::get(row, q) && !bits::get(&self.reached, q) {
                     bits::set(&mut self.reached, q);
                     self.stack.push(next);
                 }
@@ -161,6 +163,14 @@ impl Flow {
         self.reach[depth].extend_from_slice(row);
     }
 
+    /// Sets [`Flow::words`].
+    pub(super) fn find_words(&mut self) {
+        self.words.clear();
+        let row = self.reach[0].iter().enumerate();
+        self.words
+            .extend(row.filter(|&(_, &word)| word != 0).map(|(i, _)| i as u32));
+    }
+
     /// Goes on from the end of the chain, `source` being what is left of its first opening.
     fn visit(&mut self, shared: &Shared<'_>, source: Poly) {
         let dirs = shared.dirs;
@@ -184,12 +194,13 @@ impl Flow {
         }
         for &next in dirs.exits(dirs.all[pass.dir as usize].to) {
             let q = next as usize;
-            if next == back || !bits::get(&self.reach[depth], q) {
+            let is_near = bits::get(&self.reach[0], q) && bits::get(&self.reach[depth], q);
+            if next == back || !is_near {
                 continue;
             }
             let (near, far) = self.reach.split_at_mut(depth + 1);
-            let leads_on =
-                bits::and_into(&mut far[0], &near[depth], shared.might.row(q), &self.wanted);
+            let rows = (&near[depth][..], shared.might.row(q));
+            let leads_on = bits::and_into(&self.words, &mut far[0], rows, &self.wanted);
             if !leads_on && !bits::get(&self.wanted, q) {
                 continue;
             }
@@ -206,10 +217,17 @@ impl Flow {
         self.planes.truncate(first_plane);
     }
 
+    fn is_any_wanted(&self, depth: usize) -> bool {
+        let row = &self.reach[depth];
+        let at = |&i: &u32| row[i as usize] & self.wanted[i as usize] != 0;
+        self.words.iter().any(at)
+    }
+
     /// Counts all that might lie beyond the chain as seen.
     fn give_up(&mut self, shared: &Shared<'_>, depth: usize) {
-        let both = self.reach[depth].iter().zip(&self.wanted);
-        let beyond: Vec<u64> = both.map(|(a, b)| a & b).collect();
+        let mut beyond = vec![0; self.wanted.len()];
+        let rows = (&self.reach[depth][..], &self.wanted[..]);
+        bits::and_into(&self.words, &mut beyond, rows, &self.wanted);
         for q in bits::ones(&beyond) {
             let cell = shared.dirs.all[q].to;
             self.found.undecided.push(cell);
@@ -239,7 +257,7 @@ impl Flow {
                 bits::clear_range(&mut self.wanted, range.start, range.end);
             }
         }
-        if leads_on && bits::meets(&self.reach[self.chain.len() - 1], &self.wanted) {
+        if leads_on && self.is_any_wanted(self.chain.len() - 1) {
             self.visit(shared, source);
         }
     }
@@ -378,8 +396,10 @@ impl Flow {
     ) -> bool {
         let planes = &self.planes[first_plane..];
         let mut is_left = false;
-        for (i, (word, wanted)) in self.reach[depth].iter_mut().zip(&self.wanted).enumerate() {
-            let mut rest = *word & wanted;
+        for &i in &self.words {
+            let i = i as usize;
+            let word = &mut self.reach[depth][i];
+            let mut rest = *word & self.wanted[i];
             while rest != 0 {
                 let q = i * 64 + rest.trailing_zeros() as usize;
                 if admits(simd, planes, shared.dirs, q, &shared.tolerance) {
@@ -422,18 +442,21 @@ impl Flow {
         let next = &dirs.all[q];
         let mut target = self.arena.push(dirs.winding(q), q as u32);
         let source_front = front_of(dirs, source.dir);
-        target = self
-            .arena
-            .clip(target, source_front, next.turn, tolerance)?;
-        if pass.dir != source.dir {
+        if !source_front.holds(ball) {
             target = self
                 .arena
-                .clip(target, front_of(dirs, pass.dir), next.turn, tolerance)?;
+                .clip(target, source_front, next.turn, tolerance)?;
+        }
+        let pass_front = front_of(dirs, pass.dir);
+        if pass.dir != source.dir && !pass_front.holds(ball) {
+            target = self.arena.clip(target, pass_front, next.turn, tolerance)?;
         }
         let source_turn = dirs.all[source.dir as usize].turn;
-        let mut source = self
-            .arena
-            .clip(source, back_of(dirs, q), source_turn, tolerance)?;
+        let mut source = source;
+        let back = back_of(dirs, q);
+        if !back.holds(dirs.balls[source.dir as usize]) {
+            source = self.arena.clip(source, back, source_turn, tolerance)?;
+        }
         let planes = (&self.planes[first_plane..], Side::After);
         target = self
             .arena

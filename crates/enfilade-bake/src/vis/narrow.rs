@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::bits::{self, BitTable};
 use super::clip::{Arena, Tolerance};
-use super::dirs::Dirs;
+use super::dirs::{Dirs, Next};
 use super::flow::{back_of, facing, front_of};
 use super::planes::{Four, admits, pack, separators};
 
@@ -30,12 +30,13 @@ pub(super) fn narrow_might(
         .map(|d| (bits::count(might.row(d)), d))
         .collect();
     order.sort_unstable();
+    let mut next = Next::new(dirs, might);
     for round in order.chunks(ROUND) {
         let rows: Vec<Vec<u64>> = round
             .par_iter()
             .with_max_len(4)
             .map_init(Work::default, |work, &(_, source)| {
-                work.narrow(dirs, might, tolerance, source)
+                work.narrow(dirs, (might, &next), tolerance, source)
             })
             .collect();
         for (&(_, source), row) in round.iter().zip(rows) {
@@ -46,6 +47,8 @@ pub(super) fn narrow_might(
                 while gone != 0 {
                     let q = word * 64 + gone.trailing_zeros() as usize;
                     might.clear(dirs.reverse[q] as usize, back);
+                    next.clear(dirs, source, q);
+                    next.clear(dirs, dirs.reverse[q] as usize, back);
                     settled.set(source, q);
                     gone &= gone - 1;
                 }
@@ -67,7 +70,7 @@ impl Work {
     fn narrow(
         &mut self,
         dirs: &Dirs,
-        might: &BitTable,
+        (might, ahead): (&BitTable, &Next),
         tolerance: &Tolerance,
         source: usize,
     ) -> Vec<u64> {
@@ -98,7 +101,7 @@ impl Work {
                 &mut self.planes,
             );
             pack(&mut self.planes, tolerance);
-            self.flood(dirs, might, tolerance, (source, pass));
+            self.flood(dirs, (might, ahead), tolerance, (source, pass));
             for (r, &new) in row.iter_mut().zip(&self.reached) {
                 *r |= new;
             }
@@ -110,11 +113,11 @@ impl Work {
     fn flood(
         &mut self,
         dirs: &Dirs,
-        might: &BitTable,
+        (might, ahead): (&BitTable, &Next),
         tolerance: &Tolerance,
         ends: (usize, usize),
     ) {
-        dispatch!(Level::new(), simd => self.flood_by(simd, dirs, might, tolerance, ends));
+        dispatch!(Level::new(), simd => self.flood_by(simd, dirs, (might, ahead), tolerance, ends));
     }
 
     #[inline(always)]
@@ -122,7 +125,7 @@ impl Work {
         &mut self,
         simd: S,
         dirs: &Dirs,
-        might: &BitTable,
+        (might, ahead): (&BitTable, &Next),
         tolerance: &Tolerance,
         (source, pass): (usize, usize),
     ) {
@@ -134,10 +137,9 @@ impl Work {
         let rows = might.row(source).iter().zip(might.row(pass));
         self.allowed.extend(rows.map(|(a, b)| a & b));
         while let Some(at) = self.stack.pop() {
-            let from_here = might.row(at as usize);
-            for &next in dirs.after(at as usize) {
+            for next in ahead.after(dirs, might, at as usize) {
                 let q = next as usize;
-                if !bits::get(&self.allowed, q) || !bits::get(from_here, q) {
+                if !bits::get(&self.allowed, q) {
                     continue;
                 }
                 bits::clear(&mut self.allowed, q);

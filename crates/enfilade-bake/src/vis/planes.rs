@@ -130,11 +130,11 @@ fn separators_by<S: Simd>(
 ) {
     let heights = Heights::new(b.0, a.1.normal);
     for i in (0..a.0.len()).step_by(LANES) {
-        through_edges::<S, true>(simd, a.0, i, b.0, &heights, a.1, tolerance, out);
+        through_edges::<S, true>(simd, (a.0, i), (b.0, &heights), a.1, tolerance, out);
     }
     let heights = Heights::new(a.0, -b.1.normal);
     for i in (0..b.0.len()).step_by(LANES) {
-        through_edges::<S, false>(simd, b.0, i, a.0, &heights, b.1, tolerance, out);
+        through_edges::<S, false>(simd, (b.0, i), (a.0, &heights), b.1, tolerance, out);
     }
 }
 
@@ -239,10 +239,8 @@ impl<S: Simd> Lanes<S> {
 #[inline(always)]
 fn through_edges<S: Simd, const FIRST: bool>(
     simd: S,
-    own: &[DVec3],
-    first: usize,
-    other: &[DVec3],
-    heights: &Heights,
+    (own, first): (&[DVec3], usize),
+    (other, heights): (&[DVec3], &Heights),
     facing: Facing,
     tolerance: &Tolerance,
     out: &mut Vec<Four>,

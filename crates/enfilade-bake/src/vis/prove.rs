@@ -87,6 +87,7 @@ impl Flow {
         self.wanted.extend_from_slice(claims);
         let all = vec![u64::MAX; claims.len()];
         self.set_reach(0, &all);
+        self.find_words();
         let mut trace = Vec::new();
         let poly = self.chain[0];
         self.write_step(shared, poly, &mut trace)?;
@@ -124,9 +125,9 @@ impl Flow {
             }
             let (near, far) = self.reach.split_at_mut(depth + 1);
             far[0].resize(near[depth].len(), 0);
-            let leads_on =
-                bits::and_into(&mut far[0], &near[depth], shared.might.row(q), &self.wanted)
-                    && shared.might.get(source.dir as usize, q);
+            let rows = (&near[depth][..], shared.might.row(q));
+            let leads_on = bits::and_into(&self.words, &mut far[0], rows, &self.wanted)
+                && shared.might.get(source.dir as usize, q);
             let is_wanted = bits::get(&self.wanted, q);
             if !leads_on && !is_wanted {
                 trace.push(symbol::SKIP);
