@@ -1,5 +1,7 @@
 //! Rows of bits.
 
+use rayon::prelude::*;
+
 /// A square table of bits, a row after the other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct BitTable {
@@ -49,18 +51,20 @@ impl BitTable {
     /// Rows as columns, of a table with so many rows.
     pub(super) fn transposed(&self, n_rows: usize) -> Self {
         let mut out = Self::new(self.n_words * 64, n_rows);
-        for first in (0..n_rows).step_by(64) {
-            for word in 0..self.n_words {
+        let n_words = out.n_words;
+        let rows = out.words.par_chunks_mut((64 * n_words).max(1));
+        rows.enumerate().for_each(|(word, rows)| {
+            for first in (0..n_rows).step_by(64) {
                 let mut block = [0; 64];
                 for (k, b) in block.iter_mut().enumerate().take(n_rows - first) {
                     *b = self.words[(first + k) * self.n_words + word];
                 }
                 transpose_block(&mut block);
                 for (k, &b) in block.iter().enumerate() {
-                    out.words[(word * 64 + k) * out.n_words + first / 64] = b;
+                    rows[k * n_words + first / 64] = b;
                 }
             }
-        }
+        });
         out
     }
 

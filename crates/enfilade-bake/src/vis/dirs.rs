@@ -464,3 +464,92 @@ fn unit_normal(winding: &[DVec3]) -> DVec3 {
         DVec3::ZERO
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use enfilade_cpg::SightPortal;
+
+    use super::super::rays::Rng;
+    use super::*;
+
+    /// A chain of cells joined by random triangles, or as many cells around one; some triangles lie on one plane, some
+    /// a hair from another's.
+    fn random_dirs(seed: u64, n_portals: usize, is_star: bool) -> Dirs {
+        let mut rng = Rng::new(seed);
+        let mut portals = Vec::new();
+        for cell in 0..n_portals {
+            let mut point = || DVec3::new(rng.unit(), rng.unit(), rng.unit()) * 8.0;
+            let mut winding = vec![point(), point(), point()];
+            if cell % 3 == 0 {
+                winding.iter_mut().for_each(|p| p.z = p.z.round());
+            }
+            if cell % 4 == 1 {
+                let last: &SightPortal = &portals[cell - 1];
+                let shift = [0.0, 1e-8, 1e-7, -1e-7][rng.below(4)];
+                winding = last.winding.iter().map(|&p| p + DVec3::Z * shift).collect();
+            }
+            portals.push(SightPortal {
+                cells: [if is_star { 0 } else { cell as u32 }, cell as u32 + 1],
+                winding,
+                pieces: Vec::new(),
+            });
+        }
+        Dirs::new(&SightGraph {
+            n_cells: n_portals as u32 + 1,
+            portals,
+        })
+    }
+
+    #[test]
+    fn balls_say_of_sides_what_corners_say() {
+        for seed in 0..50 {
+            let dirs = random_dirs(seed, 40, false);
+            let mut of_id = vec![0u32; dirs.len()];
+            for (d, dir) in dirs.all.iter().enumerate() {
+                of_id[dir.id as usize] = d as u32;
+            }
+            for d in 0..dirs.len() {
+                let turn = dirs.all[d].turn;
+                let heights: Vec<[f64; 2]> = (0..dirs.len() / 2)
+                    .map(|i| dirs.extent(of_id[2 * i] as usize, turn))
+                    .collect();
+                let clearance = 1e-7;
+                assert_eq!(
+                    dirs.past_row_alone(d, &of_id, clearance),
+                    dirs.past_row(d, &heights, &of_id, clearance),
+                    "{seed} {d}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exits_at_hand_are_those_of_the_table() {
+        for seed in 0..20 {
+            // More exits than a mask holds, every other time.
+            let dirs = random_dirs(seed, 80, seed % 2 == 0);
+            let n = dirs.len();
+            let mut rng = Rng::new(seed + 100);
+            let mut might = BitTable::new(n, n);
+            for a in 0..n {
+                for b in 0..n {
+                    if rng.unit() < 0.7 {
+                        might.set(a, b);
+                    }
+                }
+            }
+            let mut next = Next::new(&dirs, &might);
+            for _ in 0..3 * n {
+                let (a, b) = (rng.below(n), rng.below(n));
+                might.clear(a, b);
+                next.clear(&dirs, a, b);
+            }
+            for d in 0..n {
+                let at_hand: Vec<u32> = next.after(&dirs, &might, d).collect();
+                let exits = dirs.after(d).iter().copied();
+                let of_table: Vec<u32> = exits.filter(|&q| might.get(d, q as usize)).collect();
+                assert_eq!(at_hand, of_table, "{seed} {d}");
+            }
+        }
+    }
+}

@@ -320,15 +320,17 @@ impl<'a> Search<'a> {
     pub(super) fn visible(&self) -> BitTable {
         let n = self.dirs.n_cells;
         let mut visible = BitTable::new(n, n);
-        for c in 0..n {
-            visible.set(c, c);
-        }
-        for (d, dir) in self.dirs.all.iter().enumerate() {
-            visible.set(dir.from as usize, dir.to as usize);
-            for t in bits::ones(self.might.row(d)) {
-                visible.set(dir.from as usize, self.dirs.all[t].to as usize);
+        let n_words = visible.n_words().max(1);
+        let rows = visible.words_mut().par_chunks_mut(n_words);
+        rows.enumerate().with_min_len(16).for_each(|(cell, row)| {
+            bits::set(row, cell);
+            for &d in self.dirs.exits(cell as u32) {
+                bits::set(row, self.dirs.all[d as usize].to as usize);
+                for t in bits::ones(self.might.row(d as usize)) {
+                    bits::set(row, self.dirs.all[t].to as usize);
+                }
             }
-        }
+        });
         visible
     }
 }
