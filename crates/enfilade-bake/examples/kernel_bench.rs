@@ -149,7 +149,7 @@ fn main() {
                 repeats,
                 || field.clone(),
                 |field| {
-                    let answer = watershed(dims, field, &WatershedOptions { h, outdoors: None });
+                    let answer = watershed(dims, field, WatershedOptions { h, outdoors: None });
                     let dams = mark_dams(dims, &answer.labels);
                     (answer, dams)
                 },

@@ -92,6 +92,22 @@ const HAIR: f64 = 1e-5;
 
 /// The portal in its final form; `None` when nothing of it is wider than a rounding.
 fn portal(parts: &Parts<'_>, p: &PartitionPortal) -> Option<Portal> {
+    Some(Portal {
+        cells: p.cells.map(CellId),
+        kind: kind_of(parts, p),
+        ..rounded_portal(&p.plane, &p.outline, &p.pieces, parts.outward)?
+    })
+}
+
+/// An open portal as a file holds it, its outline grown by `outward`; cells are for the caller to set.
+///
+/// `None` when nothing of it is wider than a rounding.
+pub(crate) fn rounded_portal(
+    plane: &Plane,
+    outline: &Winding,
+    pieces: &[Winding],
+    outward: f64,
+) -> Option<Portal> {
     let to_f32 = |w: &Winding| {
         w.points
             .iter()
@@ -112,18 +128,17 @@ fn portal(parts: &Parts<'_>, p: &PartitionPortal) -> Option<Portal> {
         let rim: f64 = (0..n)
             .map(|i| w.points[i].distance(w.points[(i + 1) % n]))
             .sum();
-        w.area_normal().dot(p.plane.normal) > HAIR * rim
+        w.area_normal().dot(plane.normal) > HAIR * rim
     };
-    let pieces: Vec<Vec<[f32; 3]>> = p.pieces.iter().map(to_f32).filter(is_there).collect();
+    let pieces: Vec<Vec<[f32; 3]>> = pieces.iter().map(to_f32).filter(is_there).collect();
     if pieces.is_empty() {
         return None;
     }
-    let outline = grown(&p.outline, &p.plane, parts.outward);
     Some(Portal {
-        cells: p.cells.map(CellId),
-        kind: kind_of(parts, p),
-        normal: p.plane.normal.as_vec3().to_array(),
-        outline: to_f32(&outline),
+        cells: [CellId(0); 2],
+        kind: PortalKind::Open,
+        normal: plane.normal.as_vec3().to_array(),
+        outline: to_f32(&grown(outline, plane, outward)),
         area: pieces
             .iter()
             .map(|piece| rounded(piece).area())

@@ -10,6 +10,7 @@ pub mod complex;
 mod config;
 mod context;
 pub mod delaunay;
+pub mod edit;
 mod error;
 mod join;
 pub mod pipeline;

@@ -18,9 +18,9 @@ use crate::voxel::{
     BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
 };
 use crate::watershed::{
-    Flooded, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches, cut_at_slabs,
-    find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins, opening_of,
-    rim_caps, shallow_voids, slab_heights,
+    Flooded, Frame, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches,
+    cut_at_slabs, find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins,
+    opening_of, rim_caps, shallow_voids, slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -60,12 +60,15 @@ pub fn bake(
             n_objects: scene.objects.len(),
         });
     }
-    let bvh = Bvh::build(&triangles);
-    let grid = config.grid(&bounds_of(&triangles))?;
+    // The voxels lie along the walls, however the building is turned.
+    let frame = Frame::of(&triangles);
+    let turned = frame.triangles_to_grid(&triangles);
+    let bvh = Bvh::build(&turned);
+    let grid = config.grid(&bounds_of(&turned))?;
     // Stairs stand in rooms and bound none.
-    let is_stair = find_stairs(&sources, &triangles);
+    let is_stair = find_stairs(&sources, &turned);
     let part = |stairs: bool| -> Vec<Triangle> {
-        triangles
+        turned
             .iter()
             .zip(&is_stair)
             .filter(|t| *t.1 == stairs)
@@ -74,7 +77,7 @@ pub fn bake(
     };
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
-    let closures = voxelize(&grid, &closure_triangles(scene));
+    let closures = voxelize(&grid, &frame.triangles_to_grid(&closure_triangles(scene)));
     // Where a building has no roof or a tube just ends, a lid or a cap takes its place.
     let lids = find_lids(&grid, &occupied);
     let mut shut = voxelize(&grid, &rim_caps(&walls, config.min_opening.powi(2)));
@@ -92,13 +95,11 @@ pub fn bake(
 
     // 3. Basins, cut where a slab ends a storey.
     context.stage(2)?;
-    let border = border_of(grid.dims);
     let options = WatershedOptions {
         h: config.noise / grid.voxel,
-        outdoors: Some(&border),
+        outdoors: Some(border_of(grid.dims)),
     };
-    let flood = watershed(grid.dims, distances, &options);
-    drop(border);
+    let flood = watershed(grid.dims, distances, options);
     let mut labels = flood.labels;
     let mut peaks: Vec<f32> = std::iter::once(0.0)
         .chain(flood.basins.iter().map(|b| b.peak as f32))
@@ -139,7 +140,7 @@ pub fn bake(
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
-    let screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
+    let mut screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
     drop((closures, lids));
     let ballots = Ballots::cast(
         &grid,
@@ -153,8 +154,20 @@ pub fn bake(
             regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
         })
     });
-    drop(walls);
-    drop(labels);
+    drop((walls, labels));
+    // From here on all is where the scene has it.
+    for screen in &mut screens {
+        screen.winding = frame.winding_to_scene(&screen.winding);
+    }
+    for (p, _) in &mut voids {
+        *p = frame.to_scene(*p);
+    }
+    let bvh = if frame.is_scene() {
+        bvh
+    } else {
+        Bvh::build(&triangles)
+    };
+    drop(turned);
 
     // 6. Screens and triangles cut space into convex pieces, exactly.
     context.stage(5)?;
@@ -162,12 +175,12 @@ pub fn bake(
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         screens: &windings,
-        bounds: grid.aabb(),
+        bounds: frame.aabb_to_scene(&grid.aabb()),
     });
 
     // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
     context.stage(6)?;
-    let mut votes = ballots.count(&grid);
+    let mut votes = ballots.count(&grid, &frame);
     let mut partition = complex.partition(&votes, &LabelSettings::default());
     while join_unparted(&partition, &mut votes, &mut voids) {
         partition = complex.partition(&votes, &LabelSettings::default());
@@ -207,6 +220,7 @@ pub fn bake(
     let outward = complex.opening_tolerance();
     let counts = [
         ("voxel_size", grid.voxel),
+        ("grid_turn_degrees", frame.degrees()),
         ("voxels", grid.n_voxels() as f64),
         ("occupied_voxels", n_occupied as f64),
         ("basins", n_basins as f64),
@@ -389,8 +403,12 @@ const UNSURE: f64 = 0.35;
 struct Ballots {
     /// Voxels along each edge of a block.
     block: usize,
-    /// Low and high half of the voxel's index, and its region.
-    cast: Vec<[u32; 3]>,
+    /// Blocks along each axis.
+    dims: [usize; 3],
+    /// Region that each block votes for; 0 is none.
+    region: Vec<u32>,
+    /// Which voxel of the block it is that votes: 17³ of them at most, with 2³² voxels in all.
+    voter: Vec<u16>,
 }
 
 impl Ballots {
@@ -427,52 +445,67 @@ impl Ballots {
         while grid.n_voxels() / (block * block * block) > MAX_VOTES {
             block += 1;
         }
-        let [nx, ny, nz] = grid.dims;
-        let cast = (0..nz.div_ceil(block))
-            .into_par_iter()
-            .flat_map_iter(|bz| {
-                let unsure = &unsure;
-                (0..ny.div_ceil(block)).flat_map(move |by| {
-                    (0..nx.div_ceil(block)).filter_map(move |bx| {
-                        let range = |b: usize, n: usize| b * block..((b + 1) * block).min(n);
-                        for z in range(bz, nz) {
-                            for y in range(by, ny) {
-                                for x in range(bx, nx) {
-                                    let i = grid.index(x, y, z);
-                                    let region = regions.region_of_basin[labels.get(i) as usize];
-                                    if region == 0
-                                        || unsure.get(x, y, z)
-                                        || solid.get(x, y, z)
-                                        || hollow.binary_search(&region).is_ok()
-                                    {
-                                        continue;
-                                    }
-                                    return Some([i as u32, (i as u64 >> 32) as u32, region]);
-                                }
-                            }
-                        }
-                        None
-                    })
-                })
-            })
-            .collect();
-        Self { block, cast }
+        let dims = grid.dims.map(|n| n.div_ceil(block));
+        let n_blocks = dims.iter().product();
+        let mut ballots = Self {
+            block,
+            dims,
+            region: vec![0; n_blocks],
+            voter: vec![0; n_blocks],
+        };
+        let region_of = |[x, y, z]: [usize; 3]| {
+            let region = regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize];
+            let votes = region != 0
+                && !unsure.get(x, y, z)
+                && !solid.get(x, y, z)
+                && hollow.binary_search(&region).is_err();
+            votes.then_some(region)
+        };
+        ballots
+            .region
+            .par_iter_mut()
+            .zip(&mut ballots.voter)
+            .enumerate()
+            .with_min_len(4096)
+            .for_each(|(b, (region, voter))| {
+                let [bx, by, bz] = [b % dims[0], b / dims[0] % dims[1], b / (dims[0] * dims[1])];
+                let found = (0..block * block * block).find_map(|k| {
+                    let at = voter_at([bx, by, bz], block, k);
+                    let is_inside = (0..3).all(|axis| at[axis] < grid.dims[axis]);
+                    is_inside.then(|| region_of(at)).flatten().map(|of| (k, of))
+                });
+                if let Some((k, of)) = found {
+                    (*voter, *region) = (k as u16, of);
+                }
+            });
+        ballots
     }
 
-    fn count(self, grid: &Grid) -> Vec<Vote> {
+    fn count(self, grid: &Grid, frame: &Frame) -> Vec<Vote> {
         let weight = (grid.voxel * self.block as f64).powi(3) as f32;
-        self.cast
+        let [nx, ny, _] = self.dims;
+        self.region
             .into_par_iter()
-            .map(|[low, high, label]| {
-                let [x, y, z] = grid.coords((u64::from(high) << 32 | u64::from(low)) as usize);
+            .zip(self.voter)
+            .enumerate()
+            .filter(|(_, (region, _))| *region != 0)
+            .map(|(b, (label, k))| {
+                let at = [b % nx, b / nx % ny, b / (nx * ny)];
+                let [x, y, z] = voter_at(at, self.block, usize::from(k));
                 Vote {
-                    point: grid.center(x, y, z),
+                    point: frame.to_scene(grid.center(x, y, z)),
                     label,
                     weight,
                 }
             })
             .collect()
     }
+}
+
+/// Voxel number `k` of a block, along x first.
+fn voter_at(of: [usize; 3], block: usize, k: usize) -> [usize; 3] {
+    let within = [k % block, k / block % block, k / (block * block)];
+    [0, 1, 2].map(|axis| of[axis] * block + within[axis])
 }
 
 /// Voxels that stairs fill: those that they touch, and those between from which one sees backs.

@@ -10,6 +10,7 @@ mod bench_builders;
 mod cameras;
 mod decimate;
 mod demo;
+mod edit;
 mod exact;
 mod inspect;
 mod locate;
@@ -46,7 +47,7 @@ enum Command {
     Bench(bench::Bench),
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
-    Edit(simplify::Edit),
+    Edit(edit::Edit),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Plan(plan::Plan),
@@ -66,7 +67,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Bench(args) => bench::run(&args),
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
-        Command::Edit(args) => simplify::run_edit(&args),
+        Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Plan(args) => plan::run(&args),

@@ -1,14 +1,12 @@
-//! `enfilade simplify` and `enfilade edit`: a graph becomes a simpler one.
+//! `enfilade simplify`: a graph becomes a simpler one.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::simplify::{
-    CostModel, Metric, Simplified, SimplifySettings, delete_portal, simplify,
-};
+use enfilade::bake::simplify::{CostModel, Metric, Simplified, SimplifySettings, simplify};
+use enfilade::cpg::World;
 use enfilade::cpg::wire::encode_glb;
-use enfilade::cpg::{PortalId, World};
 
 use crate::output::{check_target, write_atomically};
 use crate::world::read_world;
@@ -97,7 +95,12 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         },
     };
     let simplified = simplify(&world, &settings);
-    write(&args.output, &world, &simplified)?;
+    write(
+        &args.output,
+        &world,
+        &simplified.world,
+        &cost_line(&simplified),
+    )?;
     if let Some(max) = args.max_cost.filter(|m| simplified.max_cost > *m) {
         writeln!(
             io::stderr(),
@@ -108,19 +111,21 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn write(path: &Path, before: &World, after: &Simplified) -> anyhow::Result<()> {
-    let bytes = encode_glb(&after.world).context("the new world breaks an invariant (a bug)")?;
+/// What its cells cost.
+pub(crate) fn cost_line(s: &Simplified) -> String {
+    format!("cost of a cell {:.0} to {:.0}\n", s.min_cost, s.max_cost)
+}
+
+/// Writes a world made from another one, and says how they compare.
+pub(crate) fn write(path: &Path, before: &World, after: &World, note: &str) -> anyhow::Result<()> {
+    let bytes = encode_glb(after).context("the new world breaks an invariant (a bug)")?;
     write_atomically(path, &bytes)?;
     let count = |w: &World| (w.graph.cells.len(), w.graph.portals.len());
-    let ((cells, portals), (c, p)) = (count(before), count(&after.world));
+    let ((cells, portals), (c, p)) = (count(before), count(after));
     let mut out = io::stdout().lock();
     writeln!(out, "cells   {cells:>7} → {c}")?;
     writeln!(out, "portals {portals:>7} → {p}")?;
-    writeln!(
-        out,
-        "cost of a cell {:.0} to {:.0}",
-        after.min_cost, after.max_cost
-    )?;
+    write!(out, "{note}")?;
     writeln!(
         out,
         "wrote {} ({:.1} MB)",
@@ -128,55 +133,4 @@ fn write(path: &Path, before: &World, after: &Simplified) -> anyhow::Result<()> 
         bytes.len() as f64 / 1e6
     )?;
     Ok(())
-}
-
-/// Takes portals out of a world: the cells on both sides become one.
-#[derive(clap::Args)]
-pub(crate) struct Edit {
-    /// World, whatever built it.
-    #[arg(value_name = "IN.glb")]
-    input: PathBuf,
-    /// World to write.
-    #[arg(short, long, value_name = "OUT.glb")]
-    output: PathBuf,
-    /// Portal to take away, by its number in the input; all others between its two cells go, too.
-    #[arg(long, value_name = "ID", required = true)]
-    delete_portal: Vec<u32>,
-}
-
-pub(crate) fn run_edit(args: &Edit) -> anyhow::Result<()> {
-    check_target(&args.output)?;
-    let before = read_world(&args.input)?;
-    let n = before.graph.portals.len();
-    if let Some(id) = args.delete_portal.iter().find(|&&id| id as usize >= n) {
-        bail!(
-            "there is no portal {id}: {} has {n}, counted from 0",
-            args.input.display()
-        );
-    }
-    let mut result: Option<Simplified> = None;
-    // Numbers change as portals go, so each is found again by its cells' new numbers.
-    let mut cell_of: Vec<u32> = (0..before.graph.cells.len() as u32).collect();
-    for &id in &args.delete_portal {
-        let cells = before.graph.portals[id as usize]
-            .cells
-            .map(|c| cell_of[c.0 as usize]);
-        let world = result.as_ref().map_or(&before, |r| &r.world);
-        let between = |p: &enfilade::cpg::Portal| {
-            let now = p.cells.map(|c| c.0);
-            now == cells || now == [cells[1], cells[0]]
-        };
-        let Some(portal) = world.graph.portals.iter().position(between) else {
-            // Gone already with another one between the same cells.
-            continue;
-        };
-        if let Some(next) = delete_portal(world, PortalId(portal as u32)) {
-            for c in &mut cell_of {
-                *c = next.cell_of[*c as usize].0;
-            }
-            result = Some(next);
-        }
-    }
-    let result = result.context("no portal was taken away")?;
-    write(&args.output, &before, &result)
 }

@@ -121,6 +121,67 @@ fn a_map_is_baked_by_partition_verified_simplified_and_edited() {
 }
 
 #[test]
+fn a_portal_is_put_in_and_what_parts_nothing_is_refused() {
+    let folder = Folder::new("add");
+    let (input, world, edited) = (
+        folder.path("two.map"),
+        folder.path("w.glb"),
+        folder.path("edited.glb"),
+    );
+    std::fs::write(&input, map(-16)).unwrap();
+    assert!(
+        enfilade(&["bake", &input, "-o", &world, "--min-cost", "0"])
+            .status
+            .success()
+    );
+    let edit = |more: &[&str]| enfilade(&[&["edit", &world, "-o", &edited], more].concat());
+    // The first room is 4 by 3 by 4 meters, from the origin to -z; the doorway goes first.
+    let across = "2,-1,1;2,-1,-5;2,4,-5;2,4,1";
+    let out = edit(&["--delete-portal", "0", "--add-portal", across]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let told = text(&out.stdout);
+    assert!(
+        told.contains("of 12.00 m² parts cell 1: now 1 (24.0 m³)"),
+        "{told}"
+    );
+    assert!(told.contains("cost of a cell"), "{told}");
+    let verify = ["verify", &edited, "--source", &input, "--rays", "20000"];
+    let verified = enfilade(&verify);
+    assert!(verified.status.success(), "{}", text(&verified.stdout));
+    std::fs::remove_file(&edited).unwrap();
+    for (polygon, code, says) in [
+        // A meter short of the ceiling.
+        (
+            "1,-1,1;1,-1,-5;1,2,-5;1,2,1",
+            1,
+            "one gets around it at 1.00,2.",
+        ),
+        (
+            "2,-1,1;2,-1,-5;2.5,4,-5;2,4,1",
+            1,
+            "off the plane of the others",
+        ),
+        (
+            "2,-1,1;2,-1,-5;2,1,-2;2,4,1",
+            1,
+            "not convex at corner 2, 2.00,1.00,-2.00",
+        ),
+        ("20,-1,1;20,-1,-5;20,4,-5;20,4,1", 1, "lies in no cell"),
+        ("2,-1,1;2,-1", 2, "corner 1: '2,-1' has 2 numbers"),
+    ] {
+        let out = edit(&["--add-portal", across, "--add-portal", polygon]);
+        let error = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{polygon}: {error}");
+        assert!(error.contains(says), "{polygon}: {error}");
+        if code == 1 {
+            assert!(error.contains("--add-portal number 2"), "{error}");
+        }
+        assert!(!Path::new(&edited).exists());
+    }
+    assert_eq!(edit(&[]).status.code(), Some(2));
+}
+
+#[test]
 fn a_leak_ends_the_bake_with_the_way_out_and_writes_no_world() {
     let folder = Folder::new("leak");
     let (input, world, way) = (

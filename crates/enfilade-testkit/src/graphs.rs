@@ -178,7 +178,9 @@ impl Grid {
                 nodes.push(LocatorNode { plane, children });
             }
         }
-        self.split(&mut nodes, [0; 3], self.size, &first);
+        let inner = self.split(&mut nodes, [0; 3], self.size, &first);
+        // A grid that is one room has no node of its own.
+        nodes[5].children[1] = inner;
         Locator {
             bounds,
             outside: self.outdoors.map(CellId),

@@ -42,6 +42,7 @@ use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding};
 pub use decompose::{BspConfig, Rooms, bake_bsp};
 pub use guide::Guide;
 pub use leak::{LeakPath, find_leak};
+pub(crate) use shape::{Region, halves, shape_of, whole};
 
 use portals::LeafPortal;
 use tree::{Content, Tree};

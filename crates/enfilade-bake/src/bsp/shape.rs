@@ -11,15 +11,15 @@ use super::tree::{Tree, leaf_index};
 
 /// A leaf's measures.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
-    pub(super) bounds: Aabb,
+pub(crate) struct Shape {
+    pub(crate) bounds: Aabb,
     /// Mean of its corners.
-    pub(super) middle: DVec3,
-    pub(super) volume: f64,
+    pub(crate) middle: DVec3,
+    pub(crate) volume: f64,
 }
 
 /// A convex region by its faces, each with the plane that looks inwards.
-pub(super) type Region = Vec<(Plane, Poly)>;
+pub(crate) type Region = Vec<(Plane, Poly)>;
 
 /// Measures of all leaves; none for those that rounding has left without a volume.
 pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance) -> Vec<Option<Shape>> {
@@ -27,7 +27,7 @@ pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance) -> Vec<Option<Shape>> {
     visit(
         tree,
         tree.root,
-        whole(tree, tolerance),
+        whole(&tree.bounds, tolerance.cut),
         tolerance.cut,
         &mut |leaf, region| {
             out[leaf as usize] = shape_of(&region);
@@ -46,7 +46,7 @@ pub(super) fn regions(
     visit(
         tree,
         tree.root,
-        whole(tree, tolerance),
+        whole(&tree.bounds, tolerance.cut),
         tolerance.cut,
         &mut |leaf, region| {
             if is_wanted(leaf) {
@@ -57,12 +57,12 @@ pub(super) fn regions(
     out
 }
 
-fn whole(tree: &Tree, tolerance: &Tolerance) -> Region {
-    let b = &tree.bounds;
+/// A box as a region.
+pub(crate) fn whole(b: &Aabb, eps: f64) -> Region {
     let mut region = Region::new();
     for n in [DVec3::X, DVec3::Y, DVec3::Z] {
         for plane in [Plane::through(b.min, n), Plane::through(b.max, -n)] {
-            if let Some(face) = poly::section_of_box(&plane, &b.expanded(1e-6), tolerance.cut) {
+            if let Some(face) = poly::section_of_box(&plane, &b.expanded(1e-6), eps) {
                 region.push((plane, face));
             }
         }
@@ -85,7 +85,7 @@ fn visit(tree: &Tree, child: i32, region: Region, eps: f64, take: &mut dyn FnMut
 }
 
 /// The parts before and behind a plane.
-pub(super) fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
+pub(crate) fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
     let mut sides = [Region::new(), Region::new()];
     if let Some(mut cap) = poly::section_of_box(plane, bounds, eps) {
         let is_there = region
@@ -120,7 +120,7 @@ pub(super) fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> 
 }
 
 /// Measures of a region.
-pub(super) fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
+pub(crate) fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
     let corners = || region.iter().flat_map(|(_, points)| points.iter().copied());
     let n = corners().count();
     if region.len() < 4 {

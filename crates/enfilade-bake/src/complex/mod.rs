@@ -15,6 +15,7 @@
 //! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
 //! | borders without a screen, made small | `cut` | minimum cuts, Boykov, Veksler & Zabih 2001 |
 //! | portals, what each cell sees, the locator | `partition` | ours |
+//! | later: one cell cut in two by a new portal | `divide` | ours |
 //!
 //! Where it departs from Lefebvre & Hornus: their cells are grown by choosing among separators that
 //! the subdivision happens to make. Ours come from the volume and are only *realized* in the
@@ -35,6 +36,7 @@
 //! opens wedges along shallow creases; seams close them (`surface`), all but a few hair-fine ones.
 
 mod cut;
+pub(crate) mod divide;
 mod facet;
 mod graph;
 mod label;

@@ -59,19 +59,11 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
             });
         }
     }
-    let mut batches: BTreeMap<Key, Primitive> = BTreeMap::new();
+    let mut batches = Batches::default();
     for b in &world.batches {
-        let key = (
-            renumbered(&b.cells),
-            b.primitive.material,
-            layout_of(&b.primitive),
-        );
-        append(batches.entry(key).or_default(), &b.primitive);
+        batches.add(renumbered(&b.cells), &b.primitive);
     }
-    let batches: Vec<Batch> = batches
-        .into_iter()
-        .map(|((cells, ..), primitive)| Batch { cells, primitive })
-        .collect();
+    let batches = batches.finish();
     for b in &batches {
         for c in &b.cells {
             cells[c.0 as usize].n_triangles += (b.primitive.indices.len() / 3) as u32;
@@ -93,6 +85,24 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     out.batches = batches;
     out.details = details;
     (out, cell_of)
+}
+
+/// Batches under way: one for each list of cells, material and set of attributes.
+#[derive(Default)]
+pub(crate) struct Batches(BTreeMap<Key, Primitive>);
+
+impl Batches {
+    /// Adds triangles that `cells`, ascending, see.
+    pub(crate) fn add(&mut self, cells: Vec<CellId>, primitive: &Primitive) {
+        let key = (cells, primitive.material, layout_of(primitive));
+        append(self.0.entry(key).or_default(), primitive);
+    }
+
+    /// The batches in order of cells, material and attributes.
+    pub(crate) fn finish(self) -> Vec<Batch> {
+        let batch = |((cells, ..), primitive): (Key, Primitive)| Batch { cells, primitive };
+        self.0.into_iter().map(batch).collect()
+    }
 }
 
 /// Which attributes a primitive has; those that differ cannot share its lists.

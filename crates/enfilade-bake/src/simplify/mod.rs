@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 
+pub(crate) use apply::Batches;
 use merge::{Bounds, CostGraph, Eyes};
 
 /// How portals are compared.

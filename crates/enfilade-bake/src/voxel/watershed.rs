@@ -31,13 +31,13 @@ use flood::Flood;
 const STEPS: u32 = 64;
 
 /// What to flood.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct WatershedOptions<'a> {
+#[derive(Clone, Debug, Default)]
+pub struct WatershedOptions {
     /// Basins with dynamics (peak minus highest saddle) below this join a deeper one. [Units: vx]
     /// [Limit: 0 and above]
     pub h: f64,
     /// The free voxels set here are one basin, infinitely deep, with label 1.
-    pub outdoors: Option<&'a BitVolume>,
+    pub outdoors: Option<BitVolume>,
 }
 
 /// The basin of each voxel.
@@ -132,14 +132,14 @@ pub const fn levels_per_voxel() -> u32 {
 ///
 /// Time is linear in the voxels. On top of the 2 bytes a voxel it takes about 4 bytes for each
 /// voxel of the widest shell one voxel thick (0.4 bytes a voxel of a furnished building at 5 cm),
-/// and 8 for each local maximum. When more than 8,191 basins are alive at once it takes 4 bytes a
+/// and 4 for each local maximum. When more than 8,191 basins are alive at once it takes 4 bytes a
 /// voxel, and 6 while it moves.
 ///
 /// # Panics
 /// When `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is
 /// negative or NaN.
 #[must_use]
-pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: &WatershedOptions) -> Watershed {
+pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions) -> Watershed {
     let n: usize = dims.iter().product();
     assert_eq!(squared.len(), n, "a distance for each of {dims:?} voxels");
     assert!(u32::try_from(n).is_ok(), "fewer than 2^32 voxels");
@@ -155,11 +155,11 @@ pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: &WatershedOptions
         .ceil()
         .min(f64::from(u32::MAX)) as u32;
     let mut flood = Flood::new(dims, words, starts, h);
-    if let Some(outdoors) = options.outdoors {
-        assert_eq!(outdoors.dims(), dims, "outdoors of the same size");
-        flood.seed(outdoors);
-    }
     let outdoors = options.outdoors.is_some();
+    if let Some(seeds) = options.outdoors {
+        assert_eq!(seeds.dims(), dims, "outdoors of the same size");
+        flood.seed(&seeds);
+    }
     if flood.run() {
         return flood.finish(outdoors);
     }
@@ -250,13 +250,13 @@ fn to_levels(words: &mut [u16]) {
     });
 }
 
-/// Voxels where a basin may start, deepest first, then by index: `(level, index)`.
+/// Voxels where a basin may start, deepest first, then by index.
 ///
 /// No neighbor is higher, and none of those before it in the scan is as high: every regional
 /// maximum has such a voxel, its first.
-fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<(u16, u32)> {
+fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<u32> {
     let [nx, ny, nz] = dims;
-    let mut found: Vec<(u16, u32)> = (0..ny * nz)
+    let mut found: Vec<u32> = (0..ny * nz)
         .into_par_iter()
         .with_min_len(16)
         .fold(Vec::new, |mut found, row| {
@@ -274,7 +274,7 @@ fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<(u16, u32)> {
                     && not_above(y1)
                     && not_above(z1)
                 {
-                    found.push((here, (row * nx + x) as u32));
+                    found.push((row * nx + x) as u32);
                 }
             }
             found
@@ -283,7 +283,7 @@ fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<(u16, u32)> {
             a.append(&mut b);
             a
         });
-    found.par_sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+    found.par_sort_unstable_by_key(|&v| (std::cmp::Reverse(levels[v as usize]), v));
     found
 }
 

@@ -7,24 +7,27 @@
 
 mod closures;
 mod fit;
+mod frame;
 mod hollow;
 mod lids;
 mod regions;
 mod rims;
+mod sections;
 mod slabs;
 mod stairs;
 mod voids;
 
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen, fit_screen_at};
+pub use frame::Frame;
 pub use hollow::hollow_regions;
 pub use lids::{Lids, find_lids};
 pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,
 };
-pub(crate) use regions::{connected_count, rim_share};
 pub use rims::rim_caps;
+pub(crate) use sections::{connected_count, rim_share};
 pub use slabs::{cut_at_slabs, slab_heights};
 pub use stairs::find_stairs;
 pub use voids::shallow_voids;

@@ -26,6 +26,7 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use enfilade_geom::{DVec3, Plane};
 use rayon::prelude::*;
 
+use super::sections::section_ratio;
 use crate::voxel::{BitVolume, Grid, Labels};
 
 /// Label of the space around the building in a flooded volume.
@@ -431,7 +432,9 @@ impl Merger<'_> {
                 if apart || o.closed >= self.settings.closed_share {
                     return 0.0;
                 }
-                let (mut ratio, wall) = self.section_ratio(o, a, b);
+                let cell_of = |label| self.find(label);
+                let (mut ratio, wall) =
+                    section_ratio(self.flooded, self.settings, o, [a, b], &cell_of);
                 if a == OUTDOORS {
                     ratio *= self.settings.outdoor_gain;
                 }
@@ -442,156 +445,6 @@ impl Merger<'_> {
             })
             .fold(0.0, f64::max)
     }
-
-    /// Area of `opening` ÷ the smaller of the largest cross-sections of `a` and `b` beside it.
-    fn section_ratio(&self, opening: &Opening, a: u32, b: u32) -> (f64, f64) {
-        let grid = self.flooded.grid;
-        let (u, v) = opening.plane.basis();
-        let n = opening.plane.normal;
-        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for &f in &opening.faces {
-            let p = face_center(grid, f) - opening.center;
-            for (k, t) in [u.dot(p), v.dot(p)].into_iter().enumerate() {
-                lo[k] = lo[k].min(t);
-                hi[k] = hi[k].max(t);
-            }
-        }
-        let step = grid.voxel.max(0.1);
-        let start = [
-            lo[0] - self.settings.surround,
-            lo[1] - self.settings.surround,
-        ];
-        let side = [0, 1].map(|k| {
-            (((hi[k] - lo[k] + 2.0 * self.settings.surround) / step).ceil() as usize).max(1) + 1
-        });
-        let slices = (self.settings.reach / step).round() as i64;
-        let mut seeds = vec![false; side[0] * side[1]];
-        for &f in &opening.faces {
-            let p = face_center(grid, f) - opening.center;
-            let at =
-                [u.dot(p) - start[0], v.dot(p) - start[1]].map(|t| (t / step).round() as usize);
-            seeds[at[0].min(side[0] - 1) + at[1].min(side[1] - 1) * side[0]] = true;
-        }
-        let (mut best_a, mut best_b) = (0_usize, 0_usize);
-        let (mut in_a, mut in_b) = (vec![false; seeds.len()], vec![false; seeds.len()]);
-        let (mut beside_a, mut beside_b) = (in_a.clone(), in_b.clone());
-        let mut stack = Vec::new();
-        let end = DVec3::from(grid.dims.map(|n| n as f64));
-        // Once both are this large, the opening is a pinch whatever else there is.
-        let enough = opening.area / (self.settings.threshold * step * step);
-        // From the opening outward, as far sections are the large ones.
-        let outward = (0..=slices).flat_map(|s| [s, -s]).skip(1);
-        for s in outward {
-            let base = opening.center + n * (s as f64 * step) + u * start[0] + v * start[1];
-            // In voxels, so that a lattice point costs an addition and a look-up.
-            let (base, du, dv) = (
-                grid.to_voxel(base),
-                u * (step / grid.voxel),
-                v * (step / grid.voxel),
-            );
-            let mut last = (0, 0);
-            for j in 0..side[1] {
-                let row = base + dv * j as f64;
-                for i in 0..side[0] {
-                    let p = row + du * i as f64;
-                    let is_in = p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
-                    let label = if is_in {
-                        // Positive, so the cast rounds down.
-                        self.flooded.labels.get(grid.index(
-                            p.x as usize,
-                            p.y as usize,
-                            p.z as usize,
-                        ))
-                    } else {
-                        0
-                    };
-                    if label != last.0 {
-                        last = (label, if label == 0 { 0 } else { self.find(label) });
-                    }
-                    in_a[j * side[0] + i] = last.1 == a;
-                    in_b[j * side[0] + i] = last.1 == b;
-                }
-            }
-            let mut section = |inside: &mut [bool], beside: &mut [bool], this_side: bool| {
-                connected_count(inside, side, &seeds, &mut stack, |k| beside[k] |= this_side)
-            };
-            best_a = best_a.max(section(&mut in_a, &mut beside_a, s <= 0));
-            best_b = best_b.max(section(&mut in_b, &mut beside_b, s >= 0));
-            let smaller = if a == OUTDOORS {
-                best_b
-            } else {
-                best_a.min(best_b)
-            };
-            if smaller as f64 > enough {
-                return (opening.area / (smaller as f64 * step * step), 0.0);
-            }
-        }
-        let wall = rim_share(&seeds, side, |k| beside_a[k] && beside_b[k]);
-        let smaller = if a == OUTDOORS {
-            best_b
-        } else {
-            best_a.min(best_b)
-        };
-        let ratio = if smaller == 0 {
-            1.0
-        } else {
-            opening.area / (smaller as f64 * step * step)
-        };
-        (ratio, wall)
-    }
-}
-
-/// Share of the rim of `mask` (what lies within two steps of it) where `is_wall` holds.
-pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
-    let (mut rim, mut wall) = (0_usize, 0_usize);
-    for j in 0..side[1] {
-        for i in 0..side[0] {
-            let k = j * side[0] + i;
-            let near = |k: usize, n: usize| k.saturating_sub(2)..(k + 3).min(n);
-            if mask[k] || !near(j, side[1]).any(|y| near(i, side[0]).any(|x| mask[y * side[0] + x]))
-            {
-                continue;
-            }
-            rim += 1;
-            wall += usize::from(is_wall(k));
-        }
-    }
-    wall as f64 / rim.max(1) as f64
-}
-
-/// Points of `inside` (a lattice `side` wide and high) that hang together with a seed. Uses up
-/// `inside`. What lies behind a wall beside the opening is no part of the section at the opening.
-pub(crate) fn connected_count(
-    inside: &mut [bool],
-    side: [usize; 2],
-    seeds: &[bool],
-    stack: &mut Vec<usize>,
-    mut visit_point: impl FnMut(usize),
-) -> usize {
-    let mut count = 0;
-    for start in 0..inside.len() {
-        if !(seeds[start] && inside[start]) {
-            continue;
-        }
-        inside[start] = false;
-        stack.push(start);
-        while let Some(k) = stack.pop() {
-            count += 1;
-            visit_point(k);
-            let (i, j) = (k % side[0], k / side[0]);
-            let mut visit = |exists: bool, next: usize| {
-                if exists && inside[next] {
-                    inside[next] = false;
-                    stack.push(next);
-                }
-            };
-            visit(i > 0, k.wrapping_sub(1));
-            visit(i + 1 < side[0], k + 1);
-            visit(j > 0, k.wrapping_sub(side[0]));
-            visit(j + 1 < side[1], k + side[0]);
-        }
-    }
-    count
 }
 
 /// Center of a face. [Units: wu]

@@ -68,7 +68,8 @@ pub(super) struct Flood<W> {
     dims: [usize; 3],
     shape: Shape,
     words: Vec<W>,
-    starts: Vec<(u16, u32)>,
+    /// Voxels where basins may start, deepest first.
+    starts: Vec<u32>,
     next_start: usize,
     level: u32,
     h: u32,
@@ -81,8 +82,8 @@ pub(super) struct Flood<W> {
 }
 
 impl<W: Word> Flood<W> {
-    pub(super) fn new(dims: [usize; 3], words: Vec<W>, starts: Vec<(u16, u32)>, h: u32) -> Self {
-        let level = starts.first().map_or(0, |s| u32::from(s.0));
+    pub(super) fn new(dims: [usize; 3], words: Vec<W>, starts: Vec<u32>, h: u32) -> Self {
+        let level = starts.first().map_or(0, |&s| words[s as usize].get());
         Self {
             dims,
             shape: Shape::new(dims),
@@ -131,11 +132,13 @@ impl<W: Word> Flood<W> {
     pub(super) fn run(&mut self) -> bool {
         while self.level > 0 {
             self.drain();
-            while let Some(&(level, voxel)) = self.starts.get(self.next_start) {
-                if u32::from(level) != self.level {
-                    break;
-                }
-                if self.words[voxel as usize].get() & W::REACHED == 0 {
+            while let Some(&voxel) = self.starts.get(self.next_start) {
+                // One that is not reached still is its level.
+                let word = self.words[voxel as usize].get();
+                if word & W::REACHED == 0 {
+                    if word != self.level {
+                        break;
+                    }
                     if self.pools.len() as u32 > W::NUMBER {
                         self.renumber();
                         if self.pools.len() as u32 > W::NUMBER / 2 {

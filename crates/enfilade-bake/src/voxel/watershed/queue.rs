@@ -1,7 +1,7 @@
 //! What the flood stands on: queues by level, and the neighbors of a voxel.
 
-/// Queue entries to a chunk.
-const CHUNK: usize = 510;
+/// Queue entries to a chunk: half a kilobyte, for in a small scene most of the hundreds of levels that wait hold few.
+const CHUNK: usize = 128;
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Voxels taken from the queue at a time, so that the memory they need is fetched at once.

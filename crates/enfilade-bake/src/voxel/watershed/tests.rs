@@ -56,7 +56,14 @@ fn widest_between(n: usize, saddles: &[Saddle], from: u32) -> Vec<f64> {
 
 /// All that holds for every watershed, whatever the field.
 fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>) -> Watershed {
-    let w = watershed(dims, squared.to_vec(), &WatershedOptions { h, outdoors });
+    let w = watershed(
+        dims,
+        squared.to_vec(),
+        WatershedOptions {
+            h,
+            outdoors: outdoors.cloned(),
+        },
+    );
     let levels: Vec<u32> = squared.iter().map(|&d| level(d)).collect();
     let labels: Vec<u32> = w.labels.iter().collect();
     let n = w.basins.len();
@@ -291,7 +298,7 @@ fn the_number_of_threads_changes_nothing() {
             let w = watershed(
                 dims,
                 distance_squared(&occupied),
-                &WatershedOptions::default(),
+                WatershedOptions::default(),
             );
             let dams = mark_dams(dims, &w.labels);
             (w, dams)
@@ -388,7 +395,7 @@ fn many_basins(dims: [usize; 3], h: f64) -> Watershed {
             }
         })
         .collect();
-    watershed(dims, squared, &WatershedOptions { h, outdoors: None })
+    watershed(dims, squared, WatershedOptions { h, outdoors: None })
 }
 
 #[test]
@@ -420,7 +427,7 @@ fn renumbering_changes_nothing() {
     let w = watershed(
         dims,
         hills.clone(),
-        &WatershedOptions {
+        WatershedOptions {
             h: 0.5,
             outdoors: None,
         },
@@ -429,7 +436,7 @@ fn renumbering_changes_nothing() {
     let w = watershed(
         dims,
         hills,
-        &WatershedOptions {
+        WatershedOptions {
             h: 0.0,
             outdoors: None,
         },

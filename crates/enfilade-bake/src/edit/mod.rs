@@ -1,0 +1,537 @@
+//! A portal added to a finished world: the cell that it lies in becomes two.
+//!
+//! Everything happens within that one cell. The exact complex is built anew from the cell's own
+//! triangles, its portals and the new polygon ([`crate::complex`]); what the polygon parts are the
+//! new cells. Of the world only what names the cell changes: its part of the locator, its lists of
+//! triangles and details, and those of its portals that the polygon runs into, which are cut in two.
+//! Taking a portal away is [`crate::simplify::delete_portal`].
+//!
+//! **Which way it errs:** a triangle that neither part is found to see is listed in both.
+
+mod splice;
+
+use std::collections::BTreeMap;
+
+use enfilade_cpg::{Cell, CellId, Portal, PortalId, World};
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{DMat4, DVec3, Plane, Triangle, Winding};
+
+use crate::assemble::rounded_portal;
+use crate::complex::divide::{BACK, FRONT, Undivided};
+use crate::complex::{ComplexInput, Partition, build_complex};
+use crate::simplify::Batches;
+
+use splice::{SideTree, spliced};
+
+/// Corners may be this far off the plane through them all; they are moved into it. [Units: wu]
+///
+/// People type coordinates with two or three digits.
+const FLAT: f64 = 0.005;
+
+/// Corners nearer to the line between their neighbors may bend inwards: rounding. [Units: wu]
+const BEND: f64 = 1e-3;
+
+/// A world with one more portal.
+#[derive(Clone, Debug)]
+pub struct Added {
+    /// The world.
+    pub world: World,
+    /// The cell that was cut; its larger part, or the one outdoors, keeps its number.
+    pub cell: CellId,
+    /// The other part, the last of the cells.
+    pub new_cell: CellId,
+    /// The new portals between the two, the largest first.
+    pub portals: Vec<PortalId>,
+    /// Portals of the cell that the polygon ran into, each with the number of its second half.
+    pub halved: Vec<(PortalId, PortalId)>,
+}
+
+/// Why a portal could not be added.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AddPortalError {
+    /// Fewer than three corners.
+    #[error("a portal needs at least 3 corners, not {n}")]
+    TooFewCorners {
+        /// How many there are.
+        n: usize,
+    },
+    /// A coordinate is no number.
+    #[error("corner {corner} of the portal is not finite")]
+    NotFinite {
+        /// Its index.
+        corner: usize,
+    },
+    /// No polygon: all corners on one line.
+    #[error("the portal's corners lie on one line")]
+    NoArea,
+    /// Not planar.
+    #[error(
+        "corner {corner} of the portal, {}, is {off:.3} m off the plane of the others; at most {FLAT} m is taken for rounding",
+        place(*.at)
+    )]
+    NotPlanar {
+        /// Index of the corner.
+        corner: usize,
+        /// Where it is. [Units: wu]
+        at: DVec3,
+        /// How far it is off. [Units: wu]
+        off: f64,
+    },
+    /// Not convex.
+    #[error("the portal is not convex at corner {corner}, {}: give its corners in order around a convex outline", place(*.at))]
+    NotConvex {
+        /// Index of the corner.
+        corner: usize,
+        /// Where it is. [Units: wu]
+        at: DVec3,
+    },
+    /// The middle is in no cell.
+    #[error("the portal's middle, {}, lies in no cell but in solid matter", place(*.at))]
+    InSolid {
+        /// The middle. [Units: wu]
+        at: DVec3,
+    },
+    /// Nothing of the cell lies on both sides.
+    #[error("the portal at {} has cell {} on one side only: it lies in a wall or on a portal that is there", place(*.at), .cell.0)]
+    Aside {
+        /// Its middle. [Units: wu]
+        at: DVec3,
+        /// The cell.
+        cell: CellId,
+    },
+    /// One gets around it.
+    #[error(
+        "the portal does not part cell {}: one gets around it at {}; it must span from wall to wall (it may reach into them)",
+        .cell.0, place(*.at)
+    )]
+    DoesNotPart {
+        /// The cell.
+        cell: CellId,
+        /// Where the plane of the portal is open beside it. [Units: wu]
+        at: DVec3,
+    },
+    /// Both parts would be outdoors.
+    #[error("the portal at {} parts the outdoors, cell {}, in two that are one again beyond the scene", place(*.at), .cell.0)]
+    Endless {
+        /// Its middle. [Units: wu]
+        at: DVec3,
+        /// The cell.
+        cell: CellId,
+    },
+    /// Nothing of it would be left in a file.
+    #[error("what the portal at {} opens is narrower than the rounding of coordinates", place(*.at))]
+    TooNarrow {
+        /// Its middle. [Units: wu]
+        at: DVec3,
+    },
+}
+
+/// A point in the form that the command takes.
+fn place(p: DVec3) -> String {
+    format!("{:.2},{:.2},{:.2}", p.x, p.y, p.z)
+}
+
+/// Cuts the cell that holds the middle of a polygon in two by that polygon.
+///
+/// `corners` of a convex planar polygon, in order, either way around; what reaches into walls or other
+/// cells does not count. Both promises hold of the result if they do of `world`; cells and portals keep
+/// their numbers, new ones come last. Time as a bake's for the triangles of the one cell.
+///
+/// # Errors
+/// When the corners are no convex planar polygon, or it does not part a cell; the world is as it was.
+pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalError> {
+    let (plane, screen) = checked(corners)?;
+    let at = screen.centroid();
+    let old = &world.graph;
+    let cell = old
+        .locator
+        .locate(at)
+        .ok_or(AddPortalError::InSolid { at })?;
+
+    // 1. The complex of this cell alone.
+    let listed = triangles_of(world, cell);
+    let triangles: Vec<Triangle> = listed.iter().map(|t| t.2).collect();
+    let of_cell = &old.cells[cell.0 as usize];
+    let pieces = of_cell
+        .portals
+        .iter()
+        .flat_map(|p| &old.portals[p.0 as usize].pieces);
+    let screens: Vec<Winding> = std::iter::once(screen)
+        .chain(pieces.map(|piece| winding(piece)))
+        .collect();
+    let complex = build_complex(&ComplexInput {
+        triangles: &triangles,
+        screens: &screens,
+        // All of the scene's box, so that tolerances are those of the bake.
+        bounds: old.locator.bounds,
+    });
+
+    // 2. Its two parts.
+    let partition = complex
+        .divided(&plane, |p| old.locator.locate(p) == Some(cell))
+        .map_err(|why| match why {
+            Undivided::Aside => AddPortalError::Aside { at, cell },
+            Undivided::Around(at) => AddPortalError::DoesNotPart { cell, at },
+            Undivided::Endless => AddPortalError::Endless { at, cell },
+        })?;
+    let parts = Parts::new(cell, old.cells.len(), &partition);
+
+    // 3. Everything that names the cell.
+    let mut out = world.clone();
+    out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids);
+    let halved = parts.hand_out_portals(&mut out, complex.opening_tolerance());
+    let mut new_portals: Vec<Portal> = Vec::new();
+    for p in &partition.portals {
+        let rounded = rounded_portal(&p.plane, &p.outline, &p.pieces, complex.opening_tolerance());
+        new_portals.extend(rounded.map(|portal| Portal {
+            cells: p.cells.map(|side| parts.id(side)),
+            kind: p.kind,
+            ..portal
+        }));
+    }
+    if new_portals.is_empty() {
+        return Err(AddPortalError::TooNarrow { at });
+    }
+    new_portals.sort_by(|a, b| b.area.total_cmp(&a.area));
+    let first = out.graph.portals.len() as u32;
+    let portals = (first..first + new_portals.len() as u32)
+        .map(PortalId)
+        .collect();
+    out.graph.portals.extend(new_portals);
+    parts.hand_out_triangles(&mut out, &listed, &partition);
+    parts.hand_out_details(&mut out);
+    parts.measure_cells(&mut out, &partition);
+    Ok(Added {
+        world: out,
+        cell,
+        new_cell: parts.new_cell(),
+        portals,
+        halved,
+    })
+}
+
+/// The plane of a polygon and the polygon in it, counter-clockwise.
+fn checked(corners: &[DVec3]) -> Result<(Plane, Winding), AddPortalError> {
+    let n = corners.len();
+    if n < 3 {
+        return Err(AddPortalError::TooFewCorners { n });
+    }
+    if let Some(corner) = corners.iter().position(|p| !p.is_finite()) {
+        return Err(AddPortalError::NotFinite { corner });
+    }
+    let given = Winding::new(corners.to_vec());
+    let size = given.aabb().size().max_element();
+    let normal = given
+        .area_normal()
+        .try_normalize()
+        .filter(|_| given.area() > FLAT * size)
+        .ok_or(AddPortalError::NoArea)?;
+    let plane = Plane::through(given.mean(), normal);
+    let off = |i: &usize| plane.signed_distance(corners[*i]).abs();
+    if let Some(corner) = (0..n)
+        .max_by(|a, b| off(a).total_cmp(&off(b)))
+        .filter(|i| off(i) > FLAT)
+    {
+        return Err(AddPortalError::NotPlanar {
+            corner,
+            at: corners[corner],
+            off: off(&corner),
+        });
+    }
+    let flat: Vec<DVec3> = corners.iter().map(|&p| plane.project(p)).collect();
+    for (i, &p) in flat.iter().enumerate() {
+        let (a, b) = (flat[(i + n - 1) % n], flat[(i + 1) % n]);
+        let bend = (p - a).cross(b - p).dot(normal);
+        if bend < -BEND * (b - a).length() {
+            return Err(AddPortalError::NotConvex {
+                corner: i,
+                at: corners[i],
+            });
+        }
+    }
+    let hull = Winding::hull_in_plane(&plane, &flat);
+    // A star turns the same way at every corner, too, but does not fill its hull.
+    let rounding = BEND * n as f64 * size;
+    if (Winding::new(flat).area() - hull.area()).abs() > rounding {
+        return Err(AddPortalError::NotConvex {
+            corner: 0,
+            at: corners[0],
+        });
+    }
+    Ok((plane, hull))
+}
+
+fn winding(points: &[[f32; 3]]) -> Winding {
+    Winding::new(
+        points
+            .iter()
+            .map(|p| DVec3::from(p.map(f64::from)))
+            .collect(),
+    )
+}
+
+/// The structural triangles that a cell sees: batch, place in the batch, corners.
+fn triangles_of(world: &World, cell: CellId) -> Vec<(u32, u32, Triangle)> {
+    let mut out = Vec::new();
+    for (b, batch) in world.batches.iter().enumerate() {
+        if batch.cells.binary_search(&cell).is_ok() {
+            let p = &batch.primitive;
+            let at = |i: u32| DVec3::from(p.positions[i as usize].map(f64::from));
+            for (t, corners) in p.indices.chunks_exact(3).enumerate() {
+                let corners = [at(corners[0]), at(corners[1]), at(corners[2])];
+                out.push((b as u32, t as u32, corners));
+            }
+        }
+    }
+    out
+}
+
+/// Numbers of the two parts.
+struct Parts {
+    cell: CellId,
+    /// By side: [`FRONT`] and [`BACK`].
+    ids: [CellId; 2],
+    /// The locator that tells the two parts apart, for points of the cell; its leaves are sides.
+    sides: SideTree,
+}
+
+impl Parts {
+    fn new(cell: CellId, n_cells: usize, partition: &Partition) -> Self {
+        let [f, b] = [FRONT, BACK].map(|s| partition.volumes[s as usize]);
+        let front_keeps = partition.outside.map_or(f >= b, |s| s == FRONT);
+        let new = CellId(n_cells as u32);
+        Self {
+            cell,
+            ids: if front_keeps {
+                [cell, new]
+            } else {
+                [new, cell]
+            },
+            sides: SideTree::of(&partition.locator),
+        }
+    }
+
+    fn id(&self, side: u32) -> CellId {
+        self.ids[side as usize]
+    }
+
+    fn new_cell(&self) -> CellId {
+        self.ids[usize::from(self.ids[0] == self.cell)]
+    }
+
+    /// Portals of the old cell go to one part; those that both border on are cut in two.
+    fn hand_out_portals(&self, out: &mut World, outward: f64) -> Vec<(PortalId, PortalId)> {
+        let mut halved = Vec::new();
+        for id in out.graph.cells[self.cell.0 as usize].portals.clone() {
+            let p = &out.graph.portals[id.0 as usize];
+            let end = usize::from(p.cells[1] == self.cell);
+            let normal = DVec3::from(p.normal.map(f64::from)).normalize_or_zero();
+            // From the portal into the cell.
+            let inward = if end == 1 { normal } else { -normal };
+            let mut by_side: [Vec<Winding>; 2] = [Vec::new(), Vec::new()];
+            for piece in &p.pieces {
+                let whole = winding(piece);
+                let mut fragments: [Vec<Winding>; 2] = [Vec::new(), Vec::new()];
+                self.sides
+                    .divide(&whole.points, inward, outward, &mut |side, part| {
+                        fragments[side as usize].push(Winding::new(part.to_vec()));
+                    });
+                match fragments {
+                    [f, b] if b.is_empty() || f.is_empty() => {
+                        by_side[usize::from(f.is_empty())].push(whole);
+                    }
+                    [f, b] => {
+                        by_side[0].extend(f);
+                        by_side[1].extend(b);
+                    }
+                }
+            }
+            let anchor = p.pieces.first().map_or(DVec3::ZERO, |w| winding(w).mean());
+            let plane = Plane::through(anchor, normal);
+            let mut halves: Vec<(u32, Portal)> = Vec::new();
+            for side in [FRONT, BACK] {
+                let pieces = &by_side[side as usize];
+                let corners: Vec<DVec3> = pieces.iter().flat_map(|w| w.points.clone()).collect();
+                let outline = Winding::hull_in_plane(&plane, &corners);
+                if let Some(half) = (outline.points.len() >= 3)
+                    .then(|| rounded_portal(&plane, &outline, pieces, outward))
+                    .flatten()
+                {
+                    halves.push((side, half));
+                }
+            }
+            halves.sort_by(|a, b| b.1.area.total_cmp(&a.1.area));
+            let (mut kept, base) = (p.clone(), p.clone());
+            let renamed = |side: u32, mut portal: Portal| {
+                portal.cells = base.cells;
+                portal.cells[end] = self.id(side);
+                portal.kind = base.kind;
+                portal.normal = base.normal;
+                portal
+            };
+            match &halves[..] {
+                [(a, big), (b, small)] => {
+                    let second = PortalId(out.graph.portals.len() as u32);
+                    let small = renamed(*b, small.clone());
+                    let beyond = base.cells[1 - end].0 as usize;
+                    out.graph.cells[beyond].portals.push(second);
+                    out.graph.portals[id.0 as usize] = renamed(*a, big.clone());
+                    out.graph.portals.push(small);
+                    halved.push((id, second));
+                }
+                rest => {
+                    // Whole as it was, but for the cell's number.
+                    let side = rest.first().map_or(FRONT, |(side, _)| *side);
+                    kept.cells[end] = self.id(side);
+                    out.graph.portals[id.0 as usize] = kept;
+                }
+            }
+        }
+        halved
+    }
+
+    /// `cells` with the old cell replaced by those parts that `sees` says.
+    fn relisted(&self, cells: &[CellId], sees: [bool; 2]) -> Vec<CellId> {
+        let mut list: Vec<CellId> = cells.iter().copied().filter(|&c| c != self.cell).collect();
+        for (side, &id) in self.ids.iter().enumerate() {
+            if sees[side] || sees == [false; 2] {
+                list.push(id);
+            }
+        }
+        list.sort_unstable();
+        list
+    }
+
+    fn hand_out_triangles(
+        &self,
+        out: &mut World,
+        listed: &[(u32, u32, Triangle)],
+        partition: &Partition,
+    ) {
+        let mut sees_of: BTreeMap<(u32, u32), [bool; 2]> = BTreeMap::new();
+        for (i, &(batch, t, _)) in listed.iter().enumerate() {
+            let seen = partition.triangle_cells.both(i);
+            sees_of.insert((batch, t), [FRONT, BACK].map(|s| seen.contains(&s)));
+        }
+        let mut batches = Batches::default();
+        for (b, batch) in out.batches.iter().enumerate() {
+            let p = &batch.primitive;
+            if batch.cells.binary_search(&self.cell).is_err() {
+                batches.add(batch.cells.clone(), p);
+                continue;
+            }
+            let mut by_list: BTreeMap<Vec<CellId>, Vec<u32>> = BTreeMap::new();
+            for (t, corners) in p.indices.chunks_exact(3).enumerate() {
+                let sees = sees_of.get(&(b as u32, t as u32));
+                let list = self.relisted(&batch.cells, sees.copied().unwrap_or_default());
+                by_list.entry(list).or_default().extend(corners);
+            }
+            for (list, indices) in by_list {
+                batches.add(list, &part_of(p, &indices));
+            }
+        }
+        out.batches = batches.finish();
+    }
+
+    fn hand_out_details(&self, out: &mut World) {
+        for d in &mut out.details {
+            if d.cells.binary_search(&self.cell).is_err() {
+                continue;
+            }
+            let transform = DMat4::from_cols_array(&d.transform.map(f64::from));
+            let mut touched = Vec::new();
+            for p in &out.detail_meshes[d.mesh as usize].primitives {
+                for t in p.indices.chunks_exact(3) {
+                    let corners = [0, 1, 2].map(|k| {
+                        let p = p.positions[t[k] as usize].map(f64::from);
+                        transform.transform_point3(DVec3::from(p))
+                    });
+                    out.graph.locator.cells_touching(&corners, &mut touched);
+                }
+            }
+            let sees = self.ids.map(|id| touched.binary_search(&id).is_ok());
+            d.cells = self.relisted(&d.cells, sees);
+        }
+    }
+
+    fn measure_cells(&self, out: &mut World, partition: &Partition) {
+        let old = out.graph.cells[self.cell.0 as usize].clone();
+        let taken = |name: &str| out.graph.cells.iter().any(|c| c.name == name);
+        let new_name = (out.graph.cells.len()..)
+            .map(|i| format!("cell-{i}"))
+            .find(|name| !taken(name))
+            .unwrap_or_default();
+        out.graph.cells.push(Cell {
+            name: new_name,
+            outdoor: false,
+            ..old
+        });
+        for side in [FRONT, BACK] {
+            let id = self.id(side);
+            let mut triangles = 0;
+            for b in &out.batches {
+                if b.cells.binary_search(&id).is_ok() {
+                    triangles += b.primitive.indices.len() / 3;
+                }
+            }
+            let mut detail_triangles = 0;
+            for d in &out.details {
+                if d.cells.binary_search(&id).is_ok() {
+                    let mesh = &out.detail_meshes[d.mesh as usize];
+                    detail_triangles += mesh
+                        .primitives
+                        .iter()
+                        .map(|p| p.indices.len() / 3)
+                        .sum::<usize>();
+                }
+            }
+            let portals = out.graph.portals.iter().enumerate();
+            let portals = portals
+                .filter(|(_, p)| p.cells.contains(&id))
+                .map(|(i, _)| PortalId(i as u32))
+                .collect();
+            let b = partition.aabbs[side as usize];
+            let cell = &mut out.graph.cells[id.0 as usize];
+            cell.n_triangles = triangles as u32;
+            cell.n_detail_triangles = detail_triangles as u32;
+            cell.portals = portals;
+            cell.volume = partition.volumes[side as usize] as f32;
+            // Outdoors keeps the box of the scene.
+            if !cell.outdoor && !b.is_empty() {
+                cell.aabb = [b.min.as_vec3().to_array(), b.max.as_vec3().to_array()];
+            }
+        }
+    }
+}
+
+/// The triangles of a primitive that `indices` list, with the vertices that they use.
+fn part_of(p: &Primitive, indices: &[u32]) -> Primitive {
+    let mut number: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut used: Vec<usize> = Vec::new();
+    let indices = indices
+        .iter()
+        .map(|&i| {
+            *number.entry(i).or_insert_with(|| {
+                used.push(i as usize);
+                used.len() as u32 - 1
+            })
+        })
+        .collect();
+    fn pick<T: Copy>(used: &[usize], from: &[T]) -> Vec<T> {
+        if from.is_empty() {
+            Vec::new()
+        } else {
+            used.iter().map(|&i| from[i]).collect()
+        }
+    }
+    Primitive {
+        positions: pick(&used, &p.positions),
+        normals: pick(&used, &p.normals),
+        tangents: pick(&used, &p.tangents),
+        uvs: p.uvs.iter().map(|set| pick(&used, set)).collect(),
+        colors: pick(&used, &p.colors),
+        indices,
+        ..p.clone()
+    }
+}

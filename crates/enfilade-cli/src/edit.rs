@@ -1,0 +1,172 @@
+//! `enfilade edit`: portals taken out of a world and put in.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use enfilade::bake::edit::add_portal;
+use enfilade::bake::simplify::{Simplified, delete_portal};
+use enfilade::cpg::{Portal, PortalId, World};
+use enfilade::geom::DVec3;
+
+use crate::output::check_target;
+use crate::simplify::{cost_line, write};
+use crate::world::read_world;
+
+/// Takes portals out of a world and puts new ones in.
+#[derive(clap::Args)]
+#[command(group(clap::ArgGroup::new("edits").required(true).multiple(true)))]
+pub(crate) struct Edit {
+    /// World, whatever built it.
+    #[arg(value_name = "IN.glb")]
+    input: PathBuf,
+    /// World to write.
+    #[arg(short, long, value_name = "OUT.glb")]
+    output: PathBuf,
+    /// Portal to take away, by its number in the input; all others between its two cells go, too.
+    #[arg(long, value_name = "ID", group = "edits")]
+    delete_portal: Vec<u32>,
+    /// Portal to put in, after those to take away are gone: the corners of a convex planar polygon in
+    /// order, which cuts the cell that holds its middle; it may reach into walls.
+    #[arg(
+        long,
+        value_name = "X,Y,Z;X,Y,Z;…",
+        group = "edits",
+        value_parser = parse_polygon,
+        allow_hyphen_values = true
+    )]
+    add_portal: Vec<Polygon>,
+}
+
+/// Corners of a polygon.
+#[derive(Clone, Debug, PartialEq)]
+struct Polygon(Vec<DVec3>);
+
+fn parse_polygon(text: &str) -> Result<Polygon, String> {
+    let corner = |(i, part): (usize, &str)| {
+        let numbers: Vec<f64> = part
+            .split(',')
+            .map(|n| {
+                let value = n.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+                value.ok_or_else(|| format!("corner {i}: '{}' is not a number", n.trim()))
+            })
+            .collect::<Result<_, _>>()?;
+        match numbers[..] {
+            [x, y, z] => Ok(DVec3::new(x, y, z)),
+            _ => Err(format!(
+                "corner {i}: '{}' has {} numbers, not three",
+                part.trim(),
+                numbers.len()
+            )),
+        }
+    };
+    let text = text.trim().trim_end_matches(';');
+    let corners: Vec<DVec3> = text
+        .split(';')
+        .enumerate()
+        .map(corner)
+        .collect::<Result<_, _>>()?;
+    if corners.len() < 3 {
+        return Err(format!(
+            "a portal needs at least 3 corners, not {}; put ';' between them",
+            corners.len()
+        ));
+    }
+    Ok(Polygon(corners))
+}
+
+pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
+    check_target(&args.output)?;
+    let before = read_world(&args.input)?;
+    let mut note = String::new();
+    let mut world: Option<World> = None;
+    if !args.delete_portal.is_empty() {
+        let simpler = without_portals(args, &before)?;
+        note += &cost_line(&simpler);
+        world = Some(simpler.world);
+    }
+    for (i, polygon) in args.add_portal.iter().enumerate() {
+        let of = world.as_ref().unwrap_or(&before);
+        let added = add_portal(of, &polygon.0)
+            .with_context(|| format!("--add-portal number {} changes nothing", i + 1))?;
+        let area: f32 = added
+            .portals
+            .iter()
+            .map(|p| added.world.graph.portals[p.0 as usize].area)
+            .sum();
+        let cells = [added.cell, added.new_cell].map(|c| c.0);
+        let volumes = cells.map(|c| added.world.graph.cells[c as usize].volume);
+        writeln!(
+            note,
+            "portal {} of {area:.2} m² parts cell {}: now {} ({:.1} m³) and {} ({:.1} m³)",
+            added.portals[0].0, cells[0], cells[0], volumes[0], cells[1], volumes[1]
+        )?;
+        for (kept, new) in &added.halved {
+            writeln!(
+                note,
+                "portal {} is cut in two: now {} and {}",
+                kept.0, kept.0, new.0
+            )?;
+        }
+        world = Some(added.world);
+    }
+    let world = world.context("no portal was taken away")?;
+    write(&args.output, &before, &world, &note)
+}
+
+/// The world without the portals that are to be taken away.
+fn without_portals(args: &Edit, before: &World) -> anyhow::Result<Simplified> {
+    let n = before.graph.portals.len();
+    if let Some(id) = args.delete_portal.iter().find(|&&id| id as usize >= n) {
+        bail!(
+            "there is no portal {id}: {} has {n}, counted from 0",
+            args.input.display()
+        );
+    }
+    let mut result: Option<Simplified> = None;
+    // Numbers change as portals go, so each is found again by its cells' new numbers.
+    let mut cell_of: Vec<u32> = (0..before.graph.cells.len() as u32).collect();
+    for &id in &args.delete_portal {
+        let cells = before.graph.portals[id as usize]
+            .cells
+            .map(|c| cell_of[c.0 as usize]);
+        let world = result.as_ref().map_or(before, |r| &r.world);
+        let between = |p: &Portal| {
+            let now = p.cells.map(|c| c.0);
+            now == cells || now == [cells[1], cells[0]]
+        };
+        let Some(portal) = world.graph.portals.iter().position(between) else {
+            // Gone already with another one between the same cells.
+            continue;
+        };
+        if let Some(next) = delete_portal(world, PortalId(portal as u32)) {
+            for c in &mut cell_of {
+                *c = next.cell_of[*c as usize].0;
+            }
+            result = Some(next);
+        }
+    }
+    result.context("no portal was taken away")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polygon_is_read_and_what_is_none_is_refused_with_its_corner() {
+        let polygon = parse_polygon("-1,2,3; 4,5.5,6;7,8,9;").unwrap();
+        assert_eq!(polygon.0[0], DVec3::new(-1.0, 2.0, 3.0));
+        assert_eq!(polygon.0.len(), 3);
+        for (text, says) in [
+            ("1,2,3;4,5,6", "at least 3 corners, not 2"),
+            ("1,2,3;4,x,6;7,8,9", "corner 1: 'x' is not a number"),
+            ("1,2,3;4,5,6;7,8", "corner 2: '7,8' has 2 numbers"),
+            ("1,2,3;4,5,6;7,8,inf", "corner 2: 'inf' is not a number"),
+            ("", "corner 0: '' is not a number"),
+        ] {
+            let error = parse_polygon(text).unwrap_err();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}
