@@ -82,6 +82,15 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
+    if baked.world.graph.statistics.counts.get("separators") == Some(&0.0)
+        && baked.world.graph.cells.len() > 1
+    {
+        writeln!(
+            io::stderr(),
+            "no separator parts the scene: its openings lie in no plane of its surfaces, if it has rooms; \
+             --method watershed or delaunay needs no planes"
+        )?;
+    }
     let mut out = io::stdout().lock();
     print_summary(&mut out, &baked.world)?;
     writeln!(

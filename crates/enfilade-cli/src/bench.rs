@@ -1,5 +1,6 @@
 //! `enfilade bench`: the experiments behind `docs/benchmarks/sight.md`, printed as Markdown tables.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -112,7 +113,7 @@ enum What {
 }
 
 pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
-    let mut table = Vec::new();
+    let mut table = Table::default();
     match &args.what {
         What::Bsp {
             scenes,
@@ -152,12 +153,29 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             pairs,
         } => bench_los(&mut table, scenes, rooms, *pairs)?,
     }
-    let mut out = std::io::stdout().lock();
-    for line in table {
-        use std::io::Write;
-        writeln!(out, "{line}")?;
+    table.finish()
+}
+
+/// Lines that are printed as they come: a row may take minutes.
+#[derive(Default)]
+pub(crate) struct Table {
+    /// What went wrong first.
+    problem: Option<io::Error>,
+}
+
+impl Table {
+    pub(crate) fn push(&mut self, mut line: String) {
+        if self.problem.is_none() {
+            line.push('\n');
+            let mut out = io::stdout().lock();
+            let printed = out.write_all(line.as_bytes()).and_then(|()| out.flush());
+            self.problem = printed.err();
+        }
     }
-    Ok(())
+
+    fn finish(self) -> anyhow::Result<()> {
+        self.problem.map_or(Ok(()), |problem| Err(problem.into()))
+    }
 }
 
 fn name(path: &Path) -> String {
@@ -314,7 +332,7 @@ const MODES: [(&str, Narrowing); 3] = [
 ];
 
 fn bench_see(
-    table: &mut Vec<String>,
+    table: &mut Table,
     scenes: &[PathBuf],
     rooms: &[usize],
     views: usize,
@@ -399,12 +417,7 @@ fn bench_see(
     Ok(())
 }
 
-fn bench_tight(
-    table: &mut Vec<String>,
-    scenes: &[PathBuf],
-    views: u64,
-    rays: u64,
-) -> anyhow::Result<()> {
+fn bench_tight(table: &mut Table, scenes: &[PathBuf], views: u64, rays: u64) -> anyhow::Result<()> {
     table.push(
         "| scene | narrowed by | triangles ÷ hit | details ÷ hit | cells ÷ reached | missed |"
             .into(),
@@ -454,7 +467,7 @@ fn bench_tight(
 }
 
 fn bench_maze(
-    table: &mut Vec<String>,
+    table: &mut Table,
     path: &Path,
     views: usize,
     fov: f32,
@@ -509,7 +522,7 @@ fn bench_maze(
 }
 
 fn bench_los(
-    table: &mut Vec<String>,
+    table: &mut Table,
     scenes: &[PathBuf],
     rooms: &[usize],
     pairs: usize,

@@ -10,6 +10,7 @@ use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::clinic;
 
+use crate::bench::Table;
 use crate::world::read_world;
 
 /// Processor seconds that this process has used so far, all threads together; 0 where the system does
@@ -38,7 +39,7 @@ const HEURISTICS: [(&str, Heuristic); 4] = [
 
 /// One line a scene and heuristic; with a threshold each is baked to the end, cells merged up to it.
 pub(crate) fn bench_bsp(
-    table: &mut Vec<String>,
+    table: &mut Table,
     paths: &[PathBuf],
     clinics: &[usize],
     all: bool,
@@ -71,7 +72,7 @@ pub(crate) fn bench_bsp(
 
 /// Adds the lines of a scene; its polygons and the seconds of the last one's tree and grouping.
 fn measure(
-    table: &mut Vec<String>,
+    table: &mut Table,
     name: &str,
     scene: &Scene,
     all: bool,
@@ -145,7 +146,7 @@ fn measure(
 }
 
 /// Expected triangles a view before and after, by both metrics, at the same share of portals.
-pub(crate) fn bench_simplify(table: &mut Vec<String>, worlds: &[PathBuf]) -> anyhow::Result<()> {
+pub(crate) fn bench_simplify(table: &mut Table, worlds: &[PathBuf]) -> anyhow::Result<()> {
     const VIEWS: usize = 1000;
     table.push(
         "| world | cells | portals | metric | cells after | portals after | triangles a view | after |"

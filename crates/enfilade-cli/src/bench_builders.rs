@@ -12,6 +12,7 @@ use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::Rng;
 use enfilade_verify::{VerifyOptions, verify_world};
 
+use crate::bench::Table;
 use crate::bench_bsp::{cpu_seconds, name};
 
 /// Points that say how far two graphs agree.
@@ -19,7 +20,7 @@ const POINTS: usize = 20_000;
 
 /// One line a scene and builder, the watershed first.
 pub(crate) fn bench_builders(
-    table: &mut Vec<String>,
+    table: &mut Table,
     paths: &[PathBuf],
     rays: u64,
 ) -> anyhow::Result<()> {
@@ -60,7 +61,7 @@ const BUILDERS: [(&str, Builder); 3] = [
     }),
 ];
 
-fn compare(table: &mut Vec<String>, name: &str, scene: &Scene, rays: u64) -> anyhow::Result<()> {
+fn compare(table: &mut Table, name: &str, scene: &Scene, rays: u64) -> anyhow::Result<()> {
     let mut first: Option<CellPortalGraph> = None;
     for (builder, build) in BUILDERS {
         let start = cpu_seconds();

@@ -15,6 +15,7 @@ use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Sparing
 use enfilade_testkit::{TowerParams, office_tower};
 
 use crate::bake::bake_scene;
+use crate::bench::Table;
 use crate::cameras::{FOV, walk_cameras};
 use crate::see::size;
 use crate::world::read_world;
@@ -61,7 +62,7 @@ pub(crate) struct Walkthrough {
 /// Frames that may be under way at once, as in a program with a window.
 const IN_FLIGHT: usize = 2;
 
-pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Result<()> {
+pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()> {
     let mut worlds = Vec::new();
     for path in &args.scenes {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -131,7 +132,7 @@ pub(crate) fn bench(table: &mut Vec<String>, args: &Walkthrough) -> anyhow::Resu
             );
             rows.add(&label, &run, studio.world.n_triangles());
         }
-        table.append(&mut rows.lines);
+        rows.lines.into_iter().for_each(|line| table.push(line));
     }
     table.push(String::new());
     table.push(format!(

@@ -235,28 +235,39 @@ fn a_broken_map_is_refused_with_its_place() {
     assert!(!Path::new(&world).exists());
 }
 
-/// Each portal's polygon, each separator's portals, and what is solid.
+/// Separators among brushes, or among triangles where there are none.
 fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
     use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
-    use enfilade::geom::{Aabb, BoxTree, ConvexSolid, DVec3, Winding};
+    use enfilade::geom::scene::{Role, TriangleSource};
+    use enfilade::geom::{Aabb, BoxTree, Bvh, ConvexSolid, DVec3, Triangle, Winding};
     let entities = scene.entities.iter().filter(|e| e.object.is_none());
     let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
+    let (sources, triangles): (Vec<TriangleSource>, Vec<Triangle>) = scene
+        .triangle_sources(Role::Structural)
+        .map(|s| (s, scene.world_triangle(s)))
+        .filter(|_| scene.solids.is_empty())
+        .filter(|(_, t)| (t[1] - t[0]).cross(t[2] - t[0]).length_squared() > 0.0)
+        .unzip();
+    let objects: Vec<u32> = sources.iter().map(|s| s.object).collect();
     let input = BspInput {
-        triangles: &[],
-        objects: &[],
+        triangles: &triangles,
+        objects: &objects,
         solids: &scene.solids,
         inside: &inside,
     };
     let bsp = Bsp::build(&input, Heuristic::Default, &Guide::default());
     let portals: Vec<([u32; 2], Winding)> = bsp.portals().collect();
     let separators = bsp.separators();
+    eprintln!("{name}: {} separators", separators.len());
+    assert!(!separators.is_empty(), "{name}");
     let boxes: Vec<Aabb> = scene.solids.iter().map(ConvexSolid::aabb).collect();
     let tree = BoxTree::new(&boxes);
+    let surfaces = Bvh::build(&triangles);
     // Brushes meet their neighbors within the tree's tolerance, some hundredths of a millimeter at this
     // size; corners that rounding moved may stray by a few of those.
     let eps = 1e-3;
     let is_on_solid = |p: DVec3| {
-        let mut found = false;
+        let mut found = surfaces.nearest(p, eps).is_some();
         tree.for_each_in_box(&Aabb::new(p, p).expanded(eps), |i| {
             found |= scene.solids[i as usize].contains(p, -eps);
         });
@@ -327,6 +338,32 @@ fn separators_of_levels_end_on_solids_and_each_parts_two_cells() {
     for map in &maps {
         let imported = import(std::slice::from_ref(map), &[], &ImportOptions::default()).unwrap();
         check_separators(&map.file_stem().unwrap().to_string_lossy(), &imported.scene);
+    }
+}
+
+#[test]
+fn separators_of_buildings_end_on_surfaces_and_each_parts_two_cells() {
+    use enfilade::import::{ImportOptions, import};
+    check_separators("house", &enfilade_testkit::furnished_house().scene);
+    let scenes = std::env::var_os("ENFILADE_SCENES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
+        PathBuf::from,
+    );
+    for name in [
+        "duplex",
+        "fzk-haus",
+        "institute",
+        "jasmin-sun",
+        "kit-edc",
+        "samplehouse4",
+    ] {
+        let file = scenes.join(name).join("scene.glb");
+        if !file.exists() {
+            eprintln!("skipped: no {}", file.display());
+            continue;
+        }
+        let imported = import(&[file], &[], &ImportOptions::default()).unwrap();
+        check_separators(name, &imported.scene);
     }
 }
 

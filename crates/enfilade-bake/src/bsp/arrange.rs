@@ -6,7 +6,8 @@
 //! the section of a surface's plane with the open leaves, around its surfaces, is tried for separators
 //! as if it were portals, and only the leaves under those that hold are cut.
 //!
-//! Time: each plane visits the leaves around its own surfaces, near-linear where they are spread out.
+//! Time: each plane visits the leaves around its own surfaces, near-linear where they are spread out. Planes
+//! with most surface come first, and only so many sections are tried that it is near-linear anywhere.
 
 use enfilade_geom::Aabb;
 use rayon::prelude::*;
@@ -18,31 +19,52 @@ use super::portals::{LeafPortal, leaf_portals};
 use super::tree::{Node, Tree, leaf_index};
 use super::{Bsp, rooms, separator};
 
+/// Sections tried for each portal and surface that is there; buildings have 1 to 5 in all.
+const TRIALS: usize = 8;
+/// Planes tried before their sections are counted.
+const AT_ONCE: usize = 64;
+
 /// Cuts the leaves where a surface's plane closes an opening that is narrower than what lies beside it.
 pub(super) fn refine(bsp: &mut Bsp, settings: &MergeSettings) {
-    let mut around: Vec<Aabb> = vec![Aabb::EMPTY; bsp.tree.planes.len()];
+    let mut around: Vec<(Aabb, f64)> = vec![(Aabb::EMPTY, 0.0); bsp.tree.planes.len()];
     for f in &bsp.surfaces {
-        let b = &mut around[f.plane as usize];
+        let (b, area) = &mut around[f.plane as usize];
         *b = b.union(Aabb::of_points(&f.points));
+        *area += poly::area(&f.points);
     }
-    let n_portals = bsp.portals.len();
-    let trial: Vec<LeafPortal> = around
-        .par_iter()
-        .enumerate()
-        .filter(|(_, b)| !b.is_empty())
-        .flat_map_iter(|(plane, b)| {
-            let mut out = Vec::new();
-            let bounds = b.expanded(settings.surround);
-            if let Some(section) =
-                poly::section_of_box(&bsp.tree.planes[plane], &bounds, bsp.tolerance.cut)
-            {
-                sections(bsp, bsp.tree.root, plane as u32, &section, &mut out);
-            }
-            out
-        })
+    // Planes with much surface first: they are walls. Sections of surfaces that lie close together grow
+    // with their square.
+    let is_wall = bsp.wall_planes();
+    let mut order: Vec<u32> = (0..around.len() as u32)
+        .filter(|&p| is_wall[p as usize] && !around[p as usize].0.is_empty())
         .collect();
+    order.sort_by(|&a, &b| {
+        let area = |p: u32| around[p as usize].1;
+        area(b).total_cmp(&area(a)).then(a.cmp(&b))
+    });
+    let n_portals = bsp.portals.len();
+    let budget = TRIALS * (n_portals + bsp.surfaces.len());
+    let mut trial: Vec<LeafPortal> = Vec::new();
+    for planes in order.chunks(AT_ONCE) {
+        let found: Vec<Vec<LeafPortal>> = planes
+            .par_iter()
+            .map(|&plane| {
+                let mut out = Vec::new();
+                let bounds = around[plane as usize].0.expanded(settings.surround);
+                let plane_at = &bsp.tree.planes[plane as usize];
+                if let Some(section) = poly::section_of_box(plane_at, &bounds, bsp.tolerance.cut) {
+                    sections(bsp, bsp.tree.root, plane, &section, &mut out);
+                }
+                out
+            })
+            .collect();
+        trial.extend(found.into_iter().flatten());
+        if trial.len() > budget {
+            break;
+        }
+    }
     bsp.portals.extend(trial);
-    let cuts: Vec<(u32, Poly)> = separator::find(bsp)
+    let cuts: Vec<(u32, Poly)> = separator::find_in_walls(bsp)
         .into_par_iter()
         .filter(|s| s.portals.iter().any(|&p| p as usize >= n_portals))
         .filter(|s| rooms::may_be_pinch(bsp, s, settings))

@@ -102,7 +102,7 @@ pub fn bake_bsp(
             closures: &Bvh::build(&closure_triangles(scene)),
             slabs: &slab_heights(&walls),
         };
-        let parted = rooms::part(&bsp, separator::find(&bsp), &evidence, settings);
+        let parted = rooms::part(&bsp, separator::find_in_walls(&bsp), &evidence, settings);
         (parted, shapes)
     } else {
         let parted = cells::part(&bsp, separator::find(&bsp));

@@ -13,7 +13,7 @@
 //! | 2: separators, valid and invalid | `separator` |
 //! | 3: cells, crossing separators | `cells` |
 //! | separators that the arrangement would have shown (§3.0.2) | `arrange` |
-//! | rooms: separators that are a pinch, in buildings | `rooms` |
+//! | rooms: separators that are a pinch, in buildings | `rooms`, `lattice` |
 //! | matter, where surfaces are triangles | `inside` |
 //! | 4: cells above the bound | `split` |
 //! | leaks, as a path | `leak` |
@@ -28,6 +28,7 @@ mod cells;
 mod decompose;
 mod guide;
 mod inside;
+mod lattice;
 mod leak;
 mod portals;
 mod rooms;
@@ -108,6 +109,8 @@ pub struct Bsp {
     tolerance: Tolerance,
     /// Every surface's polygon, as the tree was built from.
     surfaces: Vec<tree::Fragment>,
+    /// Whether they are triangles, not faces of solids.
+    is_of_triangles: bool,
     /// Whether each leaf counts: empty, and reached from inside if that is known.
     is_open: Vec<bool>,
     /// A way from a point inside to the border of everything.
@@ -184,6 +187,7 @@ impl Bsp {
                 tree,
                 tolerance,
                 surfaces: fragments,
+                is_of_triangles: boxes.is_empty(),
                 is_open: Vec::new(),
                 leak: None,
             };
@@ -301,6 +305,17 @@ impl Bsp {
             .map(|&c| c == Content::Empty)
             .collect();
         self.drop_closed_portals();
+    }
+
+    /// Whether each plane may be a wall's: of triangles, it holds two or more. Each triangle of a curved
+    /// surface has a plane of its own, which means nothing.
+    fn wall_planes(&self) -> Vec<bool> {
+        let mut n = vec![0_u32; self.tree.planes.len()];
+        for f in &self.surfaces {
+            n[f.plane as usize] += 1;
+        }
+        let least = if self.is_of_triangles { 2 } else { 1 };
+        n.into_iter().map(|n| n >= least).collect()
     }
 
     fn drop_closed_portals(&mut self) {

@@ -11,197 +11,21 @@
 //! weighs the openings of the merged cell anew.
 
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
-use std::sync::OnceLock;
 
 use enfilade_geom::{Aabb, Bvh, DVec3};
 use rayon::prelude::*;
 
 use crate::complex::poly;
-use crate::watershed::{MergeSettings, connected_count, rim_share};
+use crate::watershed::MergeSettings;
 
 use super::Bsp;
 use super::cells::{self, Cells, NO_CELL};
+use super::lattice::{Lattice, NONE};
 use super::separator::{self, Separator};
 use super::shape::Shape;
 
-/// Points of a lattice along its longer side, and its least step. [Units: wu]
-const POINTS: f64 = 40.0;
-const MIN_STEP: f64 = 0.1;
-/// Sections on each side of a separator.
-const SLICES: usize = 6;
 /// A door leaf this near to a separator's plane closes it. [Units: wu]
 const CLOSURE_REACH: f64 = 0.25;
-/// No leaf, no portal.
-const NONE: u32 = u32::MAX;
-
-/// What lies around a separator.
-struct Lattice {
-    side: [usize; 2],
-    step: f64,
-    /// The portal of the separator under each point, by its place in the separator's list.
-    portal_at: Vec<u32>,
-    /// Leaves at each point of the sections; the first, third, … lie on the positive side, outwards.
-    slices: Vec<OnceLock<Vec<u32>>>,
-    base: DVec3,
-    across: [DVec3; 3],
-}
-
-/// How narrow an opening is.
-struct Section {
-    /// Its area by the smaller of the two sections beside it.
-    ratio: f64,
-    /// Share of its rim that is a wall with both cells beside it.
-    wall: f64,
-}
-
-impl Lattice {
-    fn of(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> Self {
-        let plane = &bsp.tree.planes[s.plane as usize];
-        let (u, v) = plane.basis();
-        let polygon = |p: u32| &bsp.portals[p as usize].points;
-        let flat = |p: DVec3| [u.dot(p), v.dot(p)];
-        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for p in s.portals.iter().flat_map(|&p| polygon(p)) {
-            for (k, t) in flat(*p).into_iter().enumerate() {
-                lo[k] = lo[k].min(t);
-                hi[k] = hi[k].max(t);
-            }
-        }
-        for k in 0..2 {
-            lo[k] -= settings.surround;
-            hi[k] += settings.surround;
-        }
-        let step = (f64::max(hi[0] - lo[0], hi[1] - lo[1]) / POINTS).max(MIN_STEP);
-        let side = [0, 1].map(|k| ((hi[k] - lo[k]) / step).ceil() as usize + 1);
-        let base = plane.normal * -plane.d + u * lo[0] + v * lo[1];
-        let at = |i: usize, j: usize| base + u * (i as f64 * step) + v * (j as f64 * step);
-        let mut portal_at = vec![NONE; side[0] * side[1]];
-        for (n, &p) in s.portals.iter().enumerate() {
-            let points = polygon(p);
-            let place = |p: DVec3| {
-                let f = flat(p);
-                [0, 1].map(|k| (f[k] - lo[k]) / step)
-            };
-            let (mut from, mut to) = ([f64::MAX; 2], [f64::MIN; 2]);
-            for &p in points {
-                for (k, t) in place(p).into_iter().enumerate() {
-                    from[k] = from[k].min(t);
-                    to[k] = to[k].max(t);
-                }
-            }
-            for j in from[1].ceil() as usize..=to[1].floor() as usize {
-                for i in from[0].ceil() as usize..=to[0].floor() as usize {
-                    if contains(points, plane.normal, at(i, j)) {
-                        portal_at[j * side[0] + i] = n as u32;
-                    }
-                }
-            }
-            // The smallest has a point, too.
-            let middle = points.iter().sum::<DVec3>() / points.len() as f64;
-            let [i, j] = place(middle).map(|t| t.round() as usize);
-            let slot = &mut portal_at[j * side[0] + i];
-            if *slot == NONE {
-                *slot = n as u32;
-            }
-        }
-        Self {
-            side,
-            step,
-            portal_at,
-            slices: vec![OnceLock::new(); 2 * SLICES],
-            base,
-            across: [u * step, v * step, plane.normal],
-        }
-    }
-
-    /// Leaves at the points of section `k`; looked up when first asked for, as most measures need few.
-    fn slice(&self, bsp: &Bsp, k: usize, settings: &MergeSettings) -> &[u32] {
-        self.slices[k].get_or_init(|| {
-            let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
-            let off = self.across[2] * if k.is_multiple_of(2) { off } else { -off };
-            (0..self.side[0] * self.side[1])
-                .map(|n| {
-                    let (i, j) = ((n % self.side[0]) as f64, (n / self.side[0]) as f64);
-                    let p = self.base + self.across[0] * i + self.across[1] * j + off;
-                    if !bsp.tree.bounds.contains(p) {
-                        return NONE;
-                    }
-                    let leaf = bsp.tree.leaf_of(p);
-                    if bsp.is_open[leaf as usize] {
-                        leaf
-                    } else {
-                        NONE
-                    }
-                })
-                .collect()
-        })
-    }
-
-    /// Measures the opening of the portals that `is_seed` names, of this area, between the two sides
-    /// whose leaves `in_side` tells (0 and 1; anything else is neither), given whether a leaf is met
-    /// before (0) or behind (1) the plane. One side may be without end.
-    fn section(
-        &self,
-        bsp: &Bsp,
-        area: f64,
-        is_seed: &dyn Fn(u32) -> bool,
-        in_side: &dyn Fn(usize, u32) -> u8,
-        endless: Option<usize>,
-        settings: &MergeSettings,
-    ) -> Section {
-        let seeds: Vec<bool> = self
-            .portal_at
-            .iter()
-            .map(|&p| p != NONE && is_seed(p))
-            .collect();
-        let mut beside = [vec![false; seeds.len()], vec![false; seeds.len()]];
-        let mut best = [0_usize; 2];
-        let mut stack = Vec::new();
-        let unit = self.step * self.step;
-        // Once both are this large, it is a pinch whatever else there is.
-        let enough = area / (settings.threshold * unit);
-        let smaller = |best: [usize; 2]| match endless {
-            Some(side) => best[1 - side],
-            None => best[0].min(best[1]),
-        };
-        for k in 0..self.slices.len() {
-            let of: Vec<u8> = self
-                .slice(bsp, k, settings)
-                .iter()
-                .map(|&l| if l == NONE { 2 } else { in_side(k % 2, l) })
-                .collect();
-            for c in 0..2 {
-                let mut inside: Vec<bool> = of.iter().map(|&o| usize::from(o) == c).collect();
-                let count = connected_count(&mut inside, self.side, &seeds, &mut stack, |k| {
-                    beside[c][k] = true;
-                });
-                best[c] = best[c].max(count);
-            }
-            if smaller(best) as f64 > enough {
-                return Section {
-                    ratio: area / (smaller(best) as f64 * unit),
-                    wall: 0.0,
-                };
-            }
-        }
-        let ratio = match smaller(best) {
-            0 => 1.0,
-            n => area / (n as f64 * unit),
-        };
-        let wall = rim_share(&seeds, self.side, |k| beside[0][k] && beside[1][k]);
-        Section { ratio, wall }
-    }
-}
-
-/// Whether a point of the plane lies in a convex polygon that turns about `normal`.
-fn contains(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
-    let n = points.len();
-    (0..n).all(|i| {
-        let (a, b) = (points[i], points[(i + 1) % n]);
-        normal.cross(b - a).dot(p - a) >= 0.0
-    })
-}
-
 /// Whether a separator can be a pinch however space is parted around it: whether the larger of the two
 /// sections beside it is larger than it is, all open space taken together.
 pub(super) fn may_be_pinch(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> bool {

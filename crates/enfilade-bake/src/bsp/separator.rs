@@ -28,13 +28,25 @@ pub(super) struct Separator {
 
 /// All valid separators, ordered by plane and first portal.
 pub(super) fn find(bsp: &Bsp) -> Vec<Separator> {
+    find_in(bsp, &|_| true)
+}
+
+/// The valid separators in planes that may be a wall's.
+pub(super) fn find_in_walls(bsp: &Bsp) -> Vec<Separator> {
+    let is_wall = bsp.wall_planes();
+    find_in(bsp, &|plane| is_wall[plane as usize])
+}
+
+fn find_in(bsp: &Bsp, is_wanted: &dyn Fn(u32) -> bool) -> Vec<Separator> {
     let boxes: Vec<Aabb> = bsp
         .surfaces
         .iter()
         .map(|f| Aabb::of_points(&f.points))
         .collect();
     let solids = BoxTree::new(&boxes);
-    let mut order: Vec<u32> = (0..bsp.portals.len() as u32).collect();
+    let mut order: Vec<u32> = (0..bsp.portals.len() as u32)
+        .filter(|&p| is_wanted(bsp.portals[p as usize].plane))
+        .collect();
     order.sort_by_key(|&i| (bsp.portals[i as usize].plane, i));
     let groups: Vec<&[u32]> = order
         .chunk_by(|&a, &b| bsp.portals[a as usize].plane == bsp.portals[b as usize].plane)

@@ -87,6 +87,12 @@ fn hall(rng: &mut Rng, n: usize) -> Vec<ConvexSolid> {
     out
 }
 
+/// The tree of a random hall, which other modules' tests look into.
+pub(super) fn random_hall(seed: u64) -> Bsp {
+    let solids = hall(&mut Rng::new(seed), 9);
+    bsp_of(&solids, &[], Heuristic::Default, &Guide::default())
+}
+
 #[test]
 fn leaves_fill_what_the_solids_leave_free() {
     let mut rng = Rng::new(3);

@@ -1,6 +1,7 @@
 //! The tree: space cut by the planes of its surfaces until no leaf holds any.
 
 use enfilade_geom::{Aabb, DVec3, Plane};
+use rayon::prelude::*;
 
 use crate::complex::poly::{self, Poly, Sides};
 
@@ -194,6 +195,8 @@ struct Count {
 const CANDIDATES: usize = 160;
 /// Fragments that a candidate is tried on.
 const SAMPLE: usize = 2048;
+/// With more trials of a fragment than this, candidates are tried in parallel.
+const PARALLEL: usize = 20_000;
 
 impl Builder {
     fn leaf(&mut self, content: Content) -> i32 {
@@ -361,15 +364,18 @@ impl Builder {
                 }
             }
         };
-        let best = by_plane
-            .iter()
-            .map(|&(id, area)| (score(id, area), id))
-            .min_by(|a, b| {
-                a.0.0
-                    .total_cmp(&b.0.0)
-                    .then(a.0.1.total_cmp(&b.0.1))
-                    .then(a.1.cmp(&b.1))
-            });
+        let order = |a: &((f64, f64), u32), b: &((f64, f64), u32)| {
+            a.0.0
+                .total_cmp(&b.0.0)
+                .then(a.0.1.total_cmp(&b.0.1))
+                .then(a.1.cmp(&b.1))
+        };
+        let scored = |&(id, area): &(u32, f64)| (score(id, area), id);
+        let best = if by_plane.len() * fragments.len() / stride > PARALLEL {
+            by_plane.par_iter().map(scored).min_by(order)
+        } else {
+            by_plane.iter().map(scored).min_by(order)
+        };
         best.map_or(by_plane[0].0, |b| b.1)
     }
 
