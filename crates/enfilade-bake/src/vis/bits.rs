@@ -1,5 +1,7 @@
 //! Rows of bits.
 
+use rayon::prelude::*;
+
 /// A square table of bits, a row after the other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct BitTable {
@@ -49,18 +51,20 @@ impl BitTable {
     /// Rows as columns, of a table with so many rows.
     pub(super) fn transposed(&self, n_rows: usize) -> Self {
         let mut out = Self::new(self.n_words * 64, n_rows);
-        for first in (0..n_rows).step_by(64) {
-            for word in 0..self.n_words {
+        let n_words = out.n_words;
+        let rows = out.words.par_chunks_mut((64 * n_words).max(1));
+        rows.enumerate().for_each(|(word, rows)| {
+            for first in (0..n_rows).step_by(64) {
                 let mut block = [0; 64];
                 for (k, b) in block.iter_mut().enumerate().take(n_rows - first) {
                     *b = self.words[(first + k) * self.n_words + word];
                 }
                 transpose_block(&mut block);
                 for (k, &b) in block.iter().enumerate() {
-                    out.words[(word * 64 + k) * out.n_words + first / 64] = b;
+                    rows[k * n_words + first / 64] = b;
                 }
             }
-        }
+        });
         out
     }
 
@@ -156,13 +160,22 @@ pub(super) fn count(row: &[u64]) -> usize {
     row.iter().map(|w| w.count_ones() as usize).sum()
 }
 
-/// Writes `a & b` and says whether it has a bit in common with `wanted`.
+/// Writes `a & b` where `words` says, and says whether it has a bit there in common with `wanted`.
 #[inline]
-pub(super) fn and_into(out: &mut [u64], a: &[u64], b: &[u64], wanted: &[u64]) -> bool {
+pub(super) fn and_into(
+    words: &[u32],
+    out: &mut [u64],
+    (a, b): (&[u64], &[u64]),
+    wanted: &[u64],
+) -> bool {
+    let n = out.len();
+    let (a, b, wanted) = (&a[..n], &b[..n], &wanted[..n]);
     let mut any = 0;
-    for (((o, &x), &y), &w) in out.iter_mut().zip(a).zip(b).zip(wanted) {
-        *o = x & y;
-        any |= *o & w;
+    for &i in words {
+        let i = i as usize;
+        let both = a[i] & b[i];
+        out[i] = both;
+        any |= both & wanted[i];
     }
     any != 0
 }

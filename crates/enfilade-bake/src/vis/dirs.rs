@@ -40,11 +40,13 @@ pub(super) struct Dirs {
     pub(super) reverse: Vec<u32>,
     /// By direction, the number of its portal.
     portals: Vec<u32>,
-    /// By direction, what is looked at most, side by side: the ball around it (middle, radius), the plane
-    /// (normal, height half way between `low` and `high`), and where its cell's exits stand in `reverse`.
+    /// By direction, what is looked at most, side by side: the ball around it (middle, radius), and where its cell's
+    /// exits stand in `reverse`.
     pub(super) balls: Vec<[f64; 4]>,
-    pub(super) planes: Vec<[f64; 4]>,
     ahead: Vec<[u32; 2]>,
+    /// By place in `reverse`: the plane of the direction that stands there (normal, height half way between `low` and
+    /// `high`), so that those of a cell's exits lie side by side.
+    pub(super) exit_planes: Vec<[f64; 4]>,
     /// Directions into cell `c` are `into[c]..into[c + 1]`.
     pub(super) into: Vec<u32>,
     /// Corners of each piece, in `points`.
@@ -56,6 +58,9 @@ pub(super) struct Dirs {
     /// Largest absolute coordinate, at least 1e-300. Errors are relative to it.
     pub(super) scale: f64,
 }
+
+/// Openings of one normal for which heights of all others are not worth taking once.
+const FEW: usize = 4;
 
 impl Dirs {
     /// Takes time and memory linear in the corners, but for a sort of the portals.
@@ -120,15 +125,15 @@ impl Dirs {
         for (k, dir) in all.iter().enumerate() {
             place[dir.id as usize] = k as u32;
         }
-        let reverse = all.iter().map(|dir| place[dir.id as usize ^ 1]).collect();
+        let reverse: Vec<u32> = all.iter().map(|dir| place[dir.id as usize ^ 1]).collect();
         let portals = all.iter().map(|dir| dir.id / 2).collect();
         let four = |v: DVec3, w: f64| [v.x, v.y, v.z, w];
         let balls = all.iter().map(|dir| four(dir.center, dir.radius)).collect();
-        let middle = |dir: &Dir| (dir.low + dir.high) * 0.5;
-        let planes = all
-            .iter()
-            .map(|dir| four(dir.normal, middle(dir)))
-            .collect();
+        let plane = |&d: &u32| {
+            let dir: &Dir = &all[d as usize];
+            four(dir.normal, (dir.low + dir.high) * 0.5)
+        };
+        let exit_planes = reverse.iter().map(plane).collect();
         let ahead = all
             .iter()
             .map(|dir| [into[dir.to as usize], into[dir.to as usize + 1]])
@@ -143,8 +148,8 @@ impl Dirs {
             reverse,
             portals,
             balls,
-            planes,
             ahead,
+            exit_planes,
             into,
             pieces,
             points,
@@ -168,6 +173,13 @@ impl Dirs {
     #[inline]
     pub(super) fn exits(&self, cell: u32) -> &[u32] {
         &self.reverse[self.entries(cell)]
+    }
+
+    /// Where the exits of the cell that a direction leads into stand in `reverse`.
+    #[inline]
+    pub(super) fn places_after(&self, dir: usize) -> Range<usize> {
+        let [start, end] = self.ahead[dir];
+        start as usize..end as usize
     }
 
     /// The directions out of the cell that a direction leads into.
@@ -267,6 +279,10 @@ impl Dirs {
             .map_init(Vec::new, |heights, group| {
                 let turn = self.all[group[0] as usize].turn;
                 heights.clear();
+                if group.len() < FEW {
+                    let row = |&d: &u32| (d, self.past_row_alone(d as usize, &of_id, clearance));
+                    return group.iter().map(row).collect();
+                }
                 heights.extend((0..n_portals).map(|i| self.extent(of_id[2 * i] as usize, turn)));
                 let rows = group.iter();
                 rows.map(|&d| (d, self.past_row(d as usize, heights, &of_id, clearance)))
@@ -288,6 +304,28 @@ impl Dirs {
             extent = [extent[0].min(height), extent[1].max(height)];
         }
         extent
+    }
+
+    /// [`Dirs::past_row`] by the balls around openings, and by their corners where those do not say.
+    fn past_row_alone(&self, d: usize, of_id: &[u32], clearance: f64) -> Vec<u64> {
+        let dir = &self.all[d];
+        let slack = 1e-12 * self.scale;
+        let mut row = vec![0; (of_id.len() / 2).div_ceil(64)];
+        for (k, pair) in of_id.chunks_exact(2).enumerate() {
+            let other = pair[0] as usize;
+            let [x, y, z, radius] = self.balls[other];
+            let height = dir.normal.dot(DVec3::new(x, y, z)) - dir.low;
+            let is_past = dir.normal == DVec3::ZERO
+                || height > clearance + slack
+                || height + radius > -slack && {
+                    let corners = self.winding(other).iter().map(|&p| dir.normal.dot(p));
+                    let reach = corners.fold(f64::NEG_INFINITY, f64::max) - dir.low;
+                    reach > clearance
+                        || reach > 0.0 && reach > clearance * sine(dir.normal, self.all[other].turn)
+                };
+            row[k / 64] |= u64::from(is_past) << (k % 64);
+        }
+        row
     }
 
     fn past_row(&self, d: usize, heights: &[[f64; 2]], of_id: &[u32], clearance: f64) -> Vec<u64> {
@@ -348,6 +386,55 @@ impl Dirs {
     }
 }
 
+/// By direction: which of the exits behind it a line through it might take, at hand.
+///
+/// A copy of some bits of the table of what might be seen, whose rows lie far apart.
+#[derive(Debug)]
+pub(super) struct Next(Vec<u64>);
+
+impl Next {
+    pub(super) fn new(dirs: &Dirs, might: &BitTable) -> Self {
+        let masks = (0..dirs.len()).map(|d| {
+            let exits = dirs.after(d).iter().take(64).enumerate();
+            exits.fold(0, |mask, (k, &q)| {
+                mask | u64::from(might.get(d, q as usize)) << k
+            })
+        });
+        Self(masks.collect())
+    }
+
+    /// The exits that a line through `d` might take.
+    #[inline]
+    pub(super) fn after<'a>(
+        &self,
+        dirs: &'a Dirs,
+        might: &'a BitTable,
+        d: usize,
+    ) -> impl Iterator<Item = u32> + 'a {
+        let exits = dirs.after(d);
+        let mut mask = self.0[d];
+        let first = std::iter::from_fn(move || {
+            (mask != 0).then(|| {
+                let k = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                exits[k]
+            })
+        });
+        let rest = exits.get(64..).unwrap_or_default().iter().copied();
+        first.chain(rest.filter(move |&q| might.get(d, q as usize)))
+    }
+
+    /// Takes up that a line through `a` cannot pass `b`.
+    #[inline]
+    pub(super) fn clear(&mut self, dirs: &Dirs, a: usize, b: usize) {
+        let start = dirs.places_after(a).start;
+        let place = dirs.reverse[b] as usize;
+        if dirs.all[a].to == dirs.all[b].from && place - start < 64 {
+            self.0[a] &= !(1 << (place - start));
+        }
+    }
+}
+
 /// What a flood needs, kept between floods.
 #[derive(Default)]
 struct Flood {
@@ -375,5 +462,94 @@ fn unit_normal(winding: &[DVec3]) -> DVec3 {
         sum.normalize_or_zero()
     } else {
         DVec3::ZERO
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use enfilade_cpg::SightPortal;
+
+    use super::super::rays::Rng;
+    use super::*;
+
+    /// A chain of cells joined by random triangles, or as many cells around one; some triangles lie on one plane, some
+    /// a hair from another's.
+    fn random_dirs(seed: u64, n_portals: usize, is_star: bool) -> Dirs {
+        let mut rng = Rng::new(seed);
+        let mut portals = Vec::new();
+        for cell in 0..n_portals {
+            let mut point = || DVec3::new(rng.unit(), rng.unit(), rng.unit()) * 8.0;
+            let mut winding = vec![point(), point(), point()];
+            if cell % 3 == 0 {
+                winding.iter_mut().for_each(|p| p.z = p.z.round());
+            }
+            if cell % 4 == 1 {
+                let last: &SightPortal = &portals[cell - 1];
+                let shift = [0.0, 1e-8, 1e-7, -1e-7][rng.below(4)];
+                winding = last.winding.iter().map(|&p| p + DVec3::Z * shift).collect();
+            }
+            portals.push(SightPortal {
+                cells: [if is_star { 0 } else { cell as u32 }, cell as u32 + 1],
+                winding,
+                pieces: Vec::new(),
+            });
+        }
+        Dirs::new(&SightGraph {
+            n_cells: n_portals as u32 + 1,
+            portals,
+        })
+    }
+
+    #[test]
+    fn balls_say_of_sides_what_corners_say() {
+        for seed in 0..50 {
+            let dirs = random_dirs(seed, 40, false);
+            let mut of_id = vec![0u32; dirs.len()];
+            for (d, dir) in dirs.all.iter().enumerate() {
+                of_id[dir.id as usize] = d as u32;
+            }
+            for d in 0..dirs.len() {
+                let turn = dirs.all[d].turn;
+                let heights: Vec<[f64; 2]> = (0..dirs.len() / 2)
+                    .map(|i| dirs.extent(of_id[2 * i] as usize, turn))
+                    .collect();
+                let clearance = 1e-7;
+                assert_eq!(
+                    dirs.past_row_alone(d, &of_id, clearance),
+                    dirs.past_row(d, &heights, &of_id, clearance),
+                    "{seed} {d}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exits_at_hand_are_those_of_the_table() {
+        for seed in 0..20 {
+            // More exits than a mask holds, every other time.
+            let dirs = random_dirs(seed, 80, seed % 2 == 0);
+            let n = dirs.len();
+            let mut rng = Rng::new(seed + 100);
+            let mut might = BitTable::new(n, n);
+            for a in 0..n {
+                for b in 0..n {
+                    if rng.unit() < 0.7 {
+                        might.set(a, b);
+                    }
+                }
+            }
+            let mut next = Next::new(&dirs, &might);
+            for _ in 0..3 * n {
+                let (a, b) = (rng.below(n), rng.below(n));
+                might.clear(a, b);
+                next.clear(&dirs, a, b);
+            }
+            for d in 0..n {
+                let at_hand: Vec<u32> = next.after(&dirs, &might, d).collect();
+                let exits = dirs.after(d).iter().copied();
+                let of_table: Vec<u32> = exits.filter(|&q| might.get(d, q as usize)).collect();
+                assert_eq!(at_hand, of_table, "{seed} {d}");
+            }
+        }
     }
 }

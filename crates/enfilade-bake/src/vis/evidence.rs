@@ -7,6 +7,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
 use super::bits::{self, BitTable};
+use super::dirs::Next;
 use super::flow::Shared;
 use super::search::Search;
 use super::{VisConfig, VisError, checkpoint, prove};
@@ -22,6 +23,7 @@ pub(super) fn encode(
     let shared = Shared {
         dirs: search.dirs,
         might: &search.might,
+        next: &Next::new(search.dirs, &search.might),
         seen: &search.seen,
         tolerance: search.tolerance,
         blocker: search.blocker,

@@ -14,10 +14,12 @@
 //! Errs to visible: a chain that neither a plane nor a line settles counts as seen.
 
 use enfilade_geom::DVec3;
+use fearless_simd::{Level, Simd, dispatch};
 
 use super::bits::{self, BitTable};
-use super::clip::{Arena, Facing, Fence, HalfSpace, Poly, Separator, Tolerance, separators};
-use super::dirs::Dirs;
+use super::clip::{Arena, HalfSpace, Poly, Tolerance};
+use super::dirs::{Dirs, Next};
+use super::planes::{Facing, Four, Side, admits, hide, separators};
 use super::rays::{self, Blocker, Line};
 
 /// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
@@ -27,6 +29,7 @@ const MAX_CHAIN: usize = 512;
 pub(super) struct Shared<'a> {
     pub(super) dirs: &'a Dirs,
     pub(super) might: &'a BitTable,
+    pub(super) next: &'a Next,
     /// Pairs of cells that are decided to be visible.
     pub(super) seen: &'a BitTable,
     pub(super) tolerance: Tolerance,
@@ -73,12 +76,13 @@ pub(super) struct Flow {
     pub(super) arena: Arena,
     /// By depth: what all openings of the chain might see.
     pub(super) reach: Vec<Vec<u64>>,
+    /// Words of the first row of reach that are not zero. The rows of other depths are right in these alone.
+    pub(super) words: Vec<u32>,
     /// The openings still to be settled from this source.
     pub(super) wanted: Vec<u64>,
     /// By depth: the chain's openings as clipped.
     pub(super) chain: Vec<Poly>,
-    pub(super) planes: Vec<Separator>,
-    pub(super) fence: Fence,
+    pub(super) planes: Vec<Four>,
     walked: Vec<u32>,
     reached: Vec<u64>,
     stack: Vec<u32>,
@@ -110,8 +114,9 @@ impl Flow {
         }
         let poly = self.begin(shared, source);
         self.set_reach(0, shared.might.row(source));
-        self.drop_unreached(shared, source);
-        if bits::count(&self.wanted) > 0 {
+        if self.wanted.iter().any(|&w| w != 0) {
+            self.drop_unreached(shared, source);
+            self.find_words();
             self.visit(shared, poly);
         }
         self.found.hidden = self.wanted.clone();
@@ -127,10 +132,9 @@ impl Flow {
         self.reached.resize(row.len(), 0);
         self.stack.push(source as u32);
         while let Some(at) = self.stack.pop() {
-            let from_here = shared.might.row(at as usize);
-            for &next in dirs.after(at as usize) {
+            for next in shared.next.after(dirs, shared.might, at as usize) {
                 let q = next as usize;
-                if bits::get(row, q) && bits::get(from_here, q) && !bits::get(&self.reached, q) {
+                if bits::get(row, q) && !bits::get(&self.reached, q) {
                     bits::set(&mut self.reached, q);
                     self.stack.push(next);
                 }
@@ -159,6 +163,14 @@ impl Flow {
         self.reach[depth].extend_from_slice(row);
     }
 
+    /// Sets [`Flow::words`].
+    pub(super) fn find_words(&mut self) {
+        self.words.clear();
+        let row = self.reach[0].iter().enumerate();
+        self.words
+            .extend(row.filter(|&(_, &word)| word != 0).map(|(i, _)| i as u32));
+    }
+
     /// Goes on from the end of the chain, `source` being what is left of its first opening.
     fn visit(&mut self, shared: &Shared<'_>, source: Poly) {
         let dirs = shared.dirs;
@@ -182,12 +194,13 @@ impl Flow {
         }
         for &next in dirs.exits(dirs.all[pass.dir as usize].to) {
             let q = next as usize;
-            if next == back || !bits::get(&self.reach[depth], q) {
+            let is_near = bits::get(&self.reach[0], q) && bits::get(&self.reach[depth], q);
+            if next == back || !is_near {
                 continue;
             }
             let (near, far) = self.reach.split_at_mut(depth + 1);
-            let leads_on =
-                bits::and_into(&mut far[0], &near[depth], shared.might.row(q), &self.wanted);
+            let rows = (&near[depth][..], shared.might.row(q));
+            let leads_on = bits::and_into(&self.words, &mut far[0], rows, &self.wanted);
             if !leads_on && !bits::get(&self.wanted, q) {
                 continue;
             }
@@ -204,10 +217,17 @@ impl Flow {
         self.planes.truncate(first_plane);
     }
 
+    fn is_any_wanted(&self, depth: usize) -> bool {
+        let row = &self.reach[depth];
+        let at = |&i: &u32| row[i as usize] & self.wanted[i as usize] != 0;
+        self.words.iter().any(at)
+    }
+
     /// Counts all that might lie beyond the chain as seen.
     fn give_up(&mut self, shared: &Shared<'_>, depth: usize) {
-        let both = self.reach[depth].iter().zip(&self.wanted);
-        let beyond: Vec<u64> = both.map(|(a, b)| a & b).collect();
+        let mut beyond = vec![0; self.wanted.len()];
+        let rows = (&self.reach[depth][..], &self.wanted[..]);
+        bits::and_into(&self.words, &mut beyond, rows, &self.wanted);
         for q in bits::ones(&beyond) {
             let cell = shared.dirs.all[q].to;
             self.found.undecided.push(cell);
@@ -237,7 +257,7 @@ impl Flow {
                 bits::clear_range(&mut self.wanted, range.start, range.end);
             }
         }
-        if leads_on && bits::meets(&self.reach[self.chain.len() - 1], &self.wanted) {
+        if leads_on && self.is_any_wanted(self.chain.len() - 1) {
             self.visit(shared, source);
         }
     }
@@ -318,50 +338,42 @@ impl Flow {
     }
 
     /// Clips the whole chain by all planes between the source and it; `None` where nothing is left.
-    pub(super) fn tighten(&mut self, shared: &Shared<'_>, mut source: Poly) -> Option<Poly> {
+    pub(super) fn tighten(&mut self, shared: &Shared<'_>, source: Poly) -> Option<Poly> {
+        let first_plane = self.planes.len();
+        let source = self.tighten_by(shared, source, first_plane);
+        self.planes.truncate(first_plane);
+        source
+    }
+
+    fn tighten_by(
+        &mut self,
+        shared: &Shared<'_>,
+        source: Poly,
+        first_plane: usize,
+    ) -> Option<Poly> {
         let dirs = shared.dirs;
         let tolerance = &shared.tolerance;
-        let first_plane = self.planes.len();
-        let end = self.chain.len();
-        let mut is_open = true;
-        for k in 1..end {
-            let mut poly = self.chain[k];
-            let turn = dirs.all[poly.dir as usize].turn;
-            for i in first_plane..self.planes.len() {
-                match self
-                    .arena
-                    .clip(poly, self.planes[i].after(), turn, tolerance)
-                {
-                    Some(rest) => poly = rest,
-                    None => is_open = false,
-                }
-            }
-            if !is_open {
-                break;
-            }
-            self.chain[k] = poly;
-            self.add_planes(shared, source, poly);
+        let last = self.chain.len() - 1;
+        let clip = |arena: &mut Arena, poly: Poly, planes: &[Four], side: Side| {
+            let dir = poly.dir as usize;
+            let turn = dirs.all[dir].turn;
+            arena.clip_all(poly, (planes, side), dirs.balls[dir], turn, tolerance)
+        };
+        // The last opening by each set of planes at once: most chains end with that.
+        for k in 1..last {
+            let planes = &self.planes[first_plane..];
+            self.chain[k] = clip(&mut self.arena, self.chain[k], planes, Side::After)?;
+            let end = self.planes.len();
+            self.add_planes(shared, source, self.chain[k]);
+            let planes = &self.planes[end..];
+            self.chain[last] = clip(&mut self.arena, self.chain[last], planes, Side::After)?;
         }
         self.planes.truncate(first_plane);
-        if !is_open {
-            return None;
+        for k in 1..last {
+            self.add_planes(shared, self.chain[k], self.chain[last]);
         }
-        let target = self.chain[end - 1];
-        let turn = dirs.all[source.dir as usize].turn;
-        for k in 1..end - 1 {
-            self.add_planes(shared, self.chain[k], target);
-        }
-        for i in first_plane..self.planes.len() {
-            match self
-                .arena
-                .clip(source, self.planes[i].before(), turn, tolerance)
-            {
-                Some(rest) => source = rest,
-                None => is_open = false,
-            }
-        }
-        self.planes.truncate(first_plane);
-        is_open.then_some(source)
+        let planes = &self.planes[first_plane..];
+        clip(&mut self.arena, source, planes, Side::Before)
     }
 
     /// Drops what is wanted and lies behind a plane; says whether anything is left.
@@ -371,13 +383,26 @@ impl Flow {
         first_plane: usize,
         depth: usize,
     ) -> bool {
-        self.fence.set(&self.planes[first_plane..]);
+        dispatch!(Level::new(), simd => self.check_wanted_by(simd, shared, first_plane, depth))
+    }
+
+    #[inline(always)]
+    fn check_wanted_by<S: Simd>(
+        &mut self,
+        simd: S,
+        shared: &Shared<'_>,
+        first_plane: usize,
+        depth: usize,
+    ) -> bool {
+        let planes = &self.planes[first_plane..];
         let mut is_left = false;
-        for (i, (word, wanted)) in self.reach[depth].iter_mut().zip(&self.wanted).enumerate() {
-            let mut rest = *word & wanted;
+        for &i in &self.words {
+            let i = i as usize;
+            let word = &mut self.reach[depth][i];
+            let mut rest = *word & self.wanted[i];
             while rest != 0 {
                 let q = i * 64 + rest.trailing_zeros() as usize;
-                if self.fence.admits(shared.dirs, q, &shared.tolerance) {
+                if admits(simd, planes, shared.dirs, q, &shared.tolerance) {
                     is_left = true;
                 } else {
                     *word &= !(1 << (q % 64));
@@ -410,34 +435,32 @@ impl Flow {
         let tolerance = &shared.tolerance;
         self.found.effort.clips += 1;
         // A ball around the opening settles most of it without looking at corners.
-        let [x, y, z, radius] = dirs.balls[q];
-        let center = DVec3::new(x, y, z);
-        for plane in &self.planes[first_plane..] {
-            if plane.normal.dot(center) - plane.front < -radius {
-                return None;
-            }
+        let ball = dirs.balls[q];
+        if hide(&self.planes[first_plane..], ball) {
+            return None;
         }
         let next = &dirs.all[q];
         let mut target = self.arena.push(dirs.winding(q), q as u32);
         let source_front = front_of(dirs, source.dir);
-        target = self
-            .arena
-            .clip(target, source_front, next.turn, tolerance)?;
-        if pass.dir != source.dir {
+        if !source_front.holds(ball) {
             target = self
                 .arena
-                .clip(target, front_of(dirs, pass.dir), next.turn, tolerance)?;
+                .clip(target, source_front, next.turn, tolerance)?;
+        }
+        let pass_front = front_of(dirs, pass.dir);
+        if pass.dir != source.dir && !pass_front.holds(ball) {
+            target = self.arena.clip(target, pass_front, next.turn, tolerance)?;
         }
         let source_turn = dirs.all[source.dir as usize].turn;
-        let mut source = self
-            .arena
-            .clip(source, back_of(dirs, q), source_turn, tolerance)?;
-        for i in first_plane..self.planes.len() {
-            let plane = self.planes[i].after();
-            if plane.normal.dot(center) - plane.offset < radius {
-                target = self.arena.clip(target, plane, next.turn, tolerance)?;
-            }
+        let mut source = source;
+        let back = back_of(dirs, q);
+        if !back.holds(dirs.balls[source.dir as usize]) {
+            source = self.arena.clip(source, back, source_turn, tolerance)?;
         }
+        let planes = (&self.planes[first_plane..], Side::After);
+        target = self
+            .arena
+            .clip_all(target, planes, ball, next.turn, tolerance)?;
         if pass.dir != source.dir {
             let end = self.planes.len();
             separators(
@@ -446,13 +469,11 @@ impl Flow {
                 tolerance,
                 &mut self.planes,
             );
-            let ball = &dirs.all[source.dir as usize];
-            for i in end..self.planes.len() {
-                let plane = self.planes[i].before();
-                if plane.normal.dot(ball.center) - plane.offset < ball.radius {
-                    source = self.arena.clip(source, plane, source_turn, tolerance)?;
-                }
-            }
+            let ball = dirs.balls[source.dir as usize];
+            let planes = (&self.planes[end..], Side::Before);
+            source = self
+                .arena
+                .clip_all(source, planes, ball, source_turn, tolerance)?;
             self.planes.truncate(end);
         }
         Some((source, target))

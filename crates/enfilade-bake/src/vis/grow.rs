@@ -114,19 +114,20 @@ impl Search<'_> {
 
     fn grown_from(&self, line: &Line) -> Vec<Line> {
         let mut out = Vec::new();
-        self.grow_end(line, &mut out);
+        let mut walked = [Vec::new(), Vec::new()];
+        self.grow_end(line, &mut walked, &mut out);
         let chain = line.chain.iter().rev();
         let reversed = Line {
             origin: line.origin,
             direction: -line.direction,
             chain: chain.map(|&d| self.dirs.reverse[d as usize]).collect(),
         };
-        self.grow_end(&reversed, &mut out);
+        self.grow_end(&reversed, &mut walked, &mut out);
         out
     }
 
     /// Turns a line towards the exits of the cell where it ends.
-    fn grow_end(&self, line: &Line, out: &mut Vec<Line>) {
+    fn grow_end(&self, line: &Line, walked: &mut [Vec<u32>; 2], out: &mut Vec<Line>) {
         let dirs = self.dirs;
         let Some(&last) = line.chain.last() else {
             return;
@@ -137,17 +138,23 @@ impl Search<'_> {
             }
             let to = dirs.all[exit as usize].to as usize;
             let is_wanted = |&d: &u32| {
-                self.might.get(d as usize, exit as usize)
-                    && !bits::get(self.seen.row(dirs.all[d as usize].from as usize), to)
+                !bits::get(self.seen.row(dirs.all[d as usize].from as usize), to)
+                    && self.might.get(d as usize, exit as usize)
             };
             let Some(first) = line.chain.iter().position(is_wanted) else {
                 continue;
             };
-            self.turn(line, first, exit, out);
+            self.turn(line, (first, exit), walked, out);
         }
     }
 
-    fn turn(&self, line: &Line, first: usize, exit: u32, out: &mut Vec<Line>) {
+    fn turn(
+        &self,
+        line: &Line,
+        (first, exit): (usize, u32),
+        [ahead, behind]: &mut [Vec<u32>; 2],
+        out: &mut Vec<Line>,
+    ) {
         let dirs = self.dirs;
         let margin = self.tolerance.rounding * 16.0;
         let last = line.chain.len() - 1;
@@ -161,28 +168,20 @@ impl Search<'_> {
                 if direction.dot(dirs.all[d].normal) <= 0.0 {
                     continue;
                 }
-                let mut ahead = Vec::new();
-                walk(dirs, d, pivot, direction, margin, self.blocker, &mut ahead);
+                ahead.clear();
+                walk(dirs, d, pivot, direction, margin, self.blocker, ahead);
                 if !ahead.contains(&exit) {
                     continue;
                 }
-                let mut behind = Vec::new();
+                behind.clear();
                 let back = dirs.reverse[d] as usize;
-                walk(
-                    dirs,
-                    back,
-                    pivot,
-                    -direction,
-                    margin,
-                    self.blocker,
-                    &mut behind,
-                );
+                walk(dirs, back, pivot, -direction, margin, self.blocker, behind);
                 let chain: Vec<u32> = behind
                     .iter()
                     .rev()
                     .map(|&b| dirs.reverse[b as usize])
                     .chain([d as u32])
-                    .chain(ahead)
+                    .chain(ahead.iter().copied())
                     .collect();
                 if self.proves_new(&chain) {
                     let found = chain.contains(&line.chain[first]);

@@ -25,6 +25,7 @@ mod flow;
 mod grow;
 mod narrow;
 mod occlude;
+mod planes;
 mod prove;
 mod rays;
 mod search;

@@ -4,12 +4,14 @@
 //! most of its work: the planes that separate an opening from each of its next ones bound all that lies
 //! behind both. (The Quake tools go straight to the search.)
 
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::bits::{self, BitTable};
-use super::clip::{Arena, Fence, Separator, Tolerance, separators};
-use super::dirs::Dirs;
+use super::clip::{Arena, Tolerance};
+use super::dirs::{Dirs, Next};
 use super::flow::{back_of, facing, front_of};
+use super::planes::{Four, admits, pack, separators};
 
 /// Openings a round; see [`super::search`].
 const ROUND: usize = 128;
@@ -28,12 +30,13 @@ pub(super) fn narrow_might(
         .map(|d| (bits::count(might.row(d)), d))
         .collect();
     order.sort_unstable();
+    let mut next = Next::new(dirs, might);
     for round in order.chunks(ROUND) {
         let rows: Vec<Vec<u64>> = round
             .par_iter()
             .with_max_len(4)
             .map_init(Work::default, |work, &(_, source)| {
-                work.narrow(dirs, might, tolerance, source)
+                work.narrow(dirs, (might, &next), tolerance, source)
             })
             .collect();
         for (&(_, source), row) in round.iter().zip(rows) {
@@ -44,6 +47,8 @@ pub(super) fn narrow_might(
                 while gone != 0 {
                     let q = word * 64 + gone.trailing_zeros() as usize;
                     might.clear(dirs.reverse[q] as usize, back);
+                    next.clear(dirs, source, q);
+                    next.clear(dirs, dirs.reverse[q] as usize, back);
                     settled.set(source, q);
                     gone &= gone - 1;
                 }
@@ -55,8 +60,7 @@ pub(super) fn narrow_might(
 #[derive(Default)]
 struct Work {
     arena: Arena,
-    planes: Vec<Separator>,
-    fence: Fence,
+    planes: Vec<Four>,
     allowed: Vec<u64>,
     reached: Vec<u64>,
     stack: Vec<u32>,
@@ -66,7 +70,7 @@ impl Work {
     fn narrow(
         &mut self,
         dirs: &Dirs,
-        might: &BitTable,
+        (might, ahead): (&BitTable, &Next),
         tolerance: &Tolerance,
         source: usize,
     ) -> Vec<u64> {
@@ -96,9 +100,8 @@ impl Work {
                 tolerance,
                 &mut self.planes,
             );
-            drop_twins(&mut self.planes, tolerance);
-            self.fence.set(&self.planes);
-            self.flood(dirs, might, tolerance, (source, pass));
+            pack(&mut self.planes, tolerance);
+            self.flood(dirs, (might, ahead), tolerance, (source, pass));
             for (r, &new) in row.iter_mut().zip(&self.reached) {
                 *r |= new;
             }
@@ -110,7 +113,19 @@ impl Work {
     fn flood(
         &mut self,
         dirs: &Dirs,
-        might: &BitTable,
+        (might, ahead): (&BitTable, &Next),
+        tolerance: &Tolerance,
+        ends: (usize, usize),
+    ) {
+        dispatch!(Level::new(), simd => self.flood_by(simd, dirs, (might, ahead), tolerance, ends));
+    }
+
+    #[inline(always)]
+    fn flood_by<S: Simd>(
+        &mut self,
+        simd: S,
+        dirs: &Dirs,
+        (might, ahead): (&BitTable, &Next),
         tolerance: &Tolerance,
         (source, pass): (usize, usize),
     ) {
@@ -122,35 +137,17 @@ impl Work {
         let rows = might.row(source).iter().zip(might.row(pass));
         self.allowed.extend(rows.map(|(a, b)| a & b));
         while let Some(at) = self.stack.pop() {
-            let from_here = might.row(at as usize);
-            for &next in dirs.after(at as usize) {
+            for next in ahead.after(dirs, might, at as usize) {
                 let q = next as usize;
-                if !bits::get(&self.allowed, q) || !bits::get(from_here, q) {
+                if !bits::get(&self.allowed, q) {
                     continue;
                 }
                 bits::clear(&mut self.allowed, q);
-                if self.fence.admits(dirs, q, tolerance) {
+                if admits(simd, &self.planes, dirs, q, tolerance) {
                     bits::set(&mut self.reached, q);
                     self.stack.push(next);
                 }
             }
-        }
-    }
-}
-
-/// Drops planes that are the same but for rounding: those that hold an edge of each opening.
-fn drop_twins(planes: &mut Vec<Separator>, tolerance: &Tolerance) {
-    let mut i = 0;
-    while i < planes.len() {
-        let plane = planes[i];
-        let is_twin = |other: &Separator| {
-            plane.normal.distance_squared(other.normal) < 1e-24
-                && (plane.front - other.front).abs() < tolerance.rounding
-        };
-        if planes[..i].iter().any(is_twin) {
-            planes.swap_remove(i);
-        } else {
-            i += 1;
         }
     }
 }

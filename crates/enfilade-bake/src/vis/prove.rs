@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::bits::{self, BitTable};
 use super::clip::Poly;
 use super::flow::{Flow, Shared};
+use super::planes::is_admitted;
 
 /// Symbols of the trace.
 pub(super) mod symbol {
@@ -86,6 +87,7 @@ impl Flow {
         self.wanted.extend_from_slice(claims);
         let all = vec![u64::MAX; claims.len()];
         self.set_reach(0, &all);
+        self.find_words();
         let mut trace = Vec::new();
         let poly = self.chain[0];
         self.write_step(shared, poly, &mut trace)?;
@@ -123,9 +125,9 @@ impl Flow {
             }
             let (near, far) = self.reach.split_at_mut(depth + 1);
             far[0].resize(near[depth].len(), 0);
-            let leads_on =
-                bits::and_into(&mut far[0], &near[depth], shared.might.row(q), &self.wanted)
-                    && shared.might.get(source.dir as usize, q);
+            let rows = (&near[depth][..], shared.might.row(q));
+            let leads_on = bits::and_into(&self.words, &mut far[0], rows, &self.wanted)
+                && shared.might.get(source.dir as usize, q);
             let is_wanted = bits::get(&self.wanted, q);
             if !leads_on && !is_wanted {
                 trace.push(symbol::SKIP);
@@ -197,7 +199,6 @@ impl Flow {
     fn flood_wanted(&mut self, shared: &Shared<'_>, first_plane: usize) -> bool {
         let dirs = shared.dirs;
         let (first, pass) = (self.chain[0].dir as usize, self.chain[1].dir);
-        self.fence.set(&self.planes[first_plane..]);
         let passable = shared.might.row(first);
         let mut reached = vec![0; self.wanted.len()];
         let mut stack = vec![pass];
@@ -210,7 +211,7 @@ impl Flow {
                     && bits::get(row, q)
                     && (is_passable || bits::get(&self.wanted, q))
                     && !bits::get(&reached, q)
-                    && self.fence.admits(dirs, q, &shared.tolerance)
+                    && is_admitted(&self.planes[first_plane..], dirs, q, &shared.tolerance)
                 {
                     bits::set(&mut reached, q);
                     if is_passable {

@@ -40,15 +40,19 @@ pub(super) fn walk(
         let back = dirs.reverse[at];
         let mut best = None;
         let mut best_t = f64::INFINITY;
-        for &exit in dirs.after(at) {
-            let [x, y, z, middle] = dirs.planes[exit as usize];
+        for place in dirs.places_after(at) {
+            let [x, y, z, middle] = dirs.exit_planes[place];
             let normal = DVec3::new(x, y, z);
             let speed = normal.dot(direction);
-            if exit == back || speed <= 0.0 {
+            if speed <= 0.0 {
                 continue;
             }
             let exit_t = (middle - normal.dot(origin)) / speed;
             if exit_t < t || exit_t >= best_t {
+                continue;
+            }
+            let exit = dirs.reverse[place];
+            if exit == back {
                 continue;
             }
             if dirs.is_inside(exit as usize, origin + direction * exit_t, margin) {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::bits::{self, BitTable};
 use super::clip::Tolerance;
-use super::dirs::Dirs;
+use super::dirs::{Dirs, Next};
 use super::flow::{Effort, Flow, Found, Shared};
 use super::occlude::Closed;
 use super::rays::{self, Blocker, Line, Rng};
@@ -248,6 +248,7 @@ impl<'a> Search<'a> {
         mut rest: Rest,
         mut on_round: impl FnMut(&Self, &Rest) -> bool,
     ) -> bool {
+        let mut next = Next::new(self.dirs, &self.might);
         while !rest.order.is_empty() {
             if !on_round(self, &rest) {
                 return false;
@@ -258,6 +259,7 @@ impl<'a> Search<'a> {
             let shared = Shared {
                 dirs: self.dirs,
                 might: &self.might,
+                next: &next,
                 seen: &self.seen,
                 tolerance: self.tolerance,
                 blocker: self.blocker,
@@ -269,7 +271,7 @@ impl<'a> Search<'a> {
                 .map_init(Flow::default, |flow, &(_, d)| flow.search(&shared, d))
                 .collect();
             for found in found {
-                self.merge(found);
+                self.merge(found, &mut next);
             }
             self.grow();
         }
@@ -289,12 +291,14 @@ impl<'a> Search<'a> {
         self.effort.steps = steps;
     }
 
-    fn merge(&mut self, found: Found) {
+    fn merge(&mut self, found: Found, next: &mut Next) {
         let back = self.dirs.reverse[found.source] as usize;
         for t in bits::ones(&found.hidden) {
             self.settled.set(found.source, t);
             self.might.clear(found.source, t);
             self.might.clear(self.dirs.reverse[t] as usize, back);
+            next.clear(self.dirs, found.source, t);
+            next.clear(self.dirs, self.dirs.reverse[t] as usize, back);
         }
         let a = self.dirs.all[found.source].from as usize;
         for &b in &found.undecided {
@@ -316,15 +320,17 @@ impl<'a> Search<'a> {
     pub(super) fn visible(&self) -> BitTable {
         let n = self.dirs.n_cells;
         let mut visible = BitTable::new(n, n);
-        for c in 0..n {
-            visible.set(c, c);
-        }
-        for (d, dir) in self.dirs.all.iter().enumerate() {
-            visible.set(dir.from as usize, dir.to as usize);
-            for t in bits::ones(self.might.row(d)) {
-                visible.set(dir.from as usize, self.dirs.all[t].to as usize);
+        let n_words = visible.n_words().max(1);
+        let rows = visible.words_mut().par_chunks_mut(n_words);
+        rows.enumerate().with_min_len(16).for_each(|(cell, row)| {
+            bits::set(row, cell);
+            for &d in self.dirs.exits(cell as u32) {
+                bits::set(row, self.dirs.all[d as usize].to as usize);
+                for t in bits::ones(self.might.row(d as usize)) {
+                    bits::set(row, self.dirs.all[t].to as usize);
+                }
             }
-        }
+        });
         visible
     }
 }
