@@ -1,7 +1,8 @@
 //! The simplifier on random worlds: promises kept, bounds kept, views not much dearer.
 
 use enfilade_bake::simplify::{
-    CostModel, Metric, SimplifySettings, delete_portal, expected_cost, simplify,
+    CostModel, Metric, SimplifySettings, delete_portal, expected_cost, expected_cost_after,
+    simplify,
 };
 use enfilade_cpg::{PortalId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -128,4 +129,20 @@ fn material_weights_count() {
     assert!((double.max_cost - 2.0 * plain).abs() < 1e-9);
     let views = expected_cost(&world, &CostModel::default(), 64);
     assert!((expected_cost(&world, &cost, 64) - 2.0 * views).abs() < 1e-6 * views);
+}
+
+#[test]
+fn views_of_fewer_cells_are_never_cheaper_also_where_rooms_join_the_outdoors() {
+    let mut rng = Rng::new(5);
+    for _ in 0..12 {
+        let world = grid(&mut rng);
+        let plain = CostModel::default();
+        let before = expected_cost(&world, &plain, 64);
+        let settings = SimplifySettings {
+            max_cells: Some(1 + rng.below(4)),
+            ..SimplifySettings::default()
+        };
+        let after = expected_cost_after(&world, &simplify(&world, &settings), &plain, 64);
+        assert!(after >= before * (1.0 - 1e-9), "{before} {after}");
+    }
 }

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use enfilade::bake::bsp::{Bsp, BspConfig, BspInput, Guide, Heuristic, bake_bsp};
-use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings, expected_cost, simplify};
+use enfilade::bake::simplify::{
+    CostModel, Metric, SimplifySettings, expected_cost, expected_cost_after, simplify,
+};
 use enfilade::bake::{BakeContext, Silent};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::{DVec3, Triangle};
@@ -184,7 +186,7 @@ pub(crate) fn bench_simplify(table: &mut Table, worlds: &[PathBuf]) -> anyhow::R
                     world.graph.cells.len(),
                     simple.world.graph.cells.len(),
                     simple.world.graph.portals.len(),
-                    expected_cost(&simple.world, &cost, VIEWS) / before,
+                    expected_cost_after(&world, &simple, &cost, VIEWS) / before,
                 ));
             }
         }

@@ -170,14 +170,42 @@ fn finish(world: &World, into: &[u32], cost: &CostModel) -> Simplified {
 /// [`Metric::ExpectedTriangles`] looks at.
 #[must_use]
 pub fn expected_cost(world: &World, cost: &CostModel, n_views: usize) -> f64 {
-    let graph = cost_graph(world, cost);
+    let all = (0..world.graph.cells.len() as u32).map(CellId);
+    cost_of_views(world, world, &all.collect::<Vec<_>>(), cost, n_views)
+}
+
+/// The same for a world made simpler, from the same eyes as [`expected_cost`] of the world `before`.
+///
+/// Views begin indoors, and a room that was joined to the outdoors would begin none any more.
+///
+/// # Panics
+/// When `after` was not made from `before`.
+#[must_use]
+pub fn expected_cost_after(
+    before: &World,
+    after: &Simplified,
+    cost: &CostModel,
+    n_views: usize,
+) -> f64 {
+    cost_of_views(before, &after.world, &after.cell_of, cost, n_views)
+}
+
+/// Views of one world, each of whose cells is drawn as a cell of another.
+fn cost_of_views(
+    world: &World,
+    drawn: &World,
+    cell_of: &[CellId],
+    cost: &CostModel,
+    n_views: usize,
+) -> f64 {
+    let graph = cost_graph(drawn, cost);
     let Eyes(seen_by) = metric::views(world, n_views, JUDGES);
     let total: f64 = (0..n_views)
         .map(|eye| {
             let sees = |c: usize| seen_by[c][eye / 64] >> (eye % 64) & 1 == 1;
             let mut items: Vec<u32> = (0..seen_by.len())
                 .filter(|&c| sees(c))
-                .flat_map(|c| graph.items[c].iter().copied())
+                .flat_map(|c| graph.items[cell_of[c].0 as usize].iter().copied())
                 .collect();
             items.sort_unstable();
             items.dedup();
