@@ -150,7 +150,22 @@ pub(super) fn label_leaves(
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
     absorb_chips(graph, &mut cells, settings.min_volume);
+    keep_border_outside(graph, &mut cells);
     cells
+}
+
+/// Gives leaves at the border that came to other cells back to the outside.
+fn keep_border_outside(graph: &LeafGraph, cells: &mut LeafCells) {
+    let Some(outside) = cells.outside else { return };
+    for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
+        let cell = std::mem::replace(&mut cells.cell_of_leaf[leaf], outside);
+        if cell != outside {
+            if cell != SOLID {
+                cells.volumes[cell as usize] -= graph.volumes[leaf];
+            }
+            cells.volumes[outside as usize] += graph.volumes[leaf];
+        }
+    }
 }
 
 /// The labels that stand for a region in each component; components without any are left out.
@@ -331,30 +346,43 @@ fn number_cells(graph: &LeafGraph, sets: &mut Sets, groups: &BTreeMap<u32, Group
             .then(b.1.volume.total_cmp(&a.1.volume))
             .then(a.0.cmp(b.0))
     });
-    let cell_of_set: BTreeMap<u32, u32> = cells
+    // What reaches the border is open to all that lies beyond, and that is one cell.
+    let mut border: BTreeMap<u32, f64> = BTreeMap::new();
+    for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
+        *border.entry(sets.find(leaf as u32)).or_default() += graph.volumes[leaf];
+    }
+    let outer = (0..cells.len())
+        .filter_map(|i| Some((i, *border.get(cells[i].0)?)))
+        .filter(|(_, volume)| *volume > 0.0)
+        .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+        .map(|(i, _)| *cells[i].0);
+    let also_outer: Vec<(&u32, &Group)> = cells
+        .extract_if(.., |(id, _)| {
+            outer.is_some_and(|o| o != **id) && border.contains_key(id)
+        })
+        .collect();
+    let mut cell_of_set: BTreeMap<u32, u32> = cells
         .iter()
         .enumerate()
         .map(|(i, (id, _))| (**id, i as u32))
         .collect();
-    let cell_of_leaf: Vec<u32> = (0..graph.volumes.len() as u32)
-        .map(|leaf| cell_of_set.get(&sets.find(leaf)).copied().unwrap_or(SOLID))
-        .collect();
-    let mut border = vec![0.0; cells.len()];
-    for (leaf, &cell) in cell_of_leaf.iter().enumerate() {
-        if cell != SOLID && graph.at_border[leaf] {
-            border[cell as usize] += graph.volumes[leaf];
+    let outside = outer.map(|id| cell_of_set[&id]);
+    let mut volumes: Vec<f64> = cells.iter().map(|(_, g)| g.volume).collect();
+    if let Some(outside) = outside {
+        for (id, group) in also_outer {
+            cell_of_set.insert(*id, outside);
+            volumes[outside as usize] += group.volume;
         }
     }
-    let outside = (0..cells.len())
-        .filter(|&c| border[c] > 0.0)
-        .max_by(|&a, &b| border[a].total_cmp(&border[b]).then(b.cmp(&a)));
     LeafCells {
-        cell_of_leaf,
+        cell_of_leaf: (0..graph.volumes.len() as u32)
+            .map(|leaf| cell_of_set.get(&sets.find(leaf)).copied().unwrap_or(SOLID))
+            .collect(),
         label_of_cell: cells
             .iter()
             .map(|(_, g)| g.label.unwrap_or(SOLID))
             .collect(),
-        volumes: cells.iter().map(|(_, g)| g.volume).collect(),
-        outside: outside.map(|c| c as u32),
+        volumes,
+        outside,
     }
 }

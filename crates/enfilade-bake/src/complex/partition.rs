@@ -27,7 +27,7 @@ pub struct Partition {
     pub volumes: Vec<f64>,
     /// Box of each cell.
     pub aabbs: Vec<Aabb>,
-    /// The cell that reaches the border of the box (the largest, if several do).
+    /// The cell that reaches the border of the box; no other does.
     pub outside: Option<u32>,
     /// All openings between different cells.
     pub portals: Vec<PartitionPortal>,

@@ -650,3 +650,35 @@ proptest! {
         prop_assert!((sum - 1.0).abs() < 1e-6, "{sum}");
     }
 }
+
+/// Beyond the box is one cell: whatever votes say, what reaches its border is part of that.
+#[test]
+fn two_regions_at_the_border_are_one_outside() {
+    let mut t = two_rooms(0.0);
+    sheet(&mut t, 3.1, [2.7, 4.0], [-0.2, 4.2]);
+    let screen = screen_at_x(3.1, [2.7, 6.0], [-2.0, 6.0]);
+    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1]), screen]);
+    let sides = votes(&c.bounds(), 0.1, |p| {
+        let walls = Aabb::new(DVec3::new(-0.2, -0.2, -0.2), DVec3::new(6.4, 2.7, 4.2));
+        (!walls.contains(p)).then_some(if p.x < 3.1 { 98 } else { 99 })
+    });
+    let mut all = room_votes(&c.bounds());
+    all.retain(|v| v.label != 99);
+    all.extend(sides);
+    let p = c.partition(&all, &LabelSettings::default());
+    assert_eq!(p.label_of_cell.len(), 3, "{:?}", p.label_of_cell);
+    let outside = p.outside.unwrap();
+    for corner in 0..8 {
+        let b = c.bounds();
+        let pick = |k: usize| {
+            if corner >> k & 1 == 0 {
+                b.min[k] + 1e-3
+            } else {
+                b.max[k] - 1e-3
+            }
+        };
+        let at = DVec3::new(pick(0), pick(1), pick(2));
+        assert_eq!(p.locator.locate(at).map(|c| c.0), Some(outside), "{at}");
+    }
+    assert!(p.portals.iter().all(|q| q.cells[0] != q.cells[1]));
+}
