@@ -484,21 +484,22 @@ impl Ballots {
     fn count(self, grid: &Grid, frame: &Frame) -> Vec<Vote> {
         let weight = (grid.voxel * self.block as f64).powi(3) as f32;
         let [nx, ny, _] = self.dims;
-        self.region
-            .into_par_iter()
-            .zip(self.voter)
-            .enumerate()
-            .filter(|(_, (region, _))| *region != 0)
-            .map(|(b, (label, k))| {
-                let at = [b % nx, b / nx % ny, b / (nx * ny)];
-                let [x, y, z] = voter_at(at, self.block, usize::from(k));
-                Vote {
-                    point: frame.to_scene(grid.center(x, y, z)),
-                    label,
-                    weight,
-                }
-            })
-            .collect()
+        // One after the other into a list of the right size: in parallel they would be there twice.
+        let n = self.region.iter().filter(|&&region| region != 0).count();
+        let mut votes = Vec::with_capacity(n);
+        for (b, (label, k)) in self.region.into_iter().zip(self.voter).enumerate() {
+            if label == 0 {
+                continue;
+            }
+            let at = [b % nx, b / nx % ny, b / (nx * ny)];
+            let [x, y, z] = voter_at(at, self.block, usize::from(k));
+            votes.push(Vote {
+                point: frame.to_scene(grid.center(x, y, z)),
+                label,
+                weight,
+            });
+        }
+        votes
     }
 }
 
