@@ -214,8 +214,13 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
         assert!(png.starts_with(b"\x89PNG"));
         (png, n_triangles)
     };
-    // Keys may come before the first frame.
-    let mut numbers = 1..60;
+    // Keys may come before the first frame, which on a busy machine takes seconds: as many tries as
+    // patience allows, not as many as a blank window answers at once.
+    let end = Instant::now() + PATIENCE;
+    let mut numbers = (1..).take_while(|_| {
+        sleep(Duration::from_millis(100));
+        Instant::now() < end
+    });
     let first = numbers.by_ref().map(&shot).find(|s| s.1 > 0);
     let (open, n_open) = first.expect("something is drawn");
     click();
