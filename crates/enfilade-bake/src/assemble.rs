@@ -16,8 +16,8 @@ use rayon::prelude::*;
 use crate::complex::{Partition, PartitionPortal};
 use crate::watershed::Screen;
 
-/// What the last stage is made from.
-pub(crate) struct Parts<'a> {
+/// A scene in cells, whatever found them: what the last stage, which all builders share, is made from.
+pub(crate) struct Cut<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) sources: &'a [TriangleSource],
     pub(crate) triangles: &'a [Triangle],
@@ -28,14 +28,12 @@ pub(crate) struct Parts<'a> {
     pub(crate) outward: f64,
     /// Share of an opening that a leaf or pane must fill to make a door of it.
     pub(crate) closed_share: f64,
-    pub(crate) provenance: Provenance,
-    pub(crate) statistics: Statistics,
 }
 
-pub(crate) fn assemble(parts: &Parts<'_>) -> World {
-    let Parts {
+pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
+    let Cut {
         scene, partition, ..
-    } = parts;
+    } = cut;
     let mut cells: Vec<Cell> = (0..partition.label_of_cell.len())
         .map(|i| {
             let outdoor = partition.outside == Some(i as u32);
@@ -58,7 +56,7 @@ pub(crate) fn assemble(parts: &Parts<'_>) -> World {
     let portals: Vec<Portal> = partition
         .portals
         .par_iter()
-        .map(|p| portal(parts, p))
+        .map(|p| portal(cut, p))
         .collect::<Vec<_>>()
         .into_iter()
         .flatten()
@@ -68,15 +66,15 @@ pub(crate) fn assemble(parts: &Parts<'_>) -> World {
             cells[c.0 as usize].portals.push(PortalId(i as u32));
         }
     }
-    let batches = batches(parts, &mut cells);
+    let batches = batches(cut, &mut cells);
     let (details, detail_meshes) = details(scene, &partition.locator, &mut cells);
     World {
         graph: CellPortalGraph {
             cells,
             portals,
             locator: partition.locator.clone(),
-            provenance: parts.provenance.clone(),
-            statistics: parts.statistics.clone(),
+            provenance,
+            statistics,
         },
         batches,
         details,
@@ -91,11 +89,11 @@ pub(crate) fn assemble(parts: &Parts<'_>) -> World {
 const HAIR: f64 = 1e-5;
 
 /// The portal in its final form; `None` when nothing of it is wider than a rounding.
-fn portal(parts: &Parts<'_>, p: &PartitionPortal) -> Option<Portal> {
+fn portal(cut: &Cut<'_>, p: &PartitionPortal) -> Option<Portal> {
     Some(Portal {
         cells: p.cells.map(CellId),
-        kind: kind_of(parts, p),
-        ..rounded_portal(&p.plane, &p.outline, &p.pieces, parts.outward)?
+        kind: kind_of(cut, p),
+        ..rounded_portal(&p.plane, &p.outline, &p.pieces, cut.outward)?
     })
 }
 
@@ -231,13 +229,13 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
 /// Parapets higher than this make a window of an opening. [Units: wu]
 const PARAPET: f64 = 0.4;
 
-fn kind_of(parts: &Parts<'_>, p: &PartitionPortal) -> PortalKind {
+fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> PortalKind {
     if p.kind == PortalKind::Crack {
         return PortalKind::Crack;
     }
     let n = p.plane.normal;
-    let closed = p.screen.map_or(0.0, |s| parts.screens[s as usize].closed);
-    let is_closed = closed >= parts.closed_share;
+    let closed = p.screen.map_or(0.0, |s| cut.screens[s as usize].closed);
+    let is_closed = closed >= cut.closed_share;
     if n.y.abs() < 0.5 {
         let bottom = p
             .outline
@@ -255,8 +253,7 @@ fn kind_of(parts: &Parts<'_>, p: &PartitionPortal) -> PortalKind {
                 direction: -DVec3::Y,
                 t_max: 100.0,
             };
-            parts
-                .bvh
+            cut.bvh
                 .closest_hit(&ray, |_| false)
                 .map_or(f64::INFINITY, |h| h.t - 0.05)
         };
@@ -283,12 +280,12 @@ struct BatchBuilder {
     vertices: HashMap<(u32, u32, u32), u32>,
 }
 
-fn batches(parts: &Parts<'_>, cells: &mut [Cell]) -> Vec<Batch> {
-    let scene = parts.scene;
+fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
+    let scene = cut.scene;
     let mut builders: BTreeMap<(Vec<u32>, Option<u32>, Layout), BatchBuilder> = BTreeMap::new();
     let mut normal_matrix: Option<(u32, DMat3)> = None;
-    for (t, source) in parts.sources.iter().enumerate() {
-        let seen_from = parts.partition.triangle_cells.both(t);
+    for (t, source) in cut.sources.iter().enumerate() {
+        let seen_from = cut.partition.triangle_cells.both(t);
         for &c in &seen_from {
             cells[c as usize].n_triangles += 1;
         }
@@ -311,7 +308,7 @@ fn batches(parts: &Parts<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         let to = &mut builder.primitive;
         to.material = from.material;
         to.uvs.resize(from.uvs.len(), Vec::new());
-        for (corner, position) in parts.triangles[t].iter().enumerate() {
+        for (corner, position) in cut.triangles[t].iter().enumerate() {
             let v = from.indices[source.triangle as usize * 3 + corner];
             let key = (source.object, source.primitive, v);
             let index = *builder.vertices.entry(key).or_insert_with(|| {

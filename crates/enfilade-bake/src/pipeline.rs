@@ -11,7 +11,7 @@ use enfilade_geom::scene::{Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
-use crate::assemble::{Parts, assemble};
+use crate::assemble::{Cut, assemble};
 use crate::complex::{ComplexInput, LabelSettings, Leak, Partition, Vote, build_complex};
 use crate::join::{VOID, join_unparted, join_voids};
 use crate::voxel::{
@@ -253,18 +253,6 @@ pub fn bake(
     })
 }
 
-/// A scene in cells, whatever found them: the end that all builders share.
-pub(crate) struct Cut<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) sources: &'a [TriangleSource],
-    pub(crate) triangles: &'a [Triangle],
-    pub(crate) bvh: &'a Bvh,
-    pub(crate) partition: Partition,
-    pub(crate) screens: &'a [Screen],
-    pub(crate) outward: f64,
-    pub(crate) closed_share: f64,
-}
-
 impl Cut<'_> {
     /// Hands out the geometry, and says how the world came to be.
     pub(crate) fn into_world(
@@ -280,25 +268,16 @@ impl Cut<'_> {
             ("leaks", self.partition.leaks.len() as f64),
         ];
         let counts = common.iter().chain(counts);
-        assemble(&Parts {
-            scene: self.scene,
-            sources: self.sources,
-            triangles: self.triangles,
-            bvh: self.bvh,
-            partition: self.partition,
-            screens: self.screens,
-            outward: self.outward,
-            closed_share: self.closed_share,
-            provenance: Provenance {
-                generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
-                method: method.to_owned(),
-                input_hash: input_hash(self.triangles, &settings),
-                settings,
-            },
-            statistics: Statistics {
-                counts: counts.map(|&(k, v)| (k.to_owned(), v)).collect(),
-            },
-        })
+        let provenance = Provenance {
+            generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
+            method: method.to_owned(),
+            input_hash: input_hash(self.triangles, &settings),
+            settings,
+        };
+        let statistics = Statistics {
+            counts: counts.map(|&(k, v)| (k.to_owned(), v)).collect(),
+        };
+        assemble(&self, provenance, statistics)
     }
 }
 

@@ -3,8 +3,9 @@
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding};
 
+use crate::assemble::Cut;
 use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
-use crate::pipeline::{Cut, structural_triangles};
+use crate::pipeline::structural_triangles;
 use crate::simplify::{SimplifySettings, simplify};
 use crate::watershed::{
     MergeSettings, OUTDOORS, Screen, bounds_of, closure_triangles, find_stairs, slab_heights,

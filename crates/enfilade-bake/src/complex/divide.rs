@@ -240,14 +240,6 @@ impl Sink<'_> {
 }
 
 impl FacetSink for Sink<'_> {
-    fn wants_subtree(&self, _: i32) -> bool {
-        true
-    }
-
-    fn wants_pair(&self, _: i32, _: i32) -> bool {
-        true
-    }
-
     fn take(&mut self, facet: &RawFacet<'_>) {
         facet
             .leaves

@@ -40,9 +40,13 @@ pub(super) struct RawFacet<'a> {
 /// What is done with the facets. Forked and joined along the tree, never along threads.
 pub(super) trait FacetSink: Send + Sized {
     /// Whether facets within this subtree matter.
-    fn wants_subtree(&self, child: i32) -> bool;
+    fn wants_subtree(&self, _child: i32) -> bool {
+        true
+    }
     /// Whether facets between two subtrees matter.
-    fn wants_pair(&self, front: i32, back: i32) -> bool;
+    fn wants_pair(&self, _front: i32, _back: i32) -> bool {
+        true
+    }
     /// Takes a facet.
     fn take(&mut self, facet: &RawFacet<'_>);
     /// A sink for one subtree.

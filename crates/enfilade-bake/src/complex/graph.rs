@@ -134,14 +134,6 @@ struct Sink<'a> {
 }
 
 impl FacetSink for Sink<'_> {
-    fn wants_subtree(&self, _: i32) -> bool {
-        true
-    }
-
-    fn wants_pair(&self, _: i32, _: i32) -> bool {
-        true
-    }
-
     fn take(&mut self, facet: &RawFacet<'_>) {
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let cone = cone_volume(facet.points, normal, self.origin);

@@ -6,9 +6,10 @@ use enfilade_geom::{Bvh, Triangle};
 use super::decimate::{Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together};
 use super::rooms::find_rooms;
 use super::space::{Space, divide};
+use crate::assemble::Cut;
 use crate::complex::{ComplexInput, LabelSettings, build_complex};
 use crate::join::join_unparted;
-use crate::pipeline::{Cut, in_own_order, structural_triangles};
+use crate::pipeline::{in_own_order, structural_triangles};
 use crate::watershed::{bounds_of, closure_triangles, find_stairs};
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput};
 
