@@ -80,8 +80,7 @@ impl Session {
         let walls = in_own_order(&walls);
         let closures = in_own_order(&closure_triangles(scene));
         let bvh = Bvh::build(&walls);
-        // Three points across the narrowest opening.
-        let space = divide(&walls, &closures, &bvh, opening / 3.0)?;
+        let space = divide(&walls, &closures, &bvh, opening)?;
         context.delaunay_stage(1)?;
         let cells = flow_together(&space);
         let mut session = Self {
@@ -171,7 +170,7 @@ pub fn bake_session(
     let outward = complex.opening_tolerance();
     let counts = [
         ("tetrahedra", session.space.delaunay.n_finite as f64),
-        ("spacing", session.space.spacing),
+        ("finest", session.space.finest),
         ("steps", n_steps as f64),
         ("screens", rooms.screens.len() as f64),
         ("leaves", complex.n_leaves() as f64),
@@ -202,7 +201,7 @@ pub fn bake_session(
     context.end_stage();
     Ok(BakeOutput {
         world,
-        voxel: session.space.spacing,
+        voxel: session.space.finest,
         dims: [0; 3],
         times: context.times(),
         leaks,

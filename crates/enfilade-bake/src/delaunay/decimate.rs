@@ -32,6 +32,10 @@ use super::space::Space;
 /// bulge: differences this small come from where points happen to be sampled.
 const FLOWS: f64 = 1.05;
 
+/// A cell of less than this share of its ball's volume does not hold the ball: it is a bundle of spikes whose
+/// ball lies in a neighbor. Bundles have a hundredth at most, rooms several times the ball.
+const HOLDS: f64 = 0.1;
+
 /// The cell around the scene.
 pub const OUTDOOR_CELL: u32 = 0;
 
@@ -49,10 +53,12 @@ pub enum Weight {
 
 /// Cells before decimation, and how they meet.
 pub struct Cells {
-    /// Cell of each finite tetrahedron.
-    pub cell_of_tetrahedron: Vec<u32>,
+    /// Cell of each part of the space.
+    pub cell_of_part: Vec<u32>,
     /// Radius of the largest ball in each cell. [Units: wu]
     pub radii: Vec<f64>,
+    /// Volume of each cell. [Units: wu³]
+    pub volumes: Vec<f64>,
     /// Box of each cell. [Units: wu]
     pub boxes: Vec<Aabb>,
     /// Where two cells meet, lesser number first.
@@ -103,7 +109,7 @@ pub fn flow_together(space: &Space) -> Cells {
     });
     for l in order {
         let link = &space.links[l as usize];
-        let [a, b] = link.tetrahedra.map(|t| sets.find(t));
+        let [a, b] = link.parts.map(|t| sets.find(t));
         let (ra, rb) = (radius[a as usize], radius[b as usize]);
         if a == b || ra.min(rb) > FLOWS * link.radius {
             continue;
@@ -117,8 +123,9 @@ pub fn flow_together(space: &Space) -> Cells {
         number.insert(sets.find(t), OUTDOOR_CELL);
     }
     let mut cells = Cells {
-        cell_of_tetrahedron: vec![0; n],
+        cell_of_part: vec![0; n],
         radii: vec![f64::INFINITY],
+        volumes: vec![0.0],
         boxes: vec![Aabb::EMPTY],
         portals: BTreeMap::new(),
     };
@@ -128,20 +135,16 @@ pub fn flow_together(space: &Space) -> Cells {
         let cell = *number.entry(root).or_insert(next);
         if cell == next {
             cells.radii.push(radius[root as usize]);
+            cells.volumes.push(0.0);
             cells.boxes.push(Aabb::EMPTY);
         }
-        cells.cell_of_tetrahedron[t as usize] = cell;
+        cells.volumes[cell as usize] += space.volumes[t as usize];
+        cells.cell_of_part[t as usize] = cell;
         let b = &mut cells.boxes[cell as usize];
-        *b = space
-            .delaunay
-            .corners(t)
-            .iter()
-            .fold(*b, |b, &p| b.including(p));
+        *b = space.corners(t).iter().fold(*b, |b, &p| b.including(p));
     }
     for (l, link) in space.links.iter().enumerate() {
-        let [a, b] = link
-            .tetrahedra
-            .map(|t| cells.cell_of_tetrahedron[t as usize]);
+        let [a, b] = link.parts.map(|t| cells.cell_of_part[t as usize]);
         if a == b {
             continue;
         }
@@ -154,7 +157,7 @@ pub fn flow_together(space: &Space) -> Cells {
                 links: Vec::new(),
             });
         portal.radius = portal.radius.max(link.radius);
-        let normal = enfilade_geom::triangle_area_normal(&space.facet(link)) * 0.5;
+        let normal = space.area_vector(link);
         portal.vector += if a < b { normal } else { -normal };
         portal.links.push(l as u32);
     }
@@ -265,8 +268,9 @@ struct Live {
 
 /// Removes portals, least weight first, and records each step.
 ///
-/// A cell in which no ball of `min_radius` fits is a crevice: it joins the neighbor that it opens to
-/// most before anything else is decided, choices excepted.
+/// A cell in which no ball of `min_radius` fits is a crevice, and one much smaller than its ball is a
+/// bundle of spikes: both join the neighbor that they open to most before anything else is decided, choices
+/// excepted.
 #[must_use]
 pub fn decimate(
     space: &Space,
@@ -278,13 +282,17 @@ pub fn decimate(
 ) -> Decimation {
     let n = cells.radii.len();
     let mut radius = cells.radii.clone();
+    let mut volumes = cells.volumes.clone();
     let mut boxes = cells.boxes.clone();
     let mut neighbors = vec![BTreeSet::new(); n];
     let mut portals: BTreeMap<(u32, u32), Live> = BTreeMap::new();
     for (&(a, b), portal) in &cells.portals {
         neighbors[a as usize].insert(b);
         neighbors[b as usize].insert(a);
-        let middle = |&l: &u32| space.facet(&space.links[l as usize]).iter().sum::<DVec3>() / 3.0;
+        let middle = |&l: &u32| {
+            let outline = space.outline(&space.links[l as usize]);
+            outline.iter().sum::<DVec3>() / outline.len() as f64
+        };
         let center = portal.links.iter().map(middle).sum::<DVec3>();
         let choice = choices.at(center / portal.links.len() as f64);
         portals.insert(
@@ -300,7 +308,11 @@ pub fn decimate(
             },
         );
     }
-    let weigh = |portal: &Live, pair: (u32, u32), radius: &[f64], boxes: &[Aabb]| -> f64 {
+    let is_crevice = |radius: f64, volume: f64| {
+        let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+        radius < min_radius || ball.is_finite() && volume < HOLDS * ball
+    };
+    let weigh = |portal: &Live, pair: (u32, u32), radius: &[f64], volumes: &[f64], boxes: &[Aabb]| -> f64 {
         let (a, b) = (pair.0 as usize, pair.1 as usize);
         if portal.stays || choices.at(portal.center / portal.n) == Some(true) {
             return f64::INFINITY;
@@ -310,7 +322,7 @@ pub fn decimate(
             return -2.0;
         }
         let least = radius[a].min(radius[b]);
-        if least < min_radius {
+        if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
             // Widest opening first among crevices.
             return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
         }
@@ -333,7 +345,7 @@ pub fn decimate(
     let mut queue: BinaryHeap<Candidate> = portals
         .iter()
         .map(|(&pair, p)| Candidate {
-            weight: weigh(p, pair, &radius, &boxes),
+            weight: weigh(p, pair, &radius, &volumes, &boxes),
             pair,
             version: 0,
         })
@@ -367,9 +379,13 @@ pub fn decimate(
         let joined_radius = radius[into as usize].max(radius[from as usize]);
         let joined_box = boxes[into as usize].union(boxes[from as usize]);
         // The weight of a portal that nothing joined changes with its cells only.
+        let joined_volume = volumes[into as usize] + volumes[from as usize];
+        let was_crevice = is_crevice(radius[into as usize], volumes[into as usize]);
         let weighs_anew = joined_radius != radius[into as usize]
+            || was_crevice != is_crevice(joined_radius, joined_volume)
             || weight != Weight::ScaleFree && joined_box != boxes[into as usize];
         radius[into as usize] = joined_radius;
+        volumes[into as usize] = joined_volume;
         boxes[into as usize] = joined_box;
         neighbors[into as usize].remove(&from);
         let mut touched = Vec::new();
@@ -416,7 +432,7 @@ pub fn decimate(
             // Unlike any version of this pair before, since steps only grow in number.
             live.version = steps.len() as u32;
             queue.push(Candidate {
-                weight: weigh(live, pair, &radius, &boxes),
+                weight: weigh(live, pair, &radius, &volumes, &boxes),
                 pair,
                 version: live.version,
             });

@@ -6,14 +6,18 @@
 //! | stage | file | source |
 //! | --- | --- | --- |
 //! | tetrahedra of points | `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
-//! | air, and ways through it | `space` | §4.2.1, §4.2.2; Dey, Giesen & Goswami 2003 |
+//! | points where surfaces need them | `refine` | Chew 1993; Boissonnat & Oudot 2005 |
+//! | tetrahedra cut by polygons, what is open between | `cut` | §4.2.1, §4.2.2 |
+//! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | screens and votes | `rooms` | ours |
 
 mod bake;
+mod cut;
 mod decimate;
 mod order;
 mod predicate;
+mod refine;
 mod rooms;
 mod space;
 mod tetrahedra;

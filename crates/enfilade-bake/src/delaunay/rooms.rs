@@ -6,7 +6,7 @@ use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle};
 use rayon::prelude::*;
 
 use super::decimate::{Cells, OUTDOOR_CELL};
-use super::space::{Link, Space};
+use super::space::Space;
 use crate::complex::Vote;
 use crate::watershed::{OUTDOORS, Opening, Screen, fit_screen_at};
 
@@ -51,7 +51,7 @@ pub(super) fn find_rooms(
     min_radius: f64,
 ) -> Rooms {
     let room_of_cell = &void_joined(space, cells, room_of_cell, bvh)[..];
-    let room_at = |t: u32| room_of_cell[cells.cell_of_tetrahedron[t as usize] as usize];
+    let room_at = |t: u32| room_of_cell[cells.cell_of_part[t as usize] as usize];
     let mut between: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
     for (&(a, b), portal) in &cells.portals {
         let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
@@ -151,7 +151,7 @@ pub(super) fn find_rooms(
 /// only, and whatever else sees backs is part of the same void.
 fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) -> Vec<u32> {
     let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (t, &c) in cells.cell_of_tetrahedron.iter().enumerate() {
+    for (t, &c) in cells.cell_of_part.iter().enumerate() {
         members
             .entry(room_of_cell[c as usize])
             .or_default()
@@ -175,10 +175,7 @@ fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) ->
 
 /// Groups of links whose facets share corners.
 fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
-    let facet = |l: u32| {
-        let link: &Link = &space.links[l as usize];
-        space.delaunay.tetrahedra[link.tetrahedra[0] as usize].facet(usize::from(link.facet))
-    };
+    let facet = |l: u32| space.vertices_about(&space.links[l as usize]);
     let mut by_corner: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (i, &l) in links.iter().enumerate() {
         for v in facet(l) {
@@ -222,33 +219,34 @@ fn opening_of(
     let mut centers = Vec::new();
     let whole: f64 = patch
         .iter()
-        .map(|&l| {
-            enfilade_geom::triangle_area_normal(&space.facet(&space.links[l as usize])).length()
-        })
+        .map(|&l| 2.0 * space.area_vector(&space.links[l as usize]).length())
         .sum();
     // A hillside's front needs no more points than a gate's.
     let step = STEP.max((whole / MAX_CENTERS).sqrt());
     let (mut vector, mut moment, mut total) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for &l in patch {
         let link = &space.links[l as usize];
-        let f = space.facet(link);
-        let normal = enfilade_geom::triangle_area_normal(&f) * 0.5;
-        let forward = room_at(link.tetrahedra[0]) == pair.0;
-        vector += if forward { normal } else { -normal };
-        let area = normal.length();
-        moment += (f[0] + f[1] + f[2]) / 3.0 * area;
-        total += area;
-        let longest = (0..3)
-            .map(|i| f[i].distance(f[(i + 1) % 3]))
-            .fold(0.0, f64::max);
-        let n = (longest / step).ceil().clamp(1.0, 64.0) as usize;
-        for i in 0..n {
-            for j in 0..n - i {
-                let (u, v) = (
-                    (i as f64 + 1.0 / 3.0) / n as f64,
-                    (j as f64 + 1.0 / 3.0) / n as f64,
-                );
-                centers.push(f[0] + (f[1] - f[0]) * u + (f[2] - f[0]) * v);
+        let outline = space.outline(link);
+        let forward = room_at(link.parts[0]) == pair.0;
+        for k in 2..outline.len() {
+            let f = [outline[0], outline[k - 1], outline[k]];
+            let normal = enfilade_geom::triangle_area_normal(&f) * 0.5;
+            vector += if forward { normal } else { -normal };
+            let area = normal.length();
+            moment += (f[0] + f[1] + f[2]) / 3.0 * area;
+            total += area;
+            let longest = (0..3)
+                .map(|i| f[i].distance(f[(i + 1) % 3]))
+                .fold(0.0, f64::max);
+            let n = (longest / step).ceil().clamp(1.0, 64.0) as usize;
+            for i in 0..n {
+                for j in 0..n - i {
+                    let (u, v) = (
+                        (i as f64 + 1.0 / 3.0) / n as f64,
+                        (j as f64 + 1.0 / 3.0) / n as f64,
+                    );
+                    centers.push(f[0] + (f[1] - f[0]) * u + (f[2] - f[0]) * v);
+                }
             }
         }
     }
@@ -289,7 +287,7 @@ fn hollow_rooms(
         group.insert(a.max(b), a.min(b));
     }
     let group_of: BTreeMap<u32, u32> = group.keys().map(|&r| (r, root(&group, r))).collect();
-    let group_at = |t: usize| group_of[&room_of_cell[cells.cell_of_tetrahedron[t] as usize]];
+    let group_at = |t: usize| group_of[&room_of_cell[cells.cell_of_part[t] as usize]];
     let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut radius: BTreeMap<u32, f64> = BTreeMap::new();
     for t in 0..space.middles.len() {

@@ -1,38 +1,56 @@
 //! Air as tetrahedra: where one can get from one to the next, and how wide it is there.
 //!
-//! Gjørup 1999, §4.2.1–4.2.2, with two departures. Large triangles give spikes because their few
-//! corners say little about where the surface is (his §4.3.3), so surfaces are *sampled* first: along
-//! edges and on a lattice inside. And tetrahedra are not cut by polygons here: two neighbors are
-//! joined only where the line from middle to middle over the middle of their facet meets no polygon.
-//! Such lines put together make a way through the air, so no wall without a hole is ever passed;
-//! what is exact is left to the cell complex.
+//! Gjørup 1999, §4.2.1–4.2.2. Large triangles give spikes because their few corners say little about where
+//! the surface is (his §4.3.3), so points are added to surfaces first (`refine`), as dense as the air beside
+//! them is narrow. What polygons still run through is cut by them (`cut`), and two parts are joined by
+//! what the polygons leave open of their common boundary: no opening is missed and no wall passed, however
+//! few points there are.
 //!
 //! How wide it is: the circumsphere of a tetrahedron is a ball of air that touches four surface
 //! points, so its middle is on the medial axis; between two neighbors the widest ball that passes is
 //! as wide as their facet's circle, or as the lesser of both where the circle is no bottleneck (Dey,
-//! Giesen & Goswami, "Shape segmentation and matching with flow discretization", 2003).
+//! Giesen & Goswami, "Shape segmentation and matching with flow discretization", 2003). A part of a
+//! tetrahedron is a spike and has none.
 
 use std::collections::BTreeSet;
 
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
-use super::tetrahedra::{Delaunay, DelaunayError, INFINITE, tetrahedralize};
+use super::cut::{self, Found, Tolerance};
+use super::refine::refined;
+use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
+use crate::complex::poly::{area, area_normal};
 
-/// Points sampled on the walls at most about this many; larger scenes are sampled more coarsely.
-const MAX_POINTS: f64 = 300_000.0;
+/// Most points on surfaces; about 700 bytes each while tetrahedra become cells.
+const MAX_POINTS: usize = 4_000_000;
 /// Points along each edge of the box around the scene.
 const BOX_POINTS: usize = 9;
 /// A tetrahedron of less than this share of the cube over its longest edge has no reliable middle.
 const FLAT: f64 = 1e-5;
+/// What polygons leave of a facet is an opening where it is this share of the narrowest opening wide;
+/// narrower ones are cracks, which the cell complex finds.
+const CRACK: f64 = 1.0 / 60.0;
+/// Balls below this share of the narrowest opening need not be known; half the opening passes it.
+const LEAST: f64 = 1.0 / 3.0;
+/// Points nearer to a plane than this share of the largest coordinate lie in it.
+const ON_PLANE: f64 = 1e-9;
 
-/// The air between surfaces, as tetrahedra.
+/// The air between surfaces, as tetrahedra and parts of tetrahedra.
 pub struct Space {
     /// The tetrahedra. [Units: wu]
     pub delaunay: Delaunay,
-    /// Distance between points sampled on surfaces. [Units: wu]
-    pub spacing: f64,
-    /// Middle of each finite tetrahedron. [Units: wu]
+    /// Balls wider than this hold no surface. [Units: wu]
+    pub finest: f64,
+    /// The same as it was asked for; less than `finest` where points ran out. [Units: wu]
+    pub wanted: f64,
+    /// The tetrahedron of each part: as many parts as tetrahedra, part by part, then further parts of those
+    /// that are cut.
+    pub tetrahedron_of_part: Vec<u32>,
+    /// Polygons that no longer cut a tetrahedron since it had too many parts.
+    pub n_passed_over: usize,
+    /// A point well inside each part. [Units: wu]
     pub middles: Vec<DVec3>,
     /// Volume of each. [Units: wu³]
     pub volumes: Vec<f64>,
@@ -40,23 +58,42 @@ pub struct Space {
     pub radii: Vec<f64>,
     /// Ways from one to the next.
     pub links: Vec<Link>,
+    /// Corners of openings that are no whole facets, one after the other. [Units: wu]
+    corners: Vec<DVec3>,
 }
 
-/// A way from one tetrahedron to a neighbor.
+/// A way from one part to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
-    /// The two tetrahedra; the first holds the facet.
-    pub tetrahedra: [u32; 2],
-    /// The facet of the first.
+    /// The two parts.
+    pub parts: [u32; 2],
+    /// A tetrahedron that the opening bounds or lies in: that of the first part.
+    pub tetrahedron: u32,
+    /// Its facet, or 4 where the opening lies inside.
     pub facet: u8,
+    /// Corners of the opening's outline; 0 for the whole facet.
+    n_corners: u16,
+    /// Where they begin.
+    first_corner: u32,
     /// Radius of the widest ball that passes. [Units: wu]
     pub radius: f64,
+}
+
+/// What is known of a part.
+#[derive(Clone, Copy)]
+struct Fact {
+    middle: DVec3,
+    volume: f64,
+    radius: f64,
+    /// Middle of the tetrahedron's ball.
+    center: DVec3,
 }
 
 /// Divides the air around `walls` into tetrahedra.
 ///
 /// `bvh` holds the walls; the points of `closures` (door leaves, panes) narrow what is near them but
-/// close nothing. `spacing` is the distance between sampled points; scenes too large for it get more.
+/// close nothing. Openings down to `narrowest` are weighed rightly; if that takes more points than there
+/// is memory for, [`Space::finest`] tells from which width on.
 ///
 /// # Errors
 /// When coordinates are out of limits; the box around the scene always has a volume.
@@ -64,23 +101,22 @@ pub fn divide(
     walls: &[Triangle],
     closures: &[Triangle],
     bvh: &Bvh,
-    spacing: f64,
+    narrowest: f64,
 ) -> Result<Space, DelaunayError> {
-    let all = || walls.iter().chain(closures);
-    let area: f64 = all()
-        .map(|t| enfilade_geom::triangle_area_normal(t).length() * 0.5)
-        .sum();
-    let spacing = spacing.max((area / MAX_POINTS).sqrt());
-    let bounds = all().flatten().fold(Aabb::EMPTY, |b, &p| b.including(p));
-    let mut points: Vec<DVec3> = all()
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .flat_map_iter(|t| sampled(t, spacing))
-        .collect();
+    let all: Vec<Triangle> = walls.iter().chain(closures).copied().collect();
+    let surfaces = Bvh::build(&all);
+    let bounds = all
+        .iter()
+        .flatten()
+        .fold(Aabb::EMPTY, |b, &p| b.including(p));
+    let mut points: Vec<DVec3> = all.into_iter().flatten().collect();
     let n_surface = points.len();
     let around = bounds.expanded(2.0 + 0.25 * bounds.size().max_element());
     points.extend(box_points(&around));
-    let delaunay = tetrahedralize(&points)?;
+    let wanted = narrowest * LEAST;
+    let refined = refined(&points, &surfaces, &around, wanted, MAX_POINTS)?;
+    drop((surfaces, points));
+    let delaunay = refined.delaunay;
     let n = delaunay.n_finite;
     let is_box: BTreeSet<u32> = delaunay.vertex_of_point[n_surface..]
         .iter()
@@ -91,7 +127,16 @@ pub fn divide(
         (0..4).any(|i| tet.neighbor(i) as usize >= n)
             || tet.vertices.iter().all(|v| is_box.contains(v))
     };
-    let facts: Vec<(DVec3, f64, f64, DVec3)> = (0..n)
+    let reach = around.min.abs().max(around.max.abs()).max_element();
+    let tolerance = Tolerance {
+        plane: ON_PLANE * reach,
+        width: (CRACK * narrowest).max(8.0 * ON_PLANE * reach),
+    };
+    let found: Vec<Found> = (0..n)
+        .into_par_iter()
+        .map(|t| cut::cut(&delaunay, t as u32, walls, bvh, tolerance))
+        .collect();
+    let balls: Vec<Fact> = (0..n)
         .into_par_iter()
         .map(|t| {
             let c = delaunay.corners(t as u32);
@@ -106,87 +151,114 @@ pub fn divide(
             } else {
                 0.0
             };
-            (middle, volume, radius, center)
+            Fact {
+                middle,
+                volume,
+                radius,
+                center,
+            }
         })
         .collect();
-    let links: Vec<Link> = (0..n)
+    // The first part of a tetrahedron has its number, the others come after all tetrahedra.
+    let mut facts = balls.clone();
+    let mut tetrahedron_of_part: Vec<u32> = (0..n as u32).collect();
+    let mut further: Vec<u32> = vec![0; n];
+    let mut n_passed_over = 0;
+    for (t, found) in found.iter().enumerate() {
+        let Some(parts) = &found.parts else { continue };
+        n_passed_over += parts.n_passed_over;
+        further[t] = facts.len() as u32;
+        for (k, part) in parts.parts.iter().enumerate() {
+            // The ball, which a polygon runs through, says nothing about a part: it is a spike.
+            let radius = if balls[t].radius == f64::INFINITY {
+                f64::INFINITY
+            } else {
+                0.0
+            };
+            let fact = Fact {
+                middle: part.middle,
+                volume: part.volume,
+                radius,
+                center: part.middle,
+            };
+            if k == 0 {
+                facts[t] = fact;
+            } else {
+                facts.push(fact);
+                tetrahedron_of_part.push(t as u32);
+            }
+        }
+    }
+    let number = |t: usize, part: u32| {
+        if part == 0 {
+            t as u32
+        } else {
+            further[t] + part - 1
+        }
+    };
+    let ways: Vec<(Link, cut::Outline)> = (0..n)
         .into_par_iter()
         .flat_map_iter(|t| {
-            let (delaunay, facts) = (&delaunay, &facts);
-            (0..4).filter_map(move |i| {
-                let tet = &delaunay.tetrahedra[t];
+            let tet = &delaunay.tetrahedra[t];
+            let mut out: SmallVec<[(Link, cut::Outline); 4]> = SmallVec::new();
+            for i in 0..4 {
                 let other = tet.neighbor(i) as usize;
                 if other >= n || other < t {
-                    return None;
+                    continue;
                 }
-                let corners = tet.facet(i).map(|v| delaunay.vertices[v as usize]);
-                let over = corners.iter().sum::<DVec3>() / 3.0;
-                if bvh.any_hit(facts[t].0, over, |_| false)
-                    || bvh.any_hit(facts[other].0, over, |_| false)
-                {
-                    return None;
+                let f = tet.facet(i).map(|v| delaunay.vertices[v as usize]);
+                let pair = [&found[t], &found[other]];
+                let is_cut = pair.iter().any(|f| f.parts.is_some());
+                for o in cut::openings(&delaunay, (t as u32, i), pair, walls, bvh, tolerance) {
+                    let parts = [number(t, o.parts[0]), number(other, o.parts[1])];
+                    let [a, b] = parts.map(|p| &facts[p as usize]);
+                    let whole = passing_radius(f, a, b);
+                    let radius = match &o.outline {
+                        // What a polygon covers of a facet narrows it; where it cuts beside it does not.
+                        Some(outline) if !is_cut => whole.min(by_size(outline)),
+                        _ => whole,
+                    };
+                    out.push((Link::new(parts, t, i, radius), o.outline));
                 }
-                Some(Link {
-                    tetrahedra: [t as u32, other as u32],
-                    facet: i as u8,
-                    radius: passing_radius(corners, &facts[t], &facts[other]),
-                })
-            })
+            }
+            for (pair, outline) in found[t].parts.iter().flat_map(|p| &p.inner) {
+                let parts = pair.map(|k| number(t, k));
+                let most = facts[parts[0] as usize].radius;
+                let radius = if most == f64::INFINITY { most } else { by_size(outline) };
+                out.push((Link::new(parts, t, 4, radius), Some(outline.clone())));
+            }
+            out
+        })
+        .collect();
+    let mut corners = Vec::new();
+    let links = ways
+        .into_iter()
+        .map(|(mut link, outline)| {
+            if let Some(outline) = outline {
+                link.first_corner = corners.len() as u32;
+                link.n_corners = outline.len() as u16;
+                corners.extend(outline);
+            }
+            link
         })
         .collect();
     Ok(Space {
-        spacing,
-        middles: facts.iter().map(|f| f.0).collect(),
-        volumes: facts.iter().map(|f| f.1).collect(),
-        radii: facts.iter().map(|f| f.2).collect(),
+        finest: refined.down_to,
+        wanted,
+        tetrahedron_of_part,
+        n_passed_over,
+        middles: facts.iter().map(|f| f.middle).collect(),
+        volumes: facts.iter().map(|f| f.volume).collect(),
+        radii: facts.iter().map(|f| f.radius).collect(),
         links,
+        corners,
         delaunay,
     })
 }
 
-/// Points along the edges of a triangle and on a lattice inside, which neighbors in its plane share.
-fn sampled(t: &Triangle, spacing: f64) -> Vec<DVec3> {
-    let mut out = t.to_vec();
-    for i in 0..3 {
-        let (mut a, mut b) = (t[i], t[(i + 1) % 3]);
-        // The neighbor across the edge must find the very same points.
-        if (a.x, a.y, a.z) > (b.x, b.y, b.z) {
-            std::mem::swap(&mut a, &mut b);
-        }
-        let n = (a.distance(b) / spacing).ceil() as usize;
-        out.extend((1..n).map(|k| a.lerp(b, k as f64 / n as f64)));
-    }
-    let normal = enfilade_geom::triangle_area_normal(t);
-    let axis = (0..3)
-        .max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs()).then(b.cmp(&a)))
-        .unwrap_or(0);
-    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for p in t {
-        for (k, x) in [p[u], p[v]].into_iter().enumerate() {
-            lo[k] = lo[k].min(x);
-            hi[k] = hi[k].max(x);
-        }
-    }
-    let range = |k: usize| (lo[k] / spacing).ceil() as i64..=(hi[k] / spacing).floor() as i64;
-    let edge = |a: DVec3, b: DVec3, x: f64, y: f64| {
-        (b[u] - a[u]) * (y - a[v]) - (b[v] - a[v]) * (x - a[u])
-    };
-    let whole = edge(t[0], t[1], t[2][u], t[2][v]);
-    if whole == 0.0 {
-        return out;
-    }
-    for j in range(1) {
-        for i in range(0) {
-            let (x, y) = (i as f64 * spacing, j as f64 * spacing);
-            let w = [1, 2, 0].map(|k| edge(t[k], t[(k + 1) % 3], x, y) / whole);
-            // Edges have their own points.
-            if w.iter().all(|&w| w > 1e-6) {
-                out.push(t[0] * w[0] + t[1] * w[1] + t[2] * w[2]);
-            }
-        }
-    }
-    out
+/// What passes an outline beside a spike: nothing is known but its size.
+fn by_size(outline: &[DVec3]) -> f64 {
+    (area(outline) / std::f64::consts::PI).sqrt()
 }
 
 /// A lattice on the faces of a box.
@@ -206,7 +278,7 @@ fn box_points(b: &Aabb) -> Vec<DVec3> {
 
 /// Middle and radius of the sphere through four points, and the volume between them. The radius is
 /// infinite where the points are too flat for it to mean anything.
-fn circumsphere(c: [DVec3; 4]) -> (DVec3, f64, f64) {
+pub(super) fn circumsphere(c: [DVec3; 4]) -> (DVec3, f64, f64) {
     let (u, v, w) = (c[0] - c[3], c[1] - c[3], c[2] - c[3]);
     let det = u.dot(v.cross(w));
     let longest = [u, v, w, u - v, v - w, w - u]
@@ -224,76 +296,94 @@ fn circumsphere(c: [DVec3; 4]) -> (DVec3, f64, f64) {
     (c[3] + to_center, to_center.length(), volume)
 }
 
-/// Radius of the widest ball that passes a facet from one tetrahedron's middle to the other's.
-fn passing_radius(
-    f: [DVec3; 3],
-    a: &(DVec3, f64, f64, DVec3),
-    b: &(DVec3, f64, f64, DVec3),
-) -> f64 {
-    let least = a.2.min(b.2);
+/// Middle and radius of the circle through three points; `None` when they lie on a line.
+pub(super) fn circle(f: Triangle) -> Option<(DVec3, f64)> {
     let (p, q) = (f[0] - f[2], f[1] - f[2]);
     let normal = p.cross(q);
-    let area2 = normal.length();
-    let circle = if area2 > 0.0 {
-        p.length() * q.length() * (p - q).length() / (2.0 * area2)
-    } else {
-        0.0
-    };
+    let area4 = 2.0 * normal.length_squared();
+    if area4 == 0.0 {
+        return None;
+    }
+    let to_middle = (q * p.length_squared() - p * q.length_squared()).cross(normal) / area4;
+    Some((f[2] + to_middle, to_middle.length()))
+}
+
+/// Radius of the widest ball that passes a facet from one part's middle to the other's.
+fn passing_radius(f: Triangle, a: &Fact, b: &Fact) -> f64 {
+    let least = a.radius.min(b.radius);
+    let circle = circle(f).map_or(0.0, |c| c.1);
     if least == 0.0 {
         // Beside a spike nothing is known but the facet; no ball is wider than what it leads to.
-        return circle.min(a.2.max(b.2)).max(0.0);
+        let most = a.radius.max(b.radius);
+        return if most > 0.0 { circle.min(most) } else { circle };
     }
+    let normal = enfilade_geom::triangle_area_normal(&f);
     let side = |c: DVec3| normal.dot(c - f[2]);
-    if least.is_finite() && side(a.3) * side(b.3) > 0.0 {
+    if least.is_finite() && side(a.center) * side(b.center) > 0.0 {
         return least;
     }
     circle.min(least)
 }
 
+impl Link {
+    fn new(parts: [u32; 2], tetrahedron: usize, facet: usize, radius: f64) -> Self {
+        Self {
+            parts,
+            tetrahedron: tetrahedron as u32,
+            facet: facet as u8,
+            n_corners: 0,
+            first_corner: 0,
+            radius,
+        }
+    }
+}
+
 impl Space {
-    /// Corners of the facet of a link, counter-clockwise seen from its second tetrahedron. [Units: wu]
-    #[must_use]
-    pub fn facet(&self, link: &Link) -> Triangle {
-        let tet = &self.delaunay.tetrahedra[link.tetrahedra[0] as usize];
-        tet.facet(usize::from(link.facet)).map(|v| {
+    /// Outline of an opening: convex, counter-clockwise seen from the second part. [Units: wu]
+    pub(super) fn outline(&self, link: &Link) -> SmallVec<[DVec3; 6]> {
+        if link.n_corners > 0 {
+            let first = link.first_corner as usize;
+            return self.corners[first..first + usize::from(link.n_corners)].into();
+        }
+        let tet = &self.delaunay.tetrahedra[link.tetrahedron as usize];
+        let corner = |v: u32| {
             debug_assert!(v != INFINITE);
             self.delaunay.vertices[v as usize]
-        })
+        };
+        tet.facet(usize::from(link.facet))
+            .map(corner)
+            .into_iter()
+            .collect()
+    }
+
+    /// Area of an opening times its unit normal, which points from the first part to the second.
+    /// [Units: wu²]
+    #[must_use]
+    pub fn area_vector(&self, link: &Link) -> DVec3 {
+        area_normal(&self.outline(link)) * 0.5
+    }
+
+    /// Vertices about an opening, to tell which openings touch.
+    pub(super) fn vertices_about(&self, link: &Link) -> SmallVec<[u32; 4]> {
+        let tet = &self.delaunay.tetrahedra[link.tetrahedron as usize];
+        if link.facet == 4 {
+            tet.vertices.into()
+        } else {
+            tet.facet(usize::from(link.facet)).into_iter().collect()
+        }
+    }
+
+    /// Corners of the tetrahedron of a part. [Units: wu]
+    #[must_use]
+    pub fn corners(&self, part: u32) -> [DVec3; 4] {
+        self.delaunay
+            .corners(self.tetrahedron_of_part[part as usize])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn neighbors_sample_their_edge_alike_and_all_points_lie_in_the_triangle() {
-        let [a, b, c, d] = [
-            DVec3::new(0.1, 0.0, 0.3),
-            DVec3::new(3.7, 0.2, 1.1),
-            DVec3::new(1.0, 2.5, 0.7),
-            DVec3::new(2.0, -2.5, 0.9),
-        ];
-        let (left, right) = (sampled(&[a, b, c], 0.2), sampled(&[b, a, d], 0.2));
-        let on_edge = |points: &[DVec3]| -> Vec<[u64; 3]> {
-            let mut bits: Vec<_> = points
-                .iter()
-                .filter(|p| (b - a).cross(**p - a).length() < 1e-9)
-                .map(|p| p.to_array().map(f64::to_bits))
-                .collect();
-            bits.sort_unstable();
-            bits
-        };
-        assert!(on_edge(&left).len() > 15);
-        assert_eq!(on_edge(&left), on_edge(&right));
-        let normal = (b - a).cross(c - a).normalize();
-        for p in &left {
-            assert!(normal.dot(*p - a).abs() < 1e-12);
-            for (q, r) in [(a, b), (b, c), (c, a)] {
-                assert!((r - q).cross(*p - q).dot(normal) > -1e-9);
-            }
-        }
-    }
 
     #[test]
     fn the_ball_through_four_corners_touches_them() {

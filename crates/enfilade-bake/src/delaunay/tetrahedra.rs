@@ -145,20 +145,81 @@ pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
     drop(points);
     let predicates = Predicates::of(&vertices);
     let first = first_four(&vertices, predicates).ok_or(DelaunayError::Flat { n_points })?;
-    let mut builder = Builder::new(&vertices, predicates, first);
-    for v in 0..vertices.len() as u32 {
+    let mut builder = Builder::new(vertices, predicates, first);
+    for v in 0..builder.vertices.len() as u32 {
         if !first.contains(&v) {
             builder.insert(v);
         }
     }
-    let (tetrahedra, n_finite) = builder.compacted();
-    Ok(Delaunay {
-        vertices,
-        vertex_of_point,
-        tetrahedra,
-        n_finite,
-        predicates,
-    })
+    Ok(builder.finished(vertex_of_point))
+}
+
+/// Tetrahedra that more points are added to, round by round.
+pub(super) struct Growing {
+    builder: Builder,
+    vertex_of_point: Vec<u32>,
+    has_rounds: bool,
+}
+
+impl Growing {
+    /// Begins with the tetrahedra of `points`, as [`tetrahedralize`] finds them.
+    pub(super) fn begin(points: &[DVec3]) -> Result<Self, DelaunayError> {
+        let d = tetrahedralize(points)?;
+        Ok(Self {
+            vertex_of_point: d.vertex_of_point,
+            builder: Builder::of(d.vertices, d.tetrahedra, d.predicates),
+            has_rounds: false,
+        })
+    }
+
+    /// Adds a round of points, which must differ from all before and from each other.
+    ///
+    /// # Errors
+    /// When there are more points than indices.
+    pub(super) fn add(&mut self, points: &[DVec3]) -> Result<(), DelaunayError> {
+        let b = &mut self.builder;
+        let n_points = b.vertices.len() + points.len();
+        if n_points > MOST_POINTS {
+            return Err(DelaunayError::TooMany { n_points });
+        }
+        self.has_rounds = true;
+        b.fresh.clear();
+        for i in insertion_order(points) {
+            b.vertices.push(points[i as usize] + DVec3::ZERO);
+            b.place.push(0);
+        }
+        b.predicates = Predicates::of(&b.vertices);
+        for v in n_points - points.len()..n_points {
+            b.insert(v as u32);
+        }
+        Ok(())
+    }
+
+    /// Finite tetrahedra that the last round made; all of them before the first.
+    pub(super) fn fresh(&self) -> Vec<u32> {
+        let b = &self.builder;
+        let is_finite = |&t: &u32| !b.tets[t as usize].vertices.contains(&INFINITE);
+        if !self.has_rounds {
+            return (0..b.tets.len() as u32).filter(is_finite).collect();
+        }
+        let mut fresh: Vec<u32> = b.fresh.iter().copied().filter(is_finite).collect();
+        fresh.sort_unstable();
+        fresh.dedup();
+        fresh
+    }
+
+    pub(super) fn tetrahedron(&self, t: u32) -> &Tetrahedron {
+        &self.builder.tets[t as usize]
+    }
+
+    pub(super) fn vertices(&self) -> &[DVec3] {
+        &self.builder.vertices
+    }
+
+    /// Ends it. Points of the beginning keep their vertices; those of rounds have none to name.
+    pub(super) fn finished(self) -> Delaunay {
+        self.builder.finished(self.vertex_of_point)
+    }
 }
 
 /// Four vertices not in one plane, oriented positively, found early in the order.
@@ -199,8 +260,8 @@ struct Fan {
 /// Vertices of a cavity's boundary that the table of edges has room for.
 const TABLE: usize = 64;
 
-struct Builder<'a> {
-    vertices: &'a [DVec3],
+struct Builder {
+    vertices: Vec<DVec3>,
     predicates: Predicates,
     tets: Vec<Tetrahedron>,
     /// Twice the number of the insertion that looked at a tetrahedron last, plus 1 for no conflict.
@@ -209,19 +270,27 @@ struct Builder<'a> {
     free: Vec<u32>,
     cavity: Vec<u32>,
     fans: Vec<Fan>,
-    /// Place of each vertex in `local_vertices`, where the two agree; the infinite one comes last.
+    /// Place of each vertex in `local_vertices`, where the two agree; the infinite one comes first.
     place: Vec<u32>,
     local_vertices: Vec<u32>,
     table: Vec<u32>,
     epoch: u32,
     last: u32,
+    /// Tetrahedra made since it was cleared, some of them gone since, when anybody asks.
+    fresh: Vec<u32>,
+    is_tracked: bool,
+}
+
+/// Where a vertex stands in the table of places.
+fn slot_of(v: u32) -> usize {
+    v.wrapping_add(1) as usize
 }
 
 /// Marks a slot that holds no tetrahedron.
 const VACANT: u32 = u32::MAX;
 
-impl<'a> Builder<'a> {
-    fn new(vertices: &'a [DVec3], predicates: Predicates, first: [u32; 4]) -> Self {
+impl Builder {
+    fn new(vertices: Vec<DVec3>, predicates: Predicates, first: [u32; 4]) -> Self {
         let mut tets = vec![Tetrahedron {
             vertices: first,
             neighbors: [0; 4],
@@ -250,11 +319,19 @@ impl<'a> Builder<'a> {
                 tets[t].neighbors[i] = other as u32;
             }
         }
-        let room = vertices.len() * 7 + 64;
-        let mut marks = Vec::with_capacity(room);
-        marks.resize(tets.len(), 0);
-        tets.reserve(room);
+        tets.reserve(vertices.len() * 7 + 64);
         Self {
+            is_tracked: false,
+            ..Self::of(vertices, tets, predicates)
+        }
+    }
+
+    /// Goes on from finished tetrahedra.
+    fn of(vertices: Vec<DVec3>, tets: Vec<Tetrahedron>, predicates: Predicates) -> Self {
+        let mut marks = Vec::with_capacity(tets.capacity());
+        marks.resize(tets.len(), 0);
+        Self {
+            place: vec![0; vertices.len() + 1],
             vertices,
             predicates,
             tets,
@@ -262,11 +339,24 @@ impl<'a> Builder<'a> {
             free: Vec::new(),
             cavity: Vec::new(),
             fans: Vec::new(),
-            place: vec![0; vertices.len() + 1],
             local_vertices: Vec::new(),
             table: vec![0; TABLE * TABLE],
             epoch: 0,
             last: 0,
+            fresh: Vec::new(),
+            is_tracked: true,
+        }
+    }
+
+    fn finished(mut self, vertex_of_point: Vec<u32>) -> Delaunay {
+        let (vertices, predicates) = (std::mem::take(&mut self.vertices), self.predicates);
+        let (tetrahedra, n_finite) = self.compacted();
+        Delaunay {
+            vertices,
+            vertex_of_point,
+            tetrahedra,
+            n_finite,
+            predicates,
         }
     }
 
@@ -299,7 +389,7 @@ impl<'a> Builder<'a> {
 
     /// The tetrahedron that holds `p`: a finite one, or one at infinity if `p` is outside.
     fn locate(&self, p: DVec3) -> u32 {
-        walk(&self.tets, self.vertices, self.predicates, self.last, p)
+        walk(&self.tets, &self.vertices, self.predicates, self.last, p)
     }
 
     fn insert(&mut self, v: u32) {
@@ -354,6 +444,9 @@ impl<'a> Builder<'a> {
                 });
             let fan = &mut self.fans[i];
             fan.tet = t;
+            if self.is_tracked {
+                self.fresh.push(t);
+            }
             let slot = fan.slot as usize;
             let tet = &mut self.tets[t as usize];
             tet.vertices = fan.vertices;
@@ -376,9 +469,8 @@ impl<'a> Builder<'a> {
             return self.join_large_fan();
         }
         self.local_vertices.clear();
-        let n_vertices = self.vertices.len();
         let mut local = |v: u32| -> usize {
-            let slot = &mut self.place[(v as usize).min(n_vertices)];
+            let slot = &mut self.place[slot_of(v)];
             if self.local_vertices.get(*slot as usize) != Some(&v) {
                 *slot = self.local_vertices.len() as u32;
                 self.local_vertices.push(v);
@@ -401,7 +493,7 @@ impl<'a> Builder<'a> {
             let slot = fan.slot as usize;
             let mut places = [0; 4];
             for (place, v) in places.iter_mut().zip(fan.vertices) {
-                *place = self.place[(v as usize).min(n_vertices)] as usize;
+                *place = self.place[slot_of(v)] as usize;
             }
             for (j, &[k, l]) in EDGES[slot].iter().enumerate() {
                 if j != slot {

@@ -1,0 +1,194 @@
+//! Points where surfaces need them: until every ball between points is a ball of air.
+//!
+//! The circumsphere of a tetrahedron is empty of points, but surfaces may run through it where points are
+//! few; then the tetrahedron says nothing about the air. The point of the surface nearest to the ball's
+//! middle is added, and so on (Chew, "Guaranteed-quality mesh generation for curved surfaces", 1993;
+//! Boissonnat & Oudot, "Provably good sampling and meshing of surfaces", 2005, for the density that comes
+//! of it: in proportion to the distance to the next surface). Great walls of great halls get few points,
+//! the jambs of a door many, wherever the scene is large or small.
+//!
+//! **It ends**: a new point lies away from all others by a tenth of a radius that is above the least.
+
+use std::collections::HashMap;
+
+use enfilade_geom::{Aabb, Bvh, DVec3};
+use rayon::prelude::*;
+
+use super::space::{circle, circumsphere};
+use super::tetrahedra::{Delaunay, DelaunayError, Growing};
+
+/// A surface may enter a ball by this share of its radius. Walls then have points about half a radius
+/// apart, and radii are right to a twentieth.
+const ENTERS: f64 = 0.1;
+/// Of points wanted in one round, none is nearer to another than this share of its ball's radius.
+const APART: f64 = 0.4;
+/// More rounds than any scene took.
+const MAX_ROUNDS: usize = 100;
+
+/// Tetrahedra whose balls are balls of air.
+pub(super) struct Refined {
+    pub(super) delaunay: Delaunay,
+    /// Radius down to which that holds: the one asked for, or where points ran out, the largest ball that
+    /// a surface still enters. [Units: wu]
+    pub(super) down_to: f64,
+}
+
+/// A point wanted, and the radius of the ball that wants it.
+#[derive(Clone, Copy)]
+struct Wanted {
+    point: DVec3,
+    radius: f64,
+}
+
+/// Adds points of `surfaces` to `points` until no ball wider than `least` has a surface in it.
+///
+/// `O(n log n)` in the points that come out, of which there are `max_points` at most.
+pub(super) fn refined(
+    points: &[DVec3],
+    surfaces: &Bvh,
+    bounds: &Aabb,
+    least: f64,
+    max_points: usize,
+) -> Result<Refined, DelaunayError> {
+    let mut growing = Growing::begin(points)?;
+    let mut down_to = least;
+    for _ in 0..MAX_ROUNDS {
+        let fresh = growing.fresh();
+        let wanted: Vec<Wanted> = fresh
+            .par_iter()
+            .flat_map_iter(|&t| wanted_by(&growing, t, surfaces, bounds, down_to))
+            .collect();
+        let mut round = spread(wanted);
+        let room = max_points.saturating_sub(growing.vertices().len());
+        if round.len() > room {
+            // The largest balls come first.
+            down_to = round[room].radius;
+            round.truncate(room);
+        }
+        if round.is_empty() {
+            break;
+        }
+        let points: Vec<DVec3> = round.iter().map(|w| w.point).collect();
+        growing.add(&points)?;
+    }
+    Ok(Refined {
+        delaunay: growing.finished(),
+        down_to,
+    })
+}
+
+/// Points that the balls of a tetrahedron and of its facets want.
+fn wanted_by(
+    growing: &Growing,
+    t: u32,
+    surfaces: &Bvh,
+    bounds: &Aabb,
+    least: f64,
+) -> impl Iterator<Item = Wanted> + use<> {
+    let vertices = growing.vertices();
+    let corners = |t: u32| {
+        let tet = growing.tetrahedron(t);
+        tet.vertices.map(|v| vertices[v as usize])
+    };
+    let entered = |center: DVec3, radius: f64| -> Option<Wanted> {
+        if radius <= least || !bounds.contains(center) {
+            return None;
+        }
+        let near = surfaces.nearest(center, radius * (1.0 - ENTERS))?;
+        Some(Wanted {
+            point: near.point,
+            radius,
+        })
+    };
+    let c = corners(t);
+    let (center, radius, _) = circumsphere(c);
+    let mut out: [Option<Wanted>; 5] = [None; 5];
+    if !radius.is_finite() {
+        return out.into_iter().flatten();
+    }
+    out[4] = entered(center, radius);
+    if out[4].is_none() {
+        // What passes a facet is as wide as the facet's own ball where that is a bottleneck: between the
+        // middles of both sides.
+        let tet = growing.tetrahedron(t);
+        for i in 0..4 {
+            let other = tet.neighbor(i);
+            if growing
+                .tetrahedron(other)
+                .vertices
+                .contains(&super::INFINITE)
+            {
+                continue;
+            }
+            let f = tet.facet(i).map(|v| vertices[v as usize]);
+            let Some((middle, radius)) = circle(f) else {
+                continue;
+            };
+            if radius <= least {
+                continue;
+            }
+            let d = corners(other);
+            let (beyond, r, _) = circumsphere(d);
+            let side = |p: DVec3| enfilade_geom::triangle_area_normal(&f).dot(p - f[2]);
+            if !r.is_finite() || side(center) * side(beyond) > 0.0 {
+                continue;
+            }
+            let Some(wanted) = entered(middle, radius) else {
+                continue;
+            };
+            // A facet in a wall wants nothing: nothing passes it.
+            let mean = |c: [DVec3; 4]| c.iter().sum::<DVec3>() / 4.0;
+            if wanted.point.distance(middle) > 1e-6 * radius
+                && !surfaces.any_hit(mean(c), middle, |_| false)
+                && !surfaces.any_hit(mean(d), middle, |_| false)
+            {
+                out[i] = Some(wanted);
+            }
+        }
+    }
+    out.into_iter().flatten()
+}
+
+/// Of the points wanted, some that are not near to each other, those of the largest balls first.
+fn spread(mut wanted: Vec<Wanted>) -> Vec<Wanted> {
+    wanted.sort_unstable_by(|a, b| {
+        let (p, q) = (a.point.to_array(), b.point.to_array());
+        let order = |k: usize| p[k].total_cmp(&q[k]);
+        b.radius
+            .total_cmp(&a.radius)
+            .then_with(|| order(0))
+            .then_with(|| order(1))
+            .then_with(|| order(2))
+    });
+    // Cells of about the distance to be kept, a size for each octave of radii.
+    let mut taken: HashMap<(i32, [i64; 3]), Vec<DVec3>> = HashMap::new();
+    let mut octaves: Vec<i32> = Vec::new();
+    let size = |octave: i32| APART * 2.0_f64.powi(octave);
+    let cell = |p: DVec3, octave: i32| (p / size(octave)).floor().to_array().map(|x| x as i64);
+    let mut out = Vec::new();
+    for w in wanted {
+        // Larger balls came first, and their cells are no smaller than the distance asked about here.
+        let is_near = octaves.iter().any(|&octave| {
+            let [x, y, z] = cell(w.point, octave);
+            (0..27).any(|i| {
+                let at = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+                taken
+                    .get(&(octave, at))
+                    .is_some_and(|list| list.iter().any(|q| q.distance(w.point) < APART * w.radius))
+            })
+        });
+        if is_near {
+            continue;
+        }
+        let octave = w.radius.log2().ceil() as i32;
+        if !octaves.contains(&octave) {
+            octaves.push(octave);
+        }
+        taken
+            .entry((octave, cell(w.point, octave)))
+            .or_default()
+            .push(w.point);
+        out.push(w);
+    }
+    out
+}
