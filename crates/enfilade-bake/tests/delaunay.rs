@@ -5,7 +5,7 @@ use enfilade_bake::delaunay::{DelaunayConfig, Session, bake_delaunay, bake_sessi
 use enfilade_bake::{BakeContext, Silent};
 use enfilade_cpg::{PortalKind, World};
 use enfilade_geom::DVec3;
-use enfilade_testkit::{Generated, Variant, gjorup_cavern, gjorup_rooms};
+use enfilade_testkit::{Generated, OpeningKind, Site, Variant, gjorup_cavern, gjorup_rooms, solid};
 use enfilade_verify::{VerifyOptions, verify_world};
 
 fn baked(g: &Generated) -> World {
@@ -151,6 +151,30 @@ fn noise_and_furniture_change_nothing() {
     all.extend(problems(&cavern, "noisy cavern"));
     let furnished = with_boxes(with_noise(rooms(), 0.04), &table_and_chair());
     all.extend(problems(&furnished, "table and chair"));
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+/// A hall of 150 × 100 m and 12 m high, parted by a wall half a meter thick with one door of 0.8 m by 2 m: its
+/// surfaces have forty thousand times the door's area.
+#[test]
+fn a_small_door_of_a_large_hall_is_found() {
+    let boxed = |lo: [f64; 3], hi: [f64; 3]| solid::aabb(lo, hi);
+    let mut site = Site::new("hall");
+    let plaster = site.material("plaster", [0.8, 0.8, 0.8]);
+    let storey = site.storey("ground floor", 0.0);
+    let halls = [
+        boxed([0.0; 3], [80.0, 12.0, 100.0]),
+        boxed([80.5, 0.0, 0.0], [150.0, 12.0, 100.0]),
+    ];
+    let west = site.room("west", storey, halls[0]);
+    let east = site.room("east", storey, halls[1]);
+    let door = boxed([80.0, 0.0, 31.3], [80.5, 2.0, 32.1]);
+    site.opening(OpeningKind::Door, door, 0, [west, east]);
+    let mut mesh = solid::MeshBuilder::new(plaster);
+    let outer = boxed([-0.5; 3], [150.5, 12.5, 100.5]);
+    mesh.carved(&[outer], &[halls[0], halls[1], door]);
+    site.structure("hall", mesh);
+    let all = problems(&site.finish(), "hall");
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 

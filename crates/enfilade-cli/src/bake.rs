@@ -238,7 +238,20 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
         config.voxel.unwrap_or(config.min_opening / 6.0)
     } else {
-        writeln!(err, "surface points {:.3} m apart", baked.voxel)?;
+        writeln!(
+            err,
+            "surfaces have points for all air at least {:.3} m in radius",
+            baked.voxel
+        )?;
+        // The builder's own share of the narrowest opening is a third.
+        let wanted = config.min_opening / 3.0;
+        if baked.voxel > wanted * 1.05 {
+            writeln!(
+                err,
+                "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \
+                 narrower openings are found, but may be weighed wrongly"
+            )?;
+        }
         f64::INFINITY
     };
     // The grid grows its voxels by tenths, if at all.

@@ -32,8 +32,8 @@ use super::space::Space;
 /// bulge: differences this small come from where points happen to be sampled.
 const FLOWS: f64 = 1.05;
 
-/// A cell of less than this share of its ball's volume does not hold the ball: it is a bundle of spikes whose
-/// ball lies in a neighbor. Bundles have a hundredth at most, rooms several times the ball.
+/// A cell of less than this share of its ball's volume does not hold the ball, which lies in a neighbor: it is
+/// a bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
 const HOLDS: f64 = 0.1;
 
 /// The cell around the scene.
@@ -312,36 +312,37 @@ pub fn decimate(
         let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         radius < min_radius || ball.is_finite() && volume < HOLDS * ball
     };
-    let weigh = |portal: &Live, pair: (u32, u32), radius: &[f64], volumes: &[f64], boxes: &[Aabb]| -> f64 {
-        let (a, b) = (pair.0 as usize, pair.1 as usize);
-        if portal.stays || choices.at(portal.center / portal.n) == Some(true) {
-            return f64::INFINITY;
-        }
-        // The middle of a portal moves as others join it: what was shown is what was meant.
-        if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
-            return -2.0;
-        }
-        let least = radius[a].min(radius[b]);
-        if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
-            // Widest opening first among crevices.
-            return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
-        }
-        if weight == Weight::ScaleFree {
-            return least / portal.radius.max(1e-9);
-        }
-        let area = portal.vector.length().max(1e-9);
-        let projected = |b: &Aabb| {
-            let s = b.size().max(DVec3::ZERO);
-            let n = (portal.vector / area).abs();
-            n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
+    let weigh =
+        |portal: &Live, pair: (u32, u32), radius: &[f64], volumes: &[f64], boxes: &[Aabb]| -> f64 {
+            let (a, b) = (pair.0 as usize, pair.1 as usize);
+            if portal.stays || choices.at(portal.center / portal.n) == Some(true) {
+                return f64::INFINITY;
+            }
+            // The middle of a portal moves as others join it: what was shown is what was meant.
+            if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
+                return -2.0;
+            }
+            let least = radius[a].min(radius[b]);
+            if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
+                // Widest opening first among crevices.
+                return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
+            }
+            if weight == Weight::ScaleFree {
+                return least / portal.radius.max(1e-9);
+            }
+            let area = portal.vector.length().max(1e-9);
+            let projected = |b: &Aabb| {
+                let s = b.size().max(DVec3::ZERO);
+                let n = (portal.vector / area).abs();
+                n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
+            };
+            let largest = projected(&boxes[a]).max(projected(&boxes[b]));
+            let aspect = largest / area;
+            match weight {
+                Weight::Aspect => aspect,
+                _ => aspect / largest.sqrt(),
+            }
         };
-        let largest = projected(&boxes[a]).max(projected(&boxes[b]));
-        let aspect = largest / area;
-        match weight {
-            Weight::Aspect => aspect,
-            _ => aspect / largest.sqrt(),
-        }
-    };
     let mut queue: BinaryHeap<Candidate> = portals
         .iter()
         .map(|(&pair, p)| Candidate {

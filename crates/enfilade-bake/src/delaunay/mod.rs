@@ -23,6 +23,8 @@ mod space;
 mod tetrahedra;
 
 #[cfg(test)]
+mod space_tests;
+#[cfg(test)]
 mod tests;
 
 pub use bake::{DelaunayConfig, Session, bake_delaunay, bake_session};

@@ -7,6 +7,9 @@
 //! of it: in proportion to the distance to the next surface). Great walls of great halls get few points,
 //! the jambs of a door many, wherever the scene is large or small.
 //!
+//! Wide places come first: passes go down to ever narrower balls of air, and the last one looks after narrow gaps,
+//! too, such as those between the two faces of a wall. When points run out, what is wide is right.
+//!
 //! **It ends**: a new point lies away from all others by a tenth of a radius that is above the least.
 
 use std::collections::HashMap;
@@ -19,7 +22,7 @@ use super::tetrahedra::{Delaunay, DelaunayError, Growing};
 
 /// A surface may enter a ball by this share of its radius. Walls then have points about half a radius
 /// apart, and radii are right to a twentieth.
-const ENTERS: f64 = 0.1;
+pub(super) const ENTERS: f64 = 0.1;
 /// Of points wanted in one round, none is nearer to another than this share of its ball's radius.
 const APART: f64 = 0.4;
 /// More rounds than any scene took.
@@ -28,8 +31,8 @@ const MAX_ROUNDS: usize = 100;
 /// Tetrahedra whose balls are balls of air.
 pub(super) struct Refined {
     pub(super) delaunay: Delaunay,
-    /// Radius down to which that holds: the one asked for, or where points ran out, the largest ball that
-    /// a surface still enters. [Units: wu]
+    /// Radius of balls of air down to which that holds; above the one asked for where points ran out.
+    /// [Units: wu]
     pub(super) down_to: f64,
 }
 
@@ -51,25 +54,31 @@ pub(super) fn refined(
     max_points: usize,
 ) -> Result<Refined, DelaunayError> {
     let mut growing = Growing::begin(points)?;
-    let mut down_to = least;
-    for _ in 0..MAX_ROUNDS {
-        let fresh = growing.fresh();
-        let wanted: Vec<Wanted> = fresh
-            .par_iter()
-            .flat_map_iter(|&t| wanted_by(&growing, t, surfaces, bounds, down_to))
-            .collect();
-        let mut round = spread(wanted);
-        let room = max_points.saturating_sub(growing.vertices().len());
-        if round.len() > room {
-            // The largest balls come first.
-            down_to = round[room].radius;
-            round.truncate(room);
+    let mut down_to = bounds.size().max_element();
+    // Least radius of a ball that wants points, and of the air about its middle.
+    let passes = [8.0, 4.0, 2.0, 1.0].map(|k| (k * least, k * least));
+    for pass in passes.into_iter().chain([(least, 0.0)]) {
+        let mut fresh = growing.all();
+        for _ in 0..MAX_ROUNDS {
+            let wanted: Vec<Wanted> = fresh
+                .par_iter()
+                .flat_map_iter(|&t| wanted_by(&growing, t, surfaces, bounds, pass))
+                .collect();
+            let round = spread(wanted);
+            if round.is_empty() {
+                break;
+            }
+            if growing.vertices().len() + round.len() > max_points {
+                return Ok(Refined {
+                    delaunay: growing.finished(),
+                    down_to,
+                });
+            }
+            let points: Vec<DVec3> = round.iter().map(|w| w.point).collect();
+            growing.add(&points)?;
+            fresh = growing.fresh();
         }
-        if round.is_empty() {
-            break;
-        }
-        let points: Vec<DVec3> = round.iter().map(|w| w.point).collect();
-        growing.add(&points)?;
+        down_to = pass.0;
     }
     Ok(Refined {
         delaunay: growing.finished(),
@@ -83,7 +92,7 @@ fn wanted_by(
     t: u32,
     surfaces: &Bvh,
     bounds: &Aabb,
-    least: f64,
+    (least, air): (f64, f64),
 ) -> impl Iterator<Item = Wanted> + use<> {
     let vertices = growing.vertices();
     let corners = |t: u32| {
@@ -95,7 +104,7 @@ fn wanted_by(
             return None;
         }
         let near = surfaces.nearest(center, radius * (1.0 - ENTERS))?;
-        Some(Wanted {
+        (near.distance > air).then_some(Wanted {
             point: near.point,
             radius,
         })

@@ -19,12 +19,12 @@ use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::cut::{self, Found, Tolerance};
-use super::refine::refined;
+use super::refine::{ENTERS, refined};
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
 use crate::complex::poly::{area, area_normal};
 
-/// Most points on surfaces; about 700 bytes each while tetrahedra become cells.
-const MAX_POINTS: usize = 4_000_000;
+/// Most points added to surfaces; up to 4 kB each while tetrahedra become cells.
+const MAX_POINTS: usize = 300_000;
 /// Points along each edge of the box around the scene.
 const BOX_POINTS: usize = 9;
 /// A tetrahedron of less than this share of the cube over its longest edge has no reliable middle.
@@ -41,9 +41,9 @@ const ON_PLANE: f64 = 1e-9;
 pub struct Space {
     /// The tetrahedra. [Units: wu]
     pub delaunay: Delaunay,
-    /// Balls wider than this hold no surface. [Units: wu]
+    /// Balls of air of this radius and more are known: no surface runs through them. [Units: wu]
     pub finest: f64,
-    /// The same as it was asked for; less than `finest` where points ran out. [Units: wu]
+    /// The radius that was asked for; less than `finest` where points ran out. [Units: wu]
     pub wanted: f64,
     /// The tetrahedron of each part: as many parts as tetrahedra, part by part, then further parts of those
     /// that are cut.
@@ -104,18 +104,19 @@ pub fn divide(
     narrowest: f64,
 ) -> Result<Space, DelaunayError> {
     let all: Vec<Triangle> = walls.iter().chain(closures).copied().collect();
-    let surfaces = Bvh::build(&all);
+    let all_bvh = Bvh::build(&all);
     let bounds = all
         .iter()
         .flatten()
         .fold(Aabb::EMPTY, |b, &p| b.including(p));
-    let mut points: Vec<DVec3> = all.into_iter().flatten().collect();
+    let mut points: Vec<DVec3> = all.iter().flatten().copied().collect();
     let n_surface = points.len();
     let around = bounds.expanded(2.0 + 0.25 * bounds.size().max_element());
     points.extend(box_points(&around));
     let wanted = narrowest * LEAST;
-    let refined = refined(&points, &surfaces, &around, wanted, MAX_POINTS)?;
-    drop((surfaces, points));
+    let max_points = points.len() + MAX_POINTS;
+    let refined = refined(&points, &all_bvh, &around, wanted, max_points)?;
+    drop((points, all_bvh, all));
     let delaunay = refined.delaunay;
     let n = delaunay.n_finite;
     let is_box: BTreeSet<u32> = delaunay.vertex_of_point[n_surface..]
@@ -147,7 +148,7 @@ pub fn divide(
             let radius = if outdoors(t) {
                 f64::INFINITY
             } else if is_own {
-                radius
+                of_air(center, radius, bvh)
             } else {
                 0.0
             };
@@ -224,7 +225,11 @@ pub fn divide(
             for (pair, outline) in found[t].parts.iter().flat_map(|p| &p.inner) {
                 let parts = pair.map(|k| number(t, k));
                 let most = facts[parts[0] as usize].radius;
-                let radius = if most == f64::INFINITY { most } else { by_size(outline) };
+                let radius = if most == f64::INFINITY {
+                    most
+                } else {
+                    by_size(outline)
+                };
                 out.push((Link::new(parts, t, 4, radius), Some(outline.clone())));
             }
             out
@@ -306,6 +311,12 @@ pub(super) fn circle(f: Triangle) -> Option<(DVec3, f64)> {
     }
     let to_middle = (q * p.length_squared() - p * q.length_squared()).cross(normal) / area4;
     Some((f[2] + to_middle, to_middle.length()))
+}
+
+/// Radius of the ball of air about the middle of a ball between points: where a surface enters it, less.
+fn of_air(center: DVec3, radius: f64, bvh: &Bvh) -> f64 {
+    bvh.nearest(center, radius * (1.0 - ENTERS))
+        .map_or(radius, |n| n.distance)
 }
 
 /// Radius of the widest ball that passes a facet from one part's middle to the other's.

@@ -158,7 +158,6 @@ pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
 pub(super) struct Growing {
     builder: Builder,
     vertex_of_point: Vec<u32>,
-    has_rounds: bool,
 }
 
 impl Growing {
@@ -168,7 +167,6 @@ impl Growing {
         Ok(Self {
             vertex_of_point: d.vertex_of_point,
             builder: Builder::of(d.vertices, d.tetrahedra, d.predicates),
-            has_rounds: false,
         })
     }
 
@@ -182,7 +180,6 @@ impl Growing {
         if n_points > MOST_POINTS {
             return Err(DelaunayError::TooMany { n_points });
         }
-        self.has_rounds = true;
         b.fresh.clear();
         for i in insertion_order(points) {
             b.vertices.push(points[i as usize] + DVec3::ZERO);
@@ -195,17 +192,26 @@ impl Growing {
         Ok(())
     }
 
-    /// Finite tetrahedra that the last round made; all of them before the first.
+    /// Finite tetrahedra.
+    pub(super) fn all(&self) -> Vec<u32> {
+        let tets = &self.builder.tets;
+        (0..tets.len() as u32)
+            .filter(|&t| self.is_finite(t))
+            .collect()
+    }
+
+    /// Finite tetrahedra that the last round made.
     pub(super) fn fresh(&self) -> Vec<u32> {
-        let b = &self.builder;
-        let is_finite = |&t: &u32| !b.tets[t as usize].vertices.contains(&INFINITE);
-        if !self.has_rounds {
-            return (0..b.tets.len() as u32).filter(is_finite).collect();
-        }
-        let mut fresh: Vec<u32> = b.fresh.iter().copied().filter(is_finite).collect();
+        let fresh = self.builder.fresh.iter().copied();
+        let mut fresh: Vec<u32> = fresh.filter(|&t| self.is_finite(t)).collect();
         fresh.sort_unstable();
         fresh.dedup();
         fresh
+    }
+
+    /// Whether there is such a tetrahedron, with corners all finite; vacant slots have none.
+    fn is_finite(&self, t: u32) -> bool {
+        !self.builder.tets[t as usize].vertices.contains(&INFINITE)
     }
 
     pub(super) fn tetrahedron(&self, t: u32) -> &Tetrahedron {

@@ -1,0 +1,162 @@
+//! Whether the air's parts are joined just where one can get from one to the next: an oracle by lines.
+
+use enfilade_geom::{Bvh, DMat4, DVec3, Triangle};
+use proptest::prelude::*;
+
+use super::space::{Space, divide};
+
+/// Whether a triangle meets a segment, by signs of volumes alone.
+fn meets(t: &Triangle, p: DVec3, q: DVec3) -> bool {
+    let volume = |a: DVec3, b: DVec3, c: DVec3| a.cross(b).dot(c);
+    let side = |x: DVec3| volume(t[1] - t[0], t[2] - t[0], x - t[0]);
+    if side(p) * side(q) > 0.0 {
+        return false;
+    }
+    let turn = |i: usize| volume(q - p, t[i] - p, t[(i + 1) % 3] - p);
+    let (a, b, c) = (turn(0), turn(1), turn(2));
+    (a >= 0.0 && b >= 0.0 && c >= 0.0) || (a <= 0.0 && b <= 0.0 && c <= 0.0)
+}
+
+fn is_free(walls: &[Triangle], p: DVec3, q: DVec3) -> bool {
+    !walls.iter().any(|t| meets(t, p, q))
+}
+
+/// The connected region of each part.
+fn regions(space: &Space) -> Vec<u32> {
+    let mut region: Vec<u32> = (0..space.middles.len() as u32).collect();
+    fn root(region: &mut [u32], mut x: u32) -> u32 {
+        while region[x as usize] != x {
+            region[x as usize] = region[region[x as usize] as usize];
+            x = region[x as usize];
+        }
+        x
+    }
+    for l in &space.links {
+        let [a, b] = l.parts.map(|p| root(&mut region, p));
+        region[a.max(b) as usize] = a.min(b);
+    }
+    (0..region.len() as u32)
+        .map(|x| root(&mut region, x))
+        .collect()
+}
+
+/// Regions of the parts of the tetrahedron around `p` that `p` sees; its own is one of them.
+fn regions_at(space: &Space, region: &[u32], walls: &[Triangle], p: DVec3) -> Vec<u32> {
+    let t = space.delaunay.locate(p, 0);
+    let parts = (0..space.middles.len()).filter(|&i| space.tetrahedron_of_part[i] == t);
+    let seen = parts.filter(|&i| is_free(walls, p, space.middles[i]));
+    seen.map(|i| region[i]).collect()
+}
+
+fn divided(walls: &[Triangle], narrowest: f64) -> Space {
+    divide(walls, &[], &Bvh::build(walls), narrowest).unwrap()
+}
+
+fn point() -> impl Strategy<Value = DVec3> {
+    prop::array::uniform3(-1.0..1.0_f64).prop_map(DVec3::from_array)
+}
+
+/// A wall across a box, with a hole from `lo` to `hi` if it is larger than nothing.
+fn parted_box(lo: [f64; 2], hi: [f64; 2]) -> Vec<Triangle> {
+    let mut out = Vec::new();
+    let mut quad = |c: [[f64; 3]; 4]| {
+        let c = c.map(DVec3::from_array);
+        out.extend([[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);
+    };
+    for axis in 0..3 {
+        for at in [-1.0, 1.0] {
+            quad(
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(u, v)| {
+                    let mut p = [at; 3];
+                    (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (u, v);
+                    p
+                }),
+            );
+        }
+    }
+    let has_hole = lo[0] < hi[0] && lo[1] < hi[1];
+    let bands = if has_hole {
+        vec![
+            ([-1.0, -1.0], [lo[0], 1.0]),
+            ([hi[0], -1.0], [1.0, 1.0]),
+            ([lo[0], -1.0], [hi[0], lo[1]]),
+            ([lo[0], hi[1]], [hi[0], 1.0]),
+        ]
+    } else {
+        vec![([-1.0, -1.0], [1.0, 1.0])]
+    };
+    for (a, b) in bands {
+        quad([
+            [0.0, a[0], a[1]],
+            [0.0, b[0], a[1]],
+            [0.0, b[0], b[1]],
+            [0.0, a[0], b[1]],
+        ]);
+    }
+    out
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Triangles through each other, larger than what points are added for.
+    #[test]
+    fn parts_are_joined_where_free_lines_go_and_nowhere_else(
+        walls in prop::collection::vec(prop::array::uniform3(point()), 1..9),
+        lines in prop::collection::vec((point(), point()), 40),
+    ) {
+        // Only balls of a fifth of the scene's size are looked after: the rest is for polygons to cut.
+        let space = divided(&walls, 0.6);
+        let region = regions(&space);
+        for l in &space.links {
+            let outline = space.outline(l);
+            let middle = outline.iter().sum::<DVec3>() / outline.len() as f64;
+            for part in l.parts {
+                // Half a micrometer off the outline: a polygon may lie in its plane beside it.
+                let to = middle.lerp(space.middles[part as usize], 1e-6);
+                prop_assert!(is_free(&walls, space.middles[part as usize], to), "{l:?}");
+            }
+        }
+        let mut volumes = vec![0.0; space.delaunay.n_finite];
+        for (part, &t) in space.tetrahedron_of_part.iter().enumerate() {
+            volumes[t as usize] += space.volumes[part];
+        }
+        for (t, &volume) in volumes.iter().enumerate() {
+            let [a, b, c, d] = space.delaunay.corners(t as u32);
+            let whole = (a - d).cross(b - d).dot(c - d).abs() / 6.0;
+            // Corners within the tolerance of a plane stay with both parts.
+            prop_assert!((volume - whole).abs() < 1e-6, "{volume} of {whole}");
+        }
+        for (p, q) in lines {
+            // Wide enough to be no crack: free lines all around.
+            let around = [DVec3::ZERO, DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
+            if around.iter().all(|&d| is_free(&walls, p + d * 0.02, q + d * 0.02)) {
+                let [from, to] = [p, q].map(|x| regions_at(&space, &region, &walls, x));
+                prop_assert!(from.iter().any(|r| to.contains(r)), "{p} {q}: {from:?} {to:?}");
+            }
+        }
+    }
+
+    /// However large the box is about its hole, and however it is turned.
+    #[test]
+    fn a_wall_parts_a_box_just_when_it_has_no_hole(
+        center in prop::array::uniform2(-0.9..0.9_f64),
+        size in prop::option::of(0.002..0.08_f64),
+        turn in point(),
+        scale in 0.1..100.0_f64,
+    ) {
+        let s = size.unwrap_or(0.0);
+        let turned = DMat4::from_axis_angle(turn.normalize_or(DVec3::X), turn.length());
+        let place = |p: DVec3| turned.transform_point3(p) * scale;
+        let walls: Vec<Triangle> = parted_box(center.map(|x| x - s), center.map(|x| x + s))
+            .into_iter()
+            .map(|t| t.map(place))
+            .collect();
+        // A hole is a crack when it is less than a sixtieth of what was asked for.
+        let space = divided(&walls, scale * 0.2);
+        let region = regions(&space);
+        let [left, right] = [-0.5, 0.5].map(|x| place(DVec3::new(x, 0.013, 0.027)));
+        let [a, b] = [left, right].map(|p| regions_at(&space, &region, &walls, p));
+        prop_assert_eq!(a.iter().any(|r| b.contains(r)), size.is_some());
+    }
+}
