@@ -61,6 +61,9 @@ struct Pair {
     both: f64,
 }
 
+/// Whether the outdoors is one of the two, what their merge adds, what drawing both costs.
+type Key = (bool, f64, f64);
+
 impl Merger {
     fn new(graph: CostGraph, sees: Vec<Vec<u64>>) -> Self {
         let n_eyes = 64 * sees.first().map_or(0, Vec::len);
@@ -99,7 +102,7 @@ impl Merger {
 
     /// The pair that adds least, of each portal or as a whole; of those, the cheapest.
     fn best(&mut self, by_portal: bool, max_cost: f64) -> Option<(u32, u32)> {
-        let mut best: Option<((bool, f64, f64), (u32, u32))> = None;
+        let mut best: Option<(Key, (u32, u32))> = None;
         for (&(a, b), pair) in &mut self.pairs {
             if pair.added.is_nan() {
                 pair.both = self.graph.cost_of_both(a, b);
@@ -206,6 +209,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// What a pair scores, and what its merge makes of all cells.
+    type Found = ((Key, [u32; 2]), Vec<u32>);
+
     /// The same by looking at every eye, cell and item anew for each pair.
     fn by_looking(graph: &CostGraph, bounds: &Bounds, sees: &[BTreeSet<usize>]) -> Vec<u32> {
         let n = graph.items.len();
@@ -237,14 +243,17 @@ mod tests {
                 return into;
             }
             let is_aloof = |g: u32| (0..n).any(|c| into[c] == g && graph.aloof[c]);
-            let mut best: Option<((bool, f64, f64, [u32; 2]), Vec<u32>)> = None;
+            let mut best: Option<Found> = None;
             for pair @ [a, b] in between.iter().copied().collect::<BTreeSet<_>>() {
                 let joined: Vec<u32> = into.iter().map(|&g| if g == b { a } else { g }).collect();
                 let both: f64 = cost(&items(&joined, a));
                 let n_same = between.iter().filter(|p| **p == pair).count();
                 let share = if by_portal { n_same } else { 1 } as f64;
                 let more = drawn(&joined) - drawn(&into);
-                let key = (is_aloof(a) || is_aloof(b), more / share, both / share, pair);
+                let key = (
+                    (is_aloof(a) || is_aloof(b), more / share, both / share),
+                    pair,
+                );
                 if both <= bounds.max_cost && best.as_ref().is_none_or(|(k, _)| key < *k) {
                     best = Some((key, joined));
                 }
