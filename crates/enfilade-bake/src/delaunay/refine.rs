@@ -120,7 +120,7 @@ fn wanted_by(
         // What passes a facet is as wide as the facet's own ball where that is a bottleneck: between the
         // middles of both sides.
         let tet = growing.tetrahedron(t);
-        for i in 0..4 {
+        for (i, out) in out.iter_mut().take(4).enumerate() {
             let other = tet.neighbor(i);
             if growing
                 .tetrahedron(other)
@@ -151,7 +151,7 @@ fn wanted_by(
                 && !surfaces.any_hit(mean(c), middle, |_| false)
                 && !surfaces.any_hit(mean(d), middle, |_| false)
             {
-                out[i] = Some(wanted);
+                *out = Some(wanted);
             }
         }
     }
