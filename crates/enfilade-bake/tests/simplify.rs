@@ -44,6 +44,7 @@ fn merged_worlds_keep_their_promises_and_bounds() {
             min_cost: rng.unit() * max,
             max_cost: Some(max),
             max_cells: rng.chance(0.5).then(|| 1 + rng.below(6)),
+            max_portals: rng.chance(0.5).then(|| rng.below(12)),
             metric: if i % 2 == 0 {
                 Metric::ExpectedTriangles
             } else {

@@ -16,6 +16,7 @@ use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 
 use crate::bench_bsp::{bench_bsp, bench_simplify};
 use crate::bench_builders::bench_builders;
+use crate::bench_facade::bench_facade;
 use crate::cameras::walk;
 use crate::see::Answers;
 use crate::walkthrough::{self, Walkthrough};
@@ -70,6 +71,15 @@ enum What {
         rooms: Vec<usize>,
         /// Views of each.
         #[arg(long, default_value_t = 2000)]
+        views: usize,
+    },
+    /// Time of a view of towers with so many windows, portals in groups and one by one.
+    Facade {
+        /// Windows of each tower.
+        #[arg(long, value_delimiter = ',', default_values_t = [64, 1024, 10_000])]
+        windows: Vec<usize>,
+        /// Views from each place.
+        #[arg(long, default_value_t = 500)]
         views: usize,
     },
     /// How much is answered beyond what rays hit, from ordinary eyes indoors.
@@ -140,6 +150,7 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             views,
             rays,
         } => bench_tight(&mut table, scenes, *views, *rays)?,
+        What::Facade { windows, views } => bench_facade(&mut table, windows, *views)?,
         What::Maze {
             world,
             views,
@@ -316,7 +327,7 @@ fn draw_view(
     Ok(None)
 }
 
-fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
     values

@@ -165,21 +165,12 @@ pub(crate) fn bench_simplify(table: &mut Table, worlds: &[PathBuf]) -> anyhow::R
                 ("expected triangles", Metric::ExpectedTriangles),
                 ("visible volume", Metric::VisibleVolume),
             ] {
-                let run = |n: usize| {
-                    let settings = SimplifySettings {
-                        max_cells: Some(n),
-                        metric,
-                        ..SimplifySettings::default()
-                    };
-                    simplify(&world, &settings)
+                let settings = SimplifySettings {
+                    max_portals: Some((share * n_portals as f64) as usize),
+                    metric,
+                    ..SimplifySettings::default()
                 };
-                // Portals grow with cells; a few steps end close below the share.
-                let mut n = (share * world.graph.cells.len() as f64) as usize;
-                let mut simple = run(n);
-                while simple.world.graph.portals.len() as f64 > share * n_portals as f64 && n > 1 {
-                    n = n * 9 / 10;
-                    simple = run(n);
-                }
+                let simple = simplify(&world, &settings);
                 table.push(format!(
                     "| {} | {} | {n_portals} | {metric_name} | {} | {} | {before:.0} | {:.2} × |",
                     name(path),

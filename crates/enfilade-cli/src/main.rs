@@ -7,6 +7,7 @@ mod bake;
 mod bench;
 mod bench_bsp;
 mod bench_builders;
+mod bench_facade;
 mod cameras;
 mod decimate;
 mod demo;

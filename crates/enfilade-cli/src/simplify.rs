@@ -23,6 +23,9 @@ pub(crate) struct Simplify {
     /// Merge until there are no more cells than this, as far as the cost bound allows.
     #[arg(long, value_name = "N")]
     max_cells: Option<usize>,
+    /// Merge until there are no more portals than this, as far as the cost bound allows.
+    #[arg(long, value_name = "N")]
+    max_portals: Option<usize>,
     /// Merge cells that cost less than this, as far as the upper bound allows.
     #[arg(long, value_name = "COST", value_parser = parse_cost)]
     min_cost: Option<f64>,
@@ -70,8 +73,8 @@ fn parse_material(text: &str) -> Result<(String, f64), String> {
 }
 
 pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
-    if args.max_cells.is_none() && args.min_cost.is_none() {
-        bail!("nothing to do: give --max-cells or --min-cost");
+    if args.max_cells.is_none() && args.max_portals.is_none() && args.min_cost.is_none() {
+        bail!("nothing to do: give --max-cells, --max-portals or --min-cost");
     }
     if let (Some(min), Some(max)) = (args.min_cost, args.max_cost)
         && min > max
@@ -84,6 +87,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         min_cost: args.min_cost.unwrap_or(0.0),
         max_cost: args.max_cost,
         max_cells: args.max_cells,
+        max_portals: args.max_portals,
         metric: match args.metric {
             MetricName::ExpectedTriangles => Metric::ExpectedTriangles,
             MetricName::VisibleVolume => Metric::VisibleVolume,

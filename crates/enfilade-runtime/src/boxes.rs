@@ -4,7 +4,7 @@
 //! Algorithms for Bounding Boxes", 2000: only the corner farthest along a plane's normal is looked
 //! at). Errs to "inside".
 
-use glam::{DVec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 use enfilade_geom::Aabb;
 
@@ -279,6 +279,16 @@ impl Planes {
 
     pub(crate) fn as_slice(&self) -> &[Vec4] {
         &self.planes[..self.len]
+    }
+
+    /// Whether a box is outside one of the planes.
+    #[inline]
+    pub(crate) fn leave_out(&self, min: Vec3, max: Vec3) -> bool {
+        self.as_slice().iter().any(|plane| {
+            let n = plane.truncate();
+            let far = Vec3::select(n.cmpge(Vec3::ZERO), max, min);
+            n.dot(far) + plane.w < 0.0
+        })
     }
 
     /// Bit `k` is set where box `k` of four is not outside any plane. Empty boxes are outside.

@@ -137,7 +137,10 @@ fn next_crossing(
     last: u32,
 ) -> Option<(f64, &Exit)> {
     let mut best: Option<(f64, &Exit)> = None;
-    for exit in sight.exits_of(cell) {
+    let (low, high) = (a.min(b), a.max(b));
+    let mut runs = sight.runs_of(cell);
+    let near = || runs.next(|group| group.is_apart_from(low, high));
+    for exit in std::iter::from_fn(near).flatten() {
         let normal = point(exit.normal);
         let center = point(exit.center);
         let (da, db) = (normal.dot(a - center), normal.dot(b - center));
@@ -162,7 +165,9 @@ fn next_crossing(
 /// Whether `p` is so near to a portal between two cells that it may be said to be in either.
 fn is_at_portal(sight: &Sight, p: DVec3, a: CellId, b: CellId) -> bool {
     let near = 4.0 * sight.tolerance();
-    sight.exits_of(a.0).iter().any(|exit| {
+    let mut runs = sight.runs_of(a.0);
+    let near_p = || runs.next(|group| group.is_apart_from(p - near, p + near));
+    std::iter::from_fn(near_p).flatten().any(|exit| {
         exit.to == b.0
             && point(exit.normal).dot(p - point(exit.center)).abs() <= near
             && sight.is_in_outline(exit, p, near)

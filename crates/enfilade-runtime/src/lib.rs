@@ -65,6 +65,7 @@
 
 mod boxes;
 mod chunks;
+mod exits;
 mod follow;
 mod occluder;
 mod region;

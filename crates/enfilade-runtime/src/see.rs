@@ -23,6 +23,7 @@ use enfilade_cpg::{CellId, PortalId};
 use glam::{DVec3, Vec3};
 
 use crate::boxes::{Planes, Root};
+use crate::exits::Group;
 use crate::occluder::Shadows;
 use crate::region::{Clipped, Clipper, Narrowing, Region};
 use crate::seen::{ChunkId, DetailId, Lists, SeeCounts, Seen, Visit};
@@ -300,13 +301,18 @@ impl Asking<'_, '_> {
             let cell = self.viewer.pending[i].cell;
             i += 1;
             let sight = self.sight;
-            for exit in sight.exits_of(cell) {
-                if self.state.lets_through(exit.portal, exit.to)
-                    && self.is_at_portal(exit)
-                    && !self.viewer.pending.iter().any(|p| p.cell == exit.to)
-                {
-                    self.add_portal(exit.portal);
-                    self.push_start(exit.to);
+            let near = 4.0 * sight.tolerance;
+            let (low, high) = (self.view.eye - near, self.view.eye + near);
+            let mut runs = sight.runs_of(cell);
+            while let Some(run) = runs.next(|group| group.is_apart_from(low, high)) {
+                for exit in run {
+                    if self.state.lets_through(exit.portal, exit.to)
+                        && self.is_at_portal(exit)
+                        && !self.viewer.pending.iter().any(|p| p.cell == exit.to)
+                    {
+                        self.add_portal(exit.portal);
+                        self.push_start(exit.to);
+                    }
                 }
             }
         }
@@ -425,9 +431,22 @@ impl Asking<'_, '_> {
         self.add_visit(cell, via, &region, near);
         self.cull(self.sight.cell_roots[cell as usize]);
         let entry_in_clip = entry.map(|(n, h)| (self.face.normals * n, h - 2.0 * sight.tolerance));
-        for exit in sight.exits_of(cell) {
-            self.try_exit(exit, &region, entry, entry_in_clip, near);
+        let mut runs = sight.runs_of(cell);
+        while let Some(run) = runs.next(|group| self.is_skipped(group)) {
+            for exit in run {
+                self.try_exit(exit, &region, entry, entry_in_clip, near);
+            }
         }
+    }
+
+    /// Whether [`Asking::try_exit`] would come to nothing for all exits of a group: the planes are those
+    /// of the visit, to which it clips.
+    #[inline]
+    fn is_skipped(&self, group: &Group) -> bool {
+        let [min, max] = group.bounds();
+        group.faces_away(self.view.eye, self.sight.tolerance)
+            || self.planes.leave_out(min, max)
+            || self.viewer.shadows.hide_box(min, max)
     }
 
     #[inline]

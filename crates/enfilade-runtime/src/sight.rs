@@ -5,6 +5,7 @@ use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
 
 use crate::boxes::{BoxTrees, Boxed, Root};
 use crate::chunks::{Chunk, chunks_of};
+use crate::exits::{Group, Runs, group};
 use crate::occluder::{Occluders, occluders_of};
 use crate::region::{MAX_CORNERS, reduced_around};
 
@@ -52,6 +53,9 @@ pub struct SightOptions {
     pub occluders: usize,
     /// Smallest area of such a polygon. [Units: wu²]
     pub occluder_area: f32,
+    /// Portals of a cell that are skipped together, at most, where it has more than 16. Changes what a
+    /// question costs, not its answer. [Limit: 0 for each by itself]
+    pub portal_group: usize,
 }
 
 impl Default for SightOptions {
@@ -62,6 +66,7 @@ impl Default for SightOptions {
             chunk_triangles: 4,
             occluders: 16,
             occluder_area: 2.0,
+            portal_group: 8,
         }
     }
 }
@@ -97,8 +102,11 @@ pub(crate) struct Detail {
 pub struct Sight {
     pub(crate) locator: Locator,
     /// Exits of cell `c` are `exits[first_exit[c]..first_exit[c + 1]]`.
-    pub(crate) first_exit: Vec<u32>,
-    pub(crate) exits: Vec<Exit>,
+    first_exit: Vec<u32>,
+    exits: Vec<Exit>,
+    /// Groups of the exits of cell `c` are `groups[first_group[c]..first_group[c + 1]]`.
+    first_group: Vec<u32>,
+    groups: Vec<Group>,
     pub(crate) corners: Vec<[f32; 3]>,
     pub(crate) trees: BoxTrees,
     /// By cell: its chunks, then its details (from `chunks.len()` on).
@@ -208,7 +216,14 @@ impl Sight {
         // What a builder may snap and a file may round, of outline and wall each; `enfilade-verify`
         // judges by the same measure.
         let tolerance = (2.0 * (4e-7 * extent).max(2e-5)).max(portals.off_plane);
-        let (first_exit, exits) = portals.by_cell(n_cells);
+        let (first_exit, mut exits) = portals.by_cell(n_cells);
+        let (mut first_group, mut groups) = (vec![0], Vec::new());
+        for c in 0..n_cells {
+            let own = &mut exits[first_exit[c] as usize..first_exit[c + 1] as usize];
+            let size = options.portal_group;
+            group(own, &portals.corners, size, tolerance, &mut groups);
+            first_group.push(groups.len() as u32);
+        }
 
         let mut listed: Vec<Vec<Boxed>> = (0..n_cells).map(|_| Vec::new()).collect();
         let mut unlisted = Vec::new();
@@ -274,6 +289,8 @@ impl Sight {
             locator: world.graph.locator.clone(),
             first_exit,
             exits,
+            first_group,
+            groups,
             corners: portals.corners,
             trees,
             cell_roots,
@@ -346,6 +363,14 @@ impl Sight {
     pub(crate) fn exits_of(&self, cell: u32) -> &[Exit] {
         let c = cell as usize;
         &self.exits[self.first_exit[c] as usize..self.first_exit[c + 1] as usize]
+    }
+
+    /// The same, without those in groups that the caller skips.
+    #[inline]
+    pub(crate) fn runs_of(&self, cell: u32) -> Runs<'_> {
+        let c = cell as usize;
+        let groups = self.first_group[c] as usize..self.first_group[c + 1] as usize;
+        Runs::new(self.exits_of(cell), &self.groups[groups])
     }
 
     /// Whether a point of an exit's plane lies in its outline, or within `near` of each edge's line.

@@ -535,6 +535,55 @@ pub fn courtyard(per_side: usize, one_room: bool) -> World {
     })
 }
 
+/// A tower of `storeys` with `per_side` windows on each side of each: rooms around a core as high as
+/// the tower, with a doorway to it but at corners, or `one_room` all around.
+///
+/// Cell 0 is the core, the last one the outdoors. Both have a portal for most rooms.
+///
+/// # Panics
+///
+/// When `per_side` is below 3 or there is no storey.
+#[must_use]
+pub fn window_tower(per_side: usize, storeys: usize, one_room: bool) -> World {
+    assert!(per_side > 2 && storeys > 0, "a tower has rooms and a core");
+    let n = per_side;
+    let mut label = vec![0; n * storeys * n];
+    let mut next = 1;
+    for (i, l) in label.iter_mut().enumerate() {
+        let (x, z) = (i % n, i / (n * storeys));
+        if x == 0 || z == 0 || x + 1 == n || z + 1 == n {
+            *l = next;
+            next += u32::from(!one_room);
+        }
+    }
+    let outdoors = label.iter().max().map_or(0, |l| l + 1);
+    let steps = |n: usize| (0..=n).map(|i| i as f64 * 3.0).collect::<Vec<_>>();
+    let grid = Grid {
+        size: [n, storeys, n],
+        at: [n, storeys, n].map(steps),
+        label,
+        outdoors: Some(outdoors),
+        turn: DMat3::IDENTITY,
+    };
+    world_of(&grid, &[], &mut |face| {
+        let (up, along) = if face.axis == 0 { (0, 1) } else { (1, 0) };
+        let is_window = face.cells.contains(&Some(outdoors));
+        if face.axis == 1 || !(is_window || face.cells.contains(&Some(0))) {
+            return None;
+        }
+        let mut low = [0.0; 2];
+        let mut high = [0.0; 2];
+        (low[along], high[along]) = (0.3, 0.7);
+        (low[up], high[up]) = if is_window { (0.3, 0.8) } else { (0.0, 0.7) };
+        let kind = if is_window {
+            PortalKind::Window
+        } else {
+            PortalKind::Open
+        };
+        Some((low, high, kind))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -577,5 +626,19 @@ mod tests {
         let ring = courtyard(16, true);
         assert_eq!(ring.validate(), Ok(()));
         assert_eq!((ring.graph.cells.len(), ring.graph.portals.len()), (2, 64));
+    }
+
+    #[test]
+    fn a_tower_has_a_window_for_each_stretch_of_its_facades() {
+        let world = window_tower(4, 4, false);
+        assert_eq!(world.validate(), Ok(()));
+        let is_window = |p: &&Portal| p.kind == PortalKind::Window;
+        assert_eq!(world.graph.portals.iter().filter(is_window).count(), 64);
+        // Twelve rooms a storey; those at corners have two windows and no doorway.
+        assert_eq!(world.graph.cells.len(), 1 + 4 * 12 + 1);
+        assert_eq!(world.graph.cells[0].portals.len(), 4 * 8);
+        let ring = window_tower(4, 4, true);
+        assert_eq!(ring.validate(), Ok(()));
+        assert_eq!((ring.graph.cells.len(), ring.graph.portals.len()), (3, 96));
     }
 }

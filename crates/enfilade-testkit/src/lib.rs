@@ -37,7 +37,7 @@ mod truth_json;
 pub use cave::cave;
 pub use clinic::clinic;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
-pub use graphs::{GridParams, courtyard, room_grid};
+pub use graphs::{GridParams, courtyard, room_grid, window_tower};
 pub use house::furnished_house;
 pub use maze::dirkse_maze;
 pub use rng::Rng;

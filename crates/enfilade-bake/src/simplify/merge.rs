@@ -4,7 +4,7 @@
 //! pairs of cells only by what the metric says of them.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// A graph as the simplifier sees it.
 #[derive(Clone, Debug, Default)]
@@ -22,9 +22,11 @@ pub(super) struct CostGraph {
 /// What is asked of the result.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
+    /// Of [`CostGraph::shares`]; the upper one is of all items.
     pub(super) min_cost: f64,
     pub(super) max_cost: f64,
     pub(super) max_cells: usize,
+    pub(super) max_portals: usize,
 }
 
 /// How good the portals between two cells are. Higher is worse: removed first.
@@ -40,13 +42,56 @@ impl CostGraph {
         self.sum(self.items[cell as usize].iter().copied())
     }
 
-    fn cost_of_both(&self, a: u32, b: u32) -> f64 {
+    /// What each cell has of the whole: an item that reaches through several cells counts in each in part,
+    /// as in the paper, where polygons are cut to pieces that lie in one cell each.
+    ///
+    /// What all cells of a room see alike is hidden by none of their portals, and is no reason to keep
+    /// them.
+    pub(super) fn shares(&self) -> Vec<f64> {
+        let mut n_cells = vec![0_u32; self.weights.len()];
+        for &i in self.items.iter().flatten() {
+            n_cells[i as usize] += 1;
+        }
+        let share = |&i: &u32| self.weights[i as usize] / f64::from(n_cells[i as usize]);
+        // The sum of nothing is -0, whose bits compare as the greatest; adding 0 makes it 0.
+        (self.items.iter())
+            .map(|items| items.iter().map(share).sum::<f64>() + 0.0)
+            .collect()
+    }
+
+    pub(super) fn cost_of_both(&self, a: u32, b: u32) -> f64 {
         self.sum(union(&self.items[a as usize], &self.items[b as usize]))
     }
 
+    /// The items of both cells, ascending.
+    pub(super) fn union(&self, a: u32, b: u32) -> Vec<u32> {
+        union(&self.items[a as usize], &self.items[b as usize]).collect()
+    }
+
+    /// The same graph with cells as parts of others; those that are gone have no items.
+    pub(super) fn contracted(&self, into: &[u32]) -> Self {
+        let mut items = vec![Vec::new(); self.items.len()];
+        let mut aloof = vec![false; self.items.len()];
+        for (c, &host) in into.iter().enumerate() {
+            items[host as usize].extend_from_slice(&self.items[c]);
+            aloof[host as usize] |= self.aloof[c];
+        }
+        for list in &mut items {
+            list.sort_unstable();
+            list.dedup();
+        }
+        Self {
+            weights: self.weights.clone(),
+            items,
+            pairs: (self.pairs.iter())
+                .map(|pair| pair.map(|c| into[c as usize]))
+                .collect(),
+            aloof,
+        }
+    }
+
     fn sum(&self, items: impl Iterator<Item = u32>) -> f64 {
-        // The sum of nothing is -0, whose bits compare as the greatest; adding 0 makes it 0.
-        items.map(|i| self.weights[i as usize]).sum::<f64>() + 0.0
+        items.map(|i| self.weights[i as usize]).sum()
     }
 }
 
@@ -73,29 +118,33 @@ fn union<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = u32> + 'a {
 pub(super) fn merge(mut graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness) -> Vec<u32> {
     let n = graph.items.len();
     let mut into: Vec<u32> = (0..n as u32).collect();
-    let mut neighbors: Vec<BTreeSet<u32>> = vec![BTreeSet::new(); n];
+    // How many portals lead from one cell to another.
+    let mut neighbors: Vec<BTreeMap<u32, usize>> = vec![BTreeMap::new(); n];
+    let mut n_portals = 0;
     for &[a, b] in &graph.pairs {
         if a != b {
-            neighbors[a as usize].insert(b);
-            neighbors[b as usize].insert(a);
+            *neighbors[a as usize].entry(b).or_default() += 1;
+            *neighbors[b as usize].entry(a).or_default() += 1;
+            n_portals += 1;
         }
     }
-    let mut costs: Vec<f64> = (0..n as u32).map(|c| graph.cost(c)).collect();
+    let mut shares = graph.shares();
     let mut n_alive = n;
-    // Costs are not negative, so their bits compare like the numbers.
+    // They are not negative, so their bits compare like the numbers.
     let mut queue: BinaryHeap<Reverse<(u64, u32)>> = (0..n as u32)
-        .map(|c| Reverse((costs[c as usize].to_bits(), c)))
+        .map(|c| Reverse((shares[c as usize].to_bits(), c)))
         .collect();
     while let Some(Reverse((bits, cell))) = queue.pop() {
-        let is_current = into[cell as usize] == cell && costs[cell as usize].to_bits() == bits;
+        let is_current = into[cell as usize] == cell && shares[cell as usize].to_bits() == bits;
         if !is_current {
             continue;
         }
-        if n_alive <= bounds.max_cells && costs[cell as usize] >= bounds.min_cost {
+        let is_few = n_alive <= bounds.max_cells && n_portals <= bounds.max_portals;
+        if is_few && shares[cell as usize] >= bounds.min_cost {
             break;
         }
-        let mut best: Option<((bool, f64), u32, f64)> = None;
-        for &other in &neighbors[cell as usize] {
+        let mut best: Option<((bool, f64), u32)> = None;
+        for &other in neighbors[cell as usize].keys() {
             let both = graph.cost_of_both(cell, other);
             if both > bounds.max_cost {
                 continue;
@@ -106,32 +155,32 @@ pub(super) fn merge(mut graph: CostGraph, bounds: &Bounds, badness: &mut dyn Bad
                 .as_ref()
                 .is_none_or(|(k, ..)| key.0.cmp(&k.0).then(key.1.total_cmp(&k.1)).is_gt());
             if is_worse {
-                best = Some((key, other, both));
+                best = Some((key, other));
             }
         }
         // One that fits nowhere never will: its neighbors only grow.
-        let Some((_, other, both)) = best else {
+        let Some((_, other)) = best else {
             continue;
         };
         let (kept, gone) = (cell.min(other), cell.max(other));
         into[gone as usize] = kept;
-        let items: Vec<u32> =
-            union(&graph.items[kept as usize], &graph.items[gone as usize]).collect();
+        let items = graph.union(kept, gone);
         graph.items[kept as usize] = items;
         graph.items[gone as usize] = Vec::new();
         graph.aloof[kept as usize] |= graph.aloof[gone as usize];
-        costs[kept as usize] = both;
-        for next in std::mem::take(&mut neighbors[gone as usize]) {
+        shares[kept as usize] += shares[gone as usize];
+        for (next, n) in std::mem::take(&mut neighbors[gone as usize]) {
             neighbors[next as usize].remove(&gone);
-            if next != kept {
-                neighbors[next as usize].insert(kept);
-                neighbors[kept as usize].insert(next);
+            if next == kept {
+                n_portals -= n;
+            } else {
+                *neighbors[next as usize].entry(kept).or_default() += n;
+                *neighbors[kept as usize].entry(next).or_default() += n;
             }
         }
-        neighbors[kept as usize].remove(&gone);
         badness.merged(kept, gone);
         n_alive -= 1;
-        queue.push(Reverse((both.to_bits(), kept)));
+        queue.push(Reverse((shares[kept as usize].to_bits(), kept)));
     }
     for c in 0..n {
         // A cell's host has a lesser number, so it is settled already.
@@ -202,11 +251,15 @@ impl Badness for Eyes {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use std::collections::BTreeSet;
+
+    use super::super::views;
     use super::*;
     use proptest::prelude::*;
 
-    fn graphs() -> impl Strategy<Value = CostGraph> {
+    /// Cells of whole weights, some far from connected.
+    pub(in super::super) fn graphs() -> impl Strategy<Value = CostGraph> {
         (1_usize..24, 1_usize..40).prop_flat_map(|(n_cells, n_items)| {
             let cell = 0..n_cells as u32;
             (
@@ -248,14 +301,16 @@ mod tests {
         #[test]
         fn bounds_are_kept_and_groups_are_connected(
             graph in graphs(), min in 0_u32..200, extra in 0_u32..300, max_cells in 1_usize..30,
+            max_portals in 0_usize..60,
             by_eyes in any::<bool>(), seed in any::<u64>(),
         ) {
-            let bounds = Bounds { min_cost: min.into(), max_cost: f64::from(min + extra), max_cells };
+            let max_cost = f64::from(min + extra);
+            let bounds = Bounds { min_cost: min.into(), max_cost, max_cells, max_portals };
             let n = graph.items.len();
             let mut state = seed;
             let mut bits = || { state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1); state };
             let into = if by_eyes {
-                merge(graph.clone(), &bounds, &mut Eyes((0..n).map(|_| vec![bits(), bits()]).collect()))
+                views::merge(&graph, &bounds, Eyes((0..n).map(|_| vec![bits(), bits()]).collect()))
             } else {
                 let scores = graph.pairs.iter().map(|&[a, b]| (PairScores::key(a, b), (bits() >> 40) as f64));
                 merge(graph.clone(), &bounds, &mut PairScores(scores.collect()))
@@ -281,11 +336,23 @@ mod tests {
                 prop_assert!(seen.contains(&into[c]));
             }
             // The lower bound is missed, or the number, only where nothing more fits.
-            let wants_more = groups.len() > bounds.max_cells;
+            let n_left = graph.pairs.iter().filter(|p| into[p[0] as usize] != into[p[1] as usize]).count();
+            let wants_more = groups.len() > bounds.max_cells || n_left > bounds.max_portals;
+            let share = |g: u32| -> f64 {
+                let n_of = |i: &u32, is_in: &dyn Fn(usize) -> bool| {
+                    (0..n).filter(|&c| is_in(c) && graph.items[c].contains(i)).count() as f64
+                };
+                let part = |i: u32| n_of(&i, &|c| into[c] == g) / n_of(&i, &|_| true).max(1.0);
+                let whole: f64 = (0..graph.weights.len())
+                    .map(|i| graph.weights[i] * part(i as u32))
+                    .sum();
+                // Sums of thirds may miss the whole number that they are.
+                whole + 1e-9
+            };
             for &[a, b] in &graph.pairs {
                 let (ga, gb) = (into[a as usize], into[b as usize]);
                 if ga == gb { continue; }
-                let is_small = groups[&ga].0 < bounds.min_cost || groups[&gb].0 < bounds.min_cost;
+                let is_small = share(ga) < bounds.min_cost || share(gb) < bounds.min_cost;
                 if wants_more || is_small {
                     let items: BTreeSet<u32> = (0..n)
                         .filter(|&c| into[c] == ga || into[c] == gb)

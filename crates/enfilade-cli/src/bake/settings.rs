@@ -266,6 +266,7 @@ struct BspTable {
     min_cost: Option<Amount>,
     max_cost: Option<Amount>,
     max_cells: Option<usize>,
+    max_portals: Option<usize>,
     triangle_cost: Option<Amount>,
     area_cost: Option<Amount>,
     material_costs: std::collections::BTreeMap<String, Amount>,
@@ -329,6 +330,7 @@ fn resolve_bsp(
             .map(f64::from)
             .or(table.max_cost.map(|v| v.0)),
         max_cells: table.max_cells,
+        max_portals: table.max_portals,
         cost: CostModel {
             triangle: table.triangle_cost.map_or(1.0, |v| v.0),
             area: table.area_cost.map_or(0.0, |v| v.0),
