@@ -447,7 +447,7 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
     let graph = there_and_back();
     let vis = see(&graph, &with_evidence());
     assert!(!sees(&vis, 0, 2) && sees(&vis, 0, 1) && sees(&vis, 1, 2));
-    assert!(vis.undecided.iter().all(|set| set.len() == 0));
+    assert!(vis.undecided.iter().all(enfilade_cpg::CellSet::is_empty));
     let bytes = vis.evidence.unwrap();
     let report = verify_evidence(&graph, &bytes, None).unwrap();
     let mut body = Vec::new();
