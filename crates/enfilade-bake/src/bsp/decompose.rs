@@ -115,6 +115,14 @@ pub fn bake_bsp(
         let matter = Soup::of(&stairs, &[]);
         votes.0.retain(|v| !matter.is_inside(v.point));
     }
+    if by_shape {
+        // What leaks from them into a room is part of that room; the complex sees to it.
+        let is_narrow = rooms::narrow_cells(&bsp, &parted, &config.merge);
+        votes.0.retain(|v| {
+            let cell = v.label.checked_sub(OUTDOORS + 1);
+            !cell.is_some_and(|c| is_narrow[c as usize])
+        });
+    }
     let n_before = parted.n_cells;
     let n_separators = parted.separators.len();
     if let Some(bound) = config.simplify.max_cost {

@@ -22,7 +22,7 @@ use super::Bsp;
 use super::cells::{self, Cells, NO_CELL};
 use super::lattice::{Lattice, NONE};
 use super::separator::{self, Separator};
-use super::shape::Shape;
+use super::shape::{self, Shape};
 
 /// A door leaf this near to a separator's plane closes it. [Units: wu]
 const CLOSURE_REACH: f64 = 0.25;
@@ -161,6 +161,36 @@ pub(super) fn part(
         n_crossing: 0,
         n_useless: 0,
     }
+}
+
+/// Directions along which cells are measured at most: walls of most buildings have two, and the height.
+const MAX_DIRECTIONS: usize = 16;
+
+/// Which cells are too narrow for a ball of the least radius of a room: layers of floors and roofs, the
+/// insides of walls. The watershed has no region there either (`watershed/hollow.rs`).
+///
+/// Measured across the planes of the tree, those of the largest portals, so that it does not matter how the building is
+/// turned. Errs to a room: a cell is narrow only where it is so between two planes as a whole.
+pub(super) fn narrow_cells(bsp: &Bsp, cells: &Cells, settings: &MergeSettings) -> Vec<bool> {
+    let mut by_area: Vec<(f64, DVec3)> = vec![(f64::INFINITY, DVec3::Y)];
+    for portal in &bsp.portals {
+        let normal = bsp.tree.planes[portal.plane as usize].normal;
+        let area = poly::area(&portal.points);
+        let same = by_area
+            .iter_mut()
+            .find(|(_, n)| n.dot(normal).abs() > 0.9999);
+        match same {
+            Some(known) => known.0 += area,
+            None => by_area.push((area, normal)),
+        }
+    }
+    by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
+    by_area.truncate(MAX_DIRECTIONS);
+    let directions: Vec<DVec3> = by_area.into_iter().map(|d| d.1).collect();
+    let (tree, tolerance) = (&bsp.tree, &bsp.tolerance);
+    let widths = shape::widths(tree, tolerance, &cells.of_leaf, cells.n_cells, &directions);
+    let least = 2.0 * settings.min_radius;
+    widths.into_iter().map(|width| width < least).collect()
 }
 
 /// The share of each portal that a door leaf or a pane fills.

@@ -383,6 +383,31 @@ fn a_building_of_overlapping_walls_has_a_cell_a_room_however_it_is_turned() {
 }
 
 #[test]
+fn the_hollow_behind_a_lining_is_no_room_but_a_deeper_closet_is() {
+    for (depth, n) in [(0.4, 2), (0.7, 3)] {
+        for turn in [0.0, 0.3_f64] {
+            let mut solids = row(2);
+            // A panel of 5 cm before a wall, with a hatch of half a meter.
+            let (a, b) = (4.0 - depth - 0.05, 4.0 - depth);
+            solids.push(boxed([0.0, 0.0, a], [3.4, 3.0, b]));
+            solids.push(boxed([3.9, 0.0, a], [4.0, 3.0, b]));
+            solids.push(boxed([3.4, 0.0, a], [3.9, 0.2, b]));
+            solids.push(boxed([3.4, 0.7, a], [3.9, 3.0, b]));
+            let mut scene = scene_of(&solids, &[]);
+            scene.solids.clear();
+            scene.objects[0].transform = DMat4::from_rotation_y(turn);
+            let g = baked(&scene, &BspConfig::default()).graph;
+            let rooms = g.cells.iter().filter(|c| !c.outdoor);
+            let volumes: Vec<f32> = rooms.map(|c| c.volume).collect();
+            assert_eq!(volumes.len(), n, "{depth} {turn}: {volumes:?}");
+            // The hollow is air all the same, and part of the room that it leaks into.
+            let sum: f32 = volumes.iter().sum();
+            assert!((95.0..97.5).contains(&sum), "{depth} {turn}: {volumes:?}");
+        }
+    }
+}
+
+#[test]
 fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
     // Guides along the jambs and the lintel leave no cut in the planes of the walls.
     let guide = Guide {
