@@ -396,7 +396,7 @@ fn a_thousand_tampered_files_are_rejected() {
             _ => {
                 // A symbol that no trace has.
                 let at = body.len() - 1 - rng.below(n_trace);
-                bad[at] = 8 + rng.below(240) as u8;
+                bad[at] = 9 + rng.below(240) as u8;
             }
         }
         let packed = pack(&bad);
@@ -409,4 +409,80 @@ fn a_thousand_tampered_files_are_rejected() {
     let mut other = graph.clone();
     other.portals[0].winding[0].y += 1e-3;
     assert!(verify_evidence(&other, &bytes, None).is_err());
+}
+
+/// Two openings of one cell in one slanting plane, but for the rounding of their corners, crossed there and back.
+fn there_and_back() -> SightGraph {
+    let there = [
+        [-48.60913705583784, 1344.7715736040611, 120.0],
+        [-48.0, 1345.2631578947373, 120.0],
+        [-48.0, 1345.2631578947373, 214.0],
+        [-48.60913705583784, 1344.7715736040611, 214.0],
+    ];
+    let back = [
+        [-79.30434782608745, 1320.0, 214.0],
+        [-79.30434782608744, 1320.0, 120.0],
+        [-77.90973408148353, 1321.125477758803, 120.0],
+        [-77.90973408148346, 1321.1254777588033, 214.0],
+    ];
+    let across = DVec3::new(-0.628_019, 0.778_198, 0.0);
+    let portal = |corners: [[f64; 3]; 4], from: u32, to: u32, ahead: DVec3| {
+        let winding = corners.map(DVec3::from_array).to_vec();
+        let normal = (winding[1] - winding[0]).cross(winding[2] - winding[0]);
+        let is_ahead = normal.dot(ahead) > 0.0;
+        SightPortal {
+            cells: if is_ahead { [from, to] } else { [to, from] },
+            winding,
+            pieces: Vec::new(),
+        }
+    };
+    SightGraph {
+        n_cells: 3,
+        portals: vec![portal(there, 0, 1, across), portal(back, 1, 2, -across)],
+    }
+}
+
+#[test]
+fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
+    let graph = there_and_back();
+    let vis = see(&graph, &with_evidence());
+    assert!(!sees(&vis, 0, 2) && sees(&vis, 0, 1) && sees(&vis, 1, 2));
+    assert!(vis.undecided.iter().all(enfilade_cpg::CellSet::is_empty));
+    let bytes = vis.evidence.unwrap();
+    let report = verify_evidence(&graph, &bytes, None).unwrap();
+    let mut body = Vec::new();
+    flate2::read::ZlibDecoder::new(&bytes[24..])
+        .read_to_end(&mut body)
+        .unwrap();
+    // A step, an exit skipped or not, then how many rows, and which with what weight.
+    let trace = &body[body.len() - report.n_trace as usize..];
+    let first = trace.iter().position(|&b| b == 8).expect("weights");
+    let n = usize::from(trace[first + 1]);
+    assert!((2..=7).contains(&n), "{n}");
+    let start = body.len() - trace.len() + first + 2;
+    for i in 0..n {
+        let row = start + 10 * i;
+        // Another row, one that is not there, and another weight: a little more, none, less than none, no number.
+        for (at, bytes) in [
+            (row, vec![body[row] ^ 1]),
+            (row, vec![0xff, 0xff]),
+            (row + 2, 0.123_f64.to_le_bytes().to_vec()),
+            (row + 2, 0.0_f64.to_le_bytes().to_vec()),
+            (row + 2, (-0.5_f64).to_le_bytes().to_vec()),
+            (row + 2, f64::NAN.to_le_bytes().to_vec()),
+        ] {
+            let mut bad = body.clone();
+            bad[at..at + bytes.len()].copy_from_slice(&bytes);
+            assert!(
+                verify_evidence(&graph, &pack(&bad), None).is_err(),
+                "{i}: {bytes:?}"
+            );
+        }
+    }
+    // All weights zero balance as well.
+    let mut bad = body.clone();
+    for i in 0..n {
+        bad[start + 10 * i + 2..start + 10 * i + 10].fill(0);
+    }
+    assert!(verify_evidence(&graph, &pack(&bad), None).is_err());
 }

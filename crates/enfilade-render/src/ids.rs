@@ -5,7 +5,7 @@
 
 use crate::camera::Projection;
 use crate::gpu::{Gpu, RenderError};
-use crate::list::{DrawList, Run};
+use crate::list::DrawList;
 use crate::pipelines::ID;
 use crate::renderer::{
     Renderer, Stage, Style, bound, color_attachment, depth_attachment, read_texture, texture,
@@ -47,11 +47,8 @@ pub struct IdPicture {
 pub struct Difference {
     /// Pixels, all of them.
     pub n_pixels: u64,
-    /// Pixels where something else is shown, at another depth.
+    /// Pixels where something else is shown.
     pub lost: Vec<LostPixel>,
-    /// Pixels where another triangle is shown at the very same depth: two triangles in one place, of
-    /// which the first drawn is shown.
-    pub n_tied: u64,
 }
 
 /// A pixel that shows something else.
@@ -92,25 +89,20 @@ impl IdPicture {
             if a.0 == b.0 {
                 continue;
             }
-            // The same adapter computes both depths from the same numbers: where they are equal,
-            // neither triangle is before the other.
-            if a.1 == b.1 && a.0 != Shown::Sky && b.0 != Shown::Sky {
-                out.n_tied += 1;
-            } else {
-                let i = i as u32;
-                out.lost.push(LostPixel {
-                    at: [i % self.width, i / self.width],
-                    expected: *a,
-                    found: *b,
-                });
-            }
+            let i = i as u32;
+            out.lost.push(LostPixel {
+                at: [i % self.width, i / self.width],
+                expected: *a,
+                found: *b,
+            });
         }
         out
     }
 }
 
 impl Renderer {
-    /// Draws the two pictures of numbers of a list: what hides, and the nearest that does not.
+    /// Draws the two pictures of numbers of a list: what hides, and the nearest that does not. Of two triangles in
+    /// one place, the one listed first is shown.
     ///
     /// # Errors
     ///
@@ -158,7 +150,7 @@ impl Renderer {
                 pass.set_pipeline(&self.pipelines.id);
                 pass.set_bind_group(0, &group, &[]);
                 pass.set_vertex_buffer(0, self.instances.buffer.slice(..));
-                for run in ordered(runs) {
+                for run in runs {
                     let [x, y, w, h] = run.scissor.unwrap_or([0, 0, size[0], size[1]]);
                     pass.set_scissor_rect(x, y, w, h);
                     pass.draw(run.first..run.first + run.n, run.instances.clone());
@@ -169,14 +161,6 @@ impl Renderer {
         let [a, b] = &layers;
         Ok([read_ids(gpu, a, size)?, read_ids(gpu, b, size)?])
     }
-}
-
-/// In the order of the world, so that two lists draw what they share in the same order: of two triangles
-/// in one place, the first one drawn is shown.
-fn ordered(runs: &[Run]) -> Vec<&Run> {
-    let mut out: Vec<&Run> = runs.iter().collect();
-    out.sort_by_key(|r| r.first);
-    out
 }
 
 fn read_ids(gpu: &Gpu, texture: &wgpu::Texture, size: [u32; 2]) -> Result<IdPicture, RenderError> {

@@ -106,6 +106,12 @@ impl DrawList {
         self.n_triangles += other.n_triangles;
     }
 
+    /// Puts draws in the order of the world, so that two lists draw what they share in the same order.
+    pub(crate) fn sort(&mut self) {
+        self.opaque.sort_by_key(|r| r.first);
+        self.transparent.sort_by_key(|r| r.first);
+    }
+
     /// Nothing yet, with structure to be drawn as its only instance.
     pub(crate) fn of_structure() -> Self {
         Self {

@@ -234,16 +234,48 @@ impl Studio {
         size: [u32; 2],
     ) -> Result<[IdPicture; 2], RenderError> {
         let aspect = size[0] as f32 / size[1] as f32;
-        let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
-        let list = self.list(&view, camera.eye, culling, size).clone();
-        self.renderer.ids(
-            &self.gpu,
-            &self.world,
-            &self.stage,
-            &projection,
-            &list,
-            size,
-        )
+        let mut list = self
+            .list(&camera.view(aspect)?, camera.eye, culling, size)
+            .clone();
+        list.sort();
+        self.ids_of(camera, &list, size)
+    }
+
+    /// Such pictures of everything, and of what portals leave. What they leave is drawn first in both, so that of
+    /// two triangles in one place both show the same.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::picture`].
+    pub fn ids_compared(
+        &mut self,
+        camera: &Camera,
+        size: [u32; 2],
+    ) -> Result<[[IdPicture; 2]; 2], RenderError> {
+        let view = camera.view(size[0] as f32 / size[1] as f32)?;
+        let mut culled = self.list(&view, camera.eye, Culling::Portals, size).clone();
+        culled.sort();
+        let mut all = self
+            .list(&view, camera.eye, Culling::Everything, size)
+            .clone();
+        all.sort();
+        let mut whole = culled.clone();
+        whole.append(&all);
+        Ok([
+            self.ids_of(camera, &whole, size)?,
+            self.ids_of(camera, &culled, size)?,
+        ])
+    }
+
+    fn ids_of(
+        &mut self,
+        camera: &Camera,
+        list: &DrawList,
+        size: [u32; 2],
+    ) -> Result<[IdPicture; 2], RenderError> {
+        let projection = camera.projection(size[0] as f32 / size[1] as f32)?;
+        self.renderer
+            .ids(&self.gpu, &self.world, &self.stage, &projection, list, size)
     }
 
     /// Chunks and details colored by why they are drawn, for pictures that explain what is culled.

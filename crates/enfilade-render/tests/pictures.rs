@@ -48,8 +48,7 @@ fn n_lost(studio: &mut Studio, world: &World, views: usize, seed: u64) -> [usize
     let mut n = [0; 2];
     for _ in 0..views {
         let camera = camera(&mut rng, world);
-        let whole = studio.ids(&camera, Culling::Everything, SIZE).unwrap();
-        let culled = studio.ids(&camera, Culling::Portals, SIZE).unwrap();
+        let [whole, culled] = studio.ids_compared(&camera, SIZE).unwrap();
         for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
             for l in a.difference(b).lost {
                 let drawn = f64::from(Camera::distance_of(l.found.1));
@@ -292,8 +291,7 @@ fn eyes_outside_and_in_walls_see_all_that_a_picture_without_culling_shows() {
     let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
     for out in [0.5, 3.0, 40.0] {
         let camera = Camera::looking_at([high[0] + out, center[1], high[2] + out], center);
-        let whole = studio.ids(&camera, Culling::Everything, SIZE).unwrap();
-        let culled = studio.ids(&camera, Culling::Portals, SIZE).unwrap();
+        let [whole, culled] = studio.ids_compared(&camera, SIZE).unwrap();
         assert_eq!(whole[0].difference(&culled[0]).lost, []);
         assert!(whole[0].pixels.iter().any(|p| p.0 != Shown::Sky));
     }

@@ -12,7 +12,7 @@ use super::flow::Shared;
 use super::search::Search;
 use super::{VisConfig, VisError, checkpoint, prove};
 
-const MAGIC: &[u8; 8] = b"ENFEVID3";
+const MAGIC: &[u8; 8] = b"ENFEVID4";
 
 /// Writes down what a search found and why.
 pub(super) fn encode(

@@ -1,6 +1,6 @@
 //! The search from one opening: a walk over all chains of portals that a line might pass.
 //!
-//! After Dirkse, section 7.4, and the level-4 flow of the Quake tools, with three departures that make it
+//! After Dirkse, section 7.4, and the level-4 flow of the Quake tools, with four departures that make it
 //! fast and exact:
 //!
 //! - *Lines first.* Where a line passes a chain, everything on it is proved visible and needs no search; a
@@ -10,6 +10,8 @@
 //!   the opposite question, and an opening that cannot be reached is not even clipped.
 //! - *Splitting.* Where planes leave a chain open and no line passes, the source is halved and each half
 //!   asked again: the smaller the source, the nearer planes come to the truth.
+//! - *The rest in Plücker coordinates* (`stabbing`): chains that only lines along an edge or a plane would pass
+//!   are not closed by any number of halves.
 //!
 //! Errs to visible: a chain that neither a plane nor a line settles counts as seen.
 
@@ -20,10 +22,14 @@ use super::bits::{self, BitTable};
 use super::clip::{Arena, HalfSpace, Poly, Tolerance};
 use super::dirs::{Dirs, Next};
 use super::planes::{Facing, Four, Side, admits, hide, separators};
-use super::rays::{self, Blocker, Line};
+use super::rays::{self, Blocker, Line, MIN_SINE};
+use super::stabbing::{self, Answer, Gate};
 
 /// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
 const MAX_CHAIN: usize = 512;
+
+/// How often the ends of a line that was guessed are moved.
+const MAX_TURNS: usize = 8;
 
 /// What stays the same during a round.
 pub(super) struct Shared<'a> {
@@ -245,6 +251,9 @@ impl Flow {
                 let mut pieces = shared.max_pieces;
                 answer = self.settle(shared, source, &mut pieces);
             }
+            if answer == Stab::Unknown {
+                answer = self.stab_at_all(shared, source);
+            }
             match answer {
                 Stab::None => return,
                 Stab::Line(from, to) => self.shoot(shared, from, to),
@@ -299,6 +308,49 @@ impl Flow {
             }
         }
         answer
+    }
+
+    /// The last resort: whether any line passes the chain, whatever planes leave of it.
+    fn stab_at_all(&mut self, shared: &Shared<'_>, source: Poly) -> Stab {
+        let (origin, direction) = match self.stabbed(shared) {
+            Answer::Closed(_) => return Stab::None,
+            Answer::Unknown => return Stab::Unknown,
+            Answer::Guess(origin, direction) => (origin, direction),
+        };
+        let dirs = shared.dirs;
+        let last = self.chain[self.chain.len() - 1];
+        let at = |dir: u32| origin + direction * dirs.crossing(dir as usize, origin, direction);
+        let (mut from, mut to) = (at(source.dir), at(last.dir));
+        let mark = self.arena.mark();
+        // Each end by turns moves to the middle of what is seen from the other.
+        for _ in 0..MAX_TURNS {
+            if self.passes(shared, from, to) {
+                return Stab::Line(from, to);
+            }
+            let target = self.seen_from(shared, from, last);
+            to = target.map_or(to, |target| self.arena.mean(target));
+            self.arena.release(mark);
+            if self.passes(shared, from, to) {
+                return Stab::Line(from, to);
+            }
+            let start = self.seen_from(shared, to, source);
+            from = start.map_or(from, |start| self.arena.mean(start));
+            self.arena.release(mark);
+        }
+        Stab::Unknown
+    }
+
+    pub(super) fn stabbed(&self, shared: &Shared<'_>) -> Answer {
+        let dirs = shared.dirs;
+        let gate = |poly: &Poly| {
+            let dir = &dirs.all[poly.dir as usize];
+            Gate {
+                winding: dirs.winding(poly.dir as usize),
+                turn: dir.turn,
+                normal: dir.normal,
+            }
+        };
+        stabbing::stabbed(&self.chain.iter().map(gate).collect::<Vec<_>>())
     }
 
     /// The source in two, across its longest side; `None` where it is too small to split.
@@ -536,31 +588,21 @@ impl Flow {
         let dirs = shared.dirs;
         let margin = shared.tolerance.rounding * 16.0;
         let direction = to - from;
+        let least = MIN_SINE * direction.length();
         // The ends too: a clip keeps a hair more than the opening.
         self.chain.iter().all(|poly| {
             let dir = &dirs.all[poly.dir as usize];
             let speed = dir.normal.dot(direction);
             let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(from)) / speed;
-            speed > 0.0 && dirs.is_inside(poly.dir as usize, from + direction * t, margin)
+            speed > least && dirs.is_inside(poly.dir as usize, from + direction * t, margin)
         })
     }
 
     /// The lines from one point through the chain meet its end in a polygon: one into its middle.
-    fn stab_from(&mut self, shared: &Shared<'_>, from: DVec3, mut target: Poly) -> Stab {
-        let dirs = shared.dirs;
-        for k in 1..self.chain.len() - 1 {
-            let pass = self.chain[k].dir as usize;
-            for i in 0..dirs.winding(pass).len() {
-                let Some(plane) = edge_plane(dirs, pass, i, from) else {
-                    continue;
-                };
-                let turn = dirs.all[target.dir as usize].turn;
-                match self.arena.clip(target, plane, turn, &shared.tolerance) {
-                    Some(rest) => target = rest,
-                    None => return Stab::Unknown,
-                }
-            }
-        }
+    fn stab_from(&mut self, shared: &Shared<'_>, from: DVec3, target: Poly) -> Stab {
+        let Some(target) = self.seen_from(shared, from, target) else {
+            return Stab::Unknown;
+        };
         let to = self.arena.mean(target);
         if self.passes(shared, from, to) {
             return Stab::Line(from, to);
@@ -568,26 +610,31 @@ impl Flow {
         Stab::Unknown
     }
 
-    fn stab_to(&mut self, shared: &Shared<'_>, mut source: Poly, to: DVec3) -> Stab {
-        let dirs = shared.dirs;
-        for k in (1..self.chain.len() - 1).rev() {
-            let pass = self.chain[k].dir as usize;
-            for i in 0..dirs.winding(pass).len() {
-                let Some(plane) = edge_plane(dirs, pass, i, to) else {
-                    continue;
-                };
-                let turn = dirs.all[source.dir as usize].turn;
-                match self.arena.clip(source, plane, turn, &shared.tolerance) {
-                    Some(rest) => source = rest,
-                    None => return Stab::Unknown,
-                }
-            }
-        }
+    fn stab_to(&mut self, shared: &Shared<'_>, source: Poly, to: DVec3) -> Stab {
+        let Some(source) = self.seen_from(shared, to, source) else {
+            return Stab::Unknown;
+        };
         let from = self.arena.mean(source);
         if self.passes(shared, from, to) {
             return Stab::Line(from, to);
         }
         Stab::Unknown
+    }
+
+    /// What of an end of the chain is seen from a point at the other end.
+    fn seen_from(&mut self, shared: &Shared<'_>, eye: DVec3, mut end: Poly) -> Option<Poly> {
+        let dirs = shared.dirs;
+        for k in 1..self.chain.len() - 1 {
+            let pass = self.chain[k].dir as usize;
+            for i in 0..dirs.winding(pass).len() {
+                let Some(plane) = edge_plane(dirs, pass, i, eye) else {
+                    continue;
+                };
+                let turn = dirs.all[end.dir as usize].turn;
+                end = self.arena.clip(end, plane, turn, &shared.tolerance)?;
+            }
+        }
+        Some(end)
     }
 }
 

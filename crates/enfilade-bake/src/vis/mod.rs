@@ -7,7 +7,7 @@
 //! 2. `narrow`: planes between two openings in a row cut most of that.
 //! 3. `rays`, `grow`: random lines, and lines turned from those, prove most of what is visible.
 //! 4. `flow`: a search over portal chains settles the rest, chain by chain, by planes, lines and
-//!    splitting. This is the heart; start reading there.
+//!    splitting, and at last by `stabbing`, a linear programme. This is the heart; start reading there.
 //! 5. `occlude`: where walls are known, beams settle what they hide inside cells.
 //!
 //! `search` puts them together in rounds, so that results do not depend on threads.
@@ -29,6 +29,7 @@ mod planes;
 mod prove;
 mod rays;
 mod search;
+mod stabbing;
 
 use std::time::{Duration, Instant};
 

@@ -13,6 +13,7 @@ use super::bits::{self, BitTable};
 use super::clip::Poly;
 use super::flow::{Flow, Shared};
 use super::planes::is_admitted;
+use super::stabbing::Answer;
 
 /// Symbols of the trace.
 pub(super) mod symbol {
@@ -32,6 +33,8 @@ pub(super) mod symbol {
     pub(crate) const CLOSED: u8 = 6;
     /// In a split: two halves follow.
     pub(crate) const HALVES: u8 = 7;
+    /// No line passes the chain through this exit: weighted rows follow.
+    pub(crate) const UNSTABBED: u8 = 8;
 }
 
 /// For each opening, those that its trace shows to be hidden: what the search settled from it, less what
@@ -142,9 +145,14 @@ impl Flow {
                 Some((source, target)) => {
                     self.chain.push(target);
                     let done = if is_wanted {
+                        let before = trace.len();
                         trace.push(symbol::SPLIT);
                         let mut pieces = shared.max_pieces;
-                        self.write_split(shared, source, &mut pieces, trace)
+                        let done = self.write_split(shared, source, &mut pieces, trace);
+                        done.or_else(|| {
+                            trace.truncate(before);
+                            self.write_weights(shared, trace)
+                        })
                     } else {
                         trace.push(symbol::ENTER);
                         self.write_step(shared, source, trace)
@@ -193,6 +201,19 @@ impl Flow {
         self.chain = kept;
         self.arena.release(mark);
         done
+    }
+
+    fn write_weights(&self, shared: &Shared<'_>, trace: &mut Vec<u8>) -> Option<()> {
+        let Answer::Closed(weights) = self.stabbed(shared) else {
+            return None;
+        };
+        trace.push(symbol::UNSTABBED);
+        trace.push(u8::try_from(weights.len()).ok()?);
+        for (row, weight) in weights {
+            trace.extend(row.to_le_bytes());
+            trace.extend(weight.to_le_bytes());
+        }
+        Some(())
     }
 
     /// Drops what is wanted and lies behind a plane, or can only be reached through what does.

@@ -18,6 +18,10 @@ pub(super) struct Line {
     pub(super) chain: Vec<u32>,
 }
 
+/// Sine of the least angle at which a line proves to cross an opening: where one that runs along its plane meets it
+/// is a matter of rounding.
+pub(super) const MIN_SINE: f64 = 1e-9;
+
 /// Longest chain followed.
 const MAX_STEPS: usize = 4096;
 
@@ -89,11 +93,12 @@ impl Dirs {
     /// Whether a line crosses all openings of its chain in order, each this far inside.
     pub(super) fn is_crossed(&self, line: &Line, margin: f64) -> bool {
         let mut before = f64::NEG_INFINITY;
+        let least = MIN_SINE * line.direction.length();
         line.chain.iter().all(|&d| {
             let dir = &self.all[d as usize];
             let speed = dir.normal.dot(line.direction);
             let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(line.origin)) / speed;
-            let is_next = speed > 0.0 && t >= before;
+            let is_next = speed > least && t >= before;
             before = t;
             is_next && self.is_inside(d as usize, line.origin + line.direction * t, margin)
         })

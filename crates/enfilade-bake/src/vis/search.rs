@@ -203,7 +203,32 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Marks what a line proves, but for what was shown to be hidden: one that passes an edge nearer than the clearance
+    /// may cross what no line with clearance does.
     fn keep_piece(&mut self, line: Line) {
+        let chain = &line.chain;
+        let might = |i: usize, j: usize| self.might.get(chain[i] as usize, chain[j] as usize);
+        let end = (1..chain.len()).find(|&j| (0..j).any(|i| !might(i, j)));
+        let Some(end) = end else {
+            return self.mark(line);
+        };
+        // The rest begins behind the last opening that does not go with it.
+        let first = (0..end)
+            .rev()
+            .find(|&i| !might(i, end))
+            .map_or(end, |i| i + 1);
+        let rest = Line {
+            chain: chain[first..].to_vec(),
+            ..line.clone()
+        };
+        self.mark(Line {
+            chain: chain[..end].to_vec(),
+            ..line
+        });
+        self.keep_piece(rest);
+    }
+
+    fn mark(&mut self, line: Line) {
         let all = &self.dirs.all;
         let mut is_new = false;
         for i in 0..line.chain.len() {
@@ -270,8 +295,12 @@ impl<'a> Search<'a> {
                 .with_max_len(1)
                 .map_init(Flow::default, |flow, &(_, d)| flow.search(&shared, d))
                 .collect();
-            for found in found {
+            // All that is hidden before any line: none is kept that says otherwise.
+            for found in &found {
                 self.merge(found, &mut next);
+            }
+            for line in found.into_iter().flat_map(|f| f.lines) {
+                self.keep(line);
             }
             self.grow();
         }
@@ -291,7 +320,7 @@ impl<'a> Search<'a> {
         self.effort.steps = steps;
     }
 
-    fn merge(&mut self, found: Found, next: &mut Next) {
+    fn merge(&mut self, found: &Found, next: &mut Next) {
         let back = self.dirs.reverse[found.source] as usize;
         for t in bits::ones(&found.hidden) {
             self.settled.set(found.source, t);
@@ -309,9 +338,6 @@ impl<'a> Search<'a> {
                     self.undecided.set(x, y);
                 }
             }
-        }
-        for line in found.lines {
-            self.keep(line);
         }
         self.effort.add(&found.effort);
     }

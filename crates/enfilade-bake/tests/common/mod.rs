@@ -10,7 +10,7 @@ pub(crate) fn pack(body: &[u8]) -> Vec<u8> {
     let sum = packed.iter().fold(0xcbf2_9ce4_8422_2325_u64, |sum, &b| {
         (sum ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
     });
-    let mut file = b"ENFEVID3".to_vec();
+    let mut file = b"ENFEVID4".to_vec();
     file.extend((body.len() as u64).to_le_bytes());
     file.extend(sum.to_le_bytes());
     file.extend(packed);

@@ -37,7 +37,7 @@ pub(super) struct Tree {
     pub(super) bytes: Vec<u8>,
 }
 
-const MAGIC: &[u8; 8] = b"ENFEVID3";
+const MAGIC: &[u8; 8] = b"ENFEVID4";
 /// Deflate cannot do better.
 const MAX_RATIO: u64 = 1032;
 /// Largest clearance, relative to the largest coordinate, that is accepted as a proof.
@@ -65,7 +65,7 @@ pub(super) fn decode(
     let (magic, rest) = head.split_at(8);
     let (size, sum) = rest.split_at(8);
     if magic != MAGIC {
-        return Err(damaged("it does not begin with ENFEVID3"));
+        return Err(damaged("it does not begin with ENFEVID4"));
     }
     let size = u64::from_le_bytes(size.try_into().map_err(|_| damaged("it is too short"))?);
     if size > packed.len() as u64 * MAX_RATIO {

@@ -3,6 +3,12 @@
 use enfilade_cpg::SightGraph;
 use enfilade_geom::DVec3;
 
+/// Sine of the least angle at which a line crosses an opening; half of what `docs/evidence.md` asks for.
+const MIN_SINE: f64 = 5e-10;
+
+/// A sum of weighted rows that is longer is not zero.
+const UNBALANCED: f64 = 1e-13;
+
 /// A portal crossed one way. Directions are numbered as in [`SightGraph`]; `d ^ 1` is the way back.
 pub(super) struct Opening {
     pub(super) from: u32,
@@ -111,12 +117,59 @@ impl Openings {
         least(self.all[d].normal, &self.all[d].corners)
     }
 
+    /// Whether weights, none below zero and of sum one, balance the rows of a chain of openings.
+    ///
+    /// A row of an edge is positive for a line that passes on the inner side, that of an opening for one that
+    /// crosses it the right way. A line would be positive for all; and so for the sum, were it not zero.
+    pub(super) fn are_balanced(&self, chain: &[usize], weights: &[(usize, f64)]) -> bool {
+        let corners = || chain.iter().flat_map(|&d| &self.all[d].corners);
+        let n = corners().count() as f64;
+        let middle = corners().fold(DVec3::ZERO, |sum, &p| sum + p / n);
+        let reach = corners().fold(f64::MIN_POSITIVE, |r, &p| {
+            r.max((p - middle).abs().max_element())
+        });
+        let mut rows = Vec::new();
+        for &d in chain {
+            let opening = &self.all[d];
+            let corners = &opening.corners;
+            // Corners run counter-clockwise about `turn`, so clockwise for who crosses the other way.
+            let side = if d.is_multiple_of(2) { 1.0 } else { -1.0 };
+            for (i, &p) in corners.iter().enumerate() {
+                let q = corners[(i + 1) % corners.len()];
+                let [a, b] = [p, q].map(|p| (p - middle) / reach);
+                let (direction, moment) = (a.cross(b) * side, (b - a) * side);
+                let length = direction.length().hypot(moment.length());
+                rows.push((p != q).then(|| [direction / length, moment / length]));
+            }
+            rows.push(Some([opening.normal, DVec3::ZERO]));
+        }
+        let mut sum = [DVec3::ZERO; 2];
+        let mut total = 0.0;
+        for &(i, weight) in weights {
+            let Some(Some(row)) = rows.get(i) else {
+                return false;
+            };
+            if weight.is_nan() || weight < 0.0 {
+                return false;
+            }
+            total += weight;
+            sum[0] += row[0] * weight;
+            sum[1] += row[1] * weight;
+        }
+        // An opening without area has no sides, and a row of zeros that would balance anything.
+        let is_flat = chain.iter().any(|&d| self.all[d].normal == DVec3::ZERO);
+        (total - 1.0).abs() <= 1e-9
+            && !is_flat
+            && sum[0].length().hypot(sum[1].length()) <= UNBALANCED
+    }
+
     /// Where a line crosses an opening's plane, from front to back.
     pub(super) fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> Option<f64> {
         let opening = &self.all[d];
         let speed = opening.normal.dot(direction);
         let middle = (self.low(d) - least(-opening.normal, &opening.corners)) * 0.5;
-        (speed > 0.0).then(|| (middle - opening.normal.dot(origin)) / speed)
+        (speed > MIN_SINE * direction.length())
+            .then(|| (middle - opening.normal.dot(origin)) / speed)
     }
 
     /// Whether a point of the plane lies inside one of the opening's pieces.

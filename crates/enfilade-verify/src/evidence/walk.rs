@@ -14,6 +14,7 @@ const EXITS: u8 = 4;
 const DONE: u8 = 5;
 const CLOSED: u8 = 6;
 const HALVES: u8 = 7;
+const UNSTABBED: u8 = 8;
 
 /// Longest chain, and deepest split: what recursion can take.
 const MAX_DEPTH: usize = 600;
@@ -134,6 +135,12 @@ impl Walk<'_> {
             match symbol {
                 CUT if target.is_none() || self.closes_with(q, target.clone(), source.clone()) => {}
                 CUT => return Err(self.error("planes do not close this chain")),
+                UNSTABBED => {
+                    self.chain.push((q, None));
+                    let done = self.unstabbed();
+                    self.chain.pop();
+                    done?;
+                }
                 ENTER | SPLIT => {
                     if symbol == ENTER && is_claimed && target.is_some() {
                         return Err(self.error("it sees what it is to show hidden"));
@@ -223,6 +230,28 @@ impl Walk<'_> {
         for (word, kept) in reach.iter_mut().zip(reached) {
             *word &= kept;
         }
+    }
+
+    /// Checks that the weighted rows of the chain's openings sum to nothing.
+    fn unstabbed(&mut self) -> Checked<()> {
+        let n = self.next()?;
+        let mut weights = Vec::new();
+        for _ in 0..n {
+            let row = [self.next()?, self.next()?];
+            let mut weight = [0; 8];
+            for byte in &mut weight {
+                *byte = self.next()?;
+            }
+            weights.push((
+                usize::from(u16::from_le_bytes(row)),
+                f64::from_le_bytes(weight),
+            ));
+        }
+        let chain: Vec<usize> = self.chain.iter().map(|&(d, _)| d).collect();
+        if self.openings.are_balanced(&chain, &weights) {
+            return Ok(());
+        }
+        Err(self.error("its weights do not show that no line passes this chain"))
     }
 
     /// Checks that planes close the chain once its source is split as the trace says.
