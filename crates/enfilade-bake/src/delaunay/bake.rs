@@ -171,6 +171,7 @@ pub fn bake_session(
     let counts = [
         ("tetrahedra", session.space.delaunay.n_finite as f64),
         ("finest", session.space.finest),
+        ("passed_over", session.space.n_passed_over as f64),
         ("steps", n_steps as f64),
         ("screens", rooms.screens.len() as f64),
         ("leaves", complex.n_leaves() as f64),
