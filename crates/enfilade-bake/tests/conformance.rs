@@ -31,10 +31,7 @@ fn bsp(scene: &Scene, context: &BakeContext<'_>) -> Result {
 }
 
 fn delaunay(scene: &Scene, context: &BakeContext<'_>) -> Result {
-    let mut config = DelaunayConfig::default();
-    // The promises hold for any; a third of the points is enough to try them.
-    config.common.min_opening = 0.9;
-    bake_delaunay(scene, &config, context)
+    bake_delaunay(scene, &DelaunayConfig::default(), context)
 }
 
 type Builder = fn(&Scene, &BakeContext<'_>) -> Result;

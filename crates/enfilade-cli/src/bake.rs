@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::bake::bsp::{bake_bsp, find_leak};
-use enfilade::bake::delaunay::bake_delaunay;
+use enfilade::bake::delaunay::{LEAST_BALL, bake_delaunay};
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
@@ -243,9 +243,8 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             "surfaces have points for all air at least {:.3} m in radius",
             baked.voxel
         )?;
-        // The builder's own share of the narrowest opening is a third.
-        let wanted = config.min_opening / 3.0;
-        if baked.voxel > wanted * 1.05 {
+        let wanted = config.min_opening * LEAST_BALL;
+        if baked.voxel > wanted {
             writeln!(
                 err,
                 "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \

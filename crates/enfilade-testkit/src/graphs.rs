@@ -520,18 +520,7 @@ pub fn courtyard(per_side: usize, one_room: bool) -> World {
         furniture.push((label, Aabb::new(low, low + 0.8)));
     }
     world_of(&grid, &furniture, &mut |face| {
-        let (up, along) = if face.axis == 0 { (0, 1) } else { (1, 0) };
-        let mut low = [0.0; 2];
-        let mut high = [0.0; 2];
-        (low[along], high[along]) = (0.3, 0.7);
-        let is_window = face.cells.contains(&Some(0));
-        (low[up], high[up]) = if is_window { (0.3, 0.8) } else { (0.0, 0.7) };
-        let kind = if is_window {
-            PortalKind::Window
-        } else {
-            PortalKind::Open
-        };
-        Some((low, high, kind))
+        Some(window_or_doorway(face.axis, face.cells.contains(&Some(0))))
     })
 }
 
@@ -566,22 +555,23 @@ pub fn window_tower(per_side: usize, storeys: usize, one_room: bool) -> World {
         turn: DMat3::IDENTITY,
     };
     world_of(&grid, &[], &mut |face| {
-        let (up, along) = if face.axis == 0 { (0, 1) } else { (1, 0) };
         let is_window = face.cells.contains(&Some(outdoors));
-        if face.axis == 1 || !(is_window || face.cells.contains(&Some(0))) {
-            return None;
-        }
-        let mut low = [0.0; 2];
-        let mut high = [0.0; 2];
-        (low[along], high[along]) = (0.3, 0.7);
-        (low[up], high[up]) = if is_window { (0.3, 0.8) } else { (0.0, 0.7) };
-        let kind = if is_window {
-            PortalKind::Window
-        } else {
-            PortalKind::Open
-        };
-        Some((low, high, kind))
+        let is_wall = face.axis != 1 && (is_window || face.cells.contains(&Some(0)));
+        is_wall.then(|| window_or_doorway(face.axis, is_window))
     })
+}
+
+/// The middle of a wall across an axis: a window above the sill, or an open doorway; as shares of the wall.
+fn window_or_doorway(axis: usize, is_window: bool) -> ([f64; 2], [f64; 2], PortalKind) {
+    let up = usize::from(axis != 0);
+    let (sill, lintel, kind) = if is_window {
+        (0.3, 0.8, PortalKind::Window)
+    } else {
+        (0.0, 0.7, PortalKind::Open)
+    };
+    let (mut low, mut high) = ([0.3; 2], [0.7; 2]);
+    (low[up], high[up]) = (sill, lintel);
+    (low, high, kind)
 }
 
 #[cfg(test)]

@@ -32,5 +32,5 @@ pub use decimate::{
     CellPortal, Cells, Choices, Decimation, OUTDOOR_CELL, Step, Weight, decimate, default_stop,
     flow_together,
 };
-pub use space::{Link, Space, divide};
+pub use space::{LEAST_BALL, Link, Space, divide};
 pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};

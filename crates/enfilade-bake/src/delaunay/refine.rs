@@ -25,7 +25,7 @@ use super::tetrahedra::{Delaunay, DelaunayError, Growing};
 pub(super) const ENTERS: f64 = 0.1;
 /// Of points wanted in one round, none is nearer to another than this share of its ball's radius.
 const APART: f64 = 0.4;
-/// More rounds than any scene took.
+/// More rounds of a pass than any scene took; after that it counts as points having run out.
 const MAX_ROUNDS: usize = 100;
 
 /// Tetrahedra whose balls are balls of air.
@@ -59,7 +59,7 @@ pub(super) fn refined(
     let passes = [8.0, 4.0, 2.0, 1.0].map(|k| (k * least, k * least));
     for pass in passes.into_iter().chain([(least, 0.0)]) {
         let mut fresh = growing.all();
-        for _ in 0..MAX_ROUNDS {
+        for n_rounds in 0.. {
             let wanted: Vec<Wanted> = fresh
                 .par_iter()
                 .flat_map_iter(|&t| wanted_by(&growing, t, surfaces, bounds, pass))
@@ -68,7 +68,8 @@ pub(super) fn refined(
             if round.is_empty() {
                 break;
             }
-            if growing.vertices().len() + round.len() > max_points {
+            let is_full = growing.vertices().len() + round.len() > max_points;
+            if is_full || n_rounds == MAX_ROUNDS {
                 return Ok(Refined {
                     delaunay: growing.finished(),
                     down_to,

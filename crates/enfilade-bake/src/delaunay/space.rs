@@ -32,8 +32,8 @@ const FLAT: f64 = 1e-5;
 /// What polygons leave of a facet is an opening where it is this share of the narrowest opening wide;
 /// narrower ones are cracks, which the cell complex finds.
 const CRACK: f64 = 1.0 / 60.0;
-/// Balls below this share of the narrowest opening need not be known; half the opening passes it.
-const LEAST: f64 = 1.0 / 3.0;
+/// Balls of air are known down to a radius of this share of the narrowest opening, which passes one of half its width.
+pub const LEAST_BALL: f64 = 1.0 / 3.0;
 /// Points nearer to a plane than this share of the largest coordinate lie in it.
 const ON_PLANE: f64 = 1e-9;
 
@@ -41,10 +41,9 @@ const ON_PLANE: f64 = 1e-9;
 pub struct Space {
     /// The tetrahedra. [Units: wu]
     pub delaunay: Delaunay,
-    /// Balls of air of this radius and more are known: no surface runs through them. [Units: wu]
+    /// Balls of air of this radius and more are known: no surface runs through them. More than [`LEAST_BALL`] of the
+    /// narrowest opening where points ran out. [Units: wu]
     pub finest: f64,
-    /// The radius that was asked for; less than `finest` where points ran out. [Units: wu]
-    pub wanted: f64,
     /// The tetrahedron of each part: as many parts as tetrahedra, part by part, then further parts of those
     /// that are cut.
     pub tetrahedron_of_part: Vec<u32>,
@@ -113,9 +112,9 @@ pub fn divide(
     let n_surface = points.len();
     let around = bounds.expanded(2.0 + 0.25 * bounds.size().max_element());
     points.extend(box_points(&around));
-    let wanted = narrowest * LEAST;
+    let least = narrowest * LEAST_BALL;
     let max_points = points.len() + MAX_POINTS;
-    let refined = refined(&points, &all_bvh, &around, wanted, max_points)?;
+    let refined = refined(&points, &all_bvh, &around, least, max_points)?;
     drop((points, all_bvh, all));
     let delaunay = refined.delaunay;
     let n = delaunay.n_finite;
@@ -249,7 +248,6 @@ pub fn divide(
         .collect();
     Ok(Space {
         finest: refined.down_to,
-        wanted,
         tetrahedron_of_part,
         n_passed_over,
         middles: facts.iter().map(|f| f.middle).collect(),

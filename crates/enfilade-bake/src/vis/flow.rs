@@ -318,24 +318,19 @@ impl Flow {
             Answer::Guess(origin, direction) => (origin, direction),
         };
         let dirs = shared.dirs;
-        let last = self.chain[self.chain.len() - 1];
+        let target = self.chain[self.chain.len() - 1];
         let at = |dir: u32| origin + direction * dirs.crossing(dir as usize, origin, direction);
-        let (mut from, mut to) = (at(source.dir), at(last.dir));
-        let mark = self.arena.mark();
+        let (mut from, mut to) = (at(source.dir), at(target.dir));
         // Each end by turns moves to the middle of what is seen from the other.
         for _ in 0..MAX_TURNS {
             if self.passes(shared, from, to) {
                 return Stab::Line(from, to);
             }
-            let target = self.seen_from(shared, from, last);
-            to = target.map_or(to, |target| self.arena.mean(target));
-            self.arena.release(mark);
+            to = self.middle_seen(shared, from, target).unwrap_or(to);
             if self.passes(shared, from, to) {
                 return Stab::Line(from, to);
             }
-            let start = self.seen_from(shared, to, source);
-            from = start.map_or(from, |start| self.arena.mean(start));
-            self.arena.release(mark);
+            from = self.middle_seen(shared, to, source).unwrap_or(from);
         }
         Stab::Unknown
     }
@@ -572,15 +567,17 @@ impl Flow {
         if self.passes(shared, from, to) {
             return Stab::Line(from, to);
         }
-        let mark = self.arena.mark();
-        let answer = self.stab_from(shared, from, target);
-        self.arena.release(mark);
-        if answer != Stab::Unknown {
-            return answer;
+        if let Some(to) = self.middle_seen(shared, from, target)
+            && self.passes(shared, from, to)
+        {
+            return Stab::Line(from, to);
         }
-        let answer = self.stab_to(shared, source, to);
-        self.arena.release(mark);
-        answer
+        if let Some(from) = self.middle_seen(shared, to, source)
+            && self.passes(shared, from, to)
+        {
+            return Stab::Line(from, to);
+        }
+        Stab::Unknown
     }
 
     /// Whether the line crosses all openings of the chain.
@@ -598,30 +595,16 @@ impl Flow {
         })
     }
 
-    /// The lines from one point through the chain meet its end in a polygon: one into its middle.
-    fn stab_from(&mut self, shared: &Shared<'_>, from: DVec3, target: Poly) -> Stab {
-        let Some(target) = self.seen_from(shared, from, target) else {
-            return Stab::Unknown;
-        };
-        let to = self.arena.mean(target);
-        if self.passes(shared, from, to) {
-            return Stab::Line(from, to);
-        }
-        Stab::Unknown
+    /// The lines from a point at one end through the chain meet its other end in a polygon: the middle of that.
+    fn middle_seen(&mut self, shared: &Shared<'_>, eye: DVec3, end: Poly) -> Option<DVec3> {
+        let mark = self.arena.mark();
+        let seen = self.seen_from(shared, eye, end);
+        let middle = seen.map(|seen| self.arena.mean(seen));
+        self.arena.release(mark);
+        middle
     }
 
-    fn stab_to(&mut self, shared: &Shared<'_>, source: Poly, to: DVec3) -> Stab {
-        let Some(source) = self.seen_from(shared, to, source) else {
-            return Stab::Unknown;
-        };
-        let from = self.arena.mean(source);
-        if self.passes(shared, from, to) {
-            return Stab::Line(from, to);
-        }
-        Stab::Unknown
-    }
-
-    /// What of an end of the chain is seen from a point at the other end.
+    /// What of an end of the chain is seen from a point at its other end.
     fn seen_from(&mut self, shared: &Shared<'_>, eye: DVec3, mut end: Poly) -> Option<Poly> {
         let dirs = shared.dirs;
         for k in 1..self.chain.len() - 1 {
