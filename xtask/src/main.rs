@@ -82,10 +82,11 @@ impl Task {
     }
 }
 
-/// The workspace's root.
+/// The workspace's root: the checkout that `cargo xtask` was called in, even where the binary was built in another that shares its target folder.
 fn root() -> PathBuf {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here).to_path_buf()
+    let here = std::env::var_os("CARGO_MANIFEST_DIR")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
+    here.parent().unwrap_or(&here).to_path_buf()
 }
 
 /// Where builds go. A relative `CARGO_TARGET_DIR` is meant from the root, where cargo is run.

@@ -48,16 +48,17 @@ impl BitTable {
         self.row_mut(row)[column / 64] &= !(1 << (column % 64));
     }
 
-    /// Rows as columns, of a table with so many rows.
-    pub(super) fn transposed(&self, n_rows: usize) -> Self {
+    /// Rows as columns; column `k` is row `order[k]`.
+    pub(super) fn transposed(&self, order: &[u32]) -> Self {
+        let n_rows = order.len();
         let mut out = Self::new(self.n_words * 64, n_rows);
         let n_words = out.n_words;
         let rows = out.words.par_chunks_mut((64 * n_words).max(1));
         rows.enumerate().for_each(|(word, rows)| {
             for first in (0..n_rows).step_by(64) {
                 let mut block = [0; 64];
-                for (k, b) in block.iter_mut().enumerate().take(n_rows - first) {
-                    *b = self.words[(first + k) * self.n_words + word];
+                for (b, &row) in block.iter_mut().zip(&order[first..]) {
+                    *b = self.words[row as usize * self.n_words + word];
                 }
                 transpose_block(&mut block);
                 for (k, &b) in block.iter().enumerate() {
@@ -107,52 +108,45 @@ pub(super) fn clear(row: &mut [u64], column: usize) {
     row[column / 64] &= !(1 << (column % 64));
 }
 
-/// Sets the bits `from..to`.
+/// The bits `start..start + 64`; zeros past the row's end.
 #[inline]
-pub(super) fn set_range(row: &mut [u64], from: usize, to: usize) {
-    for_words(from, to, |word, mask| row[word] |= mask);
+pub(super) fn window(row: &[u64], start: usize) -> u64 {
+    let (word, shift) = (start / 64, start % 64);
+    let at = |i: usize| row.get(i).copied().unwrap_or(0);
+    at(word) >> shift | (at(word + 1) << 1) << (63 - shift)
 }
 
-/// Clears the bits `from..to`.
+/// Clears those of the bits `start..start + 64` that are set in `bits`.
 #[inline]
-pub(super) fn clear_range(row: &mut [u64], from: usize, to: usize) {
-    for_words(from, to, |word, mask| row[word] &= !mask);
-}
-
-/// Whether any of the bits `from..to` is set.
-#[inline]
-pub(super) fn any_in_range(row: &[u64], from: usize, to: usize) -> bool {
-    let mut any = false;
-    for_words(from, to, |word, mask| any |= row[word] & mask != 0);
-    any
-}
-
-#[inline]
-fn for_words(from: usize, to: usize, mut visit: impl FnMut(usize, u64)) {
-    let mut at = from;
-    while at < to {
-        let word = at / 64;
-        let end = to.min((word + 1) * 64);
-        let n = end - at;
-        let mask = if n == 64 { u64::MAX } else { (1 << n) - 1 };
-        visit(word, mask << (at % 64));
-        at = end;
+pub(super) fn clear_window(row: &mut [u64], start: usize, bits: u64) {
+    let (word, shift) = (start / 64, start % 64);
+    if let Some(low) = row.get_mut(word) {
+        *low &= !(bits << shift);
     }
+    if let Some(high) = row.get_mut(word + 1) {
+        *high &= !((bits >> 1) >> (63 - shift));
+    }
+}
+
+/// Positions of the bits that are set, ascending, the first of them being `start`.
+#[inline]
+pub(super) fn ones_from(start: usize, bits: u64) -> impl Iterator<Item = usize> {
+    let mut rest = bits;
+    std::iter::from_fn(move || {
+        (rest != 0).then(|| {
+            let bit = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            start + bit
+        })
+    })
 }
 
 /// Positions of the bits that are set, ascending.
 #[inline]
 pub(super) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
-    row.iter().enumerate().flat_map(|(i, &word)| {
-        let mut rest = word;
-        std::iter::from_fn(move || {
-            (rest != 0).then(|| {
-                let bit = rest.trailing_zeros() as usize;
-                rest &= rest - 1;
-                i * 64 + bit
-            })
-        })
-    })
+    row.iter()
+        .enumerate()
+        .flat_map(|(i, &word)| ones_from(i * 64, word))
 }
 
 #[inline]
@@ -180,6 +174,14 @@ pub(super) fn and_into(
     any != 0
 }
 
+/// Takes into a row what another has.
+#[inline]
+pub(super) fn unite(row: &mut [u64], other: &[u64]) {
+    for (word, &more) in row.iter_mut().zip(other) {
+        *word |= more;
+    }
+}
+
 #[inline]
 pub(super) fn meets(a: &[u64], b: &[u64]) -> bool {
     a.iter().zip(b).any(|(x, y)| x & y != 0)
@@ -198,25 +200,30 @@ mod tests {
                 table.set(i, j);
             }
         }
-        let turned = table.transposed(n_rows);
-        for i in 0..n_rows {
+        let order: Vec<u32> = (0..n_rows as u32).map(|i| i * 7 % n_rows as u32).collect();
+        let turned = table.transposed(&order);
+        for (k, &i) in order.iter().enumerate() {
             for j in 0..n_columns {
-                assert_eq!(table.get(i, j), turned.get(j, i), "{i} {j}");
+                assert_eq!(table.get(i as usize, j), turned.get(j, k), "{i} {j}");
             }
         }
     }
 
     #[test]
-    fn ranges_reach_across_words() {
-        let mut row = vec![0; 3];
-        set_range(&mut row, 60, 130);
-        assert_eq!(
-            ones(&row).collect::<Vec<_>>(),
-            (60..130).collect::<Vec<_>>()
-        );
-        assert!(any_in_range(&row, 129, 140) && !any_in_range(&row, 130, 192));
-        clear_range(&mut row, 61, 129);
-        assert_eq!(ones(&row).collect::<Vec<_>>(), [60, 129]);
-        assert_eq!(count(&row), 2);
+    fn windows_reach_across_words() {
+        let row = [0x8000_0000_0000_0001, u64::MAX, 0x10];
+        for start in 0..200 {
+            let bit = |k: usize| start + k < 192 && get(&row, start + k);
+            let expected = (0..64).fold(0, |bits, k| bits | u64::from(bit(k)) << k);
+            assert_eq!(window(&row, start), expected, "{start}");
+            for bits in [u64::MAX, 0x8000_0000_0000_0001, 1 << 5] {
+                let mut left = row;
+                clear_window(&mut left, start, bits);
+                let is_cleared =
+                    |i: usize| i >= start && i < start + 64 && bits >> (i - start) & 1 != 0;
+                let kept = (0..192).filter(|&i| get(&row, i) && !is_cleared(i));
+                assert!(ones(&left).eq(kept), "{start} {bits:x}");
+            }
+        }
     }
 }

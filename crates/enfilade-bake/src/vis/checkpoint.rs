@@ -17,7 +17,7 @@ use super::rays::Line;
 use super::search::{Rest, Search};
 use super::{VisConfig, VisError};
 
-const MAGIC: &[u8; 8] = b"ENFVCHK1";
+const MAGIC: &[u8; 8] = b"ENFVCHK2";
 
 /// FNV-1a over all that decides what a search does.
 pub(super) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {

@@ -1,4 +1,4 @@
-//! The graph as the search wants it: each portal as two directions, numbered so that the directions into
+//! The graph as the search wants it: each portal as two directions, numbered so that the directions out of
 //! one cell are neighbors.
 
 use std::ops::Range;
@@ -40,15 +40,13 @@ pub(super) struct Dirs {
     pub(super) reverse: Vec<u32>,
     /// By direction, the number of its portal.
     portals: Vec<u32>,
-    /// By direction, what is looked at most, side by side: the ball around it (middle, radius), and where its cell's
-    /// exits stand in `reverse`.
+    /// By direction, what is looked at most, side by side: the ball around it (middle, radius), its plane (normal, height
+    /// half way between `low` and `high`), and the first exit of the cell it leads into and the one after the last.
     pub(super) balls: Vec<[f64; 4]>,
+    pub(super) planes: Vec<[f64; 4]>,
     ahead: Vec<[u32; 2]>,
-    /// By place in `reverse`: the plane of the direction that stands there (normal, height half way between `low` and
-    /// `high`), so that those of a cell's exits lie side by side.
-    pub(super) exit_planes: Vec<[f64; 4]>,
-    /// Directions into cell `c` are `into[c]..into[c + 1]`.
-    pub(super) into: Vec<u32>,
+    /// Directions out of cell `c` are `out_of[c]..out_of[c + 1]`.
+    out_of: Vec<u32>,
     /// Corners of each piece, in `points`.
     pub(super) pieces: Vec<Range<u32>>,
     /// Corners of all windings and pieces.
@@ -112,14 +110,14 @@ impl Dirs {
                 });
             }
         }
-        all.sort_by_key(|dir| (dir.to, dir.id));
+        all.sort_by_key(|dir| (dir.from, dir.id));
         let n_cells = graph.n_cells as usize;
-        let mut into = vec![0u32; n_cells + 1];
+        let mut out_of = vec![0u32; n_cells + 1];
         for dir in &all {
-            into[dir.to as usize + 1] += 1;
+            out_of[dir.from as usize + 1] += 1;
         }
         for c in 0..n_cells {
-            into[c + 1] += into[c];
+            out_of[c + 1] += out_of[c];
         }
         let mut place = vec![0u32; all.len()];
         for (k, dir) in all.iter().enumerate() {
@@ -129,14 +127,11 @@ impl Dirs {
         let portals = all.iter().map(|dir| dir.id / 2).collect();
         let four = |v: DVec3, w: f64| [v.x, v.y, v.z, w];
         let balls = all.iter().map(|dir| four(dir.center, dir.radius)).collect();
-        let plane = |&d: &u32| {
-            let dir: &Dir = &all[d as usize];
-            four(dir.normal, (dir.low + dir.high) * 0.5)
-        };
-        let exit_planes = reverse.iter().map(plane).collect();
+        let plane = |dir: &Dir| four(dir.normal, (dir.low + dir.high) * 0.5);
+        let planes = all.iter().map(plane).collect();
         let ahead = all
             .iter()
-            .map(|dir| [into[dir.to as usize], into[dir.to as usize + 1]])
+            .map(|dir| [out_of[dir.to as usize], out_of[dir.to as usize + 1]])
             .collect();
         let scale = points
             .iter()
@@ -148,9 +143,9 @@ impl Dirs {
             reverse,
             portals,
             balls,
+            planes,
             ahead,
-            exit_planes,
-            into,
+            out_of,
             pieces,
             points,
             edges,
@@ -163,30 +158,31 @@ impl Dirs {
         self.all.len()
     }
 
-    /// The directions into a cell.
-    #[inline]
-    pub(super) fn entries(&self, cell: u32) -> Range<usize> {
-        self.into[cell as usize] as usize..self.into[cell as usize + 1] as usize
-    }
-
     /// The directions out of a cell.
     #[inline]
-    pub(super) fn exits(&self, cell: u32) -> &[u32] {
-        &self.reverse[self.entries(cell)]
+    pub(super) fn exits(&self, cell: u32) -> Range<usize> {
+        self.out_of[cell as usize] as usize..self.out_of[cell as usize + 1] as usize
     }
 
-    /// Where the exits of the cell that a direction leads into stand in `reverse`.
+    /// The directions into a cell.
     #[inline]
-    pub(super) fn places_after(&self, dir: usize) -> Range<usize> {
-        let [start, end] = self.ahead[dir];
-        start as usize..end as usize
+    pub(super) fn entries(&self, cell: u32) -> &[u32] {
+        &self.reverse[self.exits(cell)]
     }
 
     /// The directions out of the cell that a direction leads into.
     #[inline]
-    pub(super) fn after(&self, dir: usize) -> &[u32] {
+    pub(super) fn after(&self, dir: usize) -> Range<usize> {
         let [start, end] = self.ahead[dir];
-        &self.reverse[start as usize..end as usize]
+        start as usize..end as usize
+    }
+
+    /// Of 64 directions from `start` on, those that are in `row` and in a range that starts there, as bits.
+    #[inline]
+    pub(super) fn window(row: &[u64], range: &Range<usize>, start: usize) -> u64 {
+        let n = range.end - start;
+        let in_range = if n >= 64 { u64::MAX } else { (1 << n) - 1 };
+        bits::window(row, start) & in_range
     }
 
     #[inline]
@@ -198,9 +194,10 @@ impl Dirs {
     /// The set of directions that lead into the cells of a set.
     pub(super) fn entries_of(&self, cells: &[u64], out: &mut [u64]) {
         out.fill(0);
-        for cell in super::bits::ones(cells) {
-            let range = self.entries(cell as u32);
-            super::bits::set_range(out, range.start, range.end);
+        for cell in bits::ones(cells) {
+            for &d in self.entries(cell as u32) {
+                bits::set(out, d as usize);
+            }
         }
     }
 
@@ -209,7 +206,8 @@ impl Dirs {
     /// Time: the square of the portals, a few nanoseconds each, plus what is reached times the exits of a cell.
     pub(super) fn might_see(&self, clearance: f64, far: Option<f64>) -> BitTable {
         let past = self.past(clearance);
-        let behind = past.transposed(self.len());
+        // By portal, the directions whose openings it reaches in front of from behind.
+        let behind = past.transposed(&self.reverse);
         let n = self.len();
         let mut might = BitTable::new(n, n);
         let n_words = might.n_words().max(1);
@@ -230,31 +228,31 @@ impl Dirs {
         (past, behind): (&BitTable, &BitTable),
         far: Option<f64>,
         row: &mut [u64],
-        Flood { tested, stack }: &mut Flood,
+        Flood { left, stack }: &mut Flood,
     ) {
         let in_front = past.row(first);
-        let behind = behind.row(self.portals[first] as usize);
-        tested.clear();
-        tested.resize(row.len(), 0);
+        // It crosses the second from behind.
+        left.clear();
+        left.extend_from_slice(behind.row(self.portals[first] as usize));
         // A line crosses a plane once, so never an opening twice.
-        bits::set(tested, first);
-        bits::set(tested, self.reverse[first] as usize);
+        bits::clear(left, first);
+        bits::clear(left, self.reverse[first] as usize);
         stack.push(first as u32);
         while let Some(at) = stack.pop() {
-            let back = self.reverse[at as usize];
-            for &next in self.after(at as usize) {
-                let q = next as usize;
-                if bits::get(tested, q) || next == back {
-                    continue;
-                }
-                bits::set(tested, q);
-                // It crosses the second from behind.
-                if bits::get(in_front, self.portals[q] as usize)
-                    && bits::get(behind, self.reverse[q] as usize)
-                    && self.is_near(first, q, far)
-                {
-                    bits::set(row, q);
-                    stack.push(next);
+            let back = self.reverse[at as usize] as usize;
+            let exits = self.after(at as usize);
+            for start in exits.clone().step_by(64) {
+                let window = Self::window(left, &exits, start);
+                bits::clear_window(left, start, window);
+                for q in bits::ones_from(start, window) {
+                    if q == back {
+                        bits::set(left, q);
+                    } else if bits::get(in_front, self.portals[q] as usize)
+                        && self.is_near(first, q, far)
+                    {
+                        bits::set(row, q);
+                        stack.push(q as u32);
+                    }
                 }
             }
         }
@@ -366,21 +364,13 @@ impl Dirs {
 
     /// Clears what is not seen both ways.
     pub(super) fn make_symmetric(&self, might: &mut BitTable) {
-        let n = self.len();
-        let seen_by = might.transposed(n);
+        let seen_by = might.transposed(&self.reverse);
         let n_words = might.n_words().max(1);
         let rows = might.words_mut().par_chunks_mut(n_words).enumerate();
         rows.for_each(|(a, row)| {
             let seen_back = seen_by.row(self.reverse[a] as usize);
-            for (i, word) in row.iter_mut().enumerate() {
-                let mut rest = *word;
-                while rest != 0 {
-                    let bit = rest.trailing_zeros() as usize;
-                    rest &= rest - 1;
-                    if !bits::get(seen_back, self.reverse[i * 64 + bit] as usize) {
-                        *word &= !(1 << bit);
-                    }
-                }
+            for (word, &back) in row.iter_mut().zip(seen_back) {
+                *word &= back;
             }
         });
     }
@@ -395,42 +385,50 @@ pub(super) struct Next(Vec<u64>);
 impl Next {
     pub(super) fn new(dirs: &Dirs, might: &BitTable) -> Self {
         let masks = (0..dirs.len()).map(|d| {
-            let exits = dirs.after(d).iter().take(64).enumerate();
-            exits.fold(0, |mask, (k, &q)| {
-                mask | u64::from(might.get(d, q as usize)) << k
-            })
+            let exits = dirs.after(d);
+            Dirs::window(might.row(d), &exits, exits.start)
         });
         Self(masks.collect())
     }
 
-    /// The exits that a line through `d` might take.
+    /// Of 64 exits behind `d` from `start` on, those that a line through `d` might take, as bits.
     #[inline]
-    pub(super) fn after<'a>(
+    pub(super) fn window(
         &self,
-        dirs: &'a Dirs,
-        might: &'a BitTable,
-        d: usize,
-    ) -> impl Iterator<Item = u32> + 'a {
-        let exits = dirs.after(d);
-        let mut mask = self.0[d];
-        let first = std::iter::from_fn(move || {
-            (mask != 0).then(|| {
-                let k = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                exits[k]
-            })
-        });
-        let rest = exits.get(64..).unwrap_or_default().iter().copied();
-        first.chain(rest.filter(move |&q| might.get(d, q as usize)))
+        (might, d): (&BitTable, usize),
+        exits: &Range<usize>,
+        start: usize,
+    ) -> u64 {
+        if start == exits.start {
+            return self.0[d];
+        }
+        Dirs::window(might.row(d), exits, start)
     }
 
-    /// Takes up that a line through `a` cannot pass `b`.
-    #[inline]
-    pub(super) fn clear(&mut self, dirs: &Dirs, a: usize, b: usize) {
-        let start = dirs.places_after(a).start;
-        let place = dirs.reverse[b] as usize;
-        if dirs.all[a].to == dirs.all[b].from && place - start < 64 {
-            self.0[a] &= !(1 << (place - start));
+    /// Takes up, in `might` too, that no line passes `source` and then one of `hidden`, nor one of them and then `source`
+    /// the other way.
+    pub(super) fn hide(
+        &mut self,
+        dirs: &Dirs,
+        might: &mut BitTable,
+        source: usize,
+        hidden: &[u64],
+    ) {
+        let back = dirs.reverse[source] as usize;
+        for t in bits::ones(hidden) {
+            might.clear(dirs.reverse[t] as usize, back);
+        }
+        for (word, &hidden) in might.row_mut(source).iter_mut().zip(hidden) {
+            *word &= !hidden;
+        }
+        // Only its next ones, and itself as a next one of theirs, are at hand.
+        let exits = dirs.after(source);
+        self.0[source] &= !bits::window(hidden, exits.start);
+        let place = back - exits.start;
+        for start in exits.clone().step_by(64).filter(|_| place < 64) {
+            for t in bits::ones_from(start, Dirs::window(hidden, &exits, start)) {
+                self.0[dirs.reverse[t] as usize] &= !(1 << place);
+            }
         }
     }
 }
@@ -438,7 +436,8 @@ impl Next {
 /// What a flood needs, kept between floods.
 #[derive(Default)]
 struct Flood {
-    tested: Vec<u64>,
+    /// What was not tested, of what has the first opening behind it.
+    left: Vec<u64>,
     stack: Vec<u32>,
 }
 
@@ -539,16 +538,27 @@ mod tests {
                 }
             }
             let mut next = Next::new(&dirs, &might);
-            for _ in 0..3 * n {
-                let (a, b) = (rng.below(n), rng.below(n));
-                might.clear(a, b);
-                next.clear(&dirs, a, b);
+            for source in 0..n {
+                let mut hidden = vec![0; might.n_words()];
+                for _ in 0..n / 4 {
+                    bits::set(&mut hidden, rng.below(n));
+                }
+                let mut expected = might.clone();
+                for t in bits::ones(&hidden) {
+                    expected.clear(source, t);
+                    expected.clear(dirs.reverse[t] as usize, dirs.reverse[source] as usize);
+                }
+                next.hide(&dirs, &mut might, source, &hidden);
+                assert!(might == expected, "{seed} {source}");
             }
             for d in 0..n {
-                let at_hand: Vec<u32> = next.after(&dirs, &might, d).collect();
-                let exits = dirs.after(d).iter().copied();
-                let of_table: Vec<u32> = exits.filter(|&q| might.get(d, q as usize)).collect();
-                assert_eq!(at_hand, of_table, "{seed} {d}");
+                let exits = dirs.after(d);
+                let windows = exits.clone().step_by(64);
+                let at_hand = windows.flat_map(|start| {
+                    bits::ones_from(start, next.window((&might, d), &exits, start))
+                });
+                let of_table = exits.clone().filter(|&q| might.get(d, q));
+                assert!(at_hand.eq(of_table), "{seed} {d}");
             }
         }
     }

@@ -10,8 +10,8 @@
 //!   the opposite question, and an opening that cannot be reached is not even clipped.
 //! - *Splitting.* Where planes leave a chain open and no line passes, the source is halved and each half
 //!   asked again: the smaller the source, the nearer planes come to the truth.
-//! - *The rest in Plücker coordinates* (`stabbing`): chains that only lines along an edge or a plane would pass
-//!   are not closed by any number of halves.
+//! - *What a few halves leave in Plücker coordinates* (`stabbing`): chains that only lines along an edge or a plane
+//!   would pass are not closed by any number of them.
 //!
 //! Errs to visible: a chain that neither a plane nor a line settles counts as seen.
 
@@ -27,6 +27,9 @@ use super::stabbing::{self, Answer, Gate};
 
 /// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
 const MAX_CHAIN: usize = 512;
+
+/// Pieces that a source is split into before a linear programme is asked, and into more only where that does not tell.
+pub(super) const FEW_PIECES: u32 = 4;
 
 /// How often the ends of a line that was guessed are moved.
 const MAX_TURNS: usize = 8;
@@ -90,7 +93,7 @@ pub(super) struct Flow {
     pub(super) chain: Vec<Poly>,
     pub(super) planes: Vec<Four>,
     walked: Vec<u32>,
-    reached: Vec<u64>,
+    unreached: Vec<u64>,
     stack: Vec<u32>,
     found: Found,
 }
@@ -134,20 +137,22 @@ impl Flow {
     fn drop_unreached(&mut self, shared: &Shared<'_>, source: usize) {
         let dirs = shared.dirs;
         let row = shared.might.row(source);
-        self.reached.clear();
-        self.reached.resize(row.len(), 0);
+        self.unreached.clear();
+        self.unreached.extend_from_slice(row);
         self.stack.push(source as u32);
         while let Some(at) = self.stack.pop() {
-            for next in shared.next.after(dirs, shared.might, at as usize) {
-                let q = next as usize;
-                if bits::get(row, q) && !bits::get(&self.reached, q) {
-                    bits::set(&mut self.reached, q);
-                    self.stack.push(next);
-                }
+            let at = at as usize;
+            let exits = dirs.after(at);
+            for start in exits.clone().step_by(64) {
+                let window = shared.next.window((shared.might, at), &exits, start)
+                    & bits::window(&self.unreached, start);
+                bits::clear_window(&mut self.unreached, start, window);
+                self.stack
+                    .extend(bits::ones_from(start, window).map(|q| q as u32));
             }
         }
-        for (word, &reached) in self.reach[0].iter_mut().zip(&self.reached) {
-            *word &= reached;
+        for (word, &unreached) in self.reach[0].iter_mut().zip(&self.unreached) {
+            *word &= !unreached;
         }
     }
 
@@ -182,7 +187,7 @@ impl Flow {
         let dirs = shared.dirs;
         let depth = self.chain.len() - 1;
         let pass = self.chain[depth];
-        let back = dirs.reverse[pass.dir as usize];
+        let back = dirs.reverse[pass.dir as usize] as usize;
         let first_plane = self.planes.len();
         if depth > 0 {
             self.add_planes(shared, source, pass);
@@ -198,10 +203,9 @@ impl Flow {
         if self.reach.len() <= depth + 1 {
             self.reach.push(vec![0; self.wanted.len()]);
         }
-        for &next in dirs.exits(dirs.all[pass.dir as usize].to) {
-            let q = next as usize;
+        for q in dirs.after(pass.dir as usize) {
             let is_near = bits::get(&self.reach[0], q) && bits::get(&self.reach[depth], q);
-            if next == back || !is_near {
+            if q == back || !is_near {
                 continue;
             }
             let (near, far) = self.reach.split_at_mut(depth + 1);
@@ -237,8 +241,7 @@ impl Flow {
         for q in bits::ones(&beyond) {
             let cell = shared.dirs.all[q].to;
             self.found.undecided.push(cell);
-            let range = shared.dirs.entries(cell);
-            bits::clear_range(&mut self.wanted, range.start, range.end);
+            self.settle_cell(shared.dirs, cell);
         }
     }
 
@@ -246,15 +249,7 @@ impl Flow {
     fn enter(&mut self, shared: &Shared<'_>, source: Poly, target: Poly, leads_on: bool) {
         let q = target.dir as usize;
         if bits::get(&self.wanted, q) {
-            let mut answer = self.stab(shared, source, target);
-            if answer == Stab::Unknown {
-                let mut pieces = shared.max_pieces;
-                answer = self.settle(shared, source, &mut pieces);
-            }
-            if answer == Stab::Unknown {
-                answer = self.stab_at_all(shared, source);
-            }
-            match answer {
+            match self.decide(shared, source, target) {
                 Stab::None => return,
                 Stab::Line(from, to) => self.shoot(shared, from, to),
                 Stab::Unknown => {}
@@ -262,13 +257,27 @@ impl Flow {
             if bits::get(&self.wanted, q) {
                 let cell = shared.dirs.all[q].to;
                 self.found.undecided.push(cell);
-                let range = shared.dirs.entries(cell);
-                bits::clear_range(&mut self.wanted, range.start, range.end);
+                self.settle_cell(shared.dirs, cell);
             }
         }
         if leads_on && self.is_any_wanted(self.chain.len() - 1) {
             self.visit(shared, source);
         }
+    }
+
+    /// Whether a line passes the chain: by the cheapest way that tells.
+    fn decide(&mut self, shared: &Shared<'_>, source: Poly, target: Poly) -> Stab {
+        let mut answer = self.stab(shared, source, target);
+        if answer == Stab::Unknown {
+            answer = self.settle(shared, source, &mut shared.max_pieces.min(FEW_PIECES));
+        }
+        if answer == Stab::Unknown {
+            answer = self.stab_at_all(shared, source);
+        }
+        if answer == Stab::Unknown && shared.max_pieces > FEW_PIECES {
+            answer = self.settle(shared, source, &mut shared.max_pieces.clone());
+        }
+        answer
     }
 
     /// Decides a chain by halving its source until planes close it or a line is found.
@@ -310,7 +319,7 @@ impl Flow {
         answer
     }
 
-    /// The last resort: whether any line passes the chain, whatever planes leave of it.
+    /// Whether any line passes the chain, whatever planes leave of it.
     fn stab_at_all(&mut self, shared: &Shared<'_>, source: Poly) -> Stab {
         let (origin, direction) = match self.stabbed(shared) {
             Answer::Closed(_) => return Stab::None,
@@ -526,6 +535,16 @@ impl Flow {
         Some((source, target))
     }
 
+    /// Wants no opening into a cell any more; says whether any was wanted.
+    fn settle_cell(&mut self, dirs: &Dirs, cell: u32) -> bool {
+        let mut any = false;
+        for &d in dirs.entries(cell) {
+            any |= bits::get(&self.wanted, d as usize);
+            bits::clear(&mut self.wanted, d as usize);
+        }
+        any
+    }
+
     /// Follows a line from the source; everything it crosses is seen.
     fn shoot(&mut self, shared: &Shared<'_>, from: DVec3, to: DVec3) {
         let dirs = shared.dirs;
@@ -542,12 +561,9 @@ impl Flow {
             &mut self.walked,
         );
         let mut is_new = false;
-        for &crossed in &self.walked {
-            let range = dirs.entries(dirs.all[crossed as usize].to);
-            if bits::any_in_range(&self.wanted, range.start, range.end) {
-                bits::clear_range(&mut self.wanted, range.start, range.end);
-                is_new = true;
-            }
+        for k in 0..self.walked.len() {
+            let crossed = self.walked[k];
+            is_new |= self.settle_cell(dirs, dirs.all[crossed as usize].to);
         }
         if is_new {
             let mut chain = vec![source as u32];

@@ -26,11 +26,7 @@ impl Search<'_> {
                 .with_max_len(8)
                 .map(|line| self.grown_from(line))
                 .collect();
-            for line in grown.into_iter().flatten() {
-                if self.proves_new(&line.chain) {
-                    self.keep(line);
-                }
-            }
+            self.keep(grown.into_iter().flatten().collect());
             first = end;
         }
         self.n_grown = first;
@@ -72,9 +68,7 @@ impl Search<'_> {
                         .collect()
                 })
                 .collect();
-            for line in found.into_iter().flatten() {
-                self.keep(line);
-            }
+            self.keep(found.into_iter().flatten().collect());
             self.grow();
         }
     }
@@ -82,11 +76,10 @@ impl Search<'_> {
     /// The first of some random lines that leads from one cell into another.
     fn line_between(&self, a: usize, b: usize, n_lines: usize, rng: &mut Rng) -> Option<Line> {
         let dirs = self.dirs;
-        let entries = dirs.entries(b as u32);
+        let entries = dirs.entries(b as u32).iter();
         let pairs: Vec<(usize, usize)> = dirs
             .exits(a as u32)
-            .iter()
-            .flat_map(|&s| entries.clone().map(move |t| (s as usize, t)))
+            .flat_map(|s| entries.clone().map(move |&t| (s, t as usize)))
             .filter(|&(s, t)| s == t || self.might.get(s, t))
             .collect();
         let margin = self.tolerance.rounding * 16.0;
@@ -132,19 +125,19 @@ impl Search<'_> {
         let Some(&last) = line.chain.last() else {
             return;
         };
-        for &exit in dirs.exits(dirs.all[last as usize].to) {
-            if exit == dirs.reverse[last as usize] {
+        for exit in dirs.after(last as usize) {
+            if exit == dirs.reverse[last as usize] as usize {
                 continue;
             }
-            let to = dirs.all[exit as usize].to as usize;
+            let to = dirs.all[exit].to as usize;
             let is_wanted = |&d: &u32| {
                 !bits::get(self.seen.row(dirs.all[d as usize].from as usize), to)
-                    && self.might.get(d as usize, exit as usize)
+                    && self.might.get(d as usize, exit)
             };
             let Some(first) = line.chain.iter().position(is_wanted) else {
                 continue;
             };
-            self.turn(line, (first, exit), walked, out);
+            self.turn(line, (first, exit as u32), walked, out);
         }
     }
 

@@ -40,19 +40,10 @@ pub(super) fn narrow_might(
             })
             .collect();
         for (&(_, source), row) in round.iter().zip(rows) {
-            let back = dirs.reverse[source] as usize;
-            for (word, &left) in row.iter().enumerate() {
-                let mut gone = might.row(source)[word] & !left;
-                might.row_mut(source)[word] &= left;
-                while gone != 0 {
-                    let q = word * 64 + gone.trailing_zeros() as usize;
-                    might.clear(dirs.reverse[q] as usize, back);
-                    next.clear(dirs, source, q);
-                    next.clear(dirs, dirs.reverse[q] as usize, back);
-                    settled.set(source, q);
-                    gone &= gone - 1;
-                }
-            }
+            let both = might.row(source).iter().zip(&row);
+            let gone: Vec<u64> = both.map(|(&might, &left)| might & !left).collect();
+            next.hide(dirs, might, source, &gone);
+            bits::unite(settled.row_mut(source), &gone);
         }
     }
 }
@@ -75,15 +66,14 @@ impl Work {
         source: usize,
     ) -> Vec<u64> {
         let mut row = vec![0; might.n_words()];
-        let back = dirs.reverse[source];
-        for &next in dirs.exits(dirs.all[source].to) {
-            let pass = next as usize;
-            if next == back || !might.get(source, pass) {
+        let back = dirs.reverse[source] as usize;
+        for pass in dirs.after(source) {
+            if pass == back || !might.get(source, pass) {
                 continue;
             }
             self.arena.release(0);
             let first = self.arena.push(dirs.winding(source), source as u32);
-            let second = self.arena.push(dirs.winding(pass), next);
+            let second = self.arena.push(dirs.winding(pass), pass as u32);
             let (turn, next_turn) = (dirs.all[source].turn, dirs.all[pass].turn);
             let front = front_of(dirs, source as u32);
             let Some(second) = self.arena.clip(second, front, next_turn, tolerance) else {
@@ -96,15 +86,13 @@ impl Work {
             self.planes.clear();
             separators(
                 (self.arena.get(first), facing(dirs, source as u32)),
-                (self.arena.get(second), facing(dirs, next)),
+                (self.arena.get(second), facing(dirs, pass as u32)),
                 tolerance,
                 &mut self.planes,
             );
             pack(&mut self.planes, tolerance);
             self.flood(dirs, (might, ahead), tolerance, (source, pass));
-            for (r, &new) in row.iter_mut().zip(&self.reached) {
-                *r |= new;
-            }
+            bits::unite(&mut row, &self.reached);
         }
         row
     }
@@ -137,15 +125,21 @@ impl Work {
         let rows = might.row(source).iter().zip(might.row(pass));
         self.allowed.extend(rows.map(|(a, b)| a & b));
         while let Some(at) = self.stack.pop() {
-            for next in ahead.after(dirs, might, at as usize) {
-                let q = next as usize;
-                if !bits::get(&self.allowed, q) {
-                    continue;
-                }
-                bits::clear(&mut self.allowed, q);
-                if admits(simd, &self.planes, dirs, q, tolerance) {
-                    bits::set(&mut self.reached, q);
-                    self.stack.push(next);
+            let at = at as usize;
+            let exits = dirs.after(at);
+            for start in exits.clone().step_by(64) {
+                let window =
+                    ahead.window((might, at), &exits, start) & bits::window(&self.allowed, start);
+                bits::clear_window(&mut self.allowed, start, window);
+                // A closure would not be compiled for the processor that `simd` stands for.
+                let mut rest = window;
+                while rest != 0 {
+                    let q = start + rest.trailing_zeros() as usize;
+                    rest &= rest - 1;
+                    if admits(simd, &self.planes, dirs, q, tolerance) {
+                        bits::set(&mut self.reached, q);
+                        self.stack.push(q as u32);
+                    }
                 }
             }
         }

@@ -441,9 +441,7 @@ impl Search<'_> {
                         tree,
                     }));
                 }
-                if let Some(line) = line {
-                    self.keep(line);
-                }
+                self.keep(line.into_iter().collect());
             }
             self.grow();
         }
@@ -455,8 +453,8 @@ impl Search<'_> {
         let mut queue = std::collections::VecDeque::from([cell as u32]);
         steps[cell] = 0;
         while let Some(at) = queue.pop_front() {
-            for &d in self.dirs.exits(at) {
-                let to = self.dirs.all[d as usize].to;
+            for d in self.dirs.exits(at) {
+                let to = self.dirs.all[d].to;
                 if steps[to as usize] == u32::MAX {
                     steps[to as usize] = steps[at as usize] + 1;
                     queue.push_back(to);
@@ -472,8 +470,9 @@ impl Search<'_> {
         if self.seen.get(a, b) {
             return settled;
         }
-        let exits = dirs.exits(a as u32).iter();
-        let both = exits.flat_map(|&s| dirs.entries(b as u32).map(move |t| (s as usize, t)));
+        let entries = dirs.entries(b as u32).iter();
+        let exits = dirs.exits(a as u32);
+        let both = exits.flat_map(|s| entries.clone().map(move |&t| (s, t as usize)));
         let mut open: Vec<_> = both.filter(|&(s, t)| self.might.get(s, t)).collect();
         for most in [FEW_BEAMS, MAX_BEAMS] {
             let mut left = Vec::new();
@@ -505,12 +504,13 @@ impl Search<'_> {
         if dirs.all[t].from == dirs.all[s].to {
             return false;
         }
-        dirs.exits(dirs.all[s].to).iter().all(|&q| {
-            let q = q as usize;
-            q == dirs.reverse[s] as usize || !might.get(s, q) || !might.get(q, t)
-        }) || dirs
-            .entries(dirs.all[t].from)
-            .all(|p| p == dirs.reverse[t] as usize || !might.get(s, p) || !might.get(p, t))
+        dirs.after(s)
+            .all(|q| q == dirs.reverse[s] as usize || !might.get(s, q) || !might.get(q, t))
+            || dirs
+                .entries(dirs.all[t].from)
+                .iter()
+                .map(|&p| p as usize)
+                .all(|p| p == dirs.reverse[t] as usize || !might.get(s, p) || !might.get(p, t))
     }
 
     fn settle_openings(

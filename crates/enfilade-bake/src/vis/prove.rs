@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::bits::{self, BitTable};
 use super::clip::Poly;
-use super::flow::{Flow, Shared};
+use super::flow::{FEW_PIECES, Flow, Shared};
 use super::planes::is_admitted;
 use super::stabbing::Answer;
 
@@ -43,16 +43,16 @@ pub(super) fn claims(shared: &Shared<'_>, settled: &BitTable) -> BitTable {
     let (dirs, might) = (shared.dirs, shared.might);
     let mut claims = settled.clone();
     for s in 0..dirs.len() {
-        let after = dirs.exits(dirs.all[s].to);
+        let after = dirs.after(s);
         for t in bits::ones(settled.row(s)) {
             let before = dirs.entries(dirs.all[t].from);
             let is_next = dirs.all[t].from == dirs.all[s].to;
-            let first_fails = after.iter().all(|&q| {
-                let q = q as usize;
-                q == dirs.reverse[s] as usize || !might.get(s, q) || !might.get(q, t)
-            });
+            let first_fails = after
+                .clone()
+                .all(|q| q == dirs.reverse[s] as usize || !might.get(s, q) || !might.get(q, t));
             let last_fails = before
-                .into_iter()
+                .iter()
+                .map(|&p| p as usize)
                 .all(|p| p == dirs.reverse[t] as usize || !might.get(s, p) || !might.get(p, t));
             if !is_next && (first_fails || last_fails) {
                 claims.clear(s, t);
@@ -101,7 +101,7 @@ impl Flow {
         let dirs = shared.dirs;
         let depth = self.chain.len() - 1;
         let pass = self.chain[depth];
-        let back = dirs.reverse[pass.dir as usize];
+        let back = dirs.reverse[pass.dir as usize] as usize;
         let first_plane = self.planes.len();
         if depth > 0 {
             self.add_planes(shared, source, pass);
@@ -120,9 +120,8 @@ impl Flow {
         if self.reach.len() <= depth + 1 {
             self.set_reach(depth + 1, &[]);
         }
-        for &next in dirs.exits(dirs.all[pass.dir as usize].to) {
-            let q = next as usize;
-            if next == back || !bits::get(&self.reach[depth], q) {
+        for q in dirs.after(pass.dir as usize) {
+            if q == back || !bits::get(&self.reach[depth], q) {
                 trace.push(symbol::SKIP);
                 continue;
             }
@@ -145,14 +144,11 @@ impl Flow {
                 Some((source, target)) => {
                     self.chain.push(target);
                     let done = if is_wanted {
-                        let before = trace.len();
-                        trace.push(symbol::SPLIT);
-                        let mut pieces = shared.max_pieces;
-                        let done = self.write_split(shared, source, &mut pieces, trace);
-                        done.or_else(|| {
-                            trace.truncate(before);
-                            self.write_weights(shared, trace)
-                        })
+                        // In the order of the search, so that what closed a chain there does here.
+                        let few = shared.max_pieces.min(FEW_PIECES);
+                        self.write_split(shared, source, few, trace)
+                            .or_else(|| self.write_weights(shared, trace))
+                            .or_else(|| self.write_split(shared, source, shared.max_pieces, trace))
                     } else {
                         trace.push(symbol::ENTER);
                         self.write_step(shared, source, trace)
@@ -167,7 +163,24 @@ impl Flow {
         Some(())
     }
 
+    /// Writes that planes leave nothing once the source is in so many pieces; nothing where they do.
     fn write_split(
+        &mut self,
+        shared: &Shared<'_>,
+        source: Poly,
+        mut pieces: u32,
+        trace: &mut Vec<u8>,
+    ) -> Option<()> {
+        let before = trace.len();
+        trace.push(symbol::SPLIT);
+        let done = self.write_pieces(shared, source, &mut pieces, trace);
+        if done.is_none() {
+            trace.truncate(before);
+        }
+        done
+    }
+
+    fn write_pieces(
         &mut self,
         shared: &Shared<'_>,
         source: Poly,
@@ -190,7 +203,7 @@ impl Flow {
                 self.halves(shared, source).and_then(|halves| {
                     for half in halves {
                         match half {
-                            Some(half) => self.write_split(shared, half, pieces, trace)?,
+                            Some(half) => self.write_pieces(shared, half, pieces, trace)?,
                             None => trace.push(symbol::CLOSED),
                         }
                     }
@@ -225,8 +238,7 @@ impl Flow {
         let mut stack = vec![pass];
         while let Some(at) = stack.pop() {
             let row = shared.might.row(at as usize);
-            for &next in dirs.exits(dirs.all[at as usize].to) {
-                let q = next as usize;
+            for q in dirs.after(at as usize) {
                 let is_passable = bits::get(passable, q);
                 if bits::get(&self.reach[1], q)
                     && bits::get(row, q)
@@ -236,7 +248,7 @@ impl Flow {
                 {
                     bits::set(&mut reached, q);
                     if is_passable {
-                        stack.push(next);
+                        stack.push(q as u32);
                     }
                 }
             }

@@ -41,11 +41,11 @@ pub(super) fn walk(
     let mut at = first;
     let mut t = 0.0;
     for _ in 0..MAX_STEPS {
-        let back = dirs.reverse[at];
+        let back = dirs.reverse[at] as usize;
         let mut best = None;
         let mut best_t = f64::INFINITY;
-        for place in dirs.places_after(at) {
-            let [x, y, z, middle] = dirs.exit_planes[place];
+        for exit in dirs.after(at) {
+            let [x, y, z, middle] = dirs.planes[exit];
             let normal = DVec3::new(x, y, z);
             let speed = normal.dot(direction);
             if speed <= 0.0 {
@@ -55,11 +55,10 @@ pub(super) fn walk(
             if exit_t < t || exit_t >= best_t {
                 continue;
             }
-            let exit = dirs.reverse[place];
             if exit == back {
                 continue;
             }
-            if dirs.is_inside(exit as usize, origin + direction * exit_t, margin) {
+            if dirs.is_inside(exit, origin + direction * exit_t, margin) {
                 best = Some(exit);
                 best_t = exit_t;
             }
@@ -70,8 +69,8 @@ pub(super) fn walk(
         {
             return;
         }
-        out.push(exit);
-        at = exit as usize;
+        out.push(exit as u32);
+        at = exit;
         t = best_t;
     }
 }

@@ -87,9 +87,7 @@ impl<'a> Search<'a> {
                 .par_iter()
                 .map(|&d| self.cast_from(d, n_rays))
                 .collect();
-            for line in lines.into_iter().flatten() {
-                self.keep(line);
-            }
+            self.keep(lines.into_iter().flatten().collect());
         }
     }
 
@@ -162,14 +160,28 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Marks what a line proves, and keeps it where that is new.
-    pub(super) fn keep(&mut self, line: Line) {
-        // Lines that graze an opening may have slipped through on other sums than a checker's.
+    /// Marks what lines prove, and keeps those that prove something new.
+    pub(super) fn keep(&mut self, lines: Vec<Line>) {
+        let pieces: Vec<Vec<Line>> = lines
+            .into_par_iter()
+            .with_min_len(16)
+            .map(|line| self.sure_pieces(line))
+            .collect();
+        for piece in pieces.into_iter().flatten() {
+            self.mark(piece);
+        }
+    }
+
+    /// The parts of a line that a checker, on other sums, takes for proofs.
+    fn sure_pieces(&self, line: Line) -> Vec<Line> {
+        let mut out = Vec::new();
+        // Lines that graze an opening may have slipped through.
         if !self.dirs.is_crossed(&line, self.tolerance.rounding * 8.0) {
-            return;
+            return out;
         }
         if self.far.is_none() && self.blocker.is_none() {
-            return self.keep_piece(line);
+            self.part(line, &mut out);
+            return out;
         }
         // What is solid and what is far, judged as a checker does: between crossings as computed from the
         // line's origin.
@@ -195,37 +207,37 @@ impl<'a> Search<'a> {
             }
             if end > covered {
                 covered = end;
-                self.keep_piece(Line {
+                let piece = Line {
                     chain: line.chain[first..end].to_vec(),
                     ..line.clone()
-                });
+                };
+                self.part(piece, &mut out);
             }
         }
+        out
     }
 
-    /// Marks what a line proves, but for what was shown to be hidden: one that passes an edge nearer than the clearance
-    /// may cross what no line with clearance does.
-    fn keep_piece(&mut self, line: Line) {
-        let chain = &line.chain;
-        let might = |i: usize, j: usize| self.might.get(chain[i] as usize, chain[j] as usize);
-        let end = (1..chain.len()).find(|&j| (0..j).any(|i| !might(i, j)));
-        let Some(end) = end else {
-            return self.mark(line);
-        };
-        // The rest begins behind the last opening that does not go with it.
-        let first = (0..end)
-            .rev()
-            .find(|&i| !might(i, end))
-            .map_or(end, |i| i + 1);
-        let rest = Line {
-            chain: chain[first..].to_vec(),
-            ..line.clone()
-        };
-        self.mark(Line {
-            chain: chain[..end].to_vec(),
-            ..line
-        });
-        self.keep_piece(rest);
+    /// Parts a line where openings on it were shown to be hidden from each other: one that passes an edge nearer than the
+    /// clearance may cross what no line with clearance does.
+    fn part(&self, mut line: Line, out: &mut Vec<Line>) {
+        loop {
+            let chain = &line.chain;
+            let might = |i: usize, j: usize| self.might.get(chain[i] as usize, chain[j] as usize);
+            let end = (1..chain.len()).find(|&j| (0..j).any(|i| !might(i, j)));
+            let Some(end) = end else { break };
+            // The rest begins behind the last opening that does not go with it.
+            let first = (0..end)
+                .rev()
+                .find(|&i| !might(i, end))
+                .map_or(end, |i| i + 1);
+            let rest = chain[first..].to_vec();
+            line.chain.truncate(end);
+            out.push(Line {
+                chain: std::mem::replace(&mut line.chain, rest),
+                ..line
+            });
+        }
+        out.push(line);
     }
 
     fn mark(&mut self, line: Line) {
@@ -299,9 +311,7 @@ impl<'a> Search<'a> {
             for found in &found {
                 self.merge(found, &mut next);
             }
-            for line in found.into_iter().flat_map(|f| f.lines) {
-                self.keep(line);
-            }
+            self.keep(found.into_iter().flat_map(|f| f.lines).collect());
             self.grow();
         }
         true
@@ -321,14 +331,8 @@ impl<'a> Search<'a> {
     }
 
     fn merge(&mut self, found: &Found, next: &mut Next) {
-        let back = self.dirs.reverse[found.source] as usize;
-        for t in bits::ones(&found.hidden) {
-            self.settled.set(found.source, t);
-            self.might.clear(found.source, t);
-            self.might.clear(self.dirs.reverse[t] as usize, back);
-            next.clear(self.dirs, found.source, t);
-            next.clear(self.dirs, self.dirs.reverse[t] as usize, back);
-        }
+        next.hide(self.dirs, &mut self.might, found.source, &found.hidden);
+        bits::unite(self.settled.row_mut(found.source), &found.hidden);
         let a = self.dirs.all[found.source].from as usize;
         for &b in &found.undecided {
             let b = b as usize;
@@ -350,9 +354,9 @@ impl<'a> Search<'a> {
         let rows = visible.words_mut().par_chunks_mut(n_words);
         rows.enumerate().with_min_len(16).for_each(|(cell, row)| {
             bits::set(row, cell);
-            for &d in self.dirs.exits(cell as u32) {
-                bits::set(row, self.dirs.all[d as usize].to as usize);
-                for t in bits::ones(self.might.row(d as usize)) {
+            for d in self.dirs.exits(cell as u32) {
+                bits::set(row, self.dirs.all[d].to as usize);
+                for t in bits::ones(self.might.row(d)) {
                     bits::set(row, self.dirs.all[t].to as usize);
                 }
             }
