@@ -302,8 +302,10 @@ impl<'a> Search<'a> {
                 blocker: self.blocker,
                 max_pieces,
             };
+            // The longest first, so that no thread begins one when the others have ended.
             let found: Vec<Found> = round
                 .par_iter()
+                .rev()
                 .with_max_len(1)
                 .map_init(Flow::default, |flow, &(_, d)| flow.search(&shared, d))
                 .collect();
