@@ -41,9 +41,9 @@ enum What {
         /// Bake to the end, cells merged up to the threshold.
         #[arg(long)]
         bake: bool,
-        /// Merging threshold in triangles.
+        /// Merging threshold in polygons of the tree, as in the paper; objects do not count.
         #[arg(long, default_value_t = 50.0)]
-        min_cost: f64,
+        min_polygons: f64,
         /// Polygons of generated clinics, e.g. 11600,50000,200000; prints the growth between them.
         #[arg(long, value_delimiter = ',')]
         clinic: Vec<usize>,
@@ -129,14 +129,14 @@ pub(crate) fn run(args: &Bench) -> anyhow::Result<()> {
             scenes,
             heuristics,
             bake,
-            min_cost,
+            min_polygons,
             clinic,
         } => bench_bsp(
             &mut table,
             scenes,
             clinic,
             *heuristics,
-            bake.then_some(*min_cost),
+            bake.then_some(*min_polygons),
         )?,
         What::Builders { scenes, rays } => bench_builders(&mut table, scenes, *rays)?,
         What::Simplify { worlds } => bench_simplify(&mut table, worlds)?,

@@ -41,6 +41,9 @@ pub(crate) struct Simplify {
     /// What a square meter costs.
     #[arg(long, value_name = "COST", value_parser = parse_cost, default_value_t = 0.0)]
     area_cost: f64,
+    /// Multiplies the cost of detail objects; 0 where only structure counts.
+    #[arg(long, value_name = "FACTOR", value_parser = parse_cost, default_value_t = 1.0)]
+    detail_cost: f64,
     /// Multiplies the cost of a material, e.g. `--material-cost water=3`.
     #[arg(long, value_name = "NAME=FACTOR", value_parser = parse_material)]
     material_cost: Vec<(String, f64)>,
@@ -95,6 +98,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         cost: CostModel {
             triangle: args.triangle_cost,
             area: args.area_cost,
+            detail: args.detail_cost,
             materials: args.material_cost.iter().cloned().collect(),
         },
     };

@@ -122,6 +122,8 @@ pub struct Bsp {
 pub struct BspCounts {
     /// Polygons that the tree was built from.
     pub n_polygons: usize,
+    /// Triangles that those make: of each polygon, two fewer than it has corners.
+    pub n_triangles: usize,
     /// Polygons in the tree.
     pub n_pieces: usize,
     /// How often one was cut in two.
@@ -232,6 +234,7 @@ impl Bsp {
     pub fn counts(&self) -> BspCounts {
         BspCounts {
             n_polygons: self.surfaces.len(),
+            n_triangles: self.surfaces.iter().map(|s| s.points.len() - 2).sum(),
             n_pieces: self.surfaces.len() + self.tree.n_splits,
             n_splits: self.tree.n_splits,
             n_leaves: self.is_open.iter().filter(|&&o| o).count(),

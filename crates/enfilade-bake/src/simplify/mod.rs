@@ -40,6 +40,8 @@ pub struct CostModel {
     pub area: f64,
     /// By what a material's name multiplies both; 1 for those not named. [Limit: at least 0]
     pub materials: BTreeMap<String, f64>,
+    /// By what all that is of a detail object is multiplied; 0 where only structure counts. [Limit: at least 0]
+    pub detail: f64,
 }
 
 impl Default for CostModel {
@@ -48,6 +50,7 @@ impl Default for CostModel {
             triangle: 1.0,
             area: 0.0,
             materials: BTreeMap::new(),
+            detail: 1.0,
         }
     }
 }
@@ -88,6 +91,7 @@ impl SimplifySettings {
             ("simplify.metric", format!("{:?}", self.metric)),
             ("cost.triangle", self.cost.triangle.to_string()),
             ("cost.area", self.cost.area.to_string()),
+            ("cost.detail", self.cost.detail.to_string()),
         ]
         .map(|(k, v)| (k.to_owned(), v))
         .into();
@@ -201,6 +205,79 @@ pub fn expected_cost_after(
     cost_of_views(before, &after.world, &after.cell_of, cost, n_views)
 }
 
+/// Cells of worlds of which all ways to join them are tried: there are 115,975 for ten.
+const MAX_TRIED: usize = 10;
+
+/// The least mean cost of a view that any way to join cells comes to which leaves at most `max_portals`: all are tried, from
+/// the same eyes as [`expected_cost`] looks. `None` for worlds of more than ten cells.
+///
+/// Cells need not touch to be joined here, so that [`simplify`] may not reach it, but nothing is less.
+#[must_use]
+pub fn least_expected_cost(
+    world: &World,
+    max_portals: usize,
+    cost: &CostModel,
+    n_views: usize,
+) -> Option<f64> {
+    let n = world.graph.cells.len();
+    if n > MAX_TRIED {
+        return None;
+    }
+    let graph = cost_graph(world, cost);
+    let Eyes(seen_by) = metric::views(world, n_views, JUDGES);
+    // Sets of cells are bits of a number from here on.
+    let mut cells_of_item = vec![0_usize; graph.weights.len()];
+    for (cell, items) in graph.items.iter().enumerate() {
+        for &item in items {
+            cells_of_item[item as usize] |= 1 << cell;
+        }
+    }
+    let cost_of_cells: Vec<f64> = (0..1 << n)
+        .map(|cells| {
+            let items = cells_of_item.iter().zip(&graph.weights);
+            items
+                .filter(|(c, _)| **c & cells != 0)
+                .map(|(_, w)| w)
+                .sum()
+        })
+        .collect();
+    let mut n_views_of: BTreeMap<usize, usize> = BTreeMap::new();
+    for eye in 0..n_views {
+        let sees = |c: &usize| seen_by[*c][eye / 64] >> (eye % 64) & 1 == 1;
+        let cells = (0..n).filter(sees).fold(0, |cells, c| cells | 1 << c);
+        *n_views_of.entry(cells).or_default() += 1;
+    }
+    let mut least = f64::INFINITY;
+    // A part for each cell, numbered as they come up, counted through like digits.
+    let mut part = vec![0_usize; n];
+    loop {
+        let parts = world.graph.portals.iter();
+        let n_left = parts.filter(|p| part[p.cells[0].0 as usize] != part[p.cells[1].0 as usize]);
+        if n_left.count() <= max_portals {
+            let mut cells_of_part = vec![0; n];
+            for (c, &p) in part.iter().enumerate() {
+                cells_of_part[p] |= 1 << c;
+            }
+            let drawn = |seen: usize| -> usize {
+                let parts = cells_of_part.iter().filter(|cells| **cells & seen != 0);
+                parts.sum()
+            };
+            let views = n_views_of.iter();
+            let total: f64 = views
+                .map(|(&seen, &n)| n as f64 * cost_of_cells[drawn(seen)])
+                .sum();
+            least = least.min(total / n_views.max(1) as f64);
+        }
+        let can_rise =
+            |&c: &usize| c > 0 && part[c] <= part[..c].iter().copied().max().unwrap_or(0);
+        let Some(rises) = (0..n).rev().find(can_rise) else {
+            return Some(least);
+        };
+        part[rises] += 1;
+        part[rises + 1..].fill(0);
+    }
+}
+
 /// Views of one world, each of whose cells is drawn as a cell of another.
 fn cost_of_views(
     world: &World,
@@ -279,10 +356,8 @@ fn cost_graph(world: &World, cost: &CostModel) -> CostGraph {
         let volume = column(0).dot(column(4).cross(column(8))).abs();
         let mesh = &world.detail_meshes[d.mesh as usize];
         let scale = volume.powf(2.0 / 3.0);
-        add(
-            &d.cells,
-            mesh.primitives.iter().map(|p| of_primitive(p, scale)).sum(),
-        );
+        let parts = mesh.primitives.iter().map(|p| of_primitive(p, scale));
+        add(&d.cells, cost.detail * parts.sum::<f64>());
     }
     graph
 }

@@ -269,6 +269,7 @@ struct BspTable {
     max_portals: Option<usize>,
     triangle_cost: Option<Amount>,
     area_cost: Option<Amount>,
+    detail_cost: Option<Amount>,
     material_costs: std::collections::BTreeMap<String, Amount>,
 }
 
@@ -334,6 +335,7 @@ fn resolve_bsp(
         cost: CostModel {
             triangle: table.triangle_cost.map_or(1.0, |v| v.0),
             area: table.area_cost.map_or(0.0, |v| v.0),
+            detail: table.detail_cost.map_or(1.0, |v| v.0),
             materials: table
                 .material_costs
                 .into_iter()
