@@ -143,10 +143,11 @@ impl Walk<'_> {
         for i in range {
             let s = &d.steps[i];
             let p = s.position;
+            let kind = if s.is_mouth { "  a branch" } else { "" };
             let stop = if i == d.stop { "  <- stops here" } else { "" };
             writeln!(
                 out,
-                "{:>6}  weight {:>8.3}  cell {} into {}  at {:.2} {:.2} {:.2}{stop}",
+                "{:>6}  weight {:>8.3}  cell {} into {}  at {:.2} {:.2} {:.2}{kind}{stop}",
                 i + 1,
                 s.weight,
                 s.from,
