@@ -41,6 +41,9 @@ const HOLDS: f64 = 0.1;
 /// The cell around the scene.
 pub const OUTDOOR_CELL: u32 = 0;
 
+/// Weight of a portal that a person joined: less than that of any other.
+pub const JOINED: f64 = -2.0;
+
 /// How the quality of a portal is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Weight {
@@ -348,7 +351,7 @@ pub fn decimate(
             }
             // The middle of a portal moves as others join it: what was shown is what was meant.
             if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
-                return -2.0;
+                return JOINED;
             }
             let least = radius[a].min(radius[b]);
             if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {

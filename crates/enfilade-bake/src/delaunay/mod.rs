@@ -31,8 +31,8 @@ mod tests;
 
 pub use bake::{DelaunayConfig, Session, bake_delaunay, bake_session};
 pub use decimate::{
-    CellPortal, Cells, Choices, Decimation, OUTDOOR_CELL, Step, Weight, decimate, default_stop,
-    flow_together,
+    CellPortal, Cells, Choices, Decimation, JOINED, OUTDOOR_CELL, Step, Weight, decimate,
+    default_stop, flow_together,
 };
 pub use space::{LEAST_BALL, Link, Space, divide};
 pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};
