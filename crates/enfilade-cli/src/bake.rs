@@ -1,5 +1,6 @@
 //! `enfilade bake`: a scene becomes a world.
 
+mod curved;
 pub(crate) mod delaunay;
 pub(crate) mod settings;
 
@@ -57,28 +58,21 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let scene = &imported.scene;
     refuse_leak(scene, options)?;
     let (method, reason) = method_for(scene, options.method);
-    writeln!(io::stderr(), "method {}: {reason}", method.name())?;
-    let bar = BakeBar::new(scene, config, method.stages());
-    let ctx = BakeContext::new(&bar, None);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads.map_or(0, usize::from))
-        .build()?;
-    let baked = match method {
-        Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
-        Builder::Bsp => {
-            let mut config = settings.bsp.clone();
-            if settings.merges_brushes_only && scene.solids.is_empty() {
-                // A room of a building has few triangles; the shape of its openings says that it is one.
-                config.simplify.min_cost = 0.0;
-            }
-            pool.install(|| bake_bsp(scene, &config, &ctx))
+    let mut baked = bake_by(method, &reason, scene, options, &settings)?;
+    if options.method == settings::Method::Auto
+        && method == Builder::Watershed
+        && n_indoors(&baked) == 1
+        && curved::is_closed_and_curved(scene)
+    {
+        let reason = "the surface is closed and curved, and the watershed finds one cell in it; \
+                      tetrahedra find branches, too";
+        let other = bake_by(Builder::Delaunay, reason, scene, options, &settings)?;
+        if n_indoors(&other) > 1 {
+            baked = other;
+        } else {
+            writeln!(io::stderr(), "there are none: the watershed's is kept")?;
         }
-        Builder::Delaunay => {
-            let config = options.delaunay.resolve(config)?;
-            pool.install(|| bake_delaunay(scene, &config, &ctx))
-        }
-    }?;
-    drop(bar);
+    }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
@@ -100,6 +94,50 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         bytes.len() as f64 / 1e6
     )?;
     Ok(())
+}
+
+/// Bakes with one builder, and says which and why.
+fn bake_by(
+    method: Builder,
+    reason: &str,
+    scene: &Scene,
+    options: &settings::BakeOptions,
+    settings: &settings::Resolved,
+) -> anyhow::Result<BakeOutput> {
+    writeln!(io::stderr(), "method {}: {reason}", method.name())?;
+    if method != Builder::Delaunay && options.delaunay.choices.is_some() {
+        writeln!(
+            io::stderr(),
+            "the choices are not asked: they are about portals of --method delaunay"
+        )?;
+    }
+    let config = &settings.watershed;
+    let bar = BakeBar::new(scene, config, method.stages());
+    let ctx = BakeContext::new(&bar, None);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads.map_or(0, usize::from))
+        .build()?;
+    let baked = match method {
+        Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
+        Builder::Bsp => {
+            let mut config = settings.bsp.clone();
+            if settings.merges_brushes_only && scene.solids.is_empty() {
+                // A room of a building has few triangles; the shape of its openings says that it is one.
+                config.simplify.min_cost = 0.0;
+            }
+            pool.install(|| bake_bsp(scene, &config, &ctx))
+        }
+        Builder::Delaunay => {
+            let config = options.delaunay.resolve(config)?;
+            pool.install(|| bake_delaunay(scene, &config, &ctx))
+        }
+    }?;
+    Ok(baked)
+}
+
+fn n_indoors(baked: &BakeOutput) -> usize {
+    let cells = &baked.world.graph.cells;
+    cells.iter().filter(|c| !c.outdoor).count()
 }
 
 /// What finds the cells.

@@ -4,11 +4,14 @@
 //! decimation, back and forth, and overrules it. Commands come from standard input, a line each, so
 //! that a script can do the same.
 
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::delaunay::{DelaunayConfig, Session, bake_session};
+use enfilade::bake::delaunay::{
+    Choices, DelaunayConfig, JOINED, OUTDOOR_CELL, Session, Step, bake_session,
+};
 use enfilade::bake::{BakeContext, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
@@ -25,8 +28,8 @@ pub(crate) struct Decimate {
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
     /// Reads commands from standard input: `n [K]` forwards, `b [K]` back, `g N` to a step, `l` lists
-    /// the steps ahead, `keep` and `join` decide about the next portal for good, `save FILE.toml`,
-    /// `bake FILE.glb`, `q`.
+    /// the steps ahead, `keep` and `join` decide about the next portal for good, `undo` takes the last
+    /// decision back, `save FILE.toml`, `bake FILE.glb`, `help`, `q`.
     #[arg(long)]
     steps: bool,
     /// Begin after this many steps; where it stops by itself if not given.
@@ -57,6 +60,8 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         at: args.at.unwrap_or(session.decimation.stop),
         session,
         config,
+        made: Vec::new(),
+        is_saved: true,
     };
     let mut out = io::stdout().lock();
     if args.steps {
@@ -65,6 +70,12 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
             if !walk.obey(&line?, &mut out)? {
                 break;
             }
+        }
+        if !walk.is_saved {
+            writeln!(
+                io::stderr(),
+                "the last decisions were not saved; `save FILE.toml` before the end does"
+            )?;
         }
     } else {
         walk.list(&mut out, 0..n)?;
@@ -76,13 +87,39 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What a step's portal weighed, in words where no ratio was asked.
+fn weight_of(step: &Step) -> String {
+    match step.weight {
+        f64::INFINITY => "kept by decision".to_owned(),
+        w if w <= JOINED => "joined by decision".to_owned(),
+        w if w < 0.0 => "a crevice".to_owned(),
+        w if step.is_mouth => format!("weight {w:.3}, a branch"),
+        w => format!("weight {w:.3}"),
+    }
+}
+
 struct Walk<'a> {
     scene: &'a Scene,
     session: Session,
     config: DelaunayConfig,
     /// Steps taken.
     at: usize,
+    /// Decisions of this walk, true to keep, in order.
+    made: Vec<bool>,
+    /// They are in a file.
+    is_saved: bool,
 }
+
+const HELP: &str = "\
+n [K]           K steps forwards, one if not given
+b [K]           back
+g N             to after step N
+l               lists the steps ahead
+keep, join      decides about the next portal, for good: it stays, or it goes first
+undo            takes the last decision of this walk back
+save FILE.toml  writes all decisions; `bake --method delaunay --choices FILE.toml` obeys them
+bake FILE.glb   writes a world of the cells that are left now
+q               ends";
 
 /// Steps that `l` shows.
 const AHEAD: usize = 10;
@@ -99,24 +136,32 @@ impl Walk<'_> {
             Some("n" | "b" | "g") if count().is_err() => {
                 writeln!(out, "'{}' is not a number of steps", words[1])?;
             }
+            Some("g") if words.len() < 2 => writeln!(out, "'g' needs the number of a step")?,
             Some("n") => self.at = self.at.saturating_add(count()?).min(n),
             Some("b") => self.at = self.at.saturating_sub(count()?),
             Some("g") => self.at = count()?.min(n),
             Some("l") => self.list(out, self.at..(self.at + AHEAD).min(n))?,
             Some(choice @ ("keep" | "join")) => self.choose(choice == "keep", out)?,
-            Some("save") if words.len() == 2 => {
-                write_atomically(
-                    Path::new(words[1]),
-                    choices_text(&self.config.choices).as_bytes(),
-                )?;
-                writeln!(out, "wrote {}", words[1])?;
+            Some("undo") => self.undo(out)?,
+            // What cannot be written is told, and no reason to lose the walk.
+            Some("save") if words.len() == 2 => match self.save(Path::new(words[1])) {
+                Ok(()) => writeln!(
+                    out,
+                    "wrote {0}; `enfilade bake --method delaunay --choices {0}` obeys it",
+                    words[1]
+                )?,
+                Err(error) => writeln!(out, "{error:#}")?,
+            },
+            Some("bake") if words.len() == 2 => {
+                if let Err(error) = self.bake(Path::new(words[1]), out) {
+                    writeln!(out, "{error:#}")?;
+                }
             }
-            Some("bake") if words.len() == 2 => self.bake(Path::new(words[1]), out)?,
-            Some(other) => writeln!(
-                out,
-                "'{other}' is no command: n [K], b [K], g N, l, keep, join, save FILE.toml, \
-                 bake FILE.glb, q"
-            )?,
+            Some(file @ ("save" | "bake")) => {
+                writeln!(out, "'{file}' needs the name of one file to write")?;
+            }
+            Some("help" | "h" | "?") => writeln!(out, "{HELP}")?,
+            Some(other) => writeln!(out, "'{other}' is no command; `help` lists them")?,
         }
         self.show(out)?;
         Ok(true)
@@ -127,15 +172,68 @@ impl Walk<'_> {
         let Some(step) = self.session.decimation.steps.get(self.at) else {
             return writeln!(out, "no portal is left to decide about");
         };
+        let p = step.position;
         let choices = &mut self.config.choices;
         if keep {
-            choices.keep.push(step.position);
+            choices.keep.push(p);
         } else {
-            choices.join.push(step.position);
+            choices.join.push(p);
         }
+        self.made.push(keep);
+        self.decided();
+        writeln!(
+            out,
+            "{} what lies within {} m of {:.2} {:.2} {:.2}",
+            if keep { "keeps" } else { "joins" },
+            Choices::REACH,
+            p.x,
+            p.y,
+            p.z
+        )
+    }
+
+    fn undo(&mut self, out: &mut impl Write) -> io::Result<()> {
+        let choices = &mut self.config.choices;
+        let taken = match self.made.pop() {
+            Some(true) => choices.keep.pop(),
+            Some(false) => choices.join.pop(),
+            None => return writeln!(out, "no decision of this walk is left to take back"),
+        };
+        self.decided();
+        let p = taken.unwrap_or_default();
+        writeln!(
+            out,
+            "took back the decision at {:.2} {:.2} {:.2}",
+            p.x, p.y, p.z
+        )
+    }
+
+    /// Decimates anew, up to where it then stops.
+    fn decided(&mut self) {
+        self.is_saved = false;
         self.session.decimate(&self.config);
         self.at = self.session.decimation.stop;
+    }
+
+    fn save(&mut self, path: &Path) -> anyhow::Result<()> {
+        write_atomically(path, choices_text(&self.config.choices).as_bytes())?;
+        self.is_saved = true;
         Ok(())
+    }
+
+    /// Cells that are left indoors, and crevices among them: no ball of the least radius of a room fits in, or no part
+    /// of the space around leads there.
+    fn left(&self) -> [usize; 2] {
+        let least = self.config.common.merge.min_radius;
+        let mut radius: BTreeMap<u32, f64> = BTreeMap::new();
+        let after = self.session.decimation.after(self.at);
+        for (cell, &r) in after.iter().zip(&self.session.cells.radii) {
+            let widest = radius.entry(*cell).or_insert(0.0);
+            *widest = widest.max(r);
+        }
+        radius.remove(&OUTDOOR_CELL);
+        let n_crevices = radius.values().filter(|&&r| r < least).count();
+        [radius.len() - n_crevices, n_crevices]
     }
 
     fn list(&self, out: &mut impl Write, range: std::ops::Range<usize>) -> io::Result<()> {
@@ -146,9 +244,9 @@ impl Walk<'_> {
             let stop = if i == d.stop { "  <- stops here" } else { "" };
             writeln!(
                 out,
-                "{:>6}  weight {:>8.3}  cell {} into {}  at {:.2} {:.2} {:.2}{stop}",
+                "{:>6}  {:<24}  cell {} into {}  at {:.2} {:.2} {:.2}{stop}",
                 i + 1,
-                s.weight,
+                weight_of(s),
                 s.from,
                 s.into,
                 p.x,
@@ -161,23 +259,20 @@ impl Walk<'_> {
 
     fn show(&self, out: &mut impl Write) -> io::Result<()> {
         let d = &self.session.decimation;
+        let [n_cells, n_crevices] = self.left();
         write!(
             out,
-            "{} of {} steps, {} cells left; stops by itself after {}",
+            "{} of {} steps, {n_cells} cells and {n_crevices} crevices left indoors; stops by itself after {}",
             self.at,
             d.steps.len(),
-            d.n_cells - self.at,
             d.stop
         )?;
         match d.steps.get(self.at) {
             None => writeln!(out, "; no portal is left"),
             Some(s) => {
                 let p = s.position;
-                writeln!(
-                    out,
-                    "; next weighs {:.3}, at {:.2} {:.2} {:.2}",
-                    s.weight, p.x, p.y, p.z
-                )
+                let weight = weight_of(s);
+                writeln!(out, "; next: {weight}, at {:.2} {:.2} {:.2}", p.x, p.y, p.z)
             }
         }
     }
@@ -191,5 +286,90 @@ impl Walk<'_> {
         print_summary(out, &baked.world)?;
         writeln!(out, "wrote {}", path.display())?;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_testkit::{Variant, gjorup_rooms};
+
+    /// What the walk says to some lines.
+    fn said(walk: &mut Walk<'_>, lines: &[&str]) -> String {
+        let mut out = Vec::new();
+        for line in lines {
+            assert!(walk.obey(line, &mut out).unwrap());
+        }
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn a_walk_forwards_and_back_overruled_taken_back_and_saved() {
+        let scene = gjorup_rooms(Variant::Optimised, [0.0; 3]).scene;
+        let config = DelaunayConfig::default();
+        let session = Session::begin(&scene, &config, &BakeContext::new(&Silent, None)).unwrap();
+        let stop = session.decimation.stop;
+        let mut walk = Walk {
+            scene: &scene,
+            session,
+            config,
+            at: stop,
+            made: Vec::new(),
+            is_saved: true,
+        };
+        // Four rooms, whatever else the insides of walls are.
+        let n_cells = walk.left()[0];
+        assert!(n_cells >= 4);
+        said(&mut walk, &["n"]);
+        assert_eq!(walk.left()[0], n_cells - 1);
+        said(&mut walk, &["b", "b 1000000", "g 0"]);
+        assert_eq!(walk.at, 0);
+        said(&mut walk, &["g 100000000"]);
+        assert_eq!(walk.at, walk.session.decimation.steps.len());
+        assert!(said(&mut walk, &["keep"]).contains("no portal is left to decide about"));
+        assert!(walk.is_saved);
+
+        walk.at = stop;
+        let text = said(&mut walk, &["join"]);
+        assert!(
+            text.starts_with("joins what lies within 0.5 m of "),
+            "{text}"
+        );
+        assert_eq!(walk.left()[0], n_cells - 1);
+        assert_eq!(walk.config.choices.join.len(), 1);
+        let folder = std::env::temp_dir().join(format!("enfilade-walk-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let inside = folder.join("choices.toml");
+        let nowhere = folder.join("none").join("choices.toml");
+        let save = |p: &Path| format!("save {}", p.display());
+        assert!(said(&mut walk, &[&save(&nowhere)]).contains("cannot write"));
+        assert!(!walk.is_saved);
+        assert!(said(&mut walk, &[&save(&inside)]).contains("--choices"));
+        assert!(walk.is_saved);
+        assert!(std::fs::read_to_string(&inside).unwrap().contains("join"));
+        std::fs::remove_dir_all(&folder).unwrap();
+
+        said(&mut walk, &["undo"]);
+        assert_eq!(walk.config.choices, Choices::default());
+        assert_eq!((walk.at, walk.left()[0]), (stop, n_cells));
+        assert!(said(&mut walk, &["undo"]).contains("no decision"));
+        // What is kept outlasts all that has a weight.
+        said(&mut walk, &["keep"]);
+        let last = walk.session.decimation.steps.last().unwrap();
+        assert_eq!(weight_of(last), "kept by decision");
+
+        for (line, answer) in [
+            ("save", "'save' needs the name of one file"),
+            ("bake a b", "'bake' needs the name of one file"),
+            ("n x", "'x' is not a number of steps"),
+            ("g", "'g' needs the number of a step"),
+            ("walk", "'walk' is no command; `help`"),
+            ("help", "undo "),
+            ("", "steps, "),
+        ] {
+            let text = said(&mut walk, &[line]);
+            assert!(text.contains(answer), "{line}: {text}");
+        }
+        assert!(!walk.obey("q", &mut Vec::new()).unwrap());
     }
 }

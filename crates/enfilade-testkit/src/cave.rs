@@ -1,13 +1,11 @@
-//! Organic caves: chambers and tunnels as a noisy distance field, meshed by surface nets.
+//! Organic caves: chambers and tunnels as a noisy distance field, meshed by a surface net.
 
-use std::collections::HashMap;
-
-use enfilade_geom::scene::{Mesh, Primitive, Role};
-use enfilade_geom::{DMat4, DVec3};
+use enfilade_geom::scene::{Mesh, Role};
+use enfilade_geom::{Aabb, DMat4, DVec3};
 
 use crate::rng::Rng;
 use crate::site::{Generated, Site};
-use crate::solid::newell;
+use crate::surface_net::surface_net;
 use crate::truth::{Convex, Opening, OpeningKind, Room, Side};
 
 const N_CHAMBERS: usize = 7;
@@ -36,7 +34,8 @@ struct Field {
     seed: u64,
 }
 
-fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
+/// [Units: wu]
+pub(crate) fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let along = b - a;
     let t = ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
     p.distance(a + along * t)
@@ -78,12 +77,6 @@ impl Field {
             sum += weight.x * weight.y * weight.z * Rng::new(key).range(-1.0, 1.0);
         }
         sum
-    }
-
-    fn gradient(&self, p: DVec3) -> DVec3 {
-        let h = GRID * 0.5;
-        let d = |axis: DVec3| self.at(p + axis * h) - self.at(p - axis * h);
-        DVec3::new(d(DVec3::X), d(DVec3::Y), d(DVec3::Z))
     }
 }
 
@@ -188,7 +181,18 @@ pub fn cave(seed: u64) -> Generated {
         site.add_opening(tunnel_opening(&field.chambers, t));
     }
     let material = site.material("rock", [0.35, 0.31, 0.28]);
-    let mesh = site.add_mesh(surface_net(&field, material));
+    let mut bounds = Aabb::EMPTY;
+    for c in &field.chambers {
+        bounds = bounds
+            .including(c.center - c.radii)
+            .including(c.center + c.radii);
+    }
+    let bounds = bounds.expanded(2.0 * ROUGHNESS + 2.0 * GRID);
+    let net = surface_net(|p| field.at(p), bounds, GRID, material);
+    let mesh = site.add_mesh(Mesh {
+        name: "cave walls".into(),
+        primitives: vec![net],
+    });
     site.place("cave walls", mesh, DMat4::IDENTITY, Role::Structural);
     site.finish()
 }
@@ -215,96 +219,5 @@ fn tunnel_opening(chambers: &[Chamber], t: &Tunnel) -> Opening {
         corners: [(-half, -half), (half, -half), (half, half), (-half, half)]
             .map(|(u, v)| center + right * u + up * v),
         rooms: t.chambers.map(Side::Room),
-    }
-}
-
-/// Naive surface nets (Gibson 1998, "Constrained elastic surface nets"): a corner in each grid
-/// cell that the surface passes, at the mean of its crossings with the cell's edges; a
-/// quadrangle for each grid edge that it crosses.
-fn surface_net(field: &Field, material: u32) -> Mesh {
-    let mut bounds = enfilade_geom::Aabb::EMPTY;
-    for c in &field.chambers {
-        bounds = bounds
-            .including(c.center - c.radii)
-            .including(c.center + c.radii);
-    }
-    let bounds = bounds.expanded(2.0 * ROUGHNESS + 2.0 * GRID);
-    let n = (bounds.size() / GRID)
-        .ceil()
-        .to_array()
-        .map(|x| x as usize + 1);
-    let stride = [1, n[0], n[0] * n[1]];
-    let cell_of = |i: usize| [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
-    let at = |c: [usize; 3]| bounds.min + DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * GRID;
-    let values: Vec<f64> = (0..n[0] * n[1] * n[2])
-        .map(|i| field.at(at(cell_of(i))))
-        .collect();
-    let offset = |corner: usize| (0..3).map(|a| (corner >> a & 1) * stride[a]).sum::<usize>();
-
-    let mut p = Primitive {
-        material: Some(material),
-        ..Primitive::default()
-    };
-    let mut positions: Vec<DVec3> = Vec::new();
-    let mut corner_of: HashMap<usize, u32> = HashMap::new();
-    for i in 0..values.len() {
-        let cell = cell_of(i);
-        if (0..3).any(|a| cell[a] + 1 >= n[a]) {
-            continue;
-        }
-        let (mut sum, mut count) = (DVec3::ZERO, 0);
-        for corner in 0..8 {
-            for axis in (0..3).filter(|a| corner >> a & 1 == 0) {
-                let (a, b) = (i + offset(corner), i + offset(corner | 1 << axis));
-                let (va, vb) = (values[a], values[b]);
-                if (va < 0.0) != (vb < 0.0) {
-                    sum += at(cell_of(a)).lerp(at(cell_of(b)), va / (va - vb));
-                    count += 1;
-                }
-            }
-        }
-        if count > 0 {
-            corner_of.insert(i, positions.len() as u32);
-            positions.push(sum / f64::from(count));
-        }
-    }
-    for i in 0..values.len() {
-        let cell = cell_of(i);
-        for axis in 0..3 {
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-            if cell[axis] + 1 >= n[axis] || cell[u] == 0 || cell[v] == 0 {
-                continue;
-            }
-            let (inside, ahead) = (values[i] < 0.0, values[i + stride[axis]] < 0.0);
-            if inside == ahead {
-                continue;
-            }
-            let cells = [i - stride[u] - stride[v], i - stride[v], i, i - stride[u]];
-            let quad = cells.map(|c| corner_of[&c]);
-            // As listed it faces along the axis, where the air must be.
-            let [a, b, c, d] = if ahead {
-                quad
-            } else {
-                [quad[3], quad[2], quad[1], quad[0]]
-            };
-            p.indices.extend([a, b, c, a, c, d]);
-        }
-    }
-    for &q in &positions {
-        p.positions.push(q.as_vec3().to_array());
-        p.normals.push(
-            (-field.gradient(q))
-                .normalize_or(DVec3::Y)
-                .as_vec3()
-                .to_array(),
-        );
-    }
-    debug_assert!(p.indices.chunks_exact(3).any(|t| {
-        let t = [0, 1, 2].map(|k| positions[t[k] as usize]);
-        newell(&t).dot(-field.gradient(t[0])) > 0.0
-    }));
-    Mesh {
-        name: "cave walls".into(),
-        primitives: vec![p],
     }
 }

@@ -29,10 +29,12 @@ mod rng;
 mod roof;
 mod site;
 pub mod solid;
+mod surface_net;
 mod tower;
 mod transform;
 mod truth;
 mod truth_json;
+mod tubes;
 
 pub use cave::cave;
 pub use clinic::clinic;
@@ -45,3 +47,4 @@ pub use site::{Generated, Site};
 pub use tower::{TowerParams, office_tower};
 pub use transform::{rotated, scaled, shuffled, transformed};
 pub use truth::{Convex, Opening, OpeningKind, Room, Side, Truth};
+pub use tubes::{Tube, tubes};

@@ -3,7 +3,10 @@
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, Triangle};
 
-use super::decimate::{Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together};
+use super::branches::find_branches;
+use super::decimate::{
+    Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together, parted,
+};
 use super::rooms::find_rooms;
 use super::space::{Space, divide};
 use crate::assemble::Cut;
@@ -82,7 +85,11 @@ impl Session {
         let bvh = Bvh::build(&walls);
         let space = divide(&walls, &closures, &bvh, opening)?;
         context.delaunay_stage(1)?;
-        let cells = flow_together(&space);
+        let cells = with_branches(
+            &space,
+            flow_together(&space),
+            config.common.merge.min_radius,
+        );
         let mut session = Self {
             space,
             cells,
@@ -110,6 +117,22 @@ impl Session {
             config.common.merge.min_radius,
             &config.choices,
         );
+    }
+}
+
+/// Cells that end where branches leave the rooms that a decimation without choices comes to.
+fn with_branches(space: &Space, cells: Cells, min_radius: f64) -> Cells {
+    let weight = Weight::ScaleFree;
+    let stop = default_stop(weight);
+    let rooms = decimate(space, &cells, weight, stop, min_radius, &Choices::default());
+    let room_of_cell = rooms.after(rooms.stop);
+    let room = |&c: &u32| room_of_cell[c as usize];
+    let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
+    let branches = find_branches(space, &room_of_part);
+    if branches.is_empty() {
+        cells
+    } else {
+        parted(space, &cells, &branches)
     }
 }
 

@@ -7,7 +7,7 @@
 //! | --- | --- | --- |
 //! | [`Weight::Aspect`] | largest projected cell ÷ portal | §4.1.4 |
 //! | [`Weight::SizeCorrected`] | the same ÷ square root of the projected cell | §4.3.2 |
-//! | [`Weight::ScaleFree`] | radius of the lesser cell's largest ball ÷ that of the ball that passes | ours |
+//! | [`Weight::ScaleFree`] | radius of the lesser cell's largest ball ÷ that of the ball that passes; at the mouth of a branch, the trunk's ÷ the branch's, if that is more | ours |
 //!
 //! His first slips through doors where cells begin alike, his second depends on the model's scale,
 //! and both leave spikes for the end (§4.3.2, §4.3.3). A ratio of two radii has no scale, a
@@ -17,7 +17,8 @@
 //! It goes in two rounds. The first joins what flows into one another, by radius, in one sweep over
 //! all links: millions of tetrahedra become a few cells a room ([`Cells`]). The second is Gjørup's,
 //! with a heap, and is recorded down to the last portal ([`Decimation`]), so that a person can go
-//! forwards and back, and overrule it.
+//! forwards and back, and overrule it. Between the two, cells are cut where branches leave them
+//! (`branches`), which no pinch shows: the steps that give a branch back to its trunk are part of the record.
 //!
 //! Ties are broken by the numbers of tetrahedra, which depend on coordinates only. `O(n log n)`.
 
@@ -26,6 +27,7 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use enfilade_geom::{Aabb, DVec3};
 
+use super::branches::Branches;
 use super::space::Space;
 
 /// Two cells whose lesser ball is hardly larger than what passes between them are parts of one
@@ -39,6 +41,9 @@ const HOLDS: f64 = 0.1;
 /// The cell around the scene.
 pub const OUTDOOR_CELL: u32 = 0;
 
+/// Weight of a portal that a person joined: less than that of any other.
+pub const JOINED: f64 = -2.0;
+
 /// How the quality of a portal is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Weight {
@@ -46,7 +51,7 @@ pub enum Weight {
     Aspect,
     /// Gjørup's ratio corrected by size; depends on the unit.
     SizeCorrected,
-    /// Ratio of radii; above 1.
+    /// Ratio of radii, at a pinch or at the mouth of a branch; above 1.
     #[default]
     ScaleFree,
 }
@@ -70,6 +75,8 @@ pub struct Cells {
 pub struct CellPortal {
     /// Radius of the widest ball that passes. [Units: wu]
     pub radius: f64,
+    /// Where a branch leaves what is wider: how many times wider that is. 0 elsewhere.
+    pub mouth: f64,
     /// Sum of the facets' area normals, from the lesser to the greater cell. [Units: wu²]
     pub vector: DVec3,
     /// Links of the space.
@@ -118,26 +125,43 @@ pub fn flow_together(space: &Space) -> Cells {
         sets.0[high as usize] = low;
         radius[low as usize] = ra.max(rb);
     }
-    let mut number: BTreeMap<u32, u32> = BTreeMap::new();
-    if let Some(t) = outdoors {
-        number.insert(sets.find(t), OUTDOOR_CELL);
+    let roots: Vec<u32> = (0..n as u32).map(|t| sets.find(t)).collect();
+    gathered(space, |t| (roots[t as usize], 0), &Branches::none(n))
+}
+
+/// Cells that end where branches begin.
+pub(super) fn parted(space: &Space, cells: &Cells, branches: &Branches) -> Cells {
+    let key = |t: u32| {
+        let t = t as usize;
+        (cells.cell_of_part[t], branches.label_of_part[t])
+    };
+    gathered(space, key, branches)
+}
+
+/// Cells of parts with equal keys, in the order of their first parts.
+fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches) -> Cells {
+    let n = space.radii.len() as u32;
+    let mut number: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+    if let Some(t) = (0..n).find(|&t| space.radii[t as usize] == f64::INFINITY) {
+        number.insert(key(t), OUTDOOR_CELL);
     }
     let mut cells = Cells {
-        cell_of_part: vec![0; n],
+        cell_of_part: vec![0; n as usize],
         radii: vec![f64::INFINITY],
         volumes: vec![0.0],
         boxes: vec![Aabb::EMPTY],
         portals: BTreeMap::new(),
     };
-    for t in 0..n as u32 {
-        let root = sets.find(t);
+    for t in 0..n {
         let next = cells.radii.len() as u32;
-        let cell = *number.entry(root).or_insert(next);
+        let cell = *number.entry(key(t)).or_insert(next);
         if cell == next {
-            cells.radii.push(radius[root as usize]);
+            cells.radii.push(0.0);
             cells.volumes.push(0.0);
             cells.boxes.push(Aabb::EMPTY);
         }
+        let radius = &mut cells.radii[cell as usize];
+        *radius = radius.max(space.radii[t as usize]);
         cells.volumes[cell as usize] += space.volumes[t as usize];
         cells.cell_of_part[t as usize] = cell;
         let b = &mut cells.boxes[cell as usize];
@@ -153,10 +177,13 @@ pub fn flow_together(space: &Space) -> Cells {
             .entry((a.min(b), a.max(b)))
             .or_insert(CellPortal {
                 radius: 0.0,
+                mouth: 0.0,
                 vector: DVec3::ZERO,
                 links: Vec::new(),
             });
         portal.radius = portal.radius.max(link.radius);
+        let labels = link.parts.map(|t| branches.label_of_part[t as usize]);
+        portal.mouth = portal.mouth.max(branches.weight(labels));
         let normal = space.area_vector(link);
         portal.vector += if a < b { normal } else { -normal };
         portal.links.push(l as u32);
@@ -173,6 +200,8 @@ pub struct Step {
     pub from: u32,
     /// What the portal between them weighed.
     pub weight: f64,
+    /// The weight is that of a branch at its mouth, not that of a pinch.
+    pub is_mouth: bool,
     /// Middle of that portal. [Units: wu]
     pub position: DVec3,
 }
@@ -256,6 +285,7 @@ impl Eq for Candidate {}
 
 struct Live {
     radius: f64,
+    mouth: f64,
     vector: DVec3,
     center: DVec3,
     n: f64,
@@ -299,6 +329,7 @@ pub fn decimate(
             (a, b),
             Live {
                 radius: portal.radius,
+                mouth: portal.mouth,
                 vector: portal.vector,
                 center,
                 n: portal.links.len() as f64,
@@ -320,7 +351,7 @@ pub fn decimate(
             }
             // The middle of a portal moves as others join it: what was shown is what was meant.
             if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
-                return -2.0;
+                return JOINED;
             }
             let least = radius[a].min(radius[b]);
             if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
@@ -328,7 +359,7 @@ pub fn decimate(
                 return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
             }
             if weight == Weight::ScaleFree {
-                return least / portal.radius.max(1e-9);
+                return (least / portal.radius.max(1e-9)).max(portal.mouth);
             }
             let area = portal.vector.length().max(1e-9);
             let projected = |b: &Aabb| {
@@ -373,6 +404,7 @@ pub fn decimate(
             into: one.min(other),
             from: one.max(other),
             weight: c.weight,
+            is_mouth: weight == Weight::ScaleFree && portal.mouth > 0.0 && c.weight == portal.mouth,
             position: portal.center / portal.n,
         });
         names[into as usize] = one.min(other);
@@ -410,6 +442,7 @@ pub fn decimate(
             let pair = (into.min(other), into.max(other));
             let live = portals.entry(pair).or_insert(Live {
                 radius: 0.0,
+                mouth: 0.0,
                 vector: DVec3::ZERO,
                 center: DVec3::ZERO,
                 n: 0.0,
@@ -418,6 +451,7 @@ pub fn decimate(
                 version: 0,
             });
             live.radius = live.radius.max(old.radius);
+            live.mouth = live.mouth.max(old.mouth);
             live.vector += old.vector * sign;
             live.center += old.center;
             live.n += old.n;

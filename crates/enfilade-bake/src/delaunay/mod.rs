@@ -9,10 +9,12 @@
 //! | points where surfaces need them | `refine` | Chew 1993; Boissonnat & Oudot 2005 |
 //! | tetrahedra cut by polygons, what is open between | `cut` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
+//! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
 //! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | screens and votes | `rooms` | ours |
 
 mod bake;
+mod branches;
 mod cut;
 mod decimate;
 mod order;
@@ -29,8 +31,8 @@ mod tests;
 
 pub use bake::{DelaunayConfig, Session, bake_delaunay, bake_session};
 pub use decimate::{
-    CellPortal, Cells, Choices, Decimation, OUTDOOR_CELL, Step, Weight, decimate, default_stop,
-    flow_together,
+    CellPortal, Cells, Choices, Decimation, JOINED, OUTDOOR_CELL, Step, Weight, decimate,
+    default_stop, flow_together,
 };
 pub use space::{LEAST_BALL, Link, Space, divide};
 pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};

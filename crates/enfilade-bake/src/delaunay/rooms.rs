@@ -174,7 +174,7 @@ fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) ->
 }
 
 /// Groups of links whose facets share corners.
-fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
+pub(super) fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
     let facet = |l: u32| space.vertices_about(&space.links[l as usize]);
     let mut by_corner: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (i, &l) in links.iter().enumerate() {

@@ -96,13 +96,14 @@ enum Switch {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(super) enum Method {
-    /// The partition where all structure is made of brushes, the watershed for everything else.
+    /// The partition where all structure is made of brushes, the watershed for everything else; tetrahedra where it finds one
+    /// cell in a closed curved surface, which may have branches.
     Auto,
     /// Voxels, distances, watershed.
     Watershed,
     /// Binary space partition and separators, for brushes and clean architectural models.
     Bsp,
-    /// Tetrahedra between the surfaces, decimated; for caves and other irregular scenes.
+    /// Tetrahedra between the surfaces, decimated; for caves, vessels and other irregular scenes.
     Delaunay,
 }
 

@@ -1,0 +1,195 @@
+//! Branches of tubes through the Delaunay builder: a cell each, though nothing pinches them.
+
+use std::collections::BTreeSet;
+
+use enfilade_bake::delaunay::{DelaunayConfig, Session, bake_delaunay};
+use enfilade_bake::{BakeContext, Silent};
+use enfilade_cpg::PortalKind;
+use enfilade_geom::DVec3;
+use enfilade_testkit::{Generated, Tube, tubes};
+use enfilade_verify::{VerifyOptions, verify_world};
+use proptest::prelude::*;
+
+/// A tube that leaves the axis of another at `foot`, in the direction `away`, and ends `length` from there.
+fn side_tube(foot: DVec3, away: DVec3, length: f64, radius: f64) -> Tube {
+    let away = away.normalize();
+    Tube {
+        ends: [foot, foot + away * (length - radius)],
+        radius,
+    }
+}
+
+fn trunk(half: f64, radius: f64) -> Tube {
+    Tube {
+        ends: [DVec3::X * -half, DVec3::X * half],
+        radius,
+    }
+}
+
+/// The room of each point after the default stop.
+fn rooms_at(g: &Generated, scale: f64, points: &[DVec3]) -> Vec<u32> {
+    let mut config = DelaunayConfig::default();
+    config.common.min_opening *= scale;
+    config.common.merge.min_radius *= scale;
+    let context = BakeContext::new(&Silent, None);
+    let session = Session::begin(&g.scene, &config, &context).unwrap();
+    let room_of_cell = session.decimation.after(session.decimation.stop);
+    let space = &session.space;
+    let room = |&p: &DVec3| {
+        let t = space.delaunay.locate(p, 0);
+        room_of_cell[session.cells.cell_of_part[t as usize] as usize]
+    };
+    points.iter().map(room).collect()
+}
+
+/// A trunk with three side tubes of various widths and angles, and a stub.
+fn vessel() -> (Vec<Tube>, [DVec3; 3], DVec3) {
+    let sides = [
+        side_tube(DVec3::X * -4.0, DVec3::Y, 5.0, 0.6),
+        side_tube(DVec3::X * -0.5, DVec3::new(0.7, 0.0, 1.0), 5.5, 0.5),
+        side_tube(DVec3::X * 3.0, DVec3::new(-0.6, -0.8, -0.3), 5.0, 0.4),
+    ];
+    // Not twice as deep as wide.
+    let stub = side_tube(DVec3::X * 3.5, DVec3::Y, 2.7, 0.5);
+    let tips = sides.map(|t| t.ends[1]);
+    let mut all = vec![trunk(6.0, 1.0)];
+    all.extend(sides);
+    all.push(stub);
+    (all, tips, stub.ends[1])
+}
+
+#[test]
+fn side_tubes_are_cells_and_a_stub_is_none() {
+    let (all, tips, stub) = vessel();
+    let g = tubes(&all, 0.17);
+    let context = BakeContext::new(&Silent, None);
+    let world = bake_delaunay(&g.scene, &DelaunayConfig::default(), &context)
+        .unwrap()
+        .world;
+    let at = |p: DVec3| world.graph.locator.locate(p).unwrap();
+    let trunk = at(DVec3::ZERO);
+    for p in [DVec3::X * 5.5, DVec3::X * -5.5, stub] {
+        assert_eq!(at(p), trunk, "{p}");
+    }
+    let cells: BTreeSet<_> = tips.iter().map(|&p| at(p)).chain([trunk]).collect();
+    assert_eq!(cells.len(), 4);
+    let indoor = world.graph.cells.iter().filter(|c| !c.outdoor).count();
+    assert_eq!(indoor, 4);
+    let open: Vec<_> = world
+        .graph
+        .portals
+        .iter()
+        .filter(|p| p.kind != PortalKind::Crack)
+        .collect();
+    assert_eq!(open.len(), 3);
+    for (tube, tip) in all[1..4].iter().zip(tips) {
+        let portal = open.iter().find(|p| p.cells.contains(&at(tip))).unwrap();
+        assert!(portal.cells.contains(&trunk));
+        let n = portal.outline.len() as f64;
+        let sum: DVec3 = portal
+            .outline
+            .iter()
+            .map(|p| DVec3::from_array(p.map(f64::from)))
+            .sum();
+        let along = (tube.ends[1] - tube.ends[0]).normalize();
+        let from_foot = sum / n - tube.ends[0];
+        let off = from_foot - along * from_foot.dot(along);
+        // Within a diameter of where the tube's axis leaves the trunk.
+        let wall = 1.0 / (1.0 - along.x * along.x).sqrt();
+        let out = from_foot.dot(along) - wall;
+        assert!(
+            out > -tube.radius && out < 2.0 * tube.radius,
+            "{out} of {tube:?}"
+        );
+        assert!(off.length() < 0.5 * tube.radius, "{off} of {tube:?}");
+    }
+    let options = VerifyOptions {
+        rays: 20_000,
+        ..VerifyOptions::default()
+    };
+    let report = verify_world(&world, None, &options);
+    assert!(report.holds(), "{report}");
+}
+
+#[test]
+fn a_neck_between_chambers_and_a_handle_are_none() {
+    let tube = |a: [f64; 3], b: [f64; 3], radius: f64| Tube {
+        ends: [a, b].map(DVec3::from_array),
+        radius,
+    };
+    // A narrow way of nine diameters between chambers, which are two rooms: it is part of one of them.
+    let neck = [
+        tube([-7.0, 0.0, 0.0], [-6.0, 0.0, 0.0], 1.2),
+        tube([-6.0, 0.0, 0.0], [6.0, 0.0, 0.0], 0.55),
+        tube([6.0, 0.0, 0.0], [7.0, 0.0, 0.0], 1.2),
+    ];
+    let points = [-6.5, -3.0, 3.0, 6.5].map(|x| DVec3::X * x);
+    let rooms = rooms_at(&tubes(&neck, 0.2), 1.0, &points);
+    assert_ne!(rooms[0], rooms[3]);
+    for neck in &rooms[1..3] {
+        assert!([rooms[0], rooms[3]].contains(neck), "{rooms:?}");
+    }
+    // A handle leaves the trunk and comes back.
+    let handle = [
+        trunk(4.0, 1.0),
+        tube([-2.5, 0.0, 0.0], [-2.5, 3.0, 0.0], 0.5),
+        tube([-2.5, 3.0, 0.0], [2.5, 3.0, 0.0], 0.5),
+        tube([2.5, 3.0, 0.0], [2.5, 0.0, 0.0], 0.5),
+    ];
+    let points = [DVec3::ZERO, DVec3::Y * 3.0];
+    let rooms = rooms_at(&tubes(&handle, 0.2), 1.0, &points);
+    assert_eq!(rooms[0], rooms[1]);
+}
+
+/// A scene larger or smaller, about the origin.
+fn times(mut g: Generated, scale: f64) -> Generated {
+    let meshes = g.scene.meshes.iter_mut();
+    for p in meshes.flat_map(|m| &mut m.primitives) {
+        for x in p.positions.iter_mut().flatten() {
+            *x *= scale as f32;
+        }
+    }
+    g
+}
+
+proptest! {
+    // Each case divides a few thousand triangles.
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    /// Two tubes that leave a trunk of radius 1 at random angles: one is a cell if it is narrow and deep, the other if
+    /// it is narrow enough, whatever the scale.
+    #[test]
+    fn narrow_and_deep_is_a_cell(
+        narrow in 0.35..0.6_f64,
+        // Mouth to tip in diameters: well below the bound of two, or well above it.
+        depth in prop_oneof![0.6..1.8_f64, 2.6..3.2],
+        // Narrower than the bound of 1 : 1.5 by a tenth, or wider by a tenth.
+        other in prop_oneof![0.4..0.6_f64, 0.74..0.9],
+        lean in -0.6..0.6_f64,
+        turn in 0.8..2.4_f64,
+        scale in prop::sample::select(vec![0.01, 1.0, 40.0]),
+    ) {
+        // The mouth is where the trunk's wall is, an extra bit out where the tube leans.
+        let one = side_tube(
+            DVec3::X * -1.5,
+            DVec3::new(lean, 1.0, 0.0),
+            (1.0 + lean * lean).sqrt() + depth * 2.0 * narrow,
+            narrow,
+        );
+        let two = side_tube(
+            DVec3::X * 1.5,
+            DVec3::new(0.0, turn.cos(), turn.sin()),
+            1.0 + 2.6 * 2.0 * other,
+            other,
+        );
+        let g = times(tubes(&[trunk(3.0, 1.0), one, two], 0.2), scale);
+        let tip = |t: &Tube| t.ends[1] - (t.ends[1] - t.ends[0]).normalize() * 0.01;
+        let points = [DVec3::ZERO, DVec3::X * 2.5, DVec3::X * -2.5, tip(&one), tip(&two)];
+        let rooms = rooms_at(&g, scale, &points.map(|p| p * scale));
+        prop_assert_eq!(rooms[0], rooms[1]);
+        prop_assert_eq!(rooms[0], rooms[2]);
+        prop_assert_eq!(rooms[3] != rooms[0], depth > 2.0, "deep");
+        prop_assert_eq!(rooms[4] != rooms[0], other < 0.65, "narrow");
+        prop_assert!(rooms[3] != rooms[4] || rooms[3] == rooms[0]);
+    }
+}

@@ -1,0 +1,101 @@
+//! Whether a scene is a vessel: a closed surface that is curved nearly everywhere.
+
+use std::collections::HashMap;
+
+use enfilade::geom::scene::{Role, Scene};
+use enfilade::geom::{DVec3, triangle_area_normal};
+
+/// Larger scenes are left to the watershed, which takes seconds where tetrahedra take minutes.
+const MAX_TRIANGLES: usize = 200_000;
+/// A flat patch is a plane if it has this share of the surface: the flat patches of a scanned aorta and of a cave have 0.0007 at
+/// most, the walls of a building a hundredth.
+const PLANE: f64 = 0.001;
+/// Share of the surface that may lie in planes: the caps of cut vessels. Of buildings half does and more.
+const FLAT: f64 = 0.2;
+/// Cosine of the angle between two triangles of one patch: a tenth of a degree, which single precision leaves of a
+/// plane in a large scene.
+const ONE_PATCH: f64 = 0.999_998_5;
+
+/// Whether the structure is closed, with an even number of triangles at each edge, and hardly any of it lies in planes.
+/// `O(n)` in triangles, of which there may be [`MAX_TRIANGLES`].
+pub(crate) fn is_closed_and_curved(scene: &Scene) -> bool {
+    let triangles: Vec<_> = scene
+        .triangle_sources(Role::Structural)
+        .take(MAX_TRIANGLES + 1)
+        .map(|s| scene.world_triangle(s))
+        .collect();
+    if triangles.is_empty() || triangles.len() > MAX_TRIANGLES {
+        return false;
+    }
+    // Corners are equal where their places are: files repeat them for normals and materials.
+    let key = |p: DVec3| (p + 0.0).to_array().map(f64::to_bits);
+    let mut sides: HashMap<_, Vec<usize>> = HashMap::new();
+    for (t, corners) in triangles.iter().enumerate() {
+        let keys = corners.map(key);
+        for i in 0..3 {
+            let (a, b) = (keys[i], keys[(i + 1) % 3]);
+            sides.entry((a.min(b), a.max(b))).or_default().push(t);
+        }
+    }
+    let normals: Vec<DVec3> = triangles.iter().map(triangle_area_normal).collect();
+    let unit = |t: usize| normals[t].normalize_or_zero();
+    let mut patch: Vec<usize> = (0..triangles.len()).collect();
+    fn root(patch: &mut [usize], mut t: usize) -> usize {
+        while patch[t] != t {
+            patch[t] = patch[patch[t]];
+            t = patch[t];
+        }
+        t
+    }
+    for around in sides.values() {
+        if around.len() % 2 == 1 {
+            return false;
+        }
+        // Sheets that touch along an edge are no planes that go on there.
+        let &[a, b] = &around[..] else { continue };
+        if unit(a).dot(unit(b)) > ONE_PATCH {
+            let (a, b) = (root(&mut patch, a), root(&mut patch, b));
+            patch[a] = b;
+        }
+    }
+    let mut areas = vec![0.0; triangles.len()];
+    for (t, normal) in normals.iter().enumerate() {
+        areas[root(&mut patch, t)] += normal.length();
+    }
+    let all: f64 = areas.iter().sum();
+    let planes: f64 = areas.iter().filter(|&&a| a >= PLANE * all).sum();
+    planes <= FLAT * all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_testkit::{Tube, Variant, cave, gjorup_rooms, tubes};
+
+    #[test]
+    fn tubes_and_caves_are_and_rooms_are_not() {
+        let along = |radius: f64, by: DVec3| Tube {
+            ends: [DVec3::ZERO, by],
+            radius,
+        };
+        let vessel = tubes(
+            &[
+                along(1.0, DVec3::new(4.0, 0.3, 0.2)),
+                along(0.5, DVec3::new(0.5, 3.0, 1.0)),
+            ],
+            0.12,
+        );
+        assert!(is_closed_and_curved(&vessel.scene));
+        assert!(is_closed_and_curved(&cave(1).scene));
+        for variant in [Variant::Optimised, Variant::Tessellated, Variant::Distorted] {
+            assert!(!is_closed_and_curved(
+                &gjorup_rooms(variant, [0.0; 3]).scene
+            ));
+        }
+        // One triangle less, and it is open.
+        let mut open = vessel.scene;
+        let indices = &mut open.meshes[0].primitives[0].indices;
+        indices.truncate(indices.len() - 3);
+        assert!(!is_closed_and_curved(&open));
+    }
+}
