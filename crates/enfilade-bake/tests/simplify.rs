@@ -154,7 +154,7 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
     let cost = CostModel::default();
     let mut rng = Rng::new(9);
     let (mut sum, mut n_worlds) = (0.0, 0);
-    for i in 0..100 {
+    for i in 0..40 {
         let world = grid(&mut rng);
         let n_portals = world.graph.portals.len();
         let settings = SimplifySettings {
@@ -180,10 +180,10 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
         sum += ours / least;
         n_worlds += 1;
     }
-    assert!(n_worlds > 20, "{n_worlds}");
-    // One merge after the other, chosen from other eyes: not the best of all, but near it.
+    assert!(n_worlds > 15, "{n_worlds}");
+    // Chosen from other eyes, so not always the best.
     assert!(
-        sum / f64::from(n_worlds) < 1.1,
+        sum / f64::from(n_worlds) < 1.01,
         "{} of {n_worlds}",
         sum / f64::from(n_worlds)
     );

@@ -61,19 +61,25 @@ pub(super) fn merge(graph: &CostGraph, bounds: &Bounds, mut eyes: Eyes) -> Vec<u
     }
     let mut best = start.merged(bounds);
     let hosts = start.hosts();
-    let n_retries = MAX_RETRIES.min(MAX_CELLS_RETRIED / hosts.len());
-    let groups = || best.1.iter().copied().collect::<BTreeSet<u32>>();
-    for open in groups().into_iter().take(n_retries) {
-        let mut reopened = start.clone();
-        for &cell in &hosts {
-            let host = best.1[cell as usize];
-            if host != cell && host != open {
-                reopened.merge(host, cell);
+    let mut n_left = MAX_RETRIES.min(MAX_CELLS_RETRIED / hosts.len());
+    let mut is_better = true;
+    while is_better {
+        is_better = false;
+        let groups: BTreeSet<u32> = best.1.iter().copied().collect();
+        for open in groups.into_iter().take(n_left) {
+            n_left -= 1;
+            let mut reopened = start.clone();
+            for &cell in &hosts {
+                let host = best.1[cell as usize];
+                if host != cell && host != open {
+                    reopened.merge(host, cell);
+                }
             }
-        }
-        let closed = reopened.merged(bounds);
-        if closed.0 < best.0 {
-            best = closed;
+            let closed = reopened.merged(bounds);
+            if closed.0 < best.0 {
+                best = closed;
+                is_better = true;
+            }
         }
     }
     best.1

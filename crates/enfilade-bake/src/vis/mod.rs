@@ -238,7 +238,7 @@ pub fn see_all(
         .transpose()?;
     Ok(VisOutput {
         evidence,
-        ..output(&search, n_base, is_complete)
+        ..output(search, n_base, is_complete)
     })
 }
 
@@ -275,7 +275,7 @@ fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
     }
 }
 
-fn output(search: &Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
+fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
     let n = search.dirs.n_cells;
     let visible = search.visible();
     let mut cells = vec![CellSet::new(n); n];
@@ -289,14 +289,15 @@ fn output(search: &Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
             }
         }
     }
-    let id = |&d: &u32| search.dirs.all[d as usize].id;
+    let n_steps = search.effort.steps;
+    let id = |d: u32| search.dirs.all[d as usize].id;
     let witnesses = search
         .lines
-        .iter()
+        .into_iter()
         .map(|line| Witness {
             origin: line.origin,
             direction: line.direction,
-            chain: line.chain.iter().map(id).collect(),
+            chain: line.chain.into_iter().map(id).collect(),
         })
         .collect();
     VisOutput {
@@ -305,7 +306,7 @@ fn output(search: &Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
         witnesses,
         is_complete,
         n_base,
-        n_steps: search.effort.steps,
+        n_steps,
         evidence: None,
     }
 }
