@@ -154,7 +154,7 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
     let cost = CostModel::default();
     let mut rng = Rng::new(9);
     let (mut sum, mut n_worlds) = (0.0, 0);
-    for i in 0..40 {
+    for i in 0..100 {
         let world = grid(&mut rng);
         let n_portals = world.graph.portals.len();
         let settings = SimplifySettings {

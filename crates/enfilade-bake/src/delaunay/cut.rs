@@ -442,3 +442,102 @@ pub(super) fn openings(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use enfilade_testkit::Rng;
+
+    use super::super::tetrahedra::tetrahedralize;
+    use super::*;
+
+    fn random_point(rng: &mut Rng) -> DVec3 {
+        DVec3::new(rng.unit(), rng.unit(), rng.unit())
+    }
+
+    /// How far inside the convex polygon a point of its plane lies; negative outside.
+    fn inset(outline: &[DVec3], p: DVec3) -> f64 {
+        let normal = area_normal(outline).normalize();
+        let n = outline.len();
+        let edges = (0..n).map(|i| (outline[i], outline[(i + 1) % n]));
+        let heights = edges.map(|(a, b)| normal.cross(b - a).normalize().dot(p - a));
+        heights.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Follows random lines from part to part of one tetrahedron: where they leave a part, there is an opening exactly where
+    /// no polygon is.
+    #[test]
+    fn parts_are_open_to_each_other_where_no_polygon_is() {
+        let mut rng = Rng::new(3);
+        let [mut n_open, mut n_closed] = [0, 0];
+        for seed in 0..500 {
+            let points: Vec<DVec3> = (0..4).map(|_| random_point(&mut rng)).collect();
+            let [a, b, c] = [1, 2, 3].map(|k| points[k] - points[0]);
+            if a.cross(b).dot(c).abs() < 0.05 {
+                continue;
+            }
+            let delaunay = tetrahedralize(&points).unwrap();
+            let walls: Vec<Triangle> = (0..1 + rng.below(3))
+                .map(|_| std::array::from_fn(|_| random_point(&mut rng)))
+                .collect();
+            let tolerance = Tolerance {
+                plane: 1e-9,
+                width: 1e-7,
+            };
+            let found = cut(&delaunay, 0, &walls, &Bvh::build(&walls), tolerance);
+            let Some(parts) = found.parts else { continue };
+            let total: f64 = parts.parts.iter().map(|p| p.volume).sum();
+            let whole = a.cross(b).dot(c).abs() / 6.0;
+            assert!((total - whole).abs() < 1e-9, "{seed}: {total} {whole}");
+            for _ in 0..60 {
+                // Any mean of the corners.
+                let shares = [(); 4].map(|()| rng.unit() + 1e-3);
+                let sum: f64 = shares.iter().sum();
+                let p: DVec3 = (0..4).map(|k| points[k] * (shares[k] / sum)).sum();
+                let toward = random_point(&mut rng) - 0.5;
+                let inside = |part: &Part, p: DVec3, by: f64| {
+                    let planes = part.faces.iter().map(|f| f.plane);
+                    planes.fold(f64::INFINITY, |d, f| d.min(f.signed_distance(p))) > by
+                };
+                let Some(from) = parts.parts.iter().position(|q| inside(q, p, 1e-6)) else {
+                    continue;
+                };
+                let exits = parts.parts[from].faces.iter().filter_map(|f| {
+                    let speed = f.plane.normal.dot(toward);
+                    (speed < -1e-3).then(|| (f.plane.signed_distance(p) / -speed, f.on))
+                });
+                let Some((t, On::Cut(_))) = exits.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                    continue;
+                };
+                let exit = p + toward * t;
+                let beyond = exit + toward * 1e-5;
+                let Some(to) = parts.parts.iter().position(|q| inside(q, beyond, 1e-9)) else {
+                    continue;
+                };
+                // By the polygons themselves; points near an edge may be either.
+                let depths = walls.iter().map(|w| {
+                    let plane = Plane::of_triangle(w).unwrap();
+                    let off = plane.signed_distance(exit).abs();
+                    if off < 1e-7 { inset(w, exit) } else { -1.0 }
+                });
+                let depth = depths.fold(-1.0, f64::max);
+                if depth.abs() < 1e-5 {
+                    continue;
+                }
+                let is_open = parts.inner.iter().any(|(pair, outline)| {
+                    let names = [from as u32, to as u32];
+                    (*pair == names || *pair == [names[1], names[0]])
+                        && area_normal(outline)
+                            .normalize()
+                            .dot(exit - outline[0])
+                            .abs()
+                            < 1e-7
+                        && inset(outline, exit) > -1e-7
+                });
+                assert_eq!(is_open, depth < 0.0, "{seed}: {exit} {depth}");
+                n_open += usize::from(is_open);
+                n_closed += usize::from(!is_open);
+            }
+        }
+        assert!(n_open > 500 && n_closed > 500, "{n_open} {n_closed}");
+    }
+}
