@@ -82,7 +82,8 @@ impl Task {
     }
 }
 
-/// The workspace's root: the checkout that `cargo xtask` was called in, even where the binary was built in another that shares its target folder.
+/// The workspace's root: the checkout that `cargo xtask` was called in, even where the binary was built in another
+/// that shares its target folder.
 fn root() -> PathBuf {
     let here = std::env::var_os("CARGO_MANIFEST_DIR")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);

@@ -9,6 +9,7 @@ mod bvh;
 mod plane;
 pub mod ray;
 pub mod scene;
+mod sets;
 pub mod solid;
 mod winding;
 
@@ -17,6 +18,7 @@ pub use bvh::{Bvh, Nearest};
 pub use glam::{DMat3, DMat4, DVec2, DVec3};
 pub use plane::Plane;
 pub use ray::{Hit, Ray};
+pub use sets::Sets;
 pub use solid::{BoxTree, ConvexSolid, SolidError};
 pub use winding::Winding;
 

@@ -6,7 +6,7 @@
 //! between floor and ceiling, the lintel between two jambs, the tile between its neighbors.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Bvh, DVec3, Sets, Triangle, triangle_area_normal};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -220,25 +220,16 @@ fn key(p: DVec3) -> [u64; 3] {
 
 /// Boxes of the connected parts: triangles that share a corner hang together.
 fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
-    let mut first_at: HashMap<[u64; 3], usize> = HashMap::new();
-    let mut parent: Vec<usize> = (0..triangles.len()).collect();
-    for (i, t) in triangles.iter().enumerate() {
+    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut sets = Sets::new(triangles.len());
+    for (i, t) in (0..).zip(triangles) {
         for p in t {
-            let other = *first_at.entry(key(*p)).or_insert(i);
-            let (a, b) = (root(&mut parent, i), root(&mut parent, other));
-            parent[a.max(b)] = a.min(b);
+            sets.join(i, *first_at.entry(key(*p)).or_insert(i));
         }
     }
     let mut boxes = vec![Aabb::EMPTY; triangles.len()];
-    for (i, t) in triangles.iter().enumerate() {
-        let r = root(&mut parent, i);
+    for (i, t) in (0..).zip(triangles) {
+        let r = sets.find(i) as usize;
         boxes[r] = boxes[r].union(Aabb::of_points(t));
     }
     boxes.retain(|b| !b.is_empty());

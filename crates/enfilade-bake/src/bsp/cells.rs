@@ -1,5 +1,7 @@
 //! Cells: leaves that no separator parts (Lefebvre & Hornus 2003, §2.1 step 3).
 
+use enfilade_geom::Sets;
+
 use super::Bsp;
 use super::separator::Separator;
 
@@ -91,26 +93,18 @@ pub(super) fn components(bsp: &Bsp, separators: &[Separator]) -> (Vec<u32>, usiz
     for &p in separators.iter().flat_map(|s| &s.portals) {
         is_cut[p as usize] = true;
     }
-    let mut set: Vec<u32> = (0..bsp.is_open.len() as u32).collect();
-    fn root(set: &mut [u32], mut x: u32) -> u32 {
-        while set[x as usize] != x {
-            set[x as usize] = set[set[x as usize] as usize];
-            x = set[x as usize];
-        }
-        x
-    }
+    let mut sets = Sets::new(bsp.is_open.len());
     for (p, _) in bsp.portals.iter().zip(&is_cut).filter(|(_, cut)| !**cut) {
-        let [a, b] = p.leaves.map(|l| root(&mut set, l));
-        set[a.max(b) as usize] = a.min(b);
+        sets.join(p.leaves[0], p.leaves[1]);
     }
-    let mut number = vec![NO_CELL; set.len()];
+    let mut number = vec![NO_CELL; sets.len()];
     let mut n = 0;
-    let of_leaf = (0..set.len() as u32)
+    let of_leaf = (0..sets.len() as u32)
         .map(|l| {
             if !bsp.is_open[l as usize] {
                 return NO_CELL;
             }
-            let slot = &mut number[root(&mut set, l) as usize];
+            let slot = &mut number[sets.find(l) as usize];
             if *slot == NO_CELL {
                 *slot = n;
                 n += 1;

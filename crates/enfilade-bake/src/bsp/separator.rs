@@ -8,7 +8,7 @@
 //! Time: near-linear in portals and surfaces that are spread out; each removal looks at the neighbors of
 //! one portal only.
 
-use enfilade_geom::{Aabb, BoxTree, DVec3};
+use enfilade_geom::{Aabb, BoxTree, DVec3, Sets};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
@@ -110,26 +110,18 @@ fn of_plane(bsp: &Bsp, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
         );
     }
     // Connected sets of what is left.
-    let mut set: Vec<u32> = (0..group.len() as u32).collect();
-    fn root(set: &mut [u32], mut x: u32) -> u32 {
-        while set[x as usize] != x {
-            set[x as usize] = set[set[x as usize] as usize];
-            x = set[x as usize];
-        }
-        x
-    }
+    let mut sets = Sets::new(group.len());
     for k in (0..group.len()).filter(|&k| is_alive[k]) {
         for &(o, _) in edges[k].iter().flat_map(|e| &e.others) {
             if is_alive[o as usize] {
-                let (a, b) = (root(&mut set, k as u32), root(&mut set, o));
-                set[a.max(b) as usize] = a.min(b);
+                sets.join(k as u32, o);
             }
         }
     }
     let mut by_root = std::collections::BTreeMap::<u32, Vec<u32>>::new();
     for k in (0..group.len()).filter(|&k| is_alive[k]) {
         by_root
-            .entry(root(&mut set, k as u32))
+            .entry(sets.find(k as u32))
             .or_default()
             .push(group[k]);
     }

@@ -15,8 +15,10 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
+use enfilade_geom::Sets;
+
 use super::graph::{LeafGraph, NO_SCREEN};
-use super::label::{LeafCells, SOLID, Sets, Tally};
+use super::label::{LeafCells, SOLID, Tally};
 
 /// What a piece of a border costs besides its area. [Units: wu²]
 const PER_FACET: f64 = 0.002;

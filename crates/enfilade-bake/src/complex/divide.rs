@@ -8,11 +8,11 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 
-use enfilade_geom::{DVec3, Plane, Winding};
+use enfilade_geom::{DVec3, Plane, Sets, Winding};
 
 use super::facet::{Cover, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{box_faces, sides_of_border};
-use super::label::{LeafCells, SOLID, Sets};
+use super::label::{LeafCells, SOLID};
 use super::partition::{self, Partition};
 use super::{Complex, poly};
 

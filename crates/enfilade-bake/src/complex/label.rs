@@ -13,6 +13,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
+use enfilade_geom::Sets;
 use rayon::prelude::*;
 
 use super::cut::{absorb_chips, move_borders};
@@ -32,30 +33,6 @@ pub(super) struct LeafCells {
     pub(super) volumes: Vec<f64>,
     /// The cell with most leaves at the border of the box by volume, if any touches it.
     pub(super) outside: Option<u32>,
-}
-
-/// Disjoint sets; the root of a set is its least member.
-pub(super) struct Sets(Vec<u32>);
-
-impl Sets {
-    pub(super) fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-
-    pub(super) fn find(&mut self, mut x: u32) -> u32 {
-        while self.0[x as usize] != x {
-            self.0[x as usize] = self.0[self.0[x as usize] as usize];
-            x = self.0[x as usize];
-        }
-        x
-    }
-
-    pub(super) fn join(&mut self, a: u32, b: u32) -> u32 {
-        let (a, b) = (self.find(a), self.find(b));
-        let (low, high) = (a.min(b), a.max(b));
-        self.0[high as usize] = low;
-        low
-    }
 }
 
 /// Votes of one leaf or component for one label.

@@ -25,7 +25,7 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, Sets};
 
 use super::branches::Branches;
 use super::space::Space;
@@ -83,28 +83,16 @@ pub struct CellPortal {
     pub links: Vec<u32>,
 }
 
-struct Sets(Vec<u32>);
-
-impl Sets {
-    fn find(&mut self, mut x: u32) -> u32 {
-        while self.0[x as usize] != x {
-            self.0[x as usize] = self.0[self.0[x as usize] as usize];
-            x = self.0[x as usize];
-        }
-        x
-    }
-}
-
 /// Joins tetrahedra that flow into one another to cells. Outdoors is [`OUTDOOR_CELL`].
 #[must_use]
 pub fn flow_together(space: &Space) -> Cells {
     let n = space.radii.len();
-    let mut sets = Sets((0..n as u32).collect());
+    let mut sets = Sets::new(n);
     let mut radius = space.radii.clone();
     let mut outdoors: Option<u32> = None;
     for t in (0..n as u32).filter(|&t| space.radii[t as usize] == f64::INFINITY) {
         let first = *outdoors.get_or_insert(t);
-        sets.0[t as usize] = first;
+        sets.join(first, t);
     }
     let mut order: Vec<u32> = (0..space.links.len() as u32).collect();
     order.sort_unstable_by(|&a, &b| {
@@ -121,9 +109,7 @@ pub fn flow_together(space: &Space) -> Cells {
         if a == b || ra.min(rb) > FLOWS * link.radius {
             continue;
         }
-        let (low, high) = (a.min(b), a.max(b));
-        sets.0[high as usize] = low;
-        radius[low as usize] = ra.max(rb);
+        radius[sets.join(a, b) as usize] = ra.max(rb);
     }
     let roots: Vec<u32> = (0..n as u32).map(|t| sets.find(t)).collect();
     gathered(space, |t| (roots[t as usize], 0), &Branches::none(n))
@@ -484,12 +470,11 @@ impl Decimation {
     /// The cell that each cell of the beginning belongs to after the first `n` steps.
     #[must_use]
     pub fn after(&self, n: usize) -> Vec<u32> {
-        let mut parent: Vec<u32> = (0..self.n_cells as u32).collect();
-        for s in self.steps.iter().take(n) {
-            parent[s.from as usize] = s.into;
+        let mut cell: Vec<u32> = (0..self.n_cells as u32).collect();
+        // A cell is gone before the one that it went into: from the last on.
+        for s in self.steps.iter().take(n).rev() {
+            cell[s.from as usize] = cell[s.into as usize];
         }
-        // A cell is gone before the one that it went into: follow to the end.
-        let mut sets = Sets(parent);
-        (0..self.n_cells as u32).map(|c| sets.find(c)).collect()
+        cell
     }
 }

@@ -55,7 +55,7 @@ pub(super) fn merge(graph: &CostGraph, bounds: &Bounds, mut eyes: Eyes) -> Vec<u
         ..*bounds
     };
     let into = merge::merge(graph.clone(), &any_number, &mut eyes);
-    let start = Merger::new(graph.contracted(&into), eyes.0, into);
+    let mut start = Merger::new(graph.contracted(&into), eyes.0, into);
     if start.n_too_many(bounds) == 0 {
         return start.into;
     }
@@ -156,12 +156,15 @@ impl Merger {
     }
 
     /// The best of what all orders come to: what is left too much of, and the cell that each cell becomes part of.
-    fn merged(&self, bounds: &Bounds) -> (Excess, Vec<u32>) {
+    fn merged(&mut self, bounds: &Bounds) -> (Excess, Vec<u32>) {
+        // Once for all orders.
+        self.weigh();
+        let start = &*self;
         let tries: Vec<(Excess, Vec<u32>)> = ORDERS
             .into_par_iter()
             .with_max_len(1)
             .map(|order| {
-                let mut tried = self.clone();
+                let mut tried = start.clone();
                 tried.merge_in(order, bounds);
                 let drawn = tried.drawn.iter().map(|items| {
                     let items = bits(items.iter().copied());
@@ -198,6 +201,16 @@ impl Merger {
         pair.added = f64::NAN;
     }
 
+    /// Weighs the pairs that are stale.
+    fn weigh(&mut self) {
+        for (&(a, b), pair) in &mut self.pairs {
+            if pair.added.is_nan() {
+                pair.both = self.graph.cost_of_both(a, b);
+                pair.added = added(&self.graph, &self.drawn, &self.sees, a, b);
+            }
+        }
+    }
+
     /// The pair that adds least, of each portal or as a whole; of those, the cheapest.
     fn best(
         &mut self,
@@ -205,12 +218,9 @@ impl Merger {
         is_outdoors_last: bool,
         max_cost: f64,
     ) -> Option<(u32, u32)> {
+        self.weigh();
         let mut best: Option<(Key, (u32, u32))> = None;
-        for (&(a, b), pair) in &mut self.pairs {
-            if pair.added.is_nan() {
-                pair.both = self.graph.cost_of_both(a, b);
-                pair.added = added(&self.graph, &self.drawn, &self.sees, a, b);
-            }
+        for (&(a, b), pair) in &self.pairs {
             if pair.both > max_cost {
                 continue;
             }

@@ -11,7 +11,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Bvh, DVec3, Ray};
+use enfilade_geom::{Bvh, DVec3, Ray, Sets};
 use rayon::prelude::*;
 
 use crate::voxel::{Grid, Labels};
@@ -107,26 +107,15 @@ fn n_groups(regions: &Regions) -> usize {
 
 fn groups(regions: &Regions) -> Vec<Vec<u32>> {
     let n = regions.region_of_basin.len();
-    let mut parent: Vec<u32> = (0..n as u32).collect();
-    fn root(parent: &mut [u32], mut a: u32) -> u32 {
-        while parent[a as usize] != a {
-            parent[a as usize] = parent[parent[a as usize] as usize];
-            a = parent[a as usize];
-        }
-        a
-    }
+    let mut sets = Sets::new(n);
     for &(a, b) in regions.contacts.keys() {
-        let (p, q) = (root(&mut parent, a), root(&mut parent, b));
-        parent[p.max(q) as usize] = p.min(q);
+        sets.join(a, b);
     }
     let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut seen = vec![false; n];
     for &region in &regions.region_of_basin {
         if region != 0 && !std::mem::replace(&mut seen[region as usize], true) {
-            groups
-                .entry(root(&mut parent, region))
-                .or_default()
-                .push(region);
+            groups.entry(sets.find(region)).or_default().push(region);
         }
     }
     groups.into_values().collect()

@@ -23,7 +23,7 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-use enfilade_geom::{DVec3, Plane};
+use enfilade_geom::{DVec3, Plane, Sets};
 use rayon::prelude::*;
 
 use super::sections::section_ratio;
@@ -510,14 +510,7 @@ pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     // Voxels that carry a face, each once; groups are found over voxels.
     let mut voxels: Vec<u64> = sorted.iter().map(|f| f / 4).collect();
     voxels.dedup();
-    let mut parent: Vec<u32> = (0..voxels.len() as u32).collect();
-    fn root(parent: &mut [u32], mut a: u32) -> u32 {
-        while parent[a as usize] != a {
-            parent[a as usize] = parent[parent[a as usize] as usize];
-            a = parent[a as usize];
-        }
-        a
-    }
+    let mut sets = Sets::new(voxels.len());
     let (nx64, layer) = (nx as i64, (nx * ny) as i64);
     for (at, &voxel) in voxels.iter().enumerate() {
         // Half of the 26 neighbors: the other half looks back at us.
@@ -532,11 +525,7 @@ pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
                         continue;
                     };
                     if let Ok(found) = voxels.binary_search(&other) {
-                        let (p, q) = (
-                            root(&mut parent, at as u32),
-                            root(&mut parent, found as u32),
-                        );
-                        parent[p.max(q) as usize] = p.min(q);
+                        sets.join(at as u32, found as u32);
                     }
                 }
             }
@@ -548,10 +537,7 @@ pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
         while voxels[at] != face / 4 {
             at += 1;
         }
-        patches
-            .entry(root(&mut parent, at as u32))
-            .or_default()
-            .push(face);
+        patches.entry(sets.find(at as u32)).or_default().push(face);
     }
     patches.into_values().collect()
 }

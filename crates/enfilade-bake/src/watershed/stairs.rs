@@ -11,7 +11,7 @@
 use std::collections::HashMap;
 
 use enfilade_geom::scene::TriangleSource;
-use enfilade_geom::{Aabb, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
 
 /// Rise from one step to the next. [Units: wu]
 const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.25;
@@ -62,28 +62,20 @@ fn bounds(triangles: &[Triangle], members: &[usize]) -> Aabb {
 
 /// Triangles that hang together by equal corners, in order of their first triangle.
 fn shells(triangles: &[Triangle], members: &[usize]) -> Vec<Vec<usize>> {
-    let mut parent: Vec<u32> = (0..members.len() as u32).collect();
-    fn root(parent: &mut [u32], mut a: u32) -> u32 {
-        while parent[a as usize] != a {
-            parent[a as usize] = parent[parent[a as usize] as usize];
-            a = parent[a as usize];
-        }
-        a
-    }
+    let mut sets = Sets::new(members.len());
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
     for (i, &t) in members.iter().enumerate() {
         for p in triangles[t] {
             // Adding zero makes -0 and 0 one key.
             let key = (p + DVec3::ZERO).to_array().map(f64::to_bits);
             let other = *first_at.entry(key).or_insert(i as u32);
-            let (a, b) = (root(&mut parent, i as u32), root(&mut parent, other));
-            parent[a.max(b) as usize] = a.min(b);
+            sets.join(i as u32, other);
         }
     }
     let mut index: HashMap<u32, usize> = HashMap::new();
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, &t) in members.iter().enumerate() {
-        let r = root(&mut parent, i as u32);
+        let r = sets.find(i as u32);
         let at = *index.entry(r).or_insert_with(|| {
             groups.push(Vec::new());
             groups.len() - 1

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use enfilade::geom::scene::{Role, Scene};
-use enfilade::geom::{DVec3, triangle_area_normal};
+use enfilade::geom::{DVec3, Sets, triangle_area_normal};
 
 /// Larger scenes are left to the watershed, which takes seconds where tetrahedra take minutes.
 const MAX_TRIANGLES: usize = 200_000;
@@ -39,14 +39,7 @@ pub(crate) fn is_closed_and_curved(scene: &Scene) -> bool {
     }
     let normals: Vec<DVec3> = triangles.iter().map(triangle_area_normal).collect();
     let unit = |t: usize| normals[t].normalize_or_zero();
-    let mut patch: Vec<usize> = (0..triangles.len()).collect();
-    fn root(patch: &mut [usize], mut t: usize) -> usize {
-        while patch[t] != t {
-            patch[t] = patch[patch[t]];
-            t = patch[t];
-        }
-        t
-    }
+    let mut patches = Sets::new(triangles.len());
     for around in sides.values() {
         if around.len() % 2 == 1 {
             return false;
@@ -54,13 +47,12 @@ pub(crate) fn is_closed_and_curved(scene: &Scene) -> bool {
         // Sheets that touch along an edge are no planes that go on there.
         let &[a, b] = &around[..] else { continue };
         if unit(a).dot(unit(b)) > ONE_PATCH {
-            let (a, b) = (root(&mut patch, a), root(&mut patch, b));
-            patch[a] = b;
+            patches.join(a as u32, b as u32);
         }
     }
     let mut areas = vec![0.0; triangles.len()];
-    for (t, normal) in normals.iter().enumerate() {
-        areas[root(&mut patch, t)] += normal.length();
+    for (t, normal) in (0..).zip(&normals) {
+        areas[patches.find(t) as usize] += normal.length();
     }
     let all: f64 = areas.iter().sum();
     let planes: f64 = areas.iter().filter(|&&a| a >= PLANE * all).sum();

@@ -523,6 +523,32 @@ mod tests {
     }
 
     #[test]
+    fn every_setting_is_documented() {
+        const DOCS: &str = include_str!("../../../../docs/settings.md");
+        let mut n = 0;
+        for table in ["", "[merge]\n", "[bsp]\n"] {
+            // An unknown key is answered with all that are known.
+            let problem = toml::from_str::<ConfigFile>(&format!("{table}unknown = 1")).err();
+            let problem = problem.unwrap().to_string();
+            let (_, known) = problem.split_once("expected one of").unwrap();
+            for key in known.split('`').skip(1).step_by(2) {
+                let is_table = key == "merge" || key == "bsp";
+                let name = if is_table {
+                    format!("`[{key}]`")
+                } else {
+                    format!("`{key}`")
+                };
+                assert!(DOCS.contains(&name), "{name} is not in docs/settings.md");
+                n += 1;
+            }
+        }
+        assert_eq!(n, 35);
+        let example = DOCS.split("```").nth(1).unwrap();
+        let file: ConfigFile = toml::from_str(example.strip_prefix("toml").unwrap()).unwrap();
+        assert_eq!(file.bsp.max_portals, Some(20));
+    }
+
+    #[test]
     fn the_settings_file_sets_what_it_names() {
         let file: ConfigFile = toml::from_str(
             "voxel = 0.2\nunit = \"mm\"\nup = \"z\"\norigin = [1, 2, 3.5]\n[merge]\nreach = 0.5",
