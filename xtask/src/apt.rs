@@ -16,7 +16,13 @@ pub(crate) struct Need {
 
 /// What draws the pictures of the tests, and the display that windows open on: nothing but Linux has
 /// these; elsewhere the window's test is not built.
-pub(crate) const NEEDS: [Need; 3] = [
+pub(crate) const NEEDS: [Need; 4] = [
+    Need {
+        what: "a C++ compiler",
+        why: "builds the library that makes levels of detail",
+        packages: &["g++"],
+        is_there: || has_tool("c++"),
+    },
     Need {
         what: "a software Vulkan driver",
         why: "draws the pictures of the tests, the same on every machine",

@@ -75,6 +75,9 @@ pub(crate) struct Render {
     /// Objects in cells that are seen through fewer pixels are not drawn.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     objects: f32,
+    /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    lod: f32,
     /// No shadows and no dark corners: quicker.
     #[arg(long)]
     plain: bool,
@@ -175,6 +178,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     if cameras.is_empty() {
         bail!("{}: no room to walk in", args.world.display());
     }
+    if args.lod > 0.0 {
+        studio.add_levels(&world)?;
+    }
     let style = Style {
         paint: match args.paint {
             Colors::Lit => Paint::Lit,
@@ -194,6 +200,8 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
                 stop_below: args.stop * scale,
                 stop_at_nothing: args.stop_at_nothing,
                 objects_below: args.objects * scale,
+                // A length: the pictures' edges are as many times larger.
+                lod: args.lod * scale.sqrt(),
             };
             if args.above {
                 above(&mut studio, &world, camera, args.cut, size)

@@ -46,6 +46,10 @@ pub(crate) struct Walkthrough {
     /// By portals once more, with those that cover fewer pixels not looked through.
     #[arg(long, value_name = "PIXELS")]
     stop: Option<f32>,
+    /// By frustum culling and by portals once more, with objects of fewer triangles where that moves their surface by
+    /// at most so many pixels.
+    #[arg(long, value_name = "PIXELS")]
+    lod: Option<f32>,
     /// Frames of the walk.
     #[arg(long, default_value_t = 200)]
     frames: usize,
@@ -110,6 +114,10 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
         let mut walks = vec![Mode::Frustum, Mode::Everything, Mode::Portals];
         walks.extend(args.stop.map(Mode::Stopped));
         walks.extend(args.queries.then_some(Mode::Queries));
+        let levels = args
+            .lod
+            .map(|p| [Mode::FrustumLevels(p), Mode::PortalsLevels(p)]);
+        walks.extend(levels.into_iter().flatten());
         let mut rows = Rows {
             name: &name,
             frustum: [f64::NAN; 2],
@@ -122,6 +130,9 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
                 1
             };
             let cameras: Vec<Camera> = cameras.iter().copied().step_by(step).collect();
+            if matches!(mode, Mode::FrustumLevels(_)) {
+                studio.add_levels(&world)?;
+            }
             let run = walk(&mut studio, &world, &cameras, mode, args)?;
             rows.add(&mode.label(), &run, studio.world.n_triangles());
         }
@@ -161,6 +172,9 @@ enum Mode {
     /// Portals of fewer pixels are not looked through.
     Stopped(f32),
     Queries,
+    /// Objects are off by at most so many pixels.
+    FrustumLevels(f32),
+    PortalsLevels(f32),
 }
 
 impl Mode {
@@ -171,6 +185,8 @@ impl Mode {
             Self::Portals => "by portals".into(),
             Self::Stopped(pixels) => format!("by portals of {pixels} pixels and more"),
             Self::Queries => "by occlusion queries".into(),
+            Self::FrustumLevels(p) => format!("by frustum culling, levels of detail to {p} px"),
+            Self::PortalsLevels(p) => format!("by portals, levels of detail to {p} px"),
         }
     }
 }
@@ -234,11 +250,16 @@ fn walk(
     let target = studio.target(args.size)?;
     let culling = match mode {
         Mode::Everything => Culling::Everything,
-        Mode::Frustum => Culling::Frustum,
+        Mode::Frustum | Mode::FrustumLevels(_) => Culling::Frustum,
         _ => Culling::Portals,
     };
     studio.sparing = Sparing {
         stop_below: if let Mode::Stopped(pixels) = mode {
+            pixels
+        } else {
+            0.0
+        },
+        lod: if let Mode::FrustumLevels(pixels) | Mode::PortalsLevels(pixels) = mode {
             pixels
         } else {
             0.0

@@ -12,6 +12,7 @@
 mod camera;
 mod gpu;
 mod ids;
+mod levels;
 mod list;
 mod marks;
 mod materials;
@@ -26,7 +27,7 @@ mod studio;
 pub use camera::{Camera, Projection};
 pub use gpu::{AdapterChoice, Gpu, RenderError};
 pub use ids::{Difference, IdPicture, LostPixel, Shown};
-pub use list::{DrawList, Lister, Reason, Sparing};
+pub use list::{DrawList, Lister, Reason, Shot, Sparing};
 pub use marks::{Mark, Shape};
 pub use oracle::Oracle;
 pub use picture::Picture;

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use enfilade_cpg::{CellId, PortalId};
-use enfilade_runtime::{ChunkId, DetailId, Seen, Sight};
+use enfilade_runtime::{ChunkId, DetailId, Seen, Sight, View};
 use glam::Vec3;
 
 use crate::scene::{Finish, GpuWorld};
@@ -47,7 +47,7 @@ pub(crate) struct Run {
     pub(crate) scissor: Option<Scissor>,
 }
 
-/// What far away rooms are spared: both change pictures, and are off unless asked for.
+/// What far away rooms and objects are spared: all of it changes pictures, and is off unless asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sparing {
     /// A portal that covers fewer pixels is not looked through: a polygon of its outline, in the mean
@@ -58,6 +58,20 @@ pub struct Sparing {
     /// Objects of cells that are seen through fewer pixels are not drawn; their walls are.
     /// [Units: px²]
     pub objects_below: f32,
+    /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels; 0 for never.
+    /// Of worlds that were [loaded with levels](GpuWorld::load_with_levels), for frustum culling, too. [Units: px]
+    pub lod: f32,
+}
+
+/// What an answer is drawn for.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot<'a> {
+    /// What was asked about.
+    pub view: &'a View,
+    /// Of the picture. [Units: px]
+    pub size: [u32; 2],
+    /// Whether batches are drawn only where their cells are seen.
+    pub has_scissors: bool,
 }
 
 /// What one frame draws, and in which order.
@@ -139,7 +153,8 @@ pub struct Lister {
     /// By batch: its place in the order of drawing.
     ranks: Vec<(u32, u32)>,
     chunks: Vec<(u32, u32)>,
-    details: Vec<(u32, u32)>,
+    /// Mesh, level, object.
+    details: Vec<(u32, u32, u32)>,
     far: Vec<(f32, Run)>,
 }
 
@@ -182,24 +197,24 @@ impl Lister {
         self.begin(Reason::Seen);
         self.chunks.extend(chunks.map(|c| (0, c)));
         self.details
-            .extend(details.map(|d| (world.details[d as usize].mesh, d)));
+            .extend(details.map(|d| (world.details[d as usize].mesh, 0, d)));
         self.finish(world, sight, eye, None)
     }
 
-    /// What an answer of the run-time names. With the `size` of a picture, each batch is drawn
-    /// within the rectangle that its cells are seen in; views that look all around take none.
+    /// What an answer of the run-time names. With scissors, each batch is drawn within the rectangle that its cells are
+    /// seen in; views that look all around take none.
     pub fn seen(
         &mut self,
         world: &GpuWorld,
         sight: &Sight,
         seen: &Seen<'_>,
-        eye: [f32; 3],
-        size: Option<[u32; 2]>,
+        shot: &Shot<'_>,
         sparing: &Sparing,
     ) -> &DrawList {
         let is_flat = seen.visits().iter().all(|v| v.face == 0);
-        let size =
-            size.filter(|_| is_flat && !seen.counts().is_eye_lost && !seen.counts().is_capped);
+        let is_whole = seen.counts().is_eye_lost || seen.counts().is_capped;
+        let is_cut = shot.has_scissors && is_flat && !is_whole;
+        let size = is_cut.then_some(shot.size);
         self.begin(Reason::Seen);
         if size.is_some() {
             self.rectangles.resize(sight.n_cells(), (0, [0.0; 4]));
@@ -233,12 +248,16 @@ impl Lister {
                     continue;
                 }
             }
-            self.details.push((placed.mesh, d.0));
+            let level = world.level(placed, sparing.lod, || {
+                let center = placed.center.to_array();
+                (shot.view).pixels_per_meter(center, placed.radius, shot.size)
+            });
+            self.details.push((placed.mesh, level, d.0));
         }
         if !sparing.stop_at_nothing {
             self.list.stand_ins.extend_from_slice(seen.stopped());
         }
-        self.finish(world, sight, eye, size)
+        self.finish(world, sight, shot.view.eye(), size)
     }
 
     /// Chunks and details of one's own choice, colored by why they are drawn.
@@ -253,7 +272,7 @@ impl Lister {
         self.begin(reason);
         self.chunks.extend(chunks.map(|c| (0, c.0)));
         self.details
-            .extend(details.map(|d| (world.details[d.0 as usize].mesh, d.0)));
+            .extend(details.map(|d| (world.details[d.0 as usize].mesh, 0, d.0)));
         self.finish(world, sight, [0.0; 3], None)
     }
 
@@ -337,19 +356,14 @@ impl Lister {
             }
         }
         self.details.sort_unstable();
-        let mut i = 0;
-        while i < self.details.len() {
-            let mesh = self.details[i].0;
+        for group in (self.details).chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (mesh, level, _) = group[0];
             let first = self.list.instances.len() as u32;
-            let start = i;
-            while let Some(&(m, detail)) = self.details.get(i)
-                && m == mesh
-            {
-                self.list.instances.push((detail + 1) | reason);
-                i += 1;
-            }
+            let instances = group.iter().map(|d| (d.2 + 1) | reason);
+            self.list.instances.extend(instances);
             let last = self.list.instances.len() as u32;
-            for span in world.meshes.get(mesh as usize).into_iter().flatten() {
+            let level = (world.meshes.get(mesh as usize)).and_then(|m| m.get(level as usize));
+            for span in level.into_iter().flat_map(|l| &l.spans) {
                 self.list.n_triangles += u64::from(span.n / 3) * u64::from(last - first);
                 let run = |instances| Run {
                     first: span.first,
@@ -361,7 +375,7 @@ impl Lister {
                     scissor: None,
                 };
                 if span.is_transparent {
-                    for (at, &(_, detail)) in (first..last).zip(&self.details[start..i]) {
+                    for (at, &(.., detail)) in (first..last).zip(group) {
                         let center = world.details[detail as usize].center;
                         self.far.push((center.distance(eye), run(at..at + 1)));
                     }

@@ -7,10 +7,11 @@
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec3, Vec4};
 use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
+use crate::levels::coarser;
 use crate::marks::{Mark, Shape};
 use crate::materials::{Look, decode, wrapping};
 
@@ -87,6 +88,15 @@ pub(crate) enum Finish {
     Masked = 2,
 }
 
+/// A detail mesh as drawn from some distance.
+#[derive(Clone, Debug)]
+pub(crate) struct Level {
+    /// How far its surface is from where it should be, at most. [Units: wu of the mesh]
+    pub(crate) error: f32,
+    /// By part.
+    pub(crate) spans: Vec<Span>,
+}
+
 /// A placed detail object, as drawn.
 #[derive(Clone, Debug)]
 pub(crate) struct Placed {
@@ -96,6 +106,8 @@ pub(crate) struct Placed {
     pub(crate) center: Vec3,
     /// Of a sphere that holds it. [Units: wu]
     pub(crate) radius: f32,
+    /// How much longer than in the mesh a length of it can be.
+    pub(crate) stretch: f32,
 }
 
 /// A world on the adapter, ready to be drawn.
@@ -114,8 +126,8 @@ pub struct GpuWorld {
     pub(crate) batch_of: Vec<u32>,
     /// By batch: the cells that see it.
     pub(crate) batch_cells: Vec<Vec<CellId>>,
-    /// By detail mesh: its parts.
-    pub(crate) meshes: Vec<Vec<Span>>,
+    /// By detail mesh: its levels, the finest first.
+    pub(crate) meshes: Vec<Vec<Level>>,
     pub(crate) details: Vec<Placed>,
     /// Least and greatest corner of all that is drawn. [Units: wu]
     pub(crate) bounds: [Vec3; 2],
@@ -227,6 +239,25 @@ impl GpuWorld {
     ///
     /// A world larger than the adapter's buffers.
     pub fn load(gpu: &Gpu, world: &World, sight: &Sight) -> Result<Self, RenderError> {
+        Self::load_with(gpu, world, sight, false)
+    }
+
+    /// The same with levels of detail for objects: see [`Sparing::lod`](crate::Sparing::lod). Takes about ten seconds
+    /// for each million triangles of meshes.
+    ///
+    /// # Errors
+    ///
+    /// As [`GpuWorld::load`].
+    pub fn load_with_levels(gpu: &Gpu, world: &World, sight: &Sight) -> Result<Self, RenderError> {
+        Self::load_with(gpu, world, sight, true)
+    }
+
+    fn load_with(
+        gpu: &Gpu,
+        world: &World,
+        sight: &Sight,
+        has_levels: bool,
+    ) -> Result<Self, RenderError> {
         let mut looks: Vec<Look> = world.materials.iter().map(Look::of).collect();
         looks.push(Look::default());
         let (textures, texture_of, n_missing_pictures) = load_textures(gpu, world, &looks)?;
@@ -239,7 +270,7 @@ impl GpuWorld {
             cell_colors: Vec::new(),
         };
         let batches = filling.add_batches(sight);
-        let meshes = filling.add_meshes();
+        let meshes = filling.add_meshes(has_levels);
         let (instances, details) = placed(world);
         let chunks: Vec<Span> = sight
             .chunks()
@@ -277,6 +308,18 @@ impl GpuWorld {
             n_triangles: sight.n_triangles(),
             n_missing_pictures,
         })
+    }
+
+    /// The level that an object is drawn at, to be off by `lod` pixels at most. `pixels` tells how many a meter has.
+    pub(crate) fn level(&self, placed: &Placed, lod: f32, pixels: impl FnOnce() -> f32) -> u32 {
+        let levels = self.meshes.get(placed.mesh as usize).map_or(&[][..], |l| l);
+        if lod <= 0.0 || levels.len() < 2 {
+            return 0;
+        }
+        let scale = placed.stretch * pixels();
+        // Not a number where the eye is in the object: the finest.
+        let n = levels.partition_point(|l| l.error * scale <= lod);
+        n.saturating_sub(1) as u32
     }
 
     /// What is drawn in a portal instead of what is behind it.
@@ -377,13 +420,50 @@ impl Filling<'_> {
         sums.into_iter().map(mean).collect()
     }
 
-    fn add_meshes(&mut self) -> Vec<Vec<Span>> {
+    fn add_meshes(&mut self, has_levels: bool) -> Vec<Vec<Level>> {
         let meshes = &self.world.detail_meshes;
         meshes
             .iter()
             .map(|mesh| {
-                let parts = mesh.primitives.iter().filter(|p| !p.indices.is_empty());
-                parts.map(|p| self.add(p, &p.indices, 0)).collect()
+                let parts: Vec<&Primitive> = mesh
+                    .primitives
+                    .iter()
+                    .filter(|p| !p.indices.is_empty())
+                    .collect();
+                // Where the corners of each part begin.
+                let mut bases = Vec::new();
+                let spans = parts
+                    .iter()
+                    .map(|p| {
+                        bases.push(self.corners.len() as u32);
+                        self.add(p, &p.indices, 0)
+                    })
+                    .collect();
+                let mut levels = vec![Level { error: 0.0, spans }];
+                let coarser = if has_levels {
+                    coarser(&parts)
+                } else {
+                    Vec::new()
+                };
+                for less in coarser {
+                    let spans = (levels[0].spans.clone().into_iter())
+                        .zip(bases.iter().zip(&less.indices))
+                        .map(|(span, (base, order))| {
+                            let first = self.indices.len() as u32;
+                            self.indices.extend(order.iter().map(|&i| base + i));
+                            Span {
+                                first,
+                                n: order.len() as u32,
+                                ..span
+                            }
+                        })
+                        .collect();
+                    levels.push(Level {
+                        error: less.error as f32,
+                        spans,
+                    });
+                }
+                levels
             })
             .collect()
     }
@@ -431,9 +511,18 @@ fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
             } else {
                 (high - low).length() * 0.5
             },
+            stretch: stretch(&m),
         });
     }
     (instances, details)
+}
+
+/// How much longer a map can make a length, at most; exact where its axes stay at right angles.
+fn stretch(m: &Mat4) -> f32 {
+    let axes = [m.x_axis, m.y_axis, m.z_axis].map(Vec4::truncate);
+    // The greatest eigenvalue of the matrix of these products is its square; Gershgorin's bound on that.
+    let rows = axes.map(|a| axes.iter().map(|b| a.dot(*b).abs()).sum::<f32>());
+    rows.into_iter().fold(0.0, f32::max).sqrt()
 }
 
 fn bounds_of(world: &World, details: &[Placed]) -> [Vec3; 2] {
@@ -591,4 +680,26 @@ fn texture_group(
             },
         ],
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_testkit::Rng;
+    use glam::Quat;
+
+    #[test]
+    fn no_length_grows_more_than_the_stretch_says() {
+        let mut rng = Rng::new(4);
+        for _ in 0..1000 {
+            let mut number = || rng.range(-2.0, 2.0) as f32;
+            let m = Mat4::from_cols_array(&std::array::from_fn(|_| number()));
+            let v = Vec3::new(number(), number(), number());
+            let long = m.transform_vector3(v).length();
+            assert!(long <= stretch(&m) * v.length() * 1.0001, "{m} {v}");
+        }
+        let turned = Quat::from_rotation_x(0.7) * Quat::from_rotation_y(1.9);
+        let m = Mat4::from_scale_rotation_translation(Vec3::new(2.0, 0.5, -3.0), turned, Vec3::ONE);
+        assert!((stretch(&m) - 3.0).abs() < 1e-5);
+    }
 }

@@ -6,7 +6,7 @@ use enfilade_runtime::{Sight, SightState, View, Viewer};
 use crate::camera::Camera;
 use crate::gpu::{Gpu, RenderError};
 use crate::ids::IdPicture;
-use crate::list::{DrawList, Lister, Sparing};
+use crate::list::{DrawList, Lister, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::renderer::{Frame, Renderer, Stage, Style};
@@ -88,6 +88,18 @@ impl Studio {
         })
     }
 
+    /// Gives objects levels of detail, for [`Sparing::lod`]. `world` is the one that the studio was made of.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::new`].
+    pub fn add_levels(&mut self, world: &World) -> Result<(), RenderError> {
+        self.world = GpuWorld::load_with_levels(&self.gpu, world, &self.sight)?;
+        let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
+        self.stage = self.renderer.set_stage(&self.gpu, &self.world, all);
+        Ok(())
+    }
+
     /// What is drawn of a view.
     pub fn list(
         &mut self,
@@ -97,12 +109,20 @@ impl Studio {
         size: [u32; 2],
     ) -> &DrawList {
         let (world, sight) = (&self.world, &self.sight);
+        let shot = Shot {
+            view,
+            size,
+            has_scissors: culling == Culling::Portals,
+        };
         match culling {
             Culling::Everything => self.lister.everything(world, sight, eye),
             Culling::Frustum => {
                 let seen = self.viewer.see_through_walls(sight, view);
-                let sparing = Sparing::default();
-                self.lister.seen(world, sight, &seen, eye, None, &sparing)
+                let sparing = Sparing {
+                    lod: self.sparing.lod,
+                    ..Sparing::default()
+                };
+                self.lister.seen(world, sight, &seen, &shot, &sparing)
             }
             Culling::Portals => {
                 let pixels = (size[0] as f32 * size[1] as f32).max(1.0);
@@ -110,9 +130,7 @@ impl Studio {
                 let before = options.min_share;
                 options.min_share = self.sparing.stop_below / pixels;
                 let seen = self.viewer.see(sight, &self.state, view);
-                let list = self
-                    .lister
-                    .seen(world, sight, &seen, eye, Some(size), &self.sparing);
+                let list = (self.lister).seen(world, sight, &seen, &shot, &self.sparing);
                 self.viewer.options_mut().min_share = before;
                 list
             }

@@ -1,15 +1,17 @@
 //! Pictures on the software adapter, which is the same on every machine.
 
 use std::collections::BTreeSet;
+use std::f32::consts::{PI, TAU};
 
-use enfilade_cpg::{PortalId, World};
-use enfilade_geom::scene::{Material, Texture};
+use enfilade_cpg::{DetailObject, PortalId, World};
+use enfilade_geom::scene::{Material, Mesh, Primitive, Texture};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, Frame, Gpu, GpuWorld, Mark, Oracle, Paint, RenderError, Shape,
     Shown, Sparing, Studio, Style,
 };
 use enfilade_runtime::Sight;
 use enfilade_testkit::{GridParams, Rng, room_grid};
+use glam::Mat4;
 
 const SIZE: [u32; 2] = [96, 64];
 
@@ -183,6 +185,86 @@ fn a_portal_of_few_pixels_is_filled_or_left_out() {
         }
     }
     assert!(n_stopped > 3, "{n_stopped}");
+}
+
+/// A ball of about 2,500 triangles, half a meter in radius.
+fn ball() -> Mesh {
+    let n = 36_u32;
+    let mut p = Primitive::default();
+    for i in 0..=n {
+        for j in 0..n {
+            let (a, b) = (i as f32 * PI / n as f32, j as f32 * TAU / n as f32);
+            let normal = [a.sin() * b.cos(), a.cos(), a.sin() * b.sin()];
+            p.normals.push(normal);
+            p.positions.push(normal.map(|x| 0.5 * x));
+        }
+    }
+    let at = |i: u32, j: u32| i * n + j % n;
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+        p.indices.extend([a, b, c, a, c, d]);
+    }
+    Mesh {
+        primitives: vec![p],
+        ..Mesh::default()
+    }
+}
+
+#[test]
+fn objects_far_away_have_fewer_triangles_and_look_the_same() {
+    let mut world = World {
+        detail_meshes: vec![ball()],
+        ..World::default()
+    };
+    // In a row away from the eye, twice as far each.
+    for i in 0..7 {
+        let mut transform = Mat4::IDENTITY.to_cols_array();
+        transform[12] = i as f32 - 3.0;
+        transform[14] = -2_f32.powi(i);
+        world.details.push(DetailObject {
+            name: String::new(),
+            mesh: 0,
+            transform,
+            cells: Vec::new(),
+        });
+    }
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let camera = Camera::looking_at([0.0, 0.0, 3.0], [0.0, 0.0, -1.0]);
+    let view = camera.view(1.5).unwrap();
+    let drawn = |studio: &mut Studio, lod| {
+        studio.sparing.lod = lod;
+        let list = studio.list(&view, camera.eye, Culling::Frustum, SIZE);
+        let n = list.n_triangles();
+        let style = Style {
+            shadows: false,
+            dark_corners: false,
+            ..Style::default()
+        };
+        let picture = studio.picture(&camera, Culling::Frustum, style, &[], SIZE);
+        (n, picture.unwrap())
+    };
+    let (n, whole) = drawn(&mut studio, 0.0);
+    assert_eq!(n, 7 * 36 * 72);
+    // Nothing to choose from yet.
+    assert_eq!(drawn(&mut studio, 1.0).0, n);
+    studio.add_levels(&world).unwrap();
+    assert_eq!(drawn(&mut studio, 0.0), (n, whole.clone()));
+    let mut last = n;
+    for lod in [0.25, 1.0, 4.0] {
+        let (less, picture) = drawn(&mut studio, lod);
+        assert!(less < last, "{less} of {last} triangles at {lod} px");
+        last = less;
+        let pixels = whole.rgba.chunks_exact(4).zip(picture.rgba.chunks_exact(4));
+        let n_other = pixels
+            .filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 24))
+            .count();
+        // Outlines of seven balls.
+        assert!(
+            n_other as f32 <= 150.0 * lod,
+            "{n_other} pixels at {lod} px"
+        );
+    }
+    assert!(last * 12 < n, "{last} of {n} triangles");
 }
 
 #[test]

@@ -225,6 +225,27 @@ impl View {
         self.eye.as_vec3().to_array()
     }
 
+    /// How many pixels a meter has, at most, where a sphere is that is in view, in a picture of `size`: for levels of
+    /// detail. To first order in what moves, which is little where it matters.
+    ///
+    /// Infinite where the sphere reaches behind the eye, and for views all around, which are no pictures.
+    #[must_use]
+    pub fn pixels_per_meter(&self, center: [f32; 3], radius: f32, size: [u32; 2]) -> f32 {
+        let center = DVec3::from_array(center.map(f64::from));
+        let rows = self.faces[0].map.transpose();
+        let depth = rows.z_axis.dot(center - self.eye) - f64::from(radius);
+        if self.n_faces > 1 || depth.is_nan() || depth <= 0.0 {
+            return f32::INFINITY;
+        }
+        // A step e moves x / w by (row x - x / w row w) e / w, with |x / w| <= 1, and row w of unit length.
+        let per_axis = [(rows.x_axis, size[0]), (rows.y_axis, size[1])].map(|(row, n)| {
+            let across = row - row.dot(rows.z_axis) * rows.z_axis;
+            let along = row.dot(rows.z_axis).abs() + 1.0;
+            across.length().hypot(along) * f64::from(n) / 2.0
+        });
+        (per_axis[0].hypot(per_axis[1]) / depth) as f32
+    }
+
     /// How many faces it has: 1, or 6 where it looks all around.
     #[must_use]
     pub fn n_faces(&self) -> usize {
@@ -245,6 +266,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     const EYE: [f32; 3] = [1.0, 2.0, 3.0];
     const UP: [f32; 3] = [0.0, 1.0, 0.0];
@@ -282,6 +304,51 @@ mod tests {
         assert_eq!(
             View::from_view_projection(EYE, flat).unwrap_err(),
             ViewError::NotPerspective
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn a_small_step_in_view_covers_no_more_pixels_than_it_may(
+            toward in prop::array::uniform3(-1_f32..1.0), fov in 0.2_f32..2.6, aspect in 0.3_f32..3.0,
+            place in prop::array::uniform3(-1.0..1.0), far in 1.0..50.0, step in prop::array::uniform3(-1.0..1.0),
+        ) {
+            let Ok(view) = View::perspective(EYE, toward, UP, fov, aspect) else { return Ok(()) };
+            prop_assume!(view.n_faces() == 1);
+            let size = [1000.0, f64::from(1000.0 / aspect).round()];
+            // A point in view.
+            let map = view.faces[0].map;
+            let [x, y, _] = place;
+            let p = view.eye + map.inverse() * (far * DVec3::new(x, y, 1.0));
+            let on_picture = |p: DVec3| {
+                let q = map * (p - view.eye);
+                [0, 1].map(|k| q[k] / q.z * size[k] / 2.0)
+            };
+            let step = 1e-6 * DVec3::from_array(step);
+            let [a, b] = [on_picture(p), on_picture(p + step)];
+            let pixels = (a[0] - b[0]).hypot(a[1] - b[1]);
+            let most = view.pixels_per_meter(p.as_vec3().to_array(), 0.01, size.map(|n| n as u32));
+            // What rounding leaves of a millionth of a meter.
+            prop_assert!(pixels <= f64::from(most) * step.length() * 1.001 + 1e-9, "{pixels} {most}");
+        }
+    }
+
+    #[test]
+    fn how_large_a_meter_is_follows_the_distance() {
+        let view = View::perspective(EYE, [0.0, 0.0, -1.0], UP, 1.0, 1.0).unwrap();
+        let at = |d: f32, r| view.pixels_per_meter([EYE[0], EYE[1], EYE[2] - d], r, [100, 100]);
+        assert!((at(20.0, 0.0) * 2.0 - at(10.0, 0.0)).abs() < 1e-3);
+        assert_eq!(at(20.0, 10.0), at(10.0, 0.0));
+        assert_eq!(at(1.0, 2.0), f32::INFINITY);
+        assert_eq!(at(-1.0, 0.5), f32::INFINITY);
+        assert_eq!(at(f32::NAN, 0.5), f32::INFINITY);
+        // Not more than twice as many as there are: straight ahead it is 100 / 2 / tan 0.5 in a meter's distance.
+        assert!(at(1.0, 0.0) < 2.0 * 50.0 / 0.5_f32.tan());
+        assert_eq!(
+            View::around(EYE)
+                .unwrap()
+                .pixels_per_meter([0.0; 3], 0.0, [9, 9]),
+            f32::INFINITY
         );
     }
 

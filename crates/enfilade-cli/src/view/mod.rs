@@ -50,6 +50,9 @@ pub(crate) struct View {
     /// Size of the window.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     size: [u32; 2],
+    /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    lod: f32,
     /// What draws: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
@@ -200,6 +203,10 @@ impl App<'_> {
         surface.configure(&gpu.device, &config);
         let panel = Panel::new(&gpu, &window, config.format, &self.world);
         let mut studio = Studio::with_format(gpu, &self.world, config.format)?;
+        if self.args.lod > 0.0 {
+            studio.add_levels(&self.world)?;
+            studio.sparing.lod = self.args.lod;
+        }
         let start = match self.args.eye {
             Some(eye) => Camera {
                 eye,
