@@ -48,6 +48,9 @@ fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
 
 /// A maximal set of leaves that is to be one cell, or part of one.
 struct Group {
+    /// Its least leaf. Merging names a group by what that was at first, so that a large one need not tell all its
+    /// neighbors of each that it takes in.
+    root: u32,
     label: Option<u32>,
     /// It is a cell whatever happens around it.
     keeps: bool,
@@ -229,6 +232,7 @@ fn merge_groups(
         let set = sets.find(leaf);
         let label = label_of_set[set as usize];
         let group = groups.entry(set).or_insert(Group {
+            root: set,
             label: (label != SOLID).then_some(label),
             keeps: false,
             volume: 0.0,
@@ -271,19 +275,20 @@ fn merge_groups(
                 .is_some_and(|l| main[&l].1.0 == id || group.volume >= settings.min_volume);
     }
     // Smallest first; volumes are not negative, so their bits compare like the numbers.
-    let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), id));
-    let mut queue: BinaryHeap<Reverse<(u64, u32)>> = groups
+    let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), group.root, id));
+    let mut queue: BinaryHeap<Reverse<(u64, u32, u32)>> = groups
         .iter()
         .filter(|(_, group)| !group.keeps && !group.neighbors.is_empty())
         .map(|(&id, group)| entry(id, group))
         .collect();
-    while let Some(Reverse((bits, id))) = queue.pop() {
+    while let Some(Reverse((bits, _, id))) = queue.pop() {
         let is_current = |g: &&Group| !g.keeps && g.volume.to_bits() == bits;
         let to = groups.get(&id).filter(is_current).and_then(|group| {
-            group
-                .neighbors
-                .iter()
-                .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))
+            let root = |id: &u32| groups[id].root;
+            let by_area = |a: &(&u32, &f64), b: &(&u32, &f64)| {
+                a.1.total_cmp(b.1).then_with(|| root(b.0).cmp(&root(a.0)))
+            };
+            group.neighbors.iter().max_by(by_area)
         });
         let Some(to) = to.map(|(&to, _)| to) else {
             continue;
@@ -291,27 +296,23 @@ fn merge_groups(
         let (Some(merged), Some(mut host)) = (groups.remove(&id), groups.remove(&to)) else {
             continue;
         };
-        let root = sets.join(id, to);
+        host.root = sets.join(merged.root, host.root);
         host.volume += merged.volume;
         host.label = host.label.or(merged.label);
-        for (other, area) in merged.neighbors {
-            *host.neighbors.entry(other).or_default() += area;
-        }
         host.neighbors.remove(&id);
-        host.neighbors.remove(&to);
-        for other in host.neighbors.keys() {
-            if let Some(n) = groups.get_mut(other) {
-                let area =
-                    n.neighbors.remove(&id).unwrap_or(0.0) + n.neighbors.remove(&to).unwrap_or(0.0);
-                n.neighbors.insert(root, area);
+        for (other, area) in merged.neighbors.into_iter().filter(|n| n.0 != to) {
+            *host.neighbors.entry(other).or_default() += area;
+            if let Some(n) = groups.get_mut(&other) {
+                let area = n.neighbors.remove(&id).unwrap_or(0.0);
+                *n.neighbors.entry(to).or_default() += area;
             }
         }
         if !host.keeps {
-            queue.push(entry(root, &host));
+            queue.push(entry(to, &host));
         }
-        groups.insert(root, host);
+        groups.insert(to, host);
     }
-    groups
+    groups.into_values().map(|g| (g.root, g)).collect()
 }
 
 /// Numbers the groups that are cells by label, then by falling volume; the rest is solid.
