@@ -1,11 +1,14 @@
 //! The thesis's cases through the Delaunay builder: with the default stop, the portals that stand are
 //! exactly the separations of the rooms.
 
-use enfilade_bake::delaunay::{DelaunayConfig, Session, bake_delaunay, bake_session};
+use enfilade_bake::delaunay::{DelaunayConfig, JOINED, Session, bake_delaunay, bake_session};
 use enfilade_bake::{BakeContext, Silent};
 use enfilade_cpg::{PortalKind, World};
 use enfilade_geom::DVec3;
-use enfilade_testkit::{Generated, OpeningKind, Site, Variant, gjorup_cavern, gjorup_rooms, solid};
+use enfilade_testkit::mixed::{pitched_roof_attic, room_within_room, stair_hall, two_rooms_crack};
+use enfilade_testkit::{
+    Generated, OpeningKind, Site, Variant, gjorup_cavern, gjorup_rooms, scaled, solid,
+};
 use enfilade_verify::{VerifyOptions, verify_world};
 
 fn baked(g: &Generated) -> World {
@@ -76,6 +79,22 @@ fn the_cavern_is_parted_at_its_necks_however_it_is_turned() {
             &gjorup_cavern(degrees),
             &format!("cavern {degrees:?}"),
         ));
+    }
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+/// The stairs stand in the hall, whose door leads outdoors; walls and roofs have insides. A gap is no portal.
+#[test]
+fn no_room_is_lost_to_the_outdoors_and_no_solid_is_a_cell() {
+    let mut all = Vec::new();
+    let buildings = [
+        stair_hall(),
+        room_within_room(),
+        pitched_roof_attic(),
+        two_rooms_crack(0.005),
+    ];
+    for g in buildings {
+        all.extend(problems(&g, &g.truth.scene));
     }
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
@@ -178,34 +197,96 @@ fn a_small_door_of_a_large_hall_is_found() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
+/// Rooms that a walk counts after some steps; a bake has to come to the same.
+fn rooms_left(g: &Generated, session: &Session, n: usize, config: &DelaunayConfig) -> usize {
+    let context = BakeContext::new(&Silent, None);
+    let out = bake_session(&g.scene, session, n, config, &context).unwrap();
+    let cells = &out.world.graph.cells;
+    let n_indoor = cells.iter().filter(|c| !c.outdoor).count();
+    let [n_rooms, _] = session.count_rooms(n, config);
+    assert_eq!(n_rooms, n_indoor, "{}, {n} steps", g.truth.scene);
+    n_rooms
+}
+
 #[test]
 fn a_person_s_choices_hold_and_steps_go_back() {
     let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
     let context = BakeContext::new(&Silent, None);
     let mut config = DelaunayConfig::default();
     let mut session = Session::begin(&g.scene, &config, &context).unwrap();
-    let indoor = |session: &Session, n: usize, config: &DelaunayConfig| {
-        let out = bake_session(&g.scene, session, n, config, &context).unwrap();
-        let cells = &out.world.graph.cells;
-        cells.iter().filter(|c| !c.outdoor).count()
-    };
     let stop = session.decimation.stop;
     // A step forwards joins two of the rooms; back again, they are four.
-    assert_eq!(indoor(&session, stop + 1, &config), 3);
-    assert_eq!(indoor(&session, stop, &config), 4);
+    assert_eq!(rooms_left(&g, &session, stop + 1, &config), 3);
+    assert_eq!(rooms_left(&g, &session, stop, &config), 4);
     // The same, decided for good.
     let door = session.decimation.steps[stop].position;
     config.choices.join.push(door);
     session.decimate(&config);
-    assert_eq!(indoor(&session, session.decimation.stop, &config), 3);
+    let stop = session.decimation.stop;
+    assert_eq!(rooms_left(&g, &session, stop, &config), 3);
     // And the other way round: a portal is kept that would go.
     config.choices.join.clear();
     config.choices.keep.push(door);
     config.stop = Some(4.0);
     session.decimate(&config);
-    let steps = &session.decimation.steps[..session.decimation.stop];
+    let stop = session.decimation.stop;
+    let steps = &session.decimation.steps[..stop];
     assert!(steps.iter().all(|s| s.position.distance(door) > 0.5));
-    assert!(indoor(&session, session.decimation.stop, &config) > 1);
+    assert!(rooms_left(&g, &session, stop, &config) > 1);
+}
+
+/// However far ahead a portal was looked at, and however much the walls and stairs about it are no rooms.
+#[test]
+fn each_portal_ahead_can_be_joined_and_the_walk_s_count_is_the_bake_s() {
+    let g = stair_hall();
+    let context = BakeContext::new(&Silent, None);
+    let mut config = DelaunayConfig::default();
+    let mut session = Session::begin(&g.scene, &config, &context).unwrap();
+    let stop = session.decimation.stop;
+    let n = rooms_left(&g, &session, stop, &config);
+    assert_eq!(n, g.truth.rooms.len());
+    let ahead = session.decimation.steps[stop..].to_vec();
+    assert_eq!(ahead.len(), n);
+    for (i, step) in ahead.iter().enumerate() {
+        config.choices.join = vec![step.position];
+        session.decimate(&config);
+        let joined = session.decimation.stop;
+        let last = &session.decimation.steps[joined - 1];
+        assert_eq!(last.position, step.position);
+        let left = if i < 2 {
+            rooms_left(&g, &session, joined, &config)
+        } else {
+            session.count_rooms(joined, &config)[0]
+        };
+        assert_eq!(left, n - 1, "{step:?}");
+    }
+}
+
+/// In rooms of a few centimeters all doors are within a handbreadth.
+#[test]
+fn a_choice_is_about_one_portal_whatever_the_scale() {
+    let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
+    for scale in [0.01, 1.0, 30.0] {
+        let g = scaled(g.clone(), scale);
+        let mut config = DelaunayConfig::default();
+        config.common.min_opening *= scale;
+        config.common.merge.min_radius *= scale;
+        let context = BakeContext::new(&Silent, None);
+        let mut session = Session::begin(&g.scene, &config, &context).unwrap();
+        let stop = session.decimation.stop;
+        let ahead = session.decimation.steps[stop..].to_vec();
+        let joins = |session: &Session| {
+            let steps = &session.decimation.steps[..session.decimation.stop];
+            steps.iter().filter(|s| s.weight == JOINED).count()
+        };
+        // Openings are 0.45 in radius: half of that aside is about the same one, more than that about none.
+        for (aside, n) in [(0.0, 1), (0.2, 1), (0.6, 0)] {
+            config.choices.join = vec![ahead[0].position + DVec3::Y * (aside * scale)];
+            session.decimate(&config);
+            assert_eq!(joins(&session), n, "{scale} {aside}");
+            assert_eq!(session.decimation.stop, stop + n, "{scale} {aside}");
+        }
+    }
 }
 
 #[test]

@@ -15,7 +15,7 @@ use anyhow::Context;
 pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     write(path, bytes).with_context(|| {
         format!(
-            "cannot write {}; choose another place with -o, or make room there",
+            "cannot write {}; choose another place, or make room there",
             path.display()
         )
     })

@@ -1,20 +1,23 @@
 //! The bake with tetrahedra: scene → tetrahedra → cells → rooms → screens → cell complex → world.
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Bvh, Triangle};
+use enfilade_geom::{Aabb, Bvh, Triangle};
 
 use super::branches::find_branches;
 use super::decimate::{
     Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together, parted,
 };
-use super::rooms::find_rooms;
-use super::space::{Space, divide};
+use super::rooms::{count_rooms, find_rooms};
+use super::space::{Space, box_points, divide};
 use crate::assemble::Cut;
-use crate::complex::{ComplexInput, LabelSettings, build_complex};
+use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
 use crate::join::join_unparted;
 use crate::pipeline::{in_own_order, structural_triangles};
-use crate::watershed::{bounds_of, closure_triangles, find_stairs};
+use crate::watershed::{OUTDOORS, bounds_of, closure_triangles, find_stairs};
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput};
+
+/// Air around the scene that the cell complex knows. [Units: wu]
+const AROUND: f64 = 1.0;
 
 /// Settings of a bake with tetrahedra; the defaults are meant for everything.
 #[derive(Clone, Debug, Default)]
@@ -38,9 +41,12 @@ pub struct Session {
     pub cells: Cells,
     /// The steps.
     pub decimation: Decimation,
-    bounds_rooms: Vec<Triangle>,
-    closures: Vec<Triangle>,
-    bvh: Bvh,
+    /// Structural triangles that bound rooms: all but stairs.
+    pub(super) walls: Vec<Triangle>,
+    /// Of the walls.
+    pub(super) bvh: Bvh,
+    pub(super) closures: Vec<Triangle>,
+    pub(super) stairs: Bvh,
 }
 
 impl Session {
@@ -76,6 +82,12 @@ impl Session {
             .filter(|t| !t.1)
             .map(|t| *t.0)
             .collect();
+        let stairs: Vec<Triangle> = triangles
+            .iter()
+            .zip(&is_stair)
+            .filter(|t| *t.1 && !walls.is_empty())
+            .map(|t| *t.0)
+            .collect();
         // What is nothing but stairs has no others to stand in.
         if walls.is_empty() {
             walls.clone_from(&triangles);
@@ -98,19 +110,34 @@ impl Session {
                 steps: Vec::new(),
                 stop: 0,
             },
-            bounds_rooms: walls,
-            closures,
+            walls,
             bvh,
+            closures,
+            stairs: Bvh::build(&stairs),
         };
         session.decimate(config);
         Ok(session)
+    }
+
+    /// How many rooms are left after the first `n_steps`, which is how many cells indoors [`bake_session`] makes of them,
+    /// and how many cells besides: crevices, and the insides of walls, which are dropped.
+    ///
+    /// `O(n log n)` in the parts of the space; a fraction of a second.
+    #[must_use]
+    pub fn count_rooms(&self, n_steps: usize, config: &DelaunayConfig) -> [usize; 2] {
+        count_rooms(
+            &self.space,
+            &self.cells,
+            &self.decimation.after(n_steps),
+            &self.bvh,
+            config.common.merge.min_radius,
+        )
     }
 
     /// Decimates anew, after other choices or with another weight or stop. Takes milliseconds.
     pub fn decimate(&mut self, config: &DelaunayConfig) {
         let stop = config.stop.unwrap_or_else(|| default_stop(config.weight));
         self.decimation = decimate(
-            &self.space,
             &self.cells,
             config.weight,
             stop,
@@ -124,7 +151,7 @@ impl Session {
 fn with_branches(space: &Space, cells: Cells, min_radius: f64) -> Cells {
     let weight = Weight::ScaleFree;
     let stop = default_stop(weight);
-    let rooms = decimate(space, &cells, weight, stop, min_radius, &Choices::default());
+    let rooms = decimate(&cells, weight, stop, min_radius, &Choices::default());
     let room_of_cell = rooms.after(rooms.stop);
     let room = |&c: &u32| room_of_cell[c as usize];
     let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
@@ -134,6 +161,20 @@ fn with_branches(space: &Space, cells: Cells, min_radius: f64) -> Cells {
     } else {
         parted(space, &cells, &branches)
     }
+}
+
+/// Votes for the outdoors between two boxes, with nothing between them. Tetrahedra there reach far beyond the outer box,
+/// and so do their middles.
+fn votes_around(inner: &Aabb, outer: &Aabb) -> impl Iterator<Item = Vote> {
+    let [volume, less] = [outer, inner].map(|b| b.size().element_product());
+    let middle = Aabb::new((inner.min + outer.min) * 0.5, (inner.max + outer.max) * 0.5);
+    let points = box_points(&middle);
+    let weight = ((volume - less) / points.len() as f64) as f32;
+    points.into_iter().map(move |point| Vote {
+        point,
+        label: OUTDOORS,
+        weight,
+    })
 }
 
 /// Finds the rooms and doorways of a scene by tetrahedra.
@@ -168,24 +209,22 @@ pub fn bake_session(
     let bvh = Bvh::build(&triangles);
     let merge = &config.common.merge;
     let rooms = find_rooms(
-        &session.space,
-        &session.cells,
+        session,
         &session.decimation.after(n_steps),
-        &session.bounds_rooms,
-        &session.bvh,
-        &session.closures,
         merge.min_radius,
     );
     context.delaunay_stage(3)?;
     let windings: Vec<_> = rooms.screens.iter().map(|s| s.winding.clone()).collect();
     let bounds = bounds_of(&triangles);
+    let around = bounds.expanded(AROUND);
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         screens: &windings,
-        bounds: bounds.expanded(1.0),
+        bounds: around,
     });
     context.delaunay_stage(4)?;
     let mut votes = rooms.votes;
+    votes.extend(votes_around(&bounds, &around));
     let mut partition = complex.partition(&votes, &LabelSettings::default());
     while join_unparted(&partition, &mut votes, &mut []) {
         partition = complex.partition(&votes, &LabelSettings::default());

@@ -67,6 +67,11 @@ impl Part {
         }
     }
 
+    /// Whether a corner of the tetrahedron is one of the part's own.
+    pub(super) fn has_corner(&self, p: DVec3) -> bool {
+        self.faces.iter().any(|f| f.poly.contains(&p))
+    }
+
     /// What of this part lies on a facet of the tetrahedron.
     fn on_facet(&self, i: usize) -> impl Iterator<Item = &Poly> {
         let on = On::Facet(i as u8);
@@ -377,19 +382,20 @@ pub(super) fn openings(
         return whole;
     };
     let eps = tolerance.plane;
+    let mut near: SmallVec<[u32; 16]> = SmallVec::new();
+    bvh.for_each_in_box(&Aabb::of_points(&f).expanded(eps), |w| near.push(w));
+    near.sort_unstable();
+    let covers_of = |poly: &[DVec3], off: f64| -> Vec<Poly> {
+        let walls = near.iter().map(|&w| &walls[w as usize]);
+        let in_plane = |p: Plane| poly.iter().all(|&c| p.signed_distance(c).abs() <= off);
+        walls
+            .filter(|wall| Plane::of_triangle(wall).is_some_and(in_plane))
+            .map(|wall| turned_to(Poly::from_slice(wall), plane.normal))
+            .collect()
+    };
     let mut open: SmallVec<[Poly; 2]> = smallvec![Poly::from_slice(&f)];
     if is_covered {
-        let mut near: SmallVec<[u32; 16]> = SmallVec::new();
-        bvh.for_each_in_box(&Aabb::of_points(&f).expanded(eps), |w| near.push(w));
-        near.sort_unstable();
-        let mut covers = Vec::new();
-        for w in near {
-            let wall = &walls[w as usize];
-            let in_plane = |p: Plane| f.iter().all(|&c| p.signed_distance(c).abs() <= eps);
-            if Plane::of_triangle(wall).is_some_and(in_plane) {
-                covers.push(turned_to(Poly::from_slice(wall), plane.normal));
-            }
-        }
+        let covers = covers_of(&f, eps);
         let n_covers = covers.len();
         open = less(open, &covers, plane.normal, tolerance);
         if open.is_empty() {
@@ -435,12 +441,16 @@ pub(super) fn openings(
     let open = open.into_iter().map(|p| ([0, 0], p)).collect();
     let open = within(open, faces(found[0], i), 0);
     let open = within(open, faces(found[1], other_facet), 1);
-    open.into_iter()
-        .map(|(parts, poly)| Opening {
+    // A wall that ends within the facet may lie in a piece of it though not in all of it.
+    let rest = |(parts, poly): ([u32; 2], Poly)| {
+        let covers = covers_of(&poly, 2.0 * eps);
+        let open = less(smallvec![poly], &covers, plane.normal, tolerance);
+        open.into_iter().map(move |poly| Opening {
             parts,
             outline: Some(poly),
         })
-        .collect()
+    };
+    open.into_iter().flat_map(rest).collect()
 }
 
 #[cfg(test)]

@@ -79,6 +79,8 @@ pub struct CellPortal {
     pub mouth: f64,
     /// Sum of the facets' area normals, from the lesser to the greater cell. [Units: wu²]
     pub vector: DVec3,
+    /// Mean of the middles of the facets. [Units: wu]
+    pub center: DVec3,
     /// Links of the space.
     pub links: Vec<u32>,
 }
@@ -165,6 +167,7 @@ fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches)
                 radius: 0.0,
                 mouth: 0.0,
                 vector: DVec3::ZERO,
+                center: DVec3::ZERO,
                 links: Vec::new(),
             });
         portal.radius = portal.radius.max(link.radius);
@@ -172,7 +175,12 @@ fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches)
         portal.mouth = portal.mouth.max(branches.weight(labels));
         let normal = space.area_vector(link);
         portal.vector += if a < b { normal } else { -normal };
+        let outline = space.outline(link);
+        portal.center += outline.iter().sum::<DVec3>() / outline.len() as f64;
         portal.links.push(l as u32);
+    }
+    for portal in cells.portals.values_mut() {
+        portal.center /= portal.links.len() as f64;
     }
     cells
 }
@@ -188,32 +196,41 @@ pub struct Step {
     pub weight: f64,
     /// The weight is that of a branch at its mouth, not that of a pinch.
     pub is_mouth: bool,
-    /// Middle of that portal. [Units: wu]
+    /// Middle of that portal, or of the widest of the portals that it has become from. [Units: wu]
     pub position: DVec3,
 }
 
-/// What a person decided, by places. A choice concerns the portals within [`Choices::REACH`] of it.
+/// What a person decided, by places as [`Step::position`] tells them. A choice is about the portal between cells before
+/// decimation that has its middle there, and later about whatever that has become part of. Where none has, since the
+/// scene was mended or has other points, it is about the nearest that goes if nobody decides.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
     /// Portals here stay, whatever they weigh. [Units: wu]
     pub keep: Vec<DVec3>,
-    /// Portals here go first. [Units: wu]
+    /// Portals here go once nothing else goes by itself: the rooms that are there then become one, however many steps a
+    /// person took to see the portal. [Units: wu]
     pub join: Vec<DVec3>,
 }
 
 impl Choices {
-    /// How far from a portal's middle a choice may lie. [Units: wu]
-    pub const REACH: f64 = 0.5;
+    /// How far from a portal's middle a choice may lie. [Units: radii of the ball that passes]
+    pub const REACH: f64 = 1.0;
 
-    fn at(&self, p: DVec3) -> Option<bool> {
-        let near = |q: &DVec3| q.distance(p) <= Self::REACH;
-        if self.keep.iter().any(near) {
-            Some(true)
-        } else if self.join.iter().any(near) {
-            Some(false)
-        } else {
-            None
-        }
+    /// The portals that are decided about: true to keep. `undecided` are the portals that go if nobody decides.
+    fn of(&self, cells: &Cells, undecided: &[(u32, u32)]) -> BTreeMap<(u32, u32), bool> {
+        let portal = |p: &DVec3| {
+            let off = |pair: &(u32, u32)| cells.portals[pair].center.distance(*p);
+            let is_at = |pair: &&(u32, u32)| off(pair) == 0.0;
+            cells.portals.keys().find(is_at).copied().or_else(|| {
+                let nearest = undecided.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+                let is_near =
+                    |pair: &&(u32, u32)| off(pair) <= Self::REACH * cells.portals[pair].radius;
+                nearest.filter(is_near).copied()
+            })
+        };
+        let join = self.join.iter().filter_map(portal).map(|p| (p, false));
+        let keep = self.keep.iter().filter_map(portal).map(|p| (p, true));
+        join.chain(keep).collect()
     }
 }
 
@@ -273,8 +290,8 @@ struct Live {
     radius: f64,
     mouth: f64,
     vector: DVec3,
-    center: DVec3,
-    n: f64,
+    /// The widest one that it has become from, whose radius this is.
+    widest: (u32, u32),
     /// A person wants it to stay; two cells with such a portal among theirs never join.
     stays: bool,
     /// A person wants it to go.
@@ -289,13 +306,37 @@ struct Live {
 /// excepted.
 #[must_use]
 pub fn decimate(
-    space: &Space,
     cells: &Cells,
     weight: Weight,
     stop: f64,
     min_radius: f64,
     choices: &Choices,
 ) -> Decimation {
+    let (undecided, portals) = decided(cells, weight, stop, min_radius, &BTreeMap::new());
+    if *choices == Choices::default() {
+        return undecided;
+    }
+    // Nobody means a crevice that lies in a doorway.
+    let steps = undecided.steps.iter().zip(portals);
+    let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
+    decided(
+        cells,
+        weight,
+        stop,
+        min_radius,
+        &choices.of(cells, &portals),
+    )
+    .0
+}
+
+/// Also gives the portal of each step, as it was before decimation.
+fn decided(
+    cells: &Cells,
+    weight: Weight,
+    stop: f64,
+    min_radius: f64,
+    choices: &BTreeMap<(u32, u32), bool>,
+) -> (Decimation, Vec<(u32, u32)>) {
     let n = cells.radii.len();
     let mut radius = cells.radii.clone();
     let mut volumes = cells.volumes.clone();
@@ -305,20 +346,14 @@ pub fn decimate(
     for (&(a, b), portal) in &cells.portals {
         neighbors[a as usize].insert(b);
         neighbors[b as usize].insert(a);
-        let middle = |&l: &u32| {
-            let outline = space.outline(&space.links[l as usize]);
-            outline.iter().sum::<DVec3>() / outline.len() as f64
-        };
-        let center = portal.links.iter().map(middle).sum::<DVec3>();
-        let choice = choices.at(center / portal.links.len() as f64);
+        let choice = choices.get(&(a, b)).copied();
         portals.insert(
             (a, b),
             Live {
                 radius: portal.radius,
                 mouth: portal.mouth,
                 vector: portal.vector,
-                center,
-                n: portal.links.len() as f64,
+                widest: (a, b),
                 stays: choice == Some(true),
                 goes: choice == Some(false),
                 version: 0,
@@ -329,41 +364,45 @@ pub fn decimate(
         let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         radius < min_radius || ball.is_finite() && volume < HOLDS * ball
     };
-    let weigh =
-        |portal: &Live, pair: (u32, u32), radius: &[f64], volumes: &[f64], boxes: &[Aabb]| -> f64 {
-            let (a, b) = (pair.0 as usize, pair.1 as usize);
-            if portal.stays || choices.at(portal.center / portal.n) == Some(true) {
-                return f64::INFINITY;
-            }
-            // The middle of a portal moves as others join it: what was shown is what was meant.
-            if portal.goes || choices.at(portal.center / portal.n) == Some(false) {
-                return JOINED;
-            }
-            let least = radius[a].min(radius[b]);
-            if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
-                // Widest opening first among crevices.
-                return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
-            }
-            if weight == Weight::ScaleFree {
-                return (least / portal.radius.max(1e-9)).max(portal.mouth);
-            }
-            let area = portal.vector.length().max(1e-9);
-            let projected = |b: &Aabb| {
-                let s = b.size().max(DVec3::ZERO);
-                let n = (portal.vector / area).abs();
-                n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
-            };
-            let largest = projected(&boxes[a]).max(projected(&boxes[b]));
-            let aspect = largest / area;
-            match weight {
-                Weight::Aspect => aspect,
-                _ => aspect / largest.sqrt(),
-            }
+    let weigh = |portal: &Live,
+                 pair: (u32, u32),
+                 radius: &[f64],
+                 volumes: &[f64],
+                 boxes: &[Aabb],
+                 has_joins: bool|
+     -> f64 {
+        let (a, b) = (pair.0 as usize, pair.1 as usize);
+        if portal.stays {
+            return f64::INFINITY;
+        }
+        if portal.goes && has_joins {
+            return JOINED;
+        }
+        let least = radius[a].min(radius[b]);
+        if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
+            // Widest opening first among crevices.
+            return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
+        }
+        if weight == Weight::ScaleFree {
+            return (least / portal.radius.max(1e-9)).max(portal.mouth);
+        }
+        let area = portal.vector.length().max(1e-9);
+        let projected = |b: &Aabb| {
+            let s = b.size().max(DVec3::ZERO);
+            let n = (portal.vector / area).abs();
+            n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
         };
+        let largest = projected(&boxes[a]).max(projected(&boxes[b]));
+        let aspect = largest / area;
+        match weight {
+            Weight::Aspect => aspect,
+            _ => aspect / largest.sqrt(),
+        }
+    };
     let mut queue: BinaryHeap<Candidate> = portals
         .iter()
         .map(|(&pair, p)| Candidate {
-            weight: weigh(p, pair, &radius, &volumes, &boxes),
+            weight: weigh(p, pair, &radius, &volumes, &boxes, false),
             pair,
             version: 0,
         })
@@ -371,13 +410,30 @@ pub fn decimate(
     // What is known of a cell lies in the slot of the one that had more neighbors, so that a hall that takes in
     // thousands of crevices is not moved each time; `names` are the numbers that steps tell.
     let mut names: Vec<u32> = (0..n as u32).collect();
-    let mut steps: Vec<Step> = Vec::new();
+    let (mut steps, mut widest): (Vec<Step>, Vec<(u32, u32)>) = Default::default();
     let mut stop_at = None;
+    // Portals that a person joined are among the next.
+    let mut has_joins = false;
     while let Some(c) = queue.pop() {
         let Some(portal) = portals.get(&c.pair).filter(|p| p.version == c.version) else {
             continue;
         };
         if c.weight > stop && stop_at.is_none() {
+            // Rooms are what they are without the joins before they are joined: what was shown is what was meant.
+            if !has_joins {
+                has_joins = true;
+                let before = queue.len();
+                let goes = portals.iter().filter(|(_, p)| p.goes && !p.stays);
+                queue.extend(goes.map(|(&pair, p)| Candidate {
+                    weight: JOINED,
+                    pair,
+                    version: p.version,
+                }));
+                if queue.len() > before {
+                    queue.push(c);
+                    continue;
+                }
+            }
             stop_at = Some(steps.len());
         }
         let [into, from] = {
@@ -391,8 +447,9 @@ pub fn decimate(
             from: one.max(other),
             weight: c.weight,
             is_mouth: weight == Weight::ScaleFree && portal.mouth > 0.0 && c.weight == portal.mouth,
-            position: portal.center / portal.n,
+            position: cells.portals[&portal.widest].center,
         });
+        widest.push(portal.widest);
         names[into as usize] = one.min(other);
         portals.remove(&c.pair);
         let joined_radius = radius[into as usize].max(radius[from as usize]);
@@ -427,20 +484,20 @@ pub fn decimate(
             };
             let pair = (into.min(other), into.max(other));
             let live = portals.entry(pair).or_insert(Live {
-                radius: 0.0,
+                // Less than any, so that it takes the other's place.
+                radius: -1.0,
                 mouth: 0.0,
                 vector: DVec3::ZERO,
-                center: DVec3::ZERO,
-                n: 0.0,
+                widest: pair,
                 stays: false,
                 goes: false,
                 version: 0,
             });
-            live.radius = live.radius.max(old.radius);
+            if old.radius > live.radius {
+                (live.radius, live.widest) = (old.radius, old.widest);
+            }
             live.mouth = live.mouth.max(old.mouth);
             live.vector += old.vector * sign;
-            live.center += old.center;
-            live.n += old.n;
             live.stays |= old.stays;
             live.goes |= old.goes;
         }
@@ -453,17 +510,18 @@ pub fn decimate(
             // Unlike any version of this pair before, since steps only grow in number.
             live.version = steps.len() as u32;
             queue.push(Candidate {
-                weight: weigh(live, pair, &radius, &volumes, &boxes),
+                weight: weigh(live, pair, &radius, &volumes, &boxes, has_joins),
                 pair,
                 version: live.version,
             });
         }
     }
-    Decimation {
+    let decimation = Decimation {
         n_cells: n,
         stop: stop_at.unwrap_or(steps.len()),
         steps,
-    }
+    };
+    (decimation, widest)
 }
 
 impl Decimation {

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray};
 use rayon::prelude::*;
 
+use super::bake::Session;
 use super::decimate::{Cells, OUTDOOR_CELL};
 use super::space::Space;
 use crate::complex::Vote;
@@ -40,36 +41,81 @@ fn label(cell: u32) -> u32 {
     cell - OUTDOOR_CELL + OUTDOORS
 }
 
-/// Screens where rooms meet and votes where they are. `room_of_cell` is what decimation left.
-pub(super) fn find_rooms(
+/// The rooms that decimation left, and what of it is none.
+struct Standing {
+    /// Room of each cell, the void in the outdoors.
+    room_of_cell: Vec<u32>,
+    /// Openings between two rooms: links that touch.
+    patches: Vec<((u32, u32), Vec<u32>)>,
+    /// Rooms that are the insides of walls and solids.
+    hollow: BTreeSet<u32>,
+}
+
+impl Standing {
+    fn of(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh, min_radius: f64) -> Self {
+        let room_of_cell = void_joined(space, cells, room_of_cell, bvh);
+        let mut between: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+        for (&(a, b), portal) in &cells.portals {
+            let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
+            if a != b {
+                // Pieces of an opening that tetrahedra cut off are missed by nobody.
+                let wide = |l: &&u32| !space.is_crack(&space.links[**l as usize]);
+                between
+                    .entry((a.min(b), a.max(b)))
+                    .or_default()
+                    .extend(portal.links.iter().filter(wide));
+            }
+        }
+        let patches: Vec<((u32, u32), Vec<u32>)> = between
+            .into_iter()
+            .flat_map(|(pair, links)| {
+                connected(space, &links)
+                    .into_iter()
+                    .map(move |patch| (pair, patch))
+            })
+            .collect();
+        let hollow = hollow_rooms(space, cells, &room_of_cell, &patches, bvh, min_radius);
+        Self {
+            room_of_cell,
+            patches,
+            hollow,
+        }
+    }
+}
+
+/// How many rooms a decimation left, and how many cells besides: crevices, and the insides of walls.
+pub(super) fn count_rooms(
     space: &Space,
     cells: &Cells,
     room_of_cell: &[u32],
-    walls: &[Triangle],
     bvh: &Bvh,
-    closures: &[Triangle],
     min_radius: f64,
-) -> Rooms {
-    let room_of_cell = &void_joined(space, cells, room_of_cell, bvh)[..];
+) -> [usize; 2] {
+    let standing = Standing::of(space, cells, room_of_cell, bvh, min_radius);
+    let mut all: BTreeSet<u32> = standing.room_of_cell.into_iter().collect();
+    all.remove(&OUTDOOR_CELL);
+    let n_hollow = all.intersection(&standing.hollow).count();
+    [all.len() - n_hollow, n_hollow]
+}
+
+/// Screens where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
+/// rooms and are no part of them.
+pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f64) -> Rooms {
+    let Session {
+        space,
+        cells,
+        walls,
+        bvh,
+        closures,
+        stairs,
+        ..
+    } = session;
+    let Standing {
+        room_of_cell,
+        patches,
+        hollow,
+    } = Standing::of(space, cells, room_of_cell, bvh, min_radius);
     let room_at = |t: u32| room_of_cell[cells.cell_of_part[t as usize] as usize];
-    let mut between: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
-    for (&(a, b), portal) in &cells.portals {
-        let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
-        if a != b {
-            between
-                .entry((a.min(b), a.max(b)))
-                .or_default()
-                .extend(&portal.links);
-        }
-    }
-    let patches: Vec<((u32, u32), Vec<u32>)> = between
-        .into_iter()
-        .flat_map(|(pair, links)| {
-            connected(space, &links)
-                .into_iter()
-                .map(move |patch| (pair, patch))
-        })
-        .collect();
     let leaves = Bvh::build(closures);
     let found: Vec<(Vec<DVec3>, Option<Screen>)> = patches
         .par_iter()
@@ -90,7 +136,6 @@ pub(super) fn find_rooms(
         })
         .collect();
 
-    let hollow = hollow_rooms(space, cells, room_of_cell, &patches, bvh, min_radius);
     let key = |p: DVec3| (p / UNSURE).floor().to_array().map(|x| x as i64);
     let mut unsure: BTreeMap<[i64; 3], Vec<DVec3>> = BTreeMap::new();
     for (centers, _) in &found {
@@ -110,7 +155,10 @@ pub(super) fn find_rooms(
     let n = space.middles.len();
     let sure: Vec<bool> = (0..n)
         .into_par_iter()
-        .map(|t| !is_unsure(space.middles[t]) && bvh.nearest(space.middles[t], AT_WALL).is_none())
+        .map(|t| {
+            let p = space.middles[t];
+            !is_unsure(p) && bvh.nearest(p, AT_WALL).is_none() && !is_inside(stairs, p)
+        })
         .collect();
     let vote = |t: u32| Vote {
         point: space.middles[t as usize],
@@ -326,6 +374,32 @@ fn hollow_rooms(
         .collect()
 }
 
+/// Whether whatever way one looks from `p`, one sees the backs of some surfaces.
+fn is_inside(surfaces: &Bvh, p: DVec3) -> bool {
+    surfaces.bounds().contains(p)
+        && (0..6).all(|i| {
+            surfaces
+                .closest_hit(&ray(p, i), |_| false)
+                .is_some_and(|hit| !hit.front)
+        })
+}
+
+/// One of rays all around: six along the axes, then eight along the diagonals.
+fn ray(origin: DVec3, i: usize) -> Ray {
+    let bit = |k: usize| if i >> k & 1 == 0 { 1.0 } else { -1.0 };
+    let direction = if i < 6 {
+        DVec3::AXES[i / 2] * bit(0)
+    } else {
+        DVec3::new(bit(0), bit(1), bit(2))
+    };
+    Ray {
+        origin,
+        // Off the axes a little, so that rays do not run along edges.
+        direction: direction + DVec3::new(0.013, 0.007, -0.011),
+        t_max: f64::INFINITY,
+    }
+}
+
 /// Of the rays from the largest of some tetrahedra, the share that meets backs.
 fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32]) -> f64 {
     // The largest speak for a region: those at its surface are many and see little.
@@ -337,18 +411,7 @@ fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32]) -> f64 {
     let (mut back, mut all) = (0.0, 0.0);
     for &t in tets.iter().take(POINTS) {
         for i in 0..14 {
-            let bit = |k: usize| if i >> k & 1 == 0 { 1.0 } else { -1.0 };
-            let mut direction = DVec3::new(bit(0), bit(1), bit(2));
-            if i >= 8 {
-                direction = DVec3::ZERO;
-                direction[(i - 8) / 2] = bit(0);
-            }
-            let ray = Ray {
-                origin: space.middles[t as usize],
-                // Off the axes a little, so that rays do not run along edges.
-                direction: direction + DVec3::new(0.013, 0.007, -0.011),
-                t_max: f64::INFINITY,
-            };
+            let ray = ray(space.middles[t as usize], i);
             if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
                 all += 1.0;
                 back += f64::from(u8::from(!hit.front));

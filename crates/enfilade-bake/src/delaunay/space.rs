@@ -21,7 +21,7 @@ use smallvec::SmallVec;
 use super::cut::{self, Found, Tolerance};
 use super::refine::{ENTERS, refined};
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
-use crate::complex::poly::{area, area_normal};
+use crate::complex::poly::{area, area_normal, width};
 
 /// Most points added to surfaces; up to 4 kB each while tetrahedra become cells.
 const MAX_POINTS: usize = 300_000;
@@ -29,13 +29,16 @@ const MAX_POINTS: usize = 300_000;
 const BOX_POINTS: usize = 9;
 /// A tetrahedron of less than this share of the cube over its longest edge has no reliable middle.
 const FLAT: f64 = 1e-5;
-/// What polygons leave of a facet is an opening where it is this share of the narrowest opening wide;
-/// narrower ones are cracks, which the cell complex finds.
+/// What polygons leave of a facet is a crack where it is less than this share of the narrowest opening wide: a way
+/// through, but none to put a portal in, since the cell complex finds the exact one.
 const CRACK: f64 = 1.0 / 60.0;
 /// Balls of air are known down to a radius of this share of the narrowest opening, which passes one of half its width.
 pub const LEAST_BALL: f64 = 1.0 / 3.0;
 /// Points nearer to a plane than this share of the largest coordinate lie in it.
 const ON_PLANE: f64 = 1e-9;
+/// What is less than this many times as wide as points may lie off a plane is closed: twice what a cut from each side may
+/// be off.
+const CLOSED: f64 = 8.0;
 
 /// The air between surfaces, as tetrahedra and parts of tetrahedra.
 pub struct Space {
@@ -57,6 +60,8 @@ pub struct Space {
     pub radii: Vec<f64>,
     /// Ways from one to the next.
     pub links: Vec<Link>,
+    /// Outlines narrower than this are cracks. [Units: wu]
+    crack: f64,
     /// Corners of openings that are no whole facets, one after the other. [Units: wu]
     corners: Vec<DVec3>,
 }
@@ -130,7 +135,7 @@ pub fn divide(
     let reach = around.min.abs().max(around.max.abs()).max_element();
     let tolerance = Tolerance {
         plane: ON_PLANE * reach,
-        width: (CRACK * narrowest).max(8.0 * ON_PLANE * reach),
+        width: CLOSED * ON_PLANE * reach,
     };
     let found: Vec<Found> = (0..n)
         .into_par_iter()
@@ -169,12 +174,14 @@ pub fn divide(
         n_passed_over += parts.n_passed_over;
         further[t] = facts.len() as u32;
         for (k, part) in parts.parts.iter().enumerate() {
-            // The ball, which a polygon runs through, says nothing about a part: it is a spike.
-            let radius = if balls[t].radius == f64::INFINITY {
-                f64::INFINITY
-            } else {
-                0.0
-            };
+            // The ball, which a polygon runs through, says nothing about a part: it is a spike. Of what reaches the
+            // box, some may lie in a wall.
+            let corners = delaunay.tetrahedra[t].vertices.iter();
+            let is_outdoors = balls[t].radius == f64::INFINITY
+                && corners
+                    .filter(|v| is_box.contains(v))
+                    .any(|&v| part.has_corner(delaunay.vertices[v as usize]));
+            let radius = if is_outdoors { f64::INFINITY } else { 0.0 };
             let fact = Fact {
                 middle: part.middle,
                 volume: part.volume,
@@ -223,9 +230,9 @@ pub fn divide(
             }
             for (pair, outline) in found[t].parts.iter().flat_map(|p| &p.inner) {
                 let parts = pair.map(|k| number(t, k));
-                let most = facts[parts[0] as usize].radius;
-                let radius = if most == f64::INFINITY {
-                    most
+                let is_outdoors = parts.map(|p| facts[p as usize].radius == f64::INFINITY);
+                let radius = if is_outdoors == [true; 2] {
+                    f64::INFINITY
                 } else {
                     by_size(outline)
                 };
@@ -254,6 +261,7 @@ pub fn divide(
         volumes: facts.iter().map(|f| f.volume).collect(),
         radii: facts.iter().map(|f| f.radius).collect(),
         links,
+        crack: CRACK * narrowest,
         corners,
         delaunay,
     })
@@ -265,7 +273,7 @@ fn by_size(outline: &[DVec3]) -> f64 {
 }
 
 /// A lattice on the faces of a box.
-fn box_points(b: &Aabb) -> Vec<DVec3> {
+pub(super) fn box_points(b: &Aabb) -> Vec<DVec3> {
     let n = BOX_POINTS;
     let step = |i: usize| i as f64 / (n - 1) as f64;
     let mut out = Vec::new();
@@ -363,6 +371,11 @@ impl Space {
             .map(corner)
             .into_iter()
             .collect()
+    }
+
+    /// Whether polygons leave less of a facet than a portal could be put in.
+    pub(super) fn is_crack(&self, link: &Link) -> bool {
+        link.n_corners > 0 && width(&self.outline(link)) < self.crack
     }
 
     /// Area of an opening times its unit normal, which points from the first part to the second.

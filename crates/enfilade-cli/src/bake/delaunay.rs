@@ -83,8 +83,9 @@ fn read_choices(path: &Path) -> anyhow::Result<Choices> {
 
 /// Choices as text of their file.
 pub(crate) fn choices_text(choices: &Choices) -> String {
-    let mut text =
-        String::from("# Portals that stay, and portals that go, by their middles in meters.\n");
+    let mut text = String::from(
+        "# Portals that stay, and portals whose two rooms become one, by their middles in meters.\n",
+    );
     for (name, list) in [("keep", &choices.keep), ("join", &choices.join)] {
         _ = writeln!(text, "{name} = [");
         for p in list {
