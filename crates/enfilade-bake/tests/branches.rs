@@ -141,6 +141,25 @@ fn a_neck_between_chambers_and_a_handle_are_none() {
     assert_eq!(rooms[0], rooms[1]);
 }
 
+#[test]
+fn an_alcove_and_a_crevice_are_none() {
+    let lies_in_the_trunk = |extra: &[Tube], tip: DVec3, what: &str| {
+        let mut all = vec![trunk(3.0, 1.0)];
+        all.extend(extra);
+        let rooms = rooms_at(&tubes(&all, 0.2), 1.0, &[DVec3::ZERO, tip]);
+        assert_eq!(rooms[0] == rooms[1], what != "tube", "{what}");
+    };
+    // Half as wide as the trunk, and so many diameters deep: the bound is two.
+    let deep = |depth: f64| side_tube(DVec3::ZERO, DVec3::Y, 1.0 + depth, 0.5);
+    lies_in_the_trunk(&[deep(2.6)], deep(2.6).ends[1], "tube");
+    lies_in_the_trunk(&[deep(1.9)], deep(1.9).ends[1], "alcove");
+    // A gap between parallel walls, four times as long as wide and four times as deep.
+    let slit: Vec<Tube> = (-6..=6)
+        .map(|i| side_tube(DVec3::X * (0.2 * f64::from(i)), DVec3::Y, 4.4, 0.4))
+        .collect();
+    lies_in_the_trunk(&slit, DVec3::Y * 3.8, "crevice");
+}
+
 /// A scene larger or smaller, about the origin.
 fn times(mut g: Generated, scale: f64) -> Generated {
     let meshes = g.scene.meshes.iter_mut();

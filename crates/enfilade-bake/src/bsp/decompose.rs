@@ -147,6 +147,7 @@ pub fn bake_bsp(
             min_room: 0.0,
             dominance: 1.0,
             strong_share: 0.2,
+            ..LabelSettings::default()
         }
     };
     let partition = complex.partition(&votes.0, &settings);

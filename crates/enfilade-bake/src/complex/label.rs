@@ -269,10 +269,9 @@ fn merge_groups(
         // A closet has a door, a shaft nothing; a hollow in furniture leaks all over.
         let open: f64 = group.neighbors.values().sum();
         let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * open;
-        group.keeps = !is_cavity
-            && group
-                .label
-                .is_some_and(|l| main[&l].1.0 == id || group.volume >= settings.min_volume);
+        let is_part = group.volume >= settings.min_volume
+            && (settings.keeps_closed || !group.neighbors.is_empty());
+        group.keeps = !is_cavity && group.label.is_some_and(|l| main[&l].1.0 == id || is_part);
     }
     // Smallest first; volumes are not negative, so their bits compare like the numbers.
     let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), group.root, id));

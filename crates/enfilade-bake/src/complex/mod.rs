@@ -88,6 +88,9 @@ pub struct LabelSettings {
     /// A smaller region that opens to others beside its screens, too, is a cavity and joins them.
     /// [Units: wu³]
     pub min_room: f64,
+    /// A part of a region that opens nowhere, apart from its main part, is a cell of its own. Otherwise it is solid: where
+    /// votes come from air that is connected, they got there through what the complex closes.
+    pub keeps_closed: bool,
     /// A label with this share of a component's votes has it alone, unless another is strong there.
     pub dominance: f64,
     /// A label is strong where this share of all its votes is.
@@ -99,6 +102,7 @@ impl Default for LabelSettings {
         Self {
             min_volume: 0.5,
             min_room: 1.5,
+            keeps_closed: true,
             dominance: 0.9,
             strong_share: 0.2,
         }

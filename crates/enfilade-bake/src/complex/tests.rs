@@ -418,6 +418,30 @@ fn the_hollow_of_a_wall_is_solid() {
     assert!(p.locator.locate(DVec3::new(3.05, 1.0, 1.5)).is_some());
 }
 
+#[test]
+fn votes_that_got_into_a_closed_hollow_make_a_cell_of_it_only_if_asked() {
+    let mut t = two_rooms(0.0);
+    block(&mut t, [1.0, 0.5, 1.0], [2.0, 1.5, 2.0]);
+    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    // Voters of the room see no block.
+    let votes = room_votes(&c.bounds());
+    let at = |keeps_closed| {
+        let settings = LabelSettings {
+            keeps_closed,
+            ..LabelSettings::default()
+        };
+        let p = c.partition(&votes, &settings);
+        assert_promises(&t, &p, &c.bounds(), 2_000);
+        [[1.5, 1.0, 1.5], [0.5, 1.0, 0.5], [4.0, 1.0, 2.0]]
+            .map(|q| p.locator.locate(DVec3::from_array(q)))
+    };
+    let [hollow, room, other] = at(true);
+    assert!(hollow.is_some() && hollow != room, "{hollow:?} {room:?}");
+    let [hollow, room, next] = at(false);
+    assert!(hollow.is_none() && room.is_some(), "{hollow:?} {room:?}");
+    assert!(next.is_some() && other.is_some());
+}
+
 /// A closed box of 4 x 4 x 2 m whose top is a pyramid of 1 cm, all of it in small triangles, turned
 /// about `axis`; its corners are rounded to `f32` after that.
 fn turned_box(axis: DVec3, angle: f64) -> Vec<Triangle> {

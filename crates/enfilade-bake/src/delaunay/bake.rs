@@ -225,9 +225,13 @@ pub fn bake_session(
     context.delaunay_stage(4)?;
     let mut votes = rooms.votes;
     votes.extend(votes_around(&bounds, &around));
-    let mut partition = complex.partition(&votes, &LabelSettings::default());
+    let settings = LabelSettings {
+        keeps_closed: false,
+        ..LabelSettings::default()
+    };
+    let mut partition = complex.partition(&votes, &settings);
     while join_unparted(&partition, &mut votes, &mut []) {
-        partition = complex.partition(&votes, &LabelSettings::default());
+        partition = complex.partition(&votes, &settings);
     }
     let outward = complex.opening_tolerance();
     let counts = [

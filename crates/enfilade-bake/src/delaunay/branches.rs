@@ -8,12 +8,13 @@
 //!
 //! - it has one mouth: what has two is a neck between chambers, or a ring;
 //! - no opening leads from it to a room that is wider than its mouth, for the same reason;
-//! - its mouth is about a disk, so that it is no slit under a bed, along a wall or in a corner;
-//! - it is a tube about as wide as its mouth, so that it is no bulge with a slit for a mouth;
-//! - it is [`DEEP`] times as deep as its mouth is wide, so that it is no alcove;
+//! - its mouth is no longer than wide by much, so that it is no slit under a bed, along a wall or in a corner;
+//! - it is [`DEEP`] times as deep as its mouth is wide, so that it is no alcove, nor a taper: balls much narrower than the
+//!   mouth do not count;
 //! - it narrows [`NARROWS`] times near the mouth, so that it is no tube that tapers.
 //!
-//! All else is part of what it opens to most. Where a trunk parts into arms as wide as itself there are no
+//! All else is part of what it opens to most. Pockets between rough walls and the balls of a room pass, too; they hold
+//! less than a ball, and decimation takes them for the spikes that they are. Where a trunk parts into arms as wide as itself there are no
 //! branches: a corridor that crosses another is no room either. Nothing here has a unit.
 //!
 //! Opening by balls from wide to narrow: Matheron, "Random sets and integral geometry" (1975), on size
@@ -23,7 +24,6 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap, VecDeque};
 use std::f64::consts::PI;
-use std::ops::RangeInclusive;
 
 use enfilade_geom::DVec3;
 
@@ -37,17 +37,9 @@ const NARROWS: f64 = 1.5;
 /// Depth of a branch, from its mouth to its far end, ÷ diameter of its mouth, at least. Alcoves are about as deep
 /// as wide.
 const DEEP: f64 = 2.0;
-/// Area of the mouth ÷ that of the disk of its ball. A ball passes, so there is hardly less; a rectangle of 1 : 2
-/// has 2.5. What lies between wall and balls in a cave has 0.6 at most; a slit along the eaves has 3 and more.
-const DISKS: RangeInclusive<f64> = 0.75..=2.6;
 /// Root of the mean square distance of the mouth's facets from its middle ÷ radius of its ball, at most: a disk has
 /// 0.7, a rectangle of 1 : 2 has 1.3, and what runs all around a bed has 2.5 and more.
 const SPREAD: f64 = 1.5;
-/// Largest ball well inside the branch ÷ ball that passes the mouth, one way or the other, at most.
-const ALIKE: f64 = 1.25;
-/// Volume of a branch ÷ that of the cylinder with its depth over the mouth's disk: a cone has a third, and
-/// a rectangle of 1 : 2 has 2.5.
-const FILLS: RangeInclusive<f64> = 0.5..=2.6;
 /// The mouth lies where balls of this many times the branch's own no longer pass. Balls of one tube differ by as
 /// much, depending on where points are.
 const FLARES: f64 = 1.05;
@@ -468,27 +460,14 @@ impl<'a> Search<'a> {
         let no = Some(mouth.parent);
         let parts = &self.regions[limb as usize].parts;
         let body = self.body(limb, &mouth).ok_or(no)?;
-        let outwards = |&l: &u32| {
-            let link = &self.space.links[l as usize];
-            let vector = self.space.area_vector(link);
-            let is_outwards = self.owner[link.parts[0] as usize] == limb;
-            if is_outwards { vector } else { -vector }
-        };
-        let disk = PI * mouth.radius.powi(2);
-        let disks = mouth.links.iter().map(outwards).sum::<DVec3>().length() / disk;
-        let is_disk = mouth.spread <= SPREAD * mouth.radius && DISKS.contains(&disks);
+        let is_slit = mouth.spread > SPREAD * mouth.radius;
         // Balls in its corners are no part of its depth.
         let depth = parts
             .iter()
             .filter(|&&t| self.radius(t) * NARROWS >= mouth.radius)
             .map(|&t| self.far(t, &mouth) + self.radius(t))
             .fold(0.0, f64::max);
-        let volume: f64 = parts.iter().map(|&t| self.space.volumes[t as usize]).sum();
-        let fills = volume / (disk * depth).max(1e-300);
-        let is_tube = body <= ALIKE * mouth.radius
-            && mouth.radius <= ALIKE * body
-            && depth >= 2.0 * DEEP * mouth.radius
-            && FILLS.contains(&fills);
+        let is_deep = depth >= 2.0 * DEEP * mouth.radius;
         // A taper narrows elsewhere, too.
         let near = 2.0 * DEEP * mouth.radius;
         let trunk = self.regions[mouth.parent as usize].parts.iter();
@@ -498,8 +477,8 @@ impl<'a> Search<'a> {
             .fold(0.0, f64::max);
         let weight = trunk / body;
         let is_branch = mouth.is_only
-            && is_disk
-            && is_tube
+            && !is_slit
+            && is_deep
             && weight >= NARROWS
             && !self.leads_on(limb, mouth.radius);
         if is_branch {
