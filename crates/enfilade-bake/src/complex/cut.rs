@@ -140,6 +140,62 @@ pub(super) fn absorb_chips(graph: &LeafGraph, cells: &mut LeafCells, min_volume:
     drop_empty(graph, cells);
 }
 
+/// Cells of less are what rounding leaves between surfaces that all but touch: no room, however small, and too thin for
+/// a portal. [Units: wu³]
+const SLIVER: f64 = 1e-4;
+
+/// Gives the leaves of slivers to the cells that they open to most; those that open to none are solid.
+///
+/// O(leaves + facets), but for chains of slivers.
+pub(super) fn dissolve_slivers(graph: &LeafGraph, cells: &mut LeafCells) {
+    let is_sliver: Vec<bool> = (0..)
+        .zip(&cells.volumes)
+        .map(|(c, &volume)| volume < SLIVER && cells.outside != Some(c))
+        .collect();
+    if !is_sliver.contains(&true) {
+        return;
+    }
+    let is_in = |c: u32| c != SOLID && is_sliver[c as usize];
+    let mut around: BTreeMap<u32, Vec<(u32, f64)>> = BTreeMap::new();
+    for f in &graph.facets {
+        let [a, b] = f.leaves;
+        for (leaf, other) in [(a, b), (b, a)] {
+            if is_in(cells.cell_of_leaf[leaf as usize]) {
+                let facets = around.entry(leaf).or_default();
+                facets.push((other, f64::from(f.area)));
+            }
+        }
+    }
+    loop {
+        let n = around.len();
+        around.retain(|&leaf, facets| {
+            let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+            for &(other, area) in facets.iter() {
+                let c = cells.cell_of_leaf[other as usize];
+                if c != SOLID && !is_in(c) {
+                    *areas.entry(c).or_default() += area;
+                }
+            }
+            let most = areas
+                .into_iter()
+                .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            if let Some((to, _)) = most {
+                cells.cell_of_leaf[leaf as usize] = to;
+            }
+            most.is_none()
+        });
+        if around.len() == n {
+            break;
+        }
+    }
+    for c in &mut cells.cell_of_leaf {
+        if is_in(*c) {
+            *c = SOLID;
+        }
+    }
+    drop_empty(graph, cells);
+}
+
 /// Numbers the cells anew without those that lost every leaf, and sums their volumes.
 fn drop_empty(graph: &LeafGraph, cells: &mut LeafCells) {
     let n = cells.label_of_cell.len();
@@ -431,6 +487,7 @@ impl Flow {
 
 #[cfg(test)]
 mod tests {
+    use super::super::graph::OpenFacet;
     use super::*;
 
     /// Every cut of a small graph, tried one by one.
@@ -454,6 +511,41 @@ mod tests {
             })
             .min()
             .unwrap()
+    }
+
+    #[test]
+    fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
+        // Rooms 0 and 2; cell 1 is made of three slivers: beside both rooms, behind that, and closed.
+        let facet = |a, b, area| OpenFacet {
+            leaves: [a, b],
+            width: area,
+            area,
+            screen: NO_SCREEN,
+        };
+        let mut graph = LeafGraph {
+            facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],
+            volumes: vec![5.0, 1e-6, 5.0, 1e-6, 1e-6],
+            at_border: vec![false; 5],
+            hairline: 1e-3,
+        };
+        let cells = || LeafCells {
+            cell_of_leaf: vec![0, 1, 2, 1, 1],
+            label_of_cell: vec![7, 8, 9],
+            volumes: vec![5.0, 3e-6, 5.0],
+            outside: Some(2),
+        };
+        let mut found = cells();
+        dissolve_slivers(&graph, &mut found);
+        assert_eq!(found.cell_of_leaf, [0, 1, 1, SOLID, 1]);
+        assert_eq!(found.label_of_cell, [7, 9]);
+        assert_eq!(found.volumes, [5.0, 5.0 + 2e-6]);
+        assert_eq!(found.outside, Some(1));
+        // A closet of a liter is a cell.
+        graph.volumes[1] = 1e-3;
+        let mut found = cells();
+        found.volumes[1] = 1e-3 + 2e-6;
+        dissolve_slivers(&graph, &mut found);
+        assert_eq!(found.cell_of_leaf, cells().cell_of_leaf);
     }
 
     proptest::proptest! {

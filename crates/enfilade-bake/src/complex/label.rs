@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 use enfilade_geom::Sets;
 use rayon::prelude::*;
 
-use super::cut::{absorb_chips, move_borders};
+use super::cut::{absorb_chips, dissolve_slivers, move_borders};
 use super::graph::{LeafGraph, NO_SCREEN};
 use super::{LabelSettings, Vote};
 
@@ -130,6 +130,7 @@ pub(super) fn label_leaves(
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
     absorb_chips(graph, &mut cells, settings.min_volume);
+    dissolve_slivers(graph, &mut cells);
     keep_border_outside(graph, &mut cells);
     cells
 }

@@ -442,6 +442,27 @@ fn votes_that_got_into_a_closed_hollow_make_a_cell_of_it_only_if_asked() {
     assert!(next.is_some() && other.is_some());
 }
 
+#[test]
+fn what_rounding_leaves_between_surfaces_is_no_cell() {
+    // A region whose only votes fall between two blocks that all but touch, closed all around.
+    let mut t = two_rooms(0.0);
+    block(&mut t, [1.0, 0.5, 1.0], [2.0, 1.0, 2.0]);
+    block(&mut t, [1.4, 0.7, 1.4], [1.6, 0.7002, 1.6]);
+    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let mut votes = room_votes(&c.bounds());
+    let between = DVec3::new(1.5, 0.7001, 1.5);
+    votes.retain(|v| v.point.distance(between) > 1.0);
+    votes.push(Vote {
+        point: between,
+        label: 30,
+        weight: 1.0,
+    });
+    let p = c.partition(&votes, &LabelSettings::default());
+    assert_promises(&t, &p, &c.bounds(), 2_000);
+    assert!(!p.label_of_cell.contains(&30), "{:?}", p.label_of_cell);
+    assert_eq!(p.locator.locate(between), None);
+}
+
 /// A closed box of 4 x 4 x 2 m whose top is a pyramid of 1 cm, all of it in small triangles, turned
 /// about `axis`; its corners are rounded to `f32` after that.
 fn turned_box(axis: DVec3, angle: f64) -> Vec<Triangle> {

@@ -205,8 +205,9 @@ impl Merger {
     fn weigh(&mut self) {
         for (&(a, b), pair) in &mut self.pairs {
             if pair.added.is_nan() {
-                pair.both = self.graph.cost_of_both(a, b);
-                pair.added = added(&self.graph, &self.drawn, &self.sees, a, b);
+                // Sums of nothing are -0, which orders before 0: ties go by names, not by that.
+                pair.both = self.graph.cost_of_both(a, b) + 0.0;
+                pair.added = added(&self.graph, &self.drawn, &self.sees, a, b) + 0.0;
             }
         }
     }
