@@ -99,6 +99,23 @@ fn no_room_is_lost_to_the_outdoors_and_no_solid_is_a_cell() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
+/// All along the top of the wall between two rooms: too narrow for the least ball that is known, and nearly as open as
+/// their door.
+#[test]
+fn a_slit_between_rooms_is_weighed_by_its_width() {
+    for width in [0.05, 0.15, 0.25, 0.35] {
+        let g = two_rooms_crack(width);
+        let context = BakeContext::new(&Silent, None);
+        let config = DelaunayConfig::default();
+        let session = Session::begin(&g.scene, &config, &context).unwrap();
+        let ahead = &session.decimation.steps[session.decimation.stop..];
+        let weights: Vec<f64> = ahead.iter().map(|s| s.weight).collect();
+        // One step joins them, by way of the door: balls 1.35 in radius, and 0.45 where the widest passes.
+        assert_eq!(weights.len(), 1, "{width}: {weights:?}");
+        assert!((2.7..3.2).contains(&weights[0]), "{width}: {weights:?}");
+    }
+}
+
 /// Moves every corner by up to `reach` along each axis, equal corners alike.
 fn with_noise(mut g: Generated, reach: f32) -> Generated {
     for p in g
