@@ -242,8 +242,8 @@ impl GpuWorld {
         Self::load_with(gpu, world, sight, false)
     }
 
-    /// The same with levels of detail for objects: see [`Sparing::lod`](crate::Sparing::lod). Takes about ten seconds
-    /// for each million triangles of meshes.
+    /// The same with levels of detail for objects: see [`Sparing::lod`](crate::Sparing::lod). Takes about half a
+    /// minute for each million triangles of meshes, nearly all of it to measure how far levels are off.
     ///
     /// # Errors
     ///
