@@ -212,3 +212,161 @@ proptest! {
         prop_assert!(rooms[3] != rooms[4] || rooms[3] == rooms[0]);
     }
 }
+
+/// Tubes from the origin, in directions by their angles in degrees, so many meters long.
+fn star(angles: &[f64], length: f64, radius: f64) -> Vec<Tube> {
+    let arm = |angle: &f64| {
+        let (sin, cos) = angle.to_radians().sin_cos();
+        side_tube(DVec3::ZERO, DVec3::new(cos, sin, 0.0), length, radius)
+    };
+    angles.iter().map(arm).collect()
+}
+
+fn n_different(rooms: &[u32]) -> usize {
+    rooms.iter().collect::<BTreeSet<_>>().len()
+}
+
+#[test]
+fn arms_as_wide_as_their_stem_are_cells() {
+    for (angles, what) in [
+        (&[0.0, 120.0, 240.0][..], "star of three"),
+        (&[0.0, 90.0, 180.0], "T"),
+        (&[0.0, 90.0, 180.0, 270.0], "cross"),
+        (&[0.0, 150.0, 210.0], "Y"),
+        (&[0.0, 160.0, 200.0], "Y of 40 degrees"),
+    ] {
+        let arms = star(angles, 5.0, 0.5);
+        let tips: Vec<DVec3> = arms.iter().map(|t| t.ends[1]).collect();
+        let rooms = rooms_at(&tubes(&arms, 0.12), 1.0, &tips);
+        assert_eq!(n_different(&rooms), tips.len(), "{what}: {rooms:?}");
+    }
+    // A bend is no fork, and neither is one with an arm that is less than two diameters long.
+    let mut bend = star(&[0.0, 90.0], 5.0, 0.5);
+    bend.extend(star(&[220.0], 2.0, 0.5));
+    let tips: Vec<DVec3> = bend.iter().map(|t| t.ends[1]).collect();
+    let rooms = rooms_at(&tubes(&bend, 0.12), 1.0, &tips);
+    assert_eq!(n_different(&rooms), 1, "{rooms:?}");
+}
+
+#[test]
+fn arms_that_part_again_and_meet_again_are_cells() {
+    let tube = |ends: [[f64; 2]; 2]| Tube {
+        ends: ends.map(|p| DVec3::new(p[0], p[1], 0.0)),
+        radius: 0.4,
+    };
+    // A stem, two arms, and two more at the end of each.
+    let tree = [
+        tube([[-4.0, 0.0], [0.0, 0.0]]),
+        tube([[0.0, 0.0], [3.0, 3.0]]),
+        tube([[0.0, 0.0], [3.0, -3.0]]),
+        tube([[3.0, 3.0], [3.0, 6.5]]),
+        tube([[3.0, 3.0], [6.5, 3.0]]),
+        tube([[3.0, -3.0], [3.0, -6.5]]),
+        tube([[3.0, -3.0], [6.5, -3.0]]),
+    ];
+    let middle = |t: &Tube| (t.ends[0] + t.ends[1]) * 0.5;
+    let mut points: Vec<DVec3> = tree.iter().map(middle).collect();
+    points.extend(tree[3..].iter().map(|t| t.ends[1]));
+    let rooms = rooms_at(&tubes(&tree, 0.12), 1.0, &points);
+    assert_eq!(n_different(&rooms), 7, "{rooms:?}");
+    assert_eq!(rooms[3..7], rooms[7..]);
+    // A ring with a spur: there are three arms about the fork, two of which are one.
+    let ring: Vec<Tube> = (0..12)
+        .map(|i| {
+            let at = |i: i32| (f64::from(i) * 30.0).to_radians().sin_cos();
+            let (p, q) = (at(i), at(i + 1));
+            tube([[3.5 * p.0, 3.5 * p.1], [3.5 * q.0, 3.5 * q.1]])
+        })
+        .collect();
+    let mut all = ring.clone();
+    all.push(tube([[3.5, 0.0], [8.0, 0.0]]));
+    let mut points: Vec<DVec3> = ring.iter().map(middle).collect();
+    points.push(DVec3::X * 7.0);
+    let rooms = rooms_at(&tubes(&all, 0.12), 1.0, &points);
+    assert_eq!(n_different(&rooms), 2, "{rooms:?}");
+    assert_eq!(n_different(&rooms[..12]), 1, "{rooms:?}");
+}
+
+/// Corridors of one height that cross are one room to their architect.
+#[test]
+fn corridors_that_cross_are_one_room() {
+    let (half, height, long) = (0.9, 2.4, 8.0);
+    let mut g = tubes(&star(&[0.0], 2.0, 0.5), 0.3);
+    let mesh = &mut g.scene.meshes[0].primitives[0];
+    mesh.positions.clear();
+    mesh.indices.clear();
+    let mut quad = |c: [[f64; 3]; 4]| {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(c.map(|p| p.map(|x| x as f32)));
+        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
+    };
+    // Counter-clockwise seen from above: a cross.
+    let plan: Vec<[f64; 2]> = (0..4)
+        .flat_map(|k| {
+            let (sin, cos) = (f64::from(k) * 90.0).to_radians().sin_cos();
+            [[long, -half], [long, half], [half, half]]
+                .map(|[x, z]| [x * cos - z * sin, x * sin + z * cos])
+        })
+        .collect();
+    for i in 0..12 {
+        let ([ax, az], [bx, bz]) = (plan[i], plan[(i + 1) % 12]);
+        quad([
+            [ax, 0.0, az],
+            [bx, 0.0, bz],
+            [bx, height, bz],
+            [ax, height, az],
+        ]);
+    }
+    let arms = [
+        [-long, -half, -half, half],
+        [-half, -half, half, half],
+        [half, -half, long, half],
+    ];
+    let ends = [[-half, -long, half, -half], [-half, half, half, long]];
+    for [x0, z0, x1, z1] in arms.into_iter().chain(ends) {
+        quad([[x0, 0.0, z0], [x0, 0.0, z1], [x1, 0.0, z1], [x1, 0.0, z0]]);
+        quad([
+            [x0, height, z0],
+            [x1, height, z0],
+            [x1, height, z1],
+            [x0, height, z1],
+        ]);
+    }
+    let y = height / 2.0;
+    let points = [[7.0, 0.0], [0.0, 7.0], [-7.0, 0.0], [0.0, -7.0], [0.0, 0.0]];
+    let rooms = rooms_at(&g, 1.0, &points.map(|[x, z]| DVec3::new(x, y, z)));
+    assert_eq!(n_different(&rooms), 1, "{rooms:?}");
+    assert_ne!(rooms[0], 0);
+}
+
+proptest! {
+    // Each case divides ten thousand triangles.
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    /// Three tubes of nearly one width that meet at any angles are three cells, whatever the scale; one if one of them is
+    /// shorter than two diameters, from where it leaves the others.
+    #[test]
+    fn where_three_tubes_meet_are_three_cells(
+        angles in prop::array::uniform3((-0.9..0.9_f64, 0.0..6.3_f64)),
+        // Narrower ones are branches, and the other two a bend.
+        narrow in 0.8..1.0_f64,
+        is_short in any::<bool>(),
+        scale in prop::sample::select(vec![0.01, 1.0, 40.0]),
+    ) {
+        let directions = angles.map(|(z, turn)| {
+            let flat = (1.0 - z * z).sqrt();
+            DVec3::new(flat * turn.cos(), flat * turn.sin(), z)
+        });
+        for i in 0..3 {
+            // Closer ones are a flat room until they part.
+            prop_assume!(directions[i].dot(directions[(i + 1) % 3]) < 0.6);
+        }
+        let radii = [0.5, 0.5 * narrow, 0.5];
+        let lengths = [5.0, 4.5, if is_short { 1.4 } else { 5.0 }];
+        let arms = [0, 1, 2].map(|i| side_tube(DVec3::ZERO, directions[i], lengths[i], radii[i]));
+        let g = times(tubes(&arms, 0.14), scale);
+        let tips = arms.map(|t| t.ends[1] * scale);
+        let rooms = rooms_at(&g, scale, &tips);
+        prop_assert_eq!(n_different(&rooms), if is_short { 1 } else { 3 }, "{:?}", rooms);
+    }
+}

@@ -101,6 +101,8 @@ impl Session {
             &space,
             flow_together(&space),
             config.common.merge.min_radius,
+            &walls,
+            &bvh,
         );
         let mut session = Self {
             space,
@@ -148,14 +150,20 @@ impl Session {
 }
 
 /// Cells that end where branches leave the rooms that a decimation without choices comes to.
-fn with_branches(space: &Space, cells: Cells, min_radius: f64) -> Cells {
+fn with_branches(
+    space: &Space,
+    cells: Cells,
+    min_radius: f64,
+    walls: &[Triangle],
+    bvh: &Bvh,
+) -> Cells {
     let weight = Weight::ScaleFree;
     let stop = default_stop(weight);
     let rooms = decimate(&cells, weight, stop, min_radius, &Choices::default());
     let room_of_cell = rooms.after(rooms.stop);
     let room = |&c: &u32| room_of_cell[c as usize];
     let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
-    let branches = find_branches(space, &room_of_part);
+    let branches = find_branches(space, &room_of_part, walls, bvh);
     if branches.is_empty() {
         cells
     } else {

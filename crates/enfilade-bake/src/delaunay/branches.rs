@@ -25,11 +25,14 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap, VecDeque};
 use std::f64::consts::PI;
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{Bvh, DVec3, Triangle};
 
 use super::decimate::OUTDOOR_CELL;
 use super::rooms::connected;
 use super::space::{Space, circumsphere};
+use forks::Walls;
+
+mod forks;
 
 /// Largest ball of the trunk near the mouth ÷ largest ball well inside the branch, at least. What narrows this
 /// much at a pinch is two rooms.
@@ -93,7 +96,12 @@ impl Branches {
 /// Finds the branches of rooms, given by the room of each part.
 ///
 /// `O(n log n)` in parts, and what the parts of trunks times their candidates are.
-pub(super) fn find_branches(space: &Space, room_of_part: &[u32]) -> Branches {
+pub(super) fn find_branches(
+    space: &Space,
+    room_of_part: &[u32],
+    walls: &[Triangle],
+    bvh: &Bvh,
+) -> Branches {
     let mut search = Search::new(space, room_of_part);
     let order = search.by_radius(0..space.radii.len() as u32);
     // The first limb of a room is its trunk.
@@ -126,6 +134,10 @@ pub(super) fn find_branches(space: &Space, room_of_part: &[u32]) -> Branches {
             }
         }
     }
+    search.part_forks(&Walls {
+        triangles: walls,
+        bvh,
+    });
     search.finished()
 }
 

@@ -25,6 +25,8 @@ use crate::complex::poly::{area, area_normal, width};
 
 /// Most points added to surfaces; up to 4 kB each while tetrahedra become cells.
 const MAX_POINTS: usize = 300_000;
+/// Air between the scene and the box around it, besides a quarter of the scene. [Units: narrowest openings]
+const MARGIN: f64 = 4.0;
 /// Points along each edge of the box around the scene.
 const BOX_POINTS: usize = 9;
 /// A tetrahedron of less than this share of the cube over its longest edge has no reliable middle.
@@ -36,9 +38,9 @@ const CRACK: f64 = 1.0 / 60.0;
 pub const LEAST_BALL: f64 = 1.0 / 3.0;
 /// Points nearer to a plane than this share of the largest coordinate lie in it.
 const ON_PLANE: f64 = 1e-9;
-/// What is less than this many times as wide as points may lie off a plane is closed: twice what a cut from each side may
-/// be off.
-const CLOSED: f64 = 8.0;
+/// What is less than this many times as wide as points may lie off a plane is closed. Coordinates are rounded to a grid of
+/// `2⁻²⁴` of their size, 60 times as much, and walls that met before may have gaps of that width.
+const CLOSED: f64 = 64.0;
 
 /// The air between surfaces, as tetrahedra and parts of tetrahedra.
 pub struct Space {
@@ -115,7 +117,7 @@ pub fn divide(
         .fold(Aabb::EMPTY, |b, &p| b.including(p));
     let mut points: Vec<DVec3> = all.iter().flatten().copied().collect();
     let n_surface = points.len();
-    let around = bounds.expanded(2.0 + 0.25 * bounds.size().max_element());
+    let around = bounds.expanded(MARGIN * narrowest + 0.25 * bounds.size().max_element());
     points.extend(box_points(&around));
     let least = narrowest * LEAST_BALL;
     let max_points = points.len() + MAX_POINTS;
@@ -221,8 +223,10 @@ pub fn divide(
                     let [a, b] = parts.map(|p| &facts[p as usize]);
                     let whole = passing_radius(f, a, b);
                     let radius = match &o.outline {
-                        // What a polygon covers of a facet narrows it; where it cuts beside it does not.
-                        Some(outline) if !is_cut => whole.min(by_size(outline)),
+                        // What a polygon covers of a facet narrows it; where it cuts beside it does not, but for cracks.
+                        Some(outline) if !is_cut || width(outline) < CRACK * narrowest => {
+                            whole.min(by_size(outline))
+                        }
                         _ => whole,
                     };
                     out.push((Link::new(parts, t, i, radius), o.outline));
