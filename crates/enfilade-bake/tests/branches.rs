@@ -339,6 +339,56 @@ fn corridors_that_cross_are_one_room() {
     assert_ne!(rooms[0], 0);
 }
 
+/// Tubes without what is beyond some ends of theirs.
+fn opened(mut g: Generated, ends: &[(DVec3, DVec3)]) -> Generated {
+    let mesh = &mut g.scene.meshes[0].primitives[0];
+    let is_gone = |i: &u32| {
+        let p = DVec3::from_array(mesh.positions[*i as usize].map(f64::from));
+        ends.iter()
+            .any(|(end, out)| (p - *end).dot(*out) > 0.0 && p.distance(*end) < 1.5)
+    };
+    let kept = mesh.indices.chunks(3).filter(|t| !t.iter().any(is_gone));
+    mesh.indices = kept.flatten().copied().collect();
+    g
+}
+
+#[test]
+fn a_vessel_that_is_open_at_its_ends_is_indoors() {
+    for (angles, what) in [
+        (&[0.0, 180.0][..], "pipe"),
+        (&[0.0, 120.0, 240.0], "star of three"),
+    ] {
+        let arms = star(angles, 5.0, 0.5);
+        let end = |t: &Tube| (t.ends[1], (t.ends[1] - t.ends[0]).normalize());
+        let ends: Vec<(DVec3, DVec3)> = arms.iter().map(end).collect();
+        let middles: Vec<DVec3> = arms.iter().map(|t| t.ends[1] * 0.6).collect();
+        for n_open in 1..=ends.len() {
+            let g = opened(tubes(&arms, 0.12), &ends[..n_open]);
+            let context = BakeContext::new(&Silent, None);
+            let world = bake_delaunay(&g.scene, &DelaunayConfig::default(), &context)
+                .unwrap()
+                .world;
+            let graph = &world.graph;
+            let at = |p: &DVec3| graph.locator.locate(*p).unwrap().0;
+            let cells: BTreeSet<u32> = middles.iter().map(at).collect();
+            assert!(!cells.contains(&0), "{what}, {n_open} open: {cells:?}");
+            let n_cells = if angles.len() == 2 { 1 } else { 3 };
+            assert_eq!(cells.len(), n_cells, "{what}, {n_open} open: {cells:?}");
+            // Where the tube ends there is a portal to the outdoors, as wide as the tube.
+            let out: Vec<_> = graph
+                .portals
+                .iter()
+                .filter(|p| p.kind != PortalKind::Crack && p.cells.iter().any(|c| c.0 == 0))
+                .collect();
+            eprintln!(
+                "{what} {n_open}: {:?}",
+                out.iter().map(|p| (p.area, &p.cells)).collect::<Vec<_>>()
+            );
+            assert_eq!(out.len(), n_open, "{what}");
+        }
+    }
+}
+
 proptest! {
     // Each case divides ten thousand triangles.
     #![proptest_config(ProptestConfig::with_cases(6))]

@@ -167,6 +167,7 @@ fn with_branches(
     if branches.is_empty() {
         cells
     } else {
+        let branches = branches.without_leftovers(space, &cells.cell_of_part);
         parted(space, &cells, &branches)
     }
 }

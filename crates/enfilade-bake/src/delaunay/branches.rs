@@ -13,6 +13,10 @@
 //!   mouth do not count;
 //! - it narrows [`NARROWS`] times near the mouth, so that it is no tube that tapers.
 //!
+//! Outdoors is a room, too, and what branches off it is a room: a tube that is open at its ends, a tunnel, a garage, a living
+//! room with its terrace door open. There may be several mouths, none a slit, and doors to rooms; depth is what it holds: as much
+//! as [`DEEP`] diameters of each mouth.
+//!
 //! All else is part of what it opens to most. Pockets between rough walls and the balls of a room pass, too; they hold
 //! less than a ball, and decimation takes them for the spikes that they are. Where a trunk parts into arms as wide as itself there are no
 //! branches: a corridor that crosses another is no room either. Nothing here has a unit.
@@ -25,7 +29,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap, VecDeque};
 use std::f64::consts::PI;
 
-use enfilade_geom::{Bvh, DVec3, Triangle};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 
 use super::decimate::OUTDOOR_CELL;
 use super::rooms::connected;
@@ -73,6 +77,31 @@ impl Branches {
             label_of_part: vec![0; n_parts],
             mouths: Vec::new(),
         }
+    }
+
+    /// Moves mouths off cells of [`flow_together`](super::decimate::flow_together) of which they leave less than a ball: what is
+    /// left goes with the most of its cell.
+    pub(super) fn without_leftovers(mut self, space: &Space, cell_of_part: &[u32]) -> Self {
+        let mut pieces: BTreeMap<(u32, u32), (f64, f64)> = BTreeMap::new();
+        for (t, (&cell, &label)) in cell_of_part.iter().zip(&self.label_of_part).enumerate() {
+            let (volume, radius) = pieces.entry((cell, label)).or_default();
+            *volume += space.volumes[t];
+            *radius = radius.max(space.radii[t]);
+        }
+        let mut most: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+        for (&(cell, label), &(volume, _)) in &pieces {
+            let of_cell = most.entry(cell).or_insert((volume, label));
+            if volume > of_cell.0 {
+                *of_cell = (volume, label);
+            }
+        }
+        for (label, cell) in self.label_of_part.iter_mut().zip(cell_of_part) {
+            let (volume, radius) = pieces[&(*cell, *label)];
+            if volume < 4.0 / 3.0 * PI * radius.powi(3) {
+                *label = most[cell].1;
+            }
+        }
+        self
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -150,7 +179,7 @@ struct Region {
     branch: Option<Found>,
 }
 
-/// The widest way out of a region within its room.
+/// A way out of a region within its room.
 struct Mouth {
     /// The region it leads to.
     parent: u32,
@@ -158,12 +187,29 @@ struct Mouth {
     radius: f64,
     /// [Units: wu]
     center: DVec3,
-    /// Root of the mean square distance of its facets from there. [Units: wu]
+    /// Area of its shadow, straight ahead. [Units: wu²]
+    area: f64,
+    /// Root of the mean square distance of its facets from the middle. [Units: wu]
     spread: f64,
     /// Links of the patch around the widest one.
     links: Vec<u32>,
-    /// No other way out is nearly as wide.
-    is_only: bool,
+}
+
+impl Mouth {
+    fn is_slit(&self) -> bool {
+        self.spread > SPREAD * self.radius
+    }
+
+    /// Radius of the disk that goes through: where little of an opening's edge leads elsewhere, that is less than its ball's.
+    /// [Units: wu]
+    fn disk(&self) -> f64 {
+        self.radius.min((self.area / PI).sqrt())
+    }
+
+    /// Much narrower than another.
+    fn is_chink_beside(&self, other: &Self) -> bool {
+        self.disk() * NARROWS < other.radius
+    }
 }
 
 struct Search<'a> {
@@ -179,6 +225,8 @@ struct Search<'a> {
     exits: BTreeMap<u32, Vec<u32>>,
     /// Middles of the parts' balls. [Units: wu]
     centers: Vec<DVec3>,
+    /// What stands for the radius of balls without an end. [Units: wu]
+    most: f64,
     /// Region of each part.
     owner: Vec<u32>,
     regions: Vec<Region>,
@@ -228,7 +276,9 @@ impl<'a> Search<'a> {
                 space.middles[t as usize]
             }
         };
+        let bounds = Aabb::of_points(&space.delaunay.vertices);
         Self {
+            most: bounds.size().max_element(),
             space,
             room_of_part,
             radius_of_room,
@@ -242,11 +292,21 @@ impl<'a> Search<'a> {
     }
 
     fn radius(&self, t: u32) -> f64 {
-        self.space.radii[t as usize]
+        self.space.radii[t as usize].min(self.most)
+    }
+
+    /// Radius of the ball about the middle of a part: 0 where it has no end, and so no middle. [Units: wu]
+    fn ball(&self, t: u32) -> f64 {
+        let radius = self.space.radii[t as usize];
+        if radius.is_finite() { radius } else { 0.0 }
     }
 
     fn passes(&self, l: u32) -> f64 {
-        self.space.links[l as usize].radius
+        self.space.links[l as usize].radius.min(self.most)
+    }
+
+    fn is_outdoors(&self, t: u32) -> bool {
+        self.room_of_part[t as usize] == OUTDOOR_CELL
     }
 
     /// Those of some parts whose balls are known well enough to begin a limb, in rooms with place for a branch.
@@ -256,9 +316,7 @@ impl<'a> Search<'a> {
         let mut order: Vec<u32> = parts
             .filter(|&t| {
                 let room = self.room_of_part[t as usize];
-                room != OUTDOOR_CELL
-                    && self.radius(t) >= finest
-                    && self.radius_of_room[&room] >= finest * NARROWS
+                self.radius(t) >= finest && self.radius_of_room[&room] >= finest * NARROWS
             })
             .collect();
         order.sort_unstable_by(|&a, &b| {
@@ -304,7 +362,7 @@ impl<'a> Search<'a> {
                 let middle = self.space.middles[other as usize];
                 let covers = || {
                     let center = self.centers[witness as usize];
-                    self.radius(other) < least && middle.distance(center) < self.radius(witness)
+                    self.radius(other) < least && middle.distance(center) < self.ball(witness)
                 };
                 if self.passes(l) >= least {
                     queue.push_back((other, other));
@@ -361,8 +419,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The widest way out of a region, if there is one. Branches of its own, which are known by then, are none.
-    fn mouth(&self, region: u32) -> Option<Mouth> {
+    /// The ways out of a region, widest first. Branches of its own, which are known by then, are none.
+    fn mouths(&self, region: u32) -> Vec<Mouth> {
         let mut contacts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &t in &self.regions[region as usize].parts {
             for &(other, l) in self.ways(t) {
@@ -374,47 +432,63 @@ impl<'a> Search<'a> {
                 contacts.entry(owner).or_default().push(l);
             }
         }
-        let widest = |links: &[u32]| links.iter().map(|&l| self.passes(l)).fold(0.0, f64::max);
-        let mut patches: Vec<(f64, u32, Vec<u32>)> = Vec::new();
+        let mut mouths: Vec<Mouth> = Vec::new();
         for (owner, links) in contacts {
-            for patch in connected(self.space, &links) {
-                patches.push((widest(&patch), owner, patch));
-            }
+            let patches = connected(self.space, &links);
+            mouths.extend(patches.into_iter().map(|p| self.mouth(region, owner, p)));
         }
-        patches.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut patches = patches.into_iter();
-        let (radius, parent, links) = patches.next()?;
-        let is_only = patches.next().is_none_or(|p| p.0 * NARROWS < radius);
+        mouths.sort_by(|a, b| b.radius.total_cmp(&a.radius));
+        mouths
+    }
+
+    fn mouth(&self, region: u32, parent: u32, links: Vec<u32>) -> Mouth {
         let facets = links.iter().map(|&l| {
             let link = &self.space.links[l as usize];
             let outline = self.space.outline(link);
             let middle = outline.iter().sum::<DVec3>() / outline.len() as f64;
-            (middle, self.space.area_vector(link).length())
+            let vector = self.space.area_vector(link);
+            let is_outward = self.owner[link.parts[0] as usize] == region;
+            (middle, if is_outward { vector } else { -vector })
         });
-        let facets: Vec<(DVec3, f64)> = facets.collect();
-        let area = facets.iter().map(|f| f.1).sum::<f64>().max(1e-300);
-        let center = facets.iter().map(|f| f.0 * f.1).sum::<DVec3>() / area;
-        let square = |f: &(DVec3, f64)| f.0.distance_squared(center) * f.1;
-        let spread = (facets.iter().map(square).sum::<f64>() / area).sqrt();
-        Some(Mouth {
+        let facets: Vec<(DVec3, DVec3)> = facets.collect();
+        let area = facets.iter().map(|f| f.1.length()).sum::<f64>().max(1e-300);
+        let center = facets.iter().map(|f| f.0 * f.1.length()).sum::<DVec3>() / area;
+        let square = |f: &(DVec3, DVec3)| f.0.distance_squared(center) * f.1.length();
+        Mouth {
             parent,
-            radius,
+            radius: links.iter().map(|&l| self.passes(l)).fold(0.0, f64::max),
             center,
-            spread,
+            area: facets.iter().map(|f| f.1).sum::<DVec3>().length(),
+            spread: (facets.iter().map(square).sum::<f64>() / area).sqrt(),
             links,
-            is_only,
-        })
+        }
     }
 
-    /// Radius of the largest ball of a region that is a diameter of its mouth or more away from the mouth, if that
+    /// Radius of the largest ball of a region that is a diameter of each of its mouths or more away from that, if that
     /// is known.
-    fn body(&self, region: u32, mouth: &Mouth) -> Option<f64> {
+    fn body(&self, region: u32, mouths: &[Mouth]) -> Option<f64> {
         let parts = self.regions[region as usize].parts.iter();
+        let is_within = |t: u32| mouths.iter().all(|m| self.far(t, m) >= 2.0 * m.radius);
         let radius = parts
-            .filter(|&&t| self.far(t, mouth) >= 2.0 * mouth.radius)
+            .filter(|&&t| is_within(t))
             .map(|&t| self.radius(t))
             .fold(0.0, f64::max);
         (radius >= self.space.finest).then_some(radius)
+    }
+
+    /// Which of the ways out of a limb are its mouths: the widest, and outdoors all that are no chinks beside it.
+    fn main<'m>(&self, limb: u32, mouths: &'m [Mouth]) -> &'m [Mouth] {
+        let n = match mouths.first() {
+            Some(first) if self.is_in_outdoors(limb) => {
+                mouths.partition_point(|m| m.radius * NARROWS >= first.radius)
+            }
+            first => usize::from(first.is_some()),
+        };
+        &mouths[..n]
+    }
+
+    fn is_in_outdoors(&self, limb: u32) -> bool {
+        self.is_outdoors(self.regions[limb as usize].parts[0])
     }
 
     fn far(&self, t: u32, mouth: &Mouth) -> f64 {
@@ -424,13 +498,18 @@ impl<'a> Search<'a> {
     /// Gives what lies between the mouth of a limb and where the limb has its own width to what it leaves.
     /// The rest may fall to several limbs, narrow ones first: the legs of a pair of trousers.
     fn without_flare(&mut self, limb: u32) -> Vec<u32> {
-        let Some(mouth) = self.mouth(limb) else {
+        let mouths = self.mouths(limb);
+        let mouths = self.main(limb, &mouths);
+        let Some(mouth) = mouths.first() else {
             return Vec::new();
         };
-        let Some(body) = self.body(limb, &mouth) else {
+        let Some(body) = self.body(limb, mouths) else {
             self.merge(limb, mouth.parent);
             return Vec::new();
         };
+        if self.is_in_outdoors(limb) && mouths.iter().all(|m| m.radius <= body * FLARES) {
+            return vec![limb];
+        }
         let parts = self.regions[limb as usize].parts.clone();
         self.dissolve(limb);
         // Nobody else is without an owner by now, except in rooms that nothing reaches into from here.
@@ -439,8 +518,13 @@ impl<'a> Search<'a> {
             let t = if self.owner[a as usize] == NONE { b } else { a };
             (t, t)
         };
-        let queue = mouth.links.iter().map(outer).collect();
-        self.reach(mouth.parent, queue, body * FLARES);
+        let queues: Vec<VecDeque<(u32, u32)>> = mouths
+            .iter()
+            .map(|m| m.links.iter().map(outer).collect())
+            .collect();
+        for (m, queue) in mouths.iter().zip(queues) {
+            self.reach(m.parent, queue, body * FLARES);
+        }
         let free = |this: &Self| -> Vec<u32> {
             let is_free = |&&t: &&u32| this.owner[t as usize] == NONE;
             parts.iter().filter(is_free).copied().collect()
@@ -468,39 +552,57 @@ impl<'a> Search<'a> {
 
     /// What is known of a branch, or else the region that the limb is part of.
     fn judged(&self, limb: u32) -> Result<Found, Option<u32>> {
-        let mouth = self.mouth(limb).ok_or(None)?;
+        let mouths = self.mouths(limb);
+        let mouth = mouths.first().ok_or(None)?;
         let no = Some(mouth.parent);
-        let parts = &self.regions[limb as usize].parts;
-        let body = self.body(limb, &mouth).ok_or(no)?;
-        let is_slit = mouth.spread > SPREAD * mouth.radius;
-        // Balls in its corners are no part of its depth.
-        let depth = parts
-            .iter()
-            .filter(|&&t| self.radius(t) * NARROWS >= mouth.radius)
-            .map(|&t| self.far(t, &mouth) + self.radius(t))
-            .fold(0.0, f64::max);
-        let is_deep = depth >= 2.0 * DEEP * mouth.radius;
-        // A taper narrows elsewhere, too.
+        let main = self.main(limb, &mouths);
+        let radius = self.body(limb, main).ok_or(no)?;
+        let is_outdoors = self.is_in_outdoors(limb);
+        let (is_alone, is_deep) = if is_outdoors {
+            (true, self.holds(limb, &mouths))
+        } else {
+            let is_only = mouths[1..].iter().all(|m| m.is_chink_beside(mouth));
+            (
+                is_only && !self.leads_on(limb, mouth.radius),
+                self.is_deep(limb, mouth),
+            )
+        };
+        // A taper narrows elsewhere, too. Outdoors, where there are few points, balls may be near and their middles far.
         let near = 2.0 * DEEP * mouth.radius;
+        let is_near = |t: u32| {
+            let ball = if is_outdoors { self.ball(t) } else { 0.0 };
+            self.far(t, mouth) - ball <= near
+        };
         let trunk = self.regions[mouth.parent as usize].parts.iter();
         let trunk = trunk
-            .filter(|&&t| self.far(t, &mouth) <= near)
+            .filter(|&&t| is_near(t))
             .map(|&t| self.radius(t))
             .fold(0.0, f64::max);
-        let weight = trunk / body;
-        let is_branch = mouth.is_only
-            && !is_slit
-            && is_deep
-            && weight >= NARROWS
-            && !self.leads_on(limb, mouth.radius);
+        let weight = trunk / radius;
+        let is_branch =
+            is_alone && is_deep && weight >= NARROWS && !main.iter().any(Mouth::is_slit);
         if is_branch {
-            Ok(Found {
-                weight,
-                radius: body,
-            })
+            Ok(Found { weight, radius })
         } else {
             Err(no)
         }
+    }
+
+    /// Whether a limb goes on for [`DEEP`] diameters of its mouth. Balls in its corners are no part of its depth.
+    fn is_deep(&self, limb: u32, mouth: &Mouth) -> bool {
+        self.regions[limb as usize]
+            .parts
+            .iter()
+            .filter(|&&t| self.radius(t) * NARROWS >= mouth.radius)
+            .any(|&t| self.far(t, mouth) + self.radius(t) >= 2.0 * DEEP * mouth.radius)
+    }
+
+    /// Whether a limb has place for [`DEEP`] diameters of each of its mouths.
+    fn holds(&self, limb: u32, mouths: &[Mouth]) -> bool {
+        let parts = self.regions[limb as usize].parts.iter();
+        let volume: f64 = parts.map(|&t| self.space.volumes[t as usize]).sum();
+        let needs = |m: &Mouth| 2.0 * DEEP * m.radius * m.area;
+        volume >= mouths.iter().map(needs).sum()
     }
 
     /// Whether openings lead from a region to rooms with balls wider than `radius`. Cracks do not count: what

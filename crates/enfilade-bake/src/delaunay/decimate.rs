@@ -38,6 +38,9 @@ const FLOWS: f64 = 1.05;
 /// a bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
 const HOLDS: f64 = 0.1;
 
+/// Weights of crevices that open to the mouth of a branch only, beside those of others: nearer to zero.
+const LAST: f64 = 1e-9;
+
 /// The cell around the scene.
 pub const OUTDOOR_CELL: u32 = 0;
 
@@ -75,7 +78,7 @@ pub struct Cells {
 pub struct CellPortal {
     /// Radius of the widest ball that passes. [Units: wu]
     pub radius: f64,
-    /// Where a branch leaves what is wider: how many times wider that is. 0 elsewhere.
+    /// Where that ball enters a branch: how many times wider what it leaves is. 0 elsewhere.
     pub mouth: f64,
     /// Sum of the facets' area normals, from the lesser to the greater cell. [Units: wu²]
     pub vector: DVec3,
@@ -170,9 +173,11 @@ fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches)
                 center: DVec3::ZERO,
                 links: Vec::new(),
             });
-        portal.radius = portal.radius.max(link.radius);
         let labels = link.parts.map(|t| branches.label_of_part[t as usize]);
-        portal.mouth = portal.mouth.max(branches.weight(labels));
+        let mouth = branches.weight(labels);
+        if (link.radius, mouth) > (portal.radius, portal.mouth) {
+            (portal.radius, portal.mouth) = (link.radius, mouth);
+        }
         let normal = space.area_vector(link);
         portal.vector += if a < b { normal } else { -normal };
         let outline = space.outline(link);
@@ -380,8 +385,9 @@ fn decided(
         }
         let least = radius[a].min(radius[b]);
         if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
-            // Widest opening first among crevices.
-            return -1.0 / (1.0 + 1.0 / portal.radius.max(1e-9));
+            // Widest opening first among crevices; through the mouth of a branch when there is no other.
+            let last = if portal.mouth > 0.0 { LAST } else { 1.0 };
+            return -last / (1.0 + 1.0 / portal.radius.max(1e-9));
         }
         if weight == Weight::ScaleFree {
             return (least / portal.radius.max(1e-9)).max(portal.mouth);
@@ -493,10 +499,9 @@ fn decided(
                 goes: false,
                 version: 0,
             });
-            if old.radius > live.radius {
-                (live.radius, live.widest) = (old.radius, old.widest);
+            if (old.radius, old.mouth) > (live.radius, live.mouth) {
+                (live.radius, live.mouth, live.widest) = (old.radius, old.mouth, old.widest);
             }
-            live.mouth = live.mouth.max(old.mouth);
             live.vector += old.vector * sign;
             live.stays |= old.stays;
             live.goes |= old.goes;

@@ -13,6 +13,7 @@
 //! `O(n log n)` in the parts of tubes; in halls one ball in hundreds is tried.
 
 use std::cmp::Reverse;
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::f64::consts::TAU;
 
@@ -119,7 +120,7 @@ impl Search<'_> {
         let mut places = Places::new(n);
         let mut found: Vec<Fork> = Vec::new();
         for c in self.by_radius(0..n as u32) {
-            if self.owner[c as usize] != NONE && !was_tried[c as usize] {
+            if self.is_enclosed(c) && !was_tried[c as usize] {
                 found.extend(self.fork_at(c, walls, &mut was_tried, &mut places));
             }
         }
@@ -141,6 +142,12 @@ impl Search<'_> {
             }
         }
         forks
+    }
+
+    /// Whether a part lies in a room, or in what branches off the outdoors.
+    fn is_enclosed(&self, t: u32) -> bool {
+        let owner = self.owner[t as usize];
+        owner != NONE && (self.regions[owner as usize].branch.is_some() || !self.is_outdoors(t))
     }
 
     /// Parts of a region with the distances of their balls from that of one of them, nearest first: what one gets to through openings
@@ -350,8 +357,8 @@ impl Search<'_> {
             push(&mut heap, &label, t);
         }
         while let Some((_, Reverse((t, l)))) = heap.pop() {
-            if !label.contains_key(&t) {
-                label.insert(t, l);
+            if let Entry::Vacant(entry) = label.entry(t) {
+                entry.insert(l);
                 push(&mut heap, &label, t);
             }
         }
@@ -423,7 +430,7 @@ fn is_round(origin: DVec3, axis: DVec3, walls: &Walls<'_>) -> bool {
         return false;
     };
     let (u, v) = axis.any_orthonormal_pair();
-    let (mut re, mut im) = (0.0, 0.0);
+    let (mut re, mut im, mut n_hits) = (0.0, 0.0, 0);
     for i in 0..RAYS {
         let (sin, cos) = (TAU * i as f64 / RAYS as f64).sin_cos();
         let ray = Ray {
@@ -436,7 +443,8 @@ fn is_round(origin: DVec3, axis: DVec3, walls: &Walls<'_>) -> bool {
             let (sin, cos) = (4.0 * normal.dot(v).atan2(normal.dot(u))).sin_cos();
             re += cos;
             im += sin;
+            n_hits += 1;
         }
     }
-    f64::hypot(re, im) < SQUARE * RAYS as f64
+    2 * n_hits >= RAYS && f64::hypot(re, im) < SQUARE * f64::from(n_hits as u32)
 }
