@@ -61,13 +61,20 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let mut baked = bake_by(method, &reason, scene, options, &settings)?;
     if options.method == settings::Method::Auto
         && method == Builder::Watershed
-        && n_indoors(&baked) == 1
-        && curved::is_closed_and_curved(scene)
+        && n_indoors(&baked) <= 1
+        && curved::is_vessel(scene)
     {
-        let reason = "the surface is closed and curved, and the watershed finds one cell in it; \
-                      tetrahedra find branches, too";
-        let other = bake_by(Builder::Delaunay, reason, scene, options, &settings)?;
-        if n_indoors(&other) > 1 {
+        let found = if n_indoors(&baked) == 1 {
+            "one cell"
+        } else {
+            "no cell"
+        };
+        let reason = format!(
+            "the surface is curved and closed but for its ends, and the watershed finds {found} in it; \
+             tetrahedra find branches, too"
+        );
+        let other = bake_by(Builder::Delaunay, &reason, scene, options, &settings)?;
+        if n_indoors(&other) > n_indoors(&baked) {
             baked = other;
         } else {
             writeln!(io::stderr(), "there are none: the watershed's is kept")?;

@@ -18,8 +18,8 @@
 //! as [`DEEP`] diameters of each mouth.
 //!
 //! All else is part of what it opens to most. Pockets between rough walls and the balls of a room pass, too; they hold
-//! less than a ball, and decimation takes them for the spikes that they are. Where a trunk parts into arms as wide as itself there are no
-//! branches: a corridor that crosses another is no room either. Nothing here has a unit.
+//! less than a ball, and decimation takes them for the spikes that they are. Where a trunk parts into arms as wide as itself
+//! no ball tells them apart; [`forks`] does. Nothing here has a unit.
 //!
 //! Opening by balls from wide to narrow: Matheron, "Random sets and integral geometry" (1975), on size
 //! distributions. The rest is ours. The bounds stand between what was measured: vessels and generated tubes on one

@@ -1,4 +1,4 @@
-//! Whether a scene is a vessel: a closed surface that is curved nearly everywhere.
+//! Whether a scene is a vessel: a surface that is curved nearly everywhere, and closed but for its ends.
 
 use std::collections::HashMap;
 
@@ -12,13 +12,19 @@ const MAX_TRIANGLES: usize = 200_000;
 const PLANE: f64 = 0.001;
 /// Share of the surface that may lie in planes: the caps of cut vessels. Of buildings half does and more.
 const FLAT: f64 = 0.2;
+/// Of the edges, the share that may have a triangle on one side only.
+const OPEN: f64 = 0.05;
+/// Length of the sum of all area normals ÷ area, at most: that of a closed surface is 0, of a vessel that of its ends, a
+/// terrain has 0.7 and more.
+const HOLES: f64 = 0.1;
 /// Cosine of the angle between two triangles of one patch: a tenth of a degree, which single precision leaves of a
 /// plane in a large scene.
 const ONE_PATCH: f64 = 0.999_998_5;
 
-/// Whether the structure is closed, with an even number of triangles at each edge, and hardly any of it lies in planes.
+/// Whether the structure is closed, with an even number of triangles at each edge, but for holes that are small beside it,
+/// and hardly any of it lies in planes.
 /// `O(n)` in triangles, of which there may be [`MAX_TRIANGLES`].
-pub(crate) fn is_closed_and_curved(scene: &Scene) -> bool {
+pub(crate) fn is_vessel(scene: &Scene) -> bool {
     let triangles: Vec<_> = scene
         .triangle_sources(Role::Structural)
         .take(MAX_TRIANGLES + 1)
@@ -40,10 +46,9 @@ pub(crate) fn is_closed_and_curved(scene: &Scene) -> bool {
     let normals: Vec<DVec3> = triangles.iter().map(triangle_area_normal).collect();
     let unit = |t: usize| normals[t].normalize_or_zero();
     let mut patches = Sets::new(triangles.len());
+    let mut n_open = 0;
     for around in sides.values() {
-        if around.len() % 2 == 1 {
-            return false;
-        }
+        n_open += around.len() % 2;
         // Sheets that touch along an edge are no planes that go on there.
         let &[a, b] = &around[..] else { continue };
         if unit(a).dot(unit(b)) > ONE_PATCH {
@@ -56,7 +61,9 @@ pub(crate) fn is_closed_and_curved(scene: &Scene) -> bool {
     }
     let all: f64 = areas.iter().sum();
     let planes: f64 = areas.iter().filter(|&&a| a >= PLANE * all).sum();
-    planes <= FLAT * all
+    // The area normals of holes are what those of the surface lack to zero.
+    let holes = normals.iter().sum::<DVec3>().length();
+    planes <= FLAT * all && holes <= HOLES * all && n_open as f64 <= OPEN * sides.len() as f64
 }
 
 #[cfg(test)]
@@ -77,17 +84,23 @@ mod tests {
             ],
             0.12,
         );
-        assert!(is_closed_and_curved(&vessel.scene));
-        assert!(is_closed_and_curved(&cave(1).scene));
+        assert!(is_vessel(&vessel.scene));
+        assert!(is_vessel(&cave(1).scene));
         for variant in [Variant::Optimised, Variant::Tessellated, Variant::Distorted] {
-            assert!(!is_closed_and_curved(
-                &gjorup_rooms(variant, [0.0; 3]).scene
-            ));
+            assert!(!is_vessel(&gjorup_rooms(variant, [0.0; 3]).scene));
         }
-        // One triangle less, and it is open.
+        // Open at one end, and cut in half along its axis.
         let mut open = vessel.scene;
-        let indices = &mut open.meshes[0].primitives[0].indices;
-        indices.truncate(indices.len() - 3);
-        assert!(!is_closed_and_curved(&open));
+        let mesh = &mut open.meshes[0].primitives[0];
+        let kept = |keeps: &dyn Fn([f32; 3]) -> bool| -> Vec<u32> {
+            let is_kept = |t: &&[u32]| t.iter().all(|&i| keeps(mesh.positions[i as usize]));
+            let kept = mesh.indices.chunks(3).filter(is_kept);
+            kept.flatten().copied().collect()
+        };
+        let (pipe, trough) = (kept(&|p| p[0] < 4.0), kept(&|p| p[2] < 0.1));
+        mesh.indices = pipe;
+        assert!(is_vessel(&open));
+        open.meshes[0].primitives[0].indices = trough;
+        assert!(!is_vessel(&open));
     }
 }

@@ -97,7 +97,7 @@ enum Switch {
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(super) enum Method {
     /// The partition where all structure is made of brushes, the watershed for everything else; tetrahedra where it finds one
-    /// cell in a closed curved surface, which may have branches.
+    /// cell or none in a curved surface that is closed but for its ends, which may have branches.
     Auto,
     /// Voxels, distances, watershed.
     Watershed,
