@@ -476,7 +476,7 @@ impl<'a> Search<'a> {
         (radius >= self.space.finest).then_some(radius)
     }
 
-    /// Which of the ways out of a limb are its mouths: the widest, and outdoors all that are no chinks beside it.
+    /// Which of the ways out of a limb are its mouths: the widest, and outdoors all that let balls through nearly as wide.
     fn main<'m>(&self, limb: u32, mouths: &'m [Mouth]) -> &'m [Mouth] {
         let n = match mouths.first() {
             Some(first) if self.is_in_outdoors(limb) => {

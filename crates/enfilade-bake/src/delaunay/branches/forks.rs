@@ -124,6 +124,7 @@ impl Search<'_> {
                 found.extend(self.fork_at(c, walls, &mut was_tried, &mut places));
             }
         }
+        // The best first: a ball beside the middle of a crossing may leave two of its arms in one piece.
         found.sort_by(|a, b| {
             (b.arms.len().cmp(&a.arms.len()))
                 .then((a.taken / a.radius).total_cmp(&(b.taken / b.radius)))
@@ -148,6 +149,13 @@ impl Search<'_> {
     fn is_enclosed(&self, t: u32) -> bool {
         let owner = self.owner[t as usize];
         owner != NONE && (self.regions[owner as usize].branch.is_some() || !self.is_outdoors(t))
+    }
+
+    /// Parts that one gets to through openings for balls at most [`NARROWS`] times less than `radius`.
+    fn wide_ways(&self, t: u32, radius: f64) -> impl Iterator<Item = u32> {
+        let ways = self.ways(t).iter();
+        ways.filter(move |w| self.passes(w.1) * NARROWS >= radius)
+            .map(|w| w.0)
     }
 
     /// Parts of a region with the distances of their balls from that of one of them, nearest first: what one gets to through openings
@@ -182,11 +190,8 @@ impl Search<'_> {
                 }
                 wide = wide.min(distance);
             }
-            for &(other, l) in self.ways(t) {
-                if self.owner[other as usize] == region
-                    && self.passes(l) * NARROWS >= radius
-                    && places.get(other).is_none()
-                {
+            for other in self.wide_ways(t, radius) {
+                if self.owner[other as usize] == region && places.get(other).is_none() {
                     let distance = self.centers[other as usize].distance(center);
                     if distance <= most {
                         places.set(other, out.len());
@@ -221,14 +226,13 @@ impl Search<'_> {
             for (i, a) in middle.iter().enumerate() {
                 places.set(a.1, i);
             }
-            let at_middle = |&&(_, t): &&(f64, u32)| {
-                let is_way = |w: &&(u32, u32)| self.passes(w.1) * NARROWS >= radius;
-                let mut ways = self.ways(t).iter().filter(is_way);
-                ways.any(|w| places.get(w.0).is_some())
+            let at_middle = |&(_, t): &(f64, u32)| {
+                let mut ways = self.wide_ways(t, radius);
+                ways.any(|other| places.get(other).is_some())
             };
             pieces.retain(|piece| {
                 let goes_on = |&(d, t): &(f64, u32)| d + self.radius(t) >= reach;
-                piece.iter().any(goes_on) && piece.iter().find(at_middle).is_some()
+                piece.iter().any(goes_on) && piece.iter().any(at_middle)
             });
             match pieces.len() {
                 0 | 1 => return None,
@@ -254,10 +258,8 @@ impl Search<'_> {
         let mut sets = Sets::new(parts.len());
         for (i, &(_, t)) in parts.iter().enumerate() {
             places.set(t, i);
-            for &(other, l) in self.ways(t) {
-                if let Some(j) = places.get(other)
-                    && self.passes(l) * NARROWS >= radius
-                {
+            for other in self.wide_ways(t, radius) {
+                if let Some(j) = places.get(other) {
                     sets.join(i as u32, j);
                 }
             }
