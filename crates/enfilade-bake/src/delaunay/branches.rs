@@ -639,3 +639,51 @@ impl<'a> Search<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::space::divide;
+    use super::*;
+    use crate::pipeline::structural_triangles;
+    use enfilade_testkit::{Tube, tubes};
+
+    #[test]
+    fn less_than_a_ball_goes_with_its_cell() {
+        let tube = Tube {
+            ends: [DVec3::X * -4.0, DVec3::X * 4.0],
+            radius: 0.7,
+        };
+        let walls = structural_triangles(&tubes(&[tube], 0.2).scene).1;
+        let space = divide(&walls, &[], &Bvh::build(&walls), 0.6).unwrap();
+        let n = space.radii.len();
+        let is_in = |t: usize| {
+            space.middles[t].with_x(0.0).length() < 0.6 && space.middles[t].x.abs() < 4.0
+        };
+        let cell_of_part: Vec<u32> = (0..n).map(|t| u32::from(is_in(t))).collect();
+        // One half is a branch, and so is one tetrahedron in the other: across the tube, and much less than its ball.
+        let lone = (0..n)
+            .filter(|&t| is_in(t) && space.middles[t].x < -1.0)
+            .max_by(|&a, &b| space.radii[a].total_cmp(&space.radii[b]))
+            .unwrap();
+        let label = |t: usize| match t {
+            t if t == lone => 2,
+            t => u32::from(is_in(t) && space.middles[t].x > 1.0),
+        };
+        let labels: Vec<u32> = (0..n).map(label).collect();
+        let found = Found {
+            weight: 2.0,
+            radius: 0.7,
+        };
+        let branches = Branches {
+            label_of_part: labels.clone(),
+            mouths: vec![found; 2],
+        };
+        let mended = branches
+            .without_leftovers(&space, &cell_of_part)
+            .label_of_part;
+        for t in 0..n {
+            let expected = if t == lone { 0 } else { labels[t] };
+            assert_eq!(mended[t], expected, "{t}");
+        }
+    }
+}

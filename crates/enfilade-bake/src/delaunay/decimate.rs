@@ -541,3 +541,42 @@ impl Decimation {
         cell
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crevice_before_a_mouth_stays_on_its_side() {
+        let portal = |radius: f64, mouth: f64| CellPortal {
+            radius,
+            mouth,
+            vector: DVec3::X,
+            center: DVec3::ZERO,
+            links: Vec::new(),
+        };
+        // A trunk, a branch, and a crevice of the branch that opens a little wider to the trunk.
+        let cells = Cells {
+            cell_of_part: Vec::new(),
+            radii: vec![f64::INFINITY, 2.0, 1.0, 0.1],
+            volumes: vec![1000.0, 100.0, 20.0, 0.1],
+            boxes: vec![Aabb::EMPTY; 4],
+            portals: [
+                ((1, 2), portal(0.95, 2.0)),
+                ((1, 3), portal(0.97, 2.0)),
+                ((2, 3), portal(0.96, 0.0)),
+            ]
+            .into(),
+        };
+        let weight = Weight::ScaleFree;
+        let done = decimate(
+            &cells,
+            weight,
+            default_stop(weight),
+            0.3,
+            &Choices::default(),
+        );
+        assert_eq!((done.steps[0].into, done.steps[0].from), (2, 3));
+        assert_eq!(done.stop, 1);
+    }
+}
