@@ -3,6 +3,8 @@
 //! Structural triangles go to batches by the set of cells that see them and by material, so that
 //! each is stored, and drawn, once. Detail objects keep their identity and list the cells they touch.
 
+mod seals;
+
 use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{
@@ -66,7 +68,8 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
             cells[c.0 as usize].portals.push(PortalId(i as u32));
         }
     }
-    let batches = batches(cut, &mut cells);
+    let mut batches = batches(cut, &mut cells);
+    batches.extend(seals::batches(cut));
     let (details, detail_meshes) = details(scene, &partition.locator, &mut cells);
     World {
         graph: CellPortalGraph {
@@ -338,6 +341,7 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         .map(|((cells, _, _), b)| Batch {
             cells: cells.into_iter().map(CellId).collect(),
             primitive: b.primitive,
+            is_seal: false,
         })
         .collect()
 }

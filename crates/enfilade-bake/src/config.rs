@@ -16,6 +16,8 @@ pub struct BakeConfig {
     pub voxel: Option<f64>,
     /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: above 0]
     pub min_opening: f64,
+    /// Narrower openings are closed by seals. [Units: wu]
+    pub smallest_hole: SmallestHole,
     /// Most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
     /// beyond that an error. About 3 bytes each. [Limit: at least 1,000]
     pub max_voxels: usize,
@@ -30,10 +32,75 @@ impl Default for BakeConfig {
         Self {
             voxel: None,
             min_opening: 0.6,
+            smallest_hole: SmallestHole::default(),
             max_voxels: 1_600_000_000,
             noise: 0.015,
             merge: MergeSettings::default(),
         }
+    }
+}
+
+/// Openings through which no ball of this diameter passes are gaps, which join no rooms. [Units: wu]
+///
+/// The default of 10 mm is wider than what exporters, scanners and hurried hands leave between surfaces that are meant to
+/// touch, and narrower than what anybody looks or shoots through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SmallestHole {
+    /// Gaps are closed by seals, polygons that are matter to every consumer of the world.
+    Sealed(f64),
+    /// Gaps stay open, as portals of kind crack. What is a gap is told by this, and which rooms there are, too.
+    Open(f64),
+}
+
+impl Default for SmallestHole {
+    fn default() -> Self {
+        Self::Sealed(0.01)
+    }
+}
+
+impl std::fmt::Display for SmallestHole {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Sealed(width) => write!(f, "{width}"),
+            Self::Open(_) => write!(f, "0"),
+        }
+    }
+}
+
+impl SmallestHole {
+    /// As users say it: 0 leaves gaps open.
+    #[must_use]
+    pub fn of_width(width: f64) -> Self {
+        match Self::default() {
+            Self::Sealed(default) if width == 0.0 => Self::Open(default),
+            _ => Self::Sealed(width),
+        }
+    }
+
+    /// The widest gap. [Units: wu]
+    #[must_use]
+    pub fn gap(self) -> f64 {
+        match self {
+            Self::Sealed(width) | Self::Open(width) => width,
+        }
+    }
+
+    /// Whether gaps are closed.
+    #[must_use]
+    pub fn has_seals(self) -> bool {
+        matches!(self, Self::Sealed(_))
+    }
+
+    pub(crate) fn check(self) -> Result<(), BakeError> {
+        let gap = self.gap();
+        if gap >= 0.0 && gap.is_finite() {
+            return Ok(());
+        }
+        Err(BakeError::Setting {
+            name: "smallest_hole",
+            value: gap.to_string(),
+            limit: "a number of at least 0",
+        })
     }
 }
 
@@ -52,6 +119,7 @@ impl BakeConfig {
                     .map_or_else(|| "auto".to_owned(), |v| v.to_string()),
             ),
             ("min_opening", self.min_opening.to_string()),
+            ("smallest_hole", self.smallest_hole.to_string()),
             ("max_voxels", self.max_voxels.to_string()),
             ("noise", self.noise.to_string()),
             ("merge.threshold", m.threshold.to_string()),
@@ -85,6 +153,7 @@ impl BakeConfig {
             }
         };
         positive("min_opening", self.min_opening)?;
+        self.smallest_hole.check()?;
         let wanted = positive("voxel", self.voxel.unwrap_or(self.min_opening / 6.0))?;
         if self.max_voxels < 1000 {
             return Err(BakeError::Setting {

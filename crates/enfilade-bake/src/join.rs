@@ -60,6 +60,9 @@ pub(crate) fn join_voids(partition: &mut Partition) {
     for p in partition.portals.iter_mut().chain(&mut partition.hairlines) {
         p.cells = p.cells.map(|c| number[c as usize]);
     }
+    for s in &mut partition.seals {
+        s.cells = s.cells.map(|c| number.get(c as usize).copied().unwrap_or(c));
+    }
     for l in &mut partition.leaks {
         l.cells = l.cells.map(|c| number[c as usize]);
     }

@@ -19,7 +19,7 @@ pub mod vis;
 pub mod voxel;
 pub mod watershed;
 
-pub use config::BakeConfig;
+pub use config::{BakeConfig, SmallestHole};
 pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;
 pub use pipeline::{BakeOutput, bake};

@@ -176,6 +176,8 @@ pub fn bake(
         triangles: &triangles,
         screens: &windings,
         bounds: frame.aabb_to_scene(&grid.aabb()),
+        gap: config.smallest_hole.gap(),
+        has_seals: config.smallest_hole.has_seals(),
     });
 
     // 7. The pieces become cells by the rooms' votes; what is open between cells are the portals.
@@ -266,6 +268,8 @@ impl Cut<'_> {
             ("input_triangles", (self.sources.len() + n_detail) as f64),
             ("structural_triangles", self.sources.len() as f64),
             ("leaks", self.partition.leaks.len() as f64),
+            ("seals", self.partition.seals.len() as f64),
+            ("seal_area", self.partition.seals.iter().map(|s| s.outline.area()).sum()),
         ];
         let counts = common.iter().chain(counts);
         let provenance = Provenance {

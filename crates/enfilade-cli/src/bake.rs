@@ -16,7 +16,7 @@ use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
 
-use crate::inspect::write_holes;
+use crate::inspect::{write_holes, write_seals};
 use crate::output::{check_target, write_atomically};
 use crate::progress::{BakeBar, StageBar};
 
@@ -337,6 +337,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
         }
     }
+    write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
-use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, World};
+use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
 use serde::Serialize;
 
 use crate::world::read_world;
@@ -37,6 +37,7 @@ struct Report<'a> {
     cells: Vec<CellReport<'a>>,
     portals: Vec<PortalReport<'a>>,
     suspected_holes: Vec<HoleReport>,
+    seals: SealReport,
     stats: Stats<'a>,
 }
 
@@ -71,6 +72,15 @@ struct HoleReport {
     portal: u32,
     position: [f32; 3],
     reason: String,
+}
+
+/// Polygons that close gaps of the model.
+#[derive(Serialize)]
+struct SealReport {
+    count: usize,
+    area: f64,
+    largest_area: f64,
+    largest_position: [f64; 3],
 }
 
 /// Times and peaks differ from run to run and are not in the file, which is the same every time.
@@ -117,10 +127,17 @@ fn report(world: &World) -> Report<'_> {
         position: h.position,
         reason: h.reason.to_string(),
     });
+    let seals = Seals::of(world);
     Report {
         cells: cells.collect(),
         portals: portals.collect(),
         suspected_holes: holes.collect(),
+        seals: SealReport {
+            count: seals.count,
+            area: seals.area,
+            largest_area: seals.largest.0,
+            largest_position: seals.largest.1,
+        },
         stats: Stats {
             input_triangles: input_triangles(world),
             seconds: BTreeMap::new(),
@@ -195,6 +212,7 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     if write_holes(out, graph, usize::MAX)? {
         writeln!(out)?;
     }
+    write_seals(out, world)?;
     write_totals(out, world)
 }
 
@@ -235,6 +253,21 @@ pub(crate) fn write_holes(
         )?;
     }
     Ok(true)
+}
+
+/// What gaps of the model were closed, if any.
+pub(crate) fn write_seals(out: &mut impl Write, world: &World) -> io::Result<()> {
+    let seals = Seals::of(world);
+    if seals.count == 0 {
+        return Ok(());
+    }
+    let (area, [x, y, z]) = seals.largest;
+    writeln!(
+        out,
+        "{} gaps in the model were closed by seals, {:.3} m² in all; the largest at {x:.2} {y:.2} {z:.2}: {area:.3} m² \
+         (--smallest-hole)",
+        seals.count, seals.area
+    )
 }
 
 fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {

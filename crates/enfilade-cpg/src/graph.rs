@@ -124,6 +124,8 @@ pub struct Batch {
     pub cells: Vec<CellId>,
     /// The triangles, in world space.
     pub primitive: Primitive,
+    /// They are seals: no part of the model, but added to close gaps of it. Matter to every consumer.
+    pub is_seal: bool,
 }
 
 /// A placed detail object.

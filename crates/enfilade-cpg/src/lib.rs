@@ -10,6 +10,7 @@ mod graph;
 mod holes;
 mod locator;
 mod look;
+mod seals;
 mod sight_graph;
 mod validate;
 pub mod wire;
@@ -21,5 +22,6 @@ pub use graph::{
 };
 pub use holes::{Hole, HoleReason};
 pub use locator::{Locator, LocatorNode};
+pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use validate::{GraphError, MAX_REPORTED};

@@ -241,15 +241,15 @@ proptest! {
     #[test]
     fn any_geometry_comes_back(
         batches in prop::collection::vec(
-            (prop::collection::btree_set(0_u32..3, 0..=3), primitive()), 0..6),
+            (prop::collection::btree_set(0_u32..3, 0..=3), primitive(), any::<bool>()), 0..6),
         mesh in prop::collection::vec(primitive(), 0..3),
         transform in prop::array::uniform12(-10.0_f32..10.0),
     ) {
         let mut world = two_rooms();
         world.batches = batches
             .into_iter()
-            .map(|(cells, primitive)| {
-                Batch { cells: cells.into_iter().map(CellId).collect(), primitive }
+            .map(|(cells, primitive, is_seal)| {
+                Batch { cells: cells.into_iter().map(CellId).collect(), primitive, is_seal }
             })
             .collect();
         world.detail_meshes[0].primitives = mesh;

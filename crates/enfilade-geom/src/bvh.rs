@@ -234,6 +234,16 @@ impl Bvh {
     /// Calls `visit` with every triangle that touches the closed box, and perhaps with some that
     /// miss it by rounding.
     pub fn for_each_in_box(&self, query: &Aabb, mut visit: impl FnMut(u32)) {
+        self.walk_box(query, |i| {
+            if triangle_touches_box(&self.triangle(i), query) {
+                visit(self.ids[i]);
+            }
+            true
+        });
+    }
+
+    /// Calls `visit` with the places of triangles whose boxes touch the closed box, until it says no.
+    fn walk_box(&self, query: &Aabb, mut visit: impl FnMut(usize) -> bool) {
         if self.nodes.is_empty() || query.is_empty() {
             return;
         }
@@ -248,8 +258,8 @@ impl Bvh {
             if at.count > 0 {
                 let first = at.child as usize;
                 for i in first..first + at.count as usize {
-                    if triangle_touches_box(&self.triangle(i), query) {
-                        visit(self.ids[i]);
+                    if !visit(i) {
+                        return;
                     }
                 }
                 continue;
@@ -271,6 +281,28 @@ impl Bvh {
                 });
             }
         }
+    }
+
+    /// How far some triangle is from `p` that is within `reach`; not the nearest, but the first that is found. [Units: wu]
+    #[must_use]
+    pub fn any_within(&self, p: DVec3, reach: f64) -> Option<f64> {
+        let mut found = None;
+        if !p.is_finite() {
+            return found;
+        }
+        let reach2 = reach * reach;
+        self.walk_box(&Aabb::new(p - reach, p + reach), |i| {
+            let t = self.triangle(i);
+            let n = (t[1] - t[0]).cross(t[2] - t[0]);
+            // Nearly all that the box meets is told by its plane.
+            let off = n.dot(p - t[0]);
+            if off * off <= reach2 * n.length_squared() {
+                let d2 = closest_point_on_triangle(p, &t).distance_squared(p);
+                found = (d2 <= reach2).then(|| d2.sqrt());
+            }
+            found.is_none()
+        });
+        found
     }
 
     /// The triangle nearest to `p`, if one is within `max_distance` (infinity allowed).

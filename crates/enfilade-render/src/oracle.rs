@@ -252,8 +252,8 @@ mod tests {
         };
         World {
             batches: vec![Batch {
-                cells: Vec::new(),
                 primitive,
+                ..Batch::default()
             }],
             ..World::default()
         }

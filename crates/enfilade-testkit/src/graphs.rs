@@ -326,7 +326,11 @@ fn world_of(
     }
     let batches: Vec<Batch> = walls
         .into_iter()
-        .map(|(cells, primitive)| Batch { cells, primitive })
+        .map(|(cells, primitive)| Batch {
+            cells,
+            primitive,
+            ..Batch::default()
+        })
         .collect();
     for batch in &batches {
         for c in &batch.cells {

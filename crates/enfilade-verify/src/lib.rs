@@ -5,7 +5,7 @@
 //!
 //! | promise | how it is tried |
 //! | --- | --- |
-//! | sealed | segments that no structural triangle blocks; the portals crossed must lead, one by one, from the cell of the start to the cell of the end |
+//! | sealed | segments that no structural triangle and no seal blocks; the portals crossed must lead, one by one, from the cell of the start to the cell of the end; and no seal closes more than a gap |
 //! | complete | rays to the first structural triangle; its batch must list the cell that the ray arrives in |
 //! | planar, convex outline | every portal, directly; and `validate()` of the world |
 //!
@@ -38,6 +38,7 @@ mod report;
 mod rng;
 mod sample;
 mod sealed;
+mod seals;
 mod subject;
 mod views;
 
@@ -117,6 +118,7 @@ pub fn verify_world_with_progress(
     }
     let subject = Subject::new(world, source, options);
     problems.extend(outlines::check(world, subject.eps));
+    problems.extend(seals::check(world, source));
 
     let n_chunks = options.rays.div_ceil(CHUNK);
     let done = AtomicU64::new(0);

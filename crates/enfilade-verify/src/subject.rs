@@ -119,7 +119,13 @@ impl<'a> Subject<'a> {
         let own = structural_triangles(world);
         let own_triangles: Vec<Triangle> = own.iter().map(|t| t.0).collect();
         let (triangles, own_bvh) = match source {
-            Some(source) => (source.to_vec(), Some(Bvh::build(&own_triangles))),
+            Some(source) => {
+                // Seals are matter, though no model has them.
+                let is_seal = |t: &&(Triangle, u32)| world.batches[t.1 as usize].is_seal;
+                let seals = own.iter().filter(is_seal).map(|t| t.0);
+                let all = source.iter().copied().chain(seals).collect();
+                (all, Some(Bvh::build(&own_triangles)))
+            }
             None => (own_triangles, None),
         };
         let blockers = Bvh::build(&triangles);

@@ -10,7 +10,7 @@ use crate::simplify::{SimplifySettings, simplify};
 use crate::watershed::{
     MergeSettings, OUTDOORS, Screen, bounds_of, closure_triangles, find_stairs, slab_heights,
 };
-use crate::{BakeContext, BakeError, BakeOutput};
+use crate::{BakeContext, BakeError, BakeOutput, SmallestHole};
 
 use super::cells::{self, Cells, NO_CELL};
 use super::inside::Soup;
@@ -30,6 +30,8 @@ pub struct BspConfig {
     pub rooms: Rooms,
     /// What that goes by: the same settings as in the watershed builder.
     pub merge: MergeSettings,
+    /// Narrower openings are closed by seals.
+    pub smallest_hole: SmallestHole,
 }
 
 /// Which separators are kept.
@@ -136,6 +138,8 @@ pub fn bake_bsp(
         triangles: &triangles,
         screens: &windings,
         bounds: bounds_of(&triangles).expanded(1.0),
+        gap: config.smallest_hole.gap(),
+        has_seals: config.smallest_hole.has_seals(),
     });
     context.bsp_stage(3)?;
     let settings = if scene.solids.is_empty() {
@@ -201,6 +205,7 @@ impl BspConfig {
             "bsp.rooms".to_owned(),
             format!("{:?}", self.rooms).to_lowercase(),
         );
+        out.insert("smallest_hole".to_owned(), self.smallest_hole.to_string());
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
         out.insert("bsp.grid".to_owned(), number(self.guide.grid));
         out.insert("bsp.tetrahedra".to_owned(), number(self.guide.tetrahedra));

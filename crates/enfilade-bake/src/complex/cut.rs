@@ -43,7 +43,7 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
     let mut leaks: BTreeMap<[u32; 2], (f64, Vec<u32>)> = BTreeMap::new();
     for (i, f) in graph.facets.iter().enumerate() {
         let [a, b] = f.leaves.map(|l| cells.cell_of_leaf[l as usize]);
-        if f.screen == NO_SCREEN && a != b && a != SOLID && b != SOLID {
+        if f.screen == NO_SCREEN && !f.is_narrow && a != b && a != SOLID && b != SOLID {
             let (area, facets) = leaks.entry([a.min(b), a.max(b)]).or_default();
             *area += f64::from(f.area);
             facets.push(i as u32);
@@ -326,12 +326,8 @@ fn cut(
                 f.leaves[0]
             };
             let cost = units(if f.screen == NO_SCREEN {
-                // A hairline makes no portal: a border of many is better than one that shows.
-                let each = if f.width < graph.hairline {
-                    0.0
-                } else {
-                    PER_FACET
-                };
+                // A gap makes no portal: a border of many is better than one that shows.
+                let each = if f.is_narrow { 0.0 } else { PER_FACET };
                 f64::from(f.area) + each
             } else {
                 f64::from(f.area) * SCREEN

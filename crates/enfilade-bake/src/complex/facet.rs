@@ -64,9 +64,27 @@ pub(super) struct Visitor<'a> {
 
 /// A node's region: a box, cut by the oblique planes above the node, facing inwards.
 #[derive(Clone)]
-struct Region {
-    bounds: Aabb,
-    cuts: SmallVec<[Plane; 16]>,
+pub(super) struct Region {
+    pub(super) bounds: Aabb,
+    pub(super) cuts: SmallVec<[Plane; 16]>,
+}
+
+impl Region {
+    /// Its parts on the positive and on the negative side of a plane.
+    pub(super) fn split(&self, plane: &Plane) -> [Self; 2] {
+        let (mut front, mut back) = (self.clone(), self.clone());
+        match (0..3).find(|&a| plane.normal[a] == 1.0) {
+            Some(axis) => {
+                front.bounds.min[axis] = front.bounds.min[axis].max(-plane.d);
+                back.bounds.max[axis] = back.bounds.max[axis].min(-plane.d);
+            }
+            None => {
+                front.cuts.push(*plane);
+                back.cuts.push(plane.flipped());
+            }
+        }
+        [front, back]
+    }
 }
 
 impl Visitor<'_> {
@@ -85,17 +103,7 @@ impl Visitor<'_> {
         }
         let node = self.tree.nodes[child as usize];
         let plane = self.tree.planes[node.plane as usize];
-        let (mut front, mut back) = (region.clone(), region.clone());
-        match (0..3).find(|&a| plane.normal[a] == 1.0) {
-            Some(axis) => {
-                front.bounds.min[axis] = front.bounds.min[axis].max(-plane.d);
-                back.bounds.max[axis] = back.bounds.max[axis].min(-plane.d);
-            }
-            None => {
-                front.cuts.push(plane);
-                back.cuts.push(plane.flipped());
-            }
-        }
+        let [front, back] = region.split(&plane);
         let [f, b] = node.children;
         let leaves = self.tree.leaf_range(child);
         if leaves.len() as u32 > PARALLEL_LEAVES {

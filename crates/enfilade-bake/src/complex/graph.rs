@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, Bvh, DVec3};
+
+use smallvec::SmallVec;
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
 use super::poly::{self, Poly, Sides};
@@ -22,6 +24,8 @@ pub(super) struct OpenFacet {
     pub(super) area: f32,
     /// The screen that it lies on, or [`NO_SCREEN`].
     pub(super) screen: u32,
+    /// No piece of it lets a ball of the smallest hole pass.
+    pub(super) is_narrow: bool,
 }
 
 /// What the first visit finds out.
@@ -30,28 +34,33 @@ pub(super) struct LeafGraph {
     pub(super) facets: Vec<OpenFacet>,
     /// Volume of each leaf.
     pub(super) volumes: Vec<f64>,
+    /// Area of the largest face of each leaf; volume by that is a leaf's thickness within a factor of three.
+    pub(super) faces: Vec<f32>,
     /// Whether each leaf touches the border of the box.
     pub(super) at_border: Vec<bool>,
-    /// Openings narrower than this make no portal.
-    pub(super) hairline: f32,
+    /// Openings through which no ball of this diameter passes are narrow. [Units: wu]
+    pub(super) hole: f64,
 }
 
 impl LeafGraph {
     /// Visits the whole tree.
-    pub(super) fn of(visitor: &Visitor<'_>) -> Self {
+    pub(super) fn of(visitor: &Visitor<'_>, clearance: &Clearance<'_>) -> Self {
         let tree = visitor.tree;
         let origin = tree.bounds.center();
         let mut sink = Sink {
             visitor,
+            clearance,
             origin,
             first_leaf: 0,
             facets: Vec::new(),
             volumes: vec![0.0; tree.n_leaves as usize],
+            faces: vec![0.0; tree.n_leaves as usize],
         };
         visitor.visit(&mut sink);
         let Sink {
             facets,
             mut volumes,
+            faces,
             ..
         } = sink;
         let mut at_border = vec![false; tree.n_leaves as usize];
@@ -71,12 +80,74 @@ impl LeafGraph {
         for v in &mut volumes {
             *v = v.max(0.0);
         }
-        Self {
+        let mut graph = Self {
             facets,
             volumes,
+            faces,
             at_border,
-            hairline: visitor.tolerance.width as f32,
+            hole: clearance.hole,
+        };
+        for i in 0..graph.facets.len() {
+            let f = graph.facets[i];
+            graph.facets[i].is_narrow |= graph.is_rim(f.leaves, f64::from(f.width));
         }
+        graph
+    }
+
+    /// Whether an opening so wide is at the rim of a thin leaf, through which nothing passes that has room: that goes
+    /// through the leaf's wide faces.
+    pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64) -> bool {
+        width < self.hole && leaves.iter().any(|&l| self.is_thin(l))
+    }
+
+    /// Whether no ball of the smallest hole fits into a leaf, but for a factor of three.
+    pub(super) fn is_thin(&self, leaf: u32) -> bool {
+        self.volumes[leaf as usize] < self.hole * f64::from(self.faces[leaf as usize])
+    }
+}
+
+/// How much room there is around openings.
+#[derive(Clone, Copy)]
+pub(super) struct Clearance<'a> {
+    /// The structural triangles.
+    pub(super) bvh: &'a Bvh,
+    /// Diameter of the smallest hole. [Units: wu]
+    pub(super) hole: f64,
+}
+
+impl Clearance<'_> {
+    /// Whether an opening, a convex polygon, lets no ball of the smallest hole pass: no point of it is farther than
+    /// half the hole's width from matter.
+    ///
+    /// Told by its middle, its corners and the middles of its edges. The width of the polygon says nothing: cuts of the tree
+    /// make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes there are wide ones.
+    /// One query of the triangles in the open, at most `2n + 1` in a gap.
+    pub(super) fn is_narrow(&self, points: &[DVec3]) -> bool {
+        self.is_narrow_at(points, true)
+    }
+
+    /// The same, by the middle alone where the rest does not count.
+    fn is_narrow_at(&self, points: &[DVec3], is_whole: bool) -> bool {
+        if self.hole <= 0.0 {
+            return false;
+        }
+        let reach = 0.5 * self.hole;
+        let n = points.len();
+        let middle = points.iter().sum::<DVec3>() / n as f64;
+        let between = (0..n).map(|i| points[i].midpoint(points[(i + 1) % n]));
+        // Corners are where matter is: a tenth of the way to the middle tells more.
+        let inner = points.iter().copied().chain(between);
+        let inner = inner.map(|p| p.lerp(middle, 0.1)).filter(|_| is_whole);
+        // Distances change no faster than places do, so near a point that is known to be close no other is asked.
+        let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
+        std::iter::once(middle).chain(inner).all(|p| {
+            if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
+                return true;
+            }
+            let distance = self.bvh.any_within(p, reach);
+            known.extend(distance.map(|d| (p, reach - d)));
+            distance.is_some()
+        })
     }
 }
 
@@ -126,11 +197,14 @@ pub(super) fn sides_of_border(
 
 struct Sink<'a> {
     visitor: &'a Visitor<'a>,
+    clearance: &'a Clearance<'a>,
     origin: DVec3,
     first_leaf: u32,
     facets: Vec<OpenFacet>,
     /// Of the leaves from `first_leaf` on.
     volumes: Vec<f64>,
+    /// Likewise.
+    faces: Vec<f32>,
 }
 
 impl FacetSink for Sink<'_> {
@@ -140,14 +214,24 @@ impl FacetSink for Sink<'_> {
         let [front, back] = facet.leaves.map(|l| (l - self.first_leaf) as usize);
         self.volumes[front] -= cone;
         self.volumes[back] += cone;
+        let face = poly::area(facet.points) as f32;
+        for leaf in [front, back] {
+            self.faces[leaf] = self.faces[leaf].max(face);
+        }
         let first = self.facets.len();
         for (piece, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let screen = screen.unwrap_or(NO_SCREEN);
             let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
+            let is_narrow = if f64::from(width) < self.clearance.hole {
+                self.clearance.is_narrow_at(&piece, false)
+            } else {
+                self.clearance.is_narrow_at(&piece, true)
+            };
             match self.facets[first..].iter_mut().find(|f| f.screen == screen) {
                 Some(f) => {
                     f.width = f.width.max(width);
                     f.area += area;
+                    f.is_narrow &= is_narrow;
                 }
                 None => {
                     self.facets.push(OpenFacet {
@@ -155,6 +239,7 @@ impl FacetSink for Sink<'_> {
                         width,
                         area,
                         screen,
+                        is_narrow,
                     });
                 }
             }
@@ -164,10 +249,12 @@ impl FacetSink for Sink<'_> {
     fn fork(&self, leaves: Range<u32>) -> Self {
         Self {
             visitor: self.visitor,
+            clearance: self.clearance,
             origin: self.origin,
             first_leaf: leaves.start,
             facets: Vec::new(),
             volumes: vec![0.0; leaves.len()],
+            faces: vec![0.0; leaves.len()],
         }
     }
 
@@ -181,6 +268,9 @@ impl FacetSink for Sink<'_> {
             let at = (part.first_leaf - self.first_leaf) as usize;
             for (sum, v) in self.volumes[at..].iter_mut().zip(&part.volumes) {
                 *sum += v;
+            }
+            for (most, v) in self.faces[at..].iter_mut().zip(&part.faces) {
+                *most = most.max(*v);
             }
         }
     }

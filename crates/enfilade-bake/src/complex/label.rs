@@ -1,12 +1,14 @@
 //! From votes to cells: which leaves make up which cell.
 //!
-//! 1. Leaves open to each other other than through screens form components.
+//! 1. Leaves open to each other other than through screens and gaps form components. A gap is an opening through
+//!    which no ball of the smallest hole passes.
 //! 2. A component in which one label rules belongs to it. One with several strong labels has a
 //!    leak: it is grown together along its openings, widest first, unless that would join two
 //!    labels (Kruskal's forest), so that cells meet at the narrowest places.
 //! 3. Parts of one label that open to each other are one again, screen or not.
 //! 4. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
-//!    most, through a screen if need be. What opens nowhere and nobody votes for is solid.
+//!    most, through a screen if need be. What opens nowhere but through gaps and nobody votes for is matter.
+//! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the widest gaps to, matter included.
 //!
 //! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
 
@@ -66,6 +68,7 @@ pub(super) fn label_leaves(
     graph: &LeafGraph,
     votes: &[Vote],
     settings: &LabelSettings,
+    has_seals: bool,
     leaf_of: impl Fn(&Vote) -> Option<u32> + Sync + Send,
 ) -> LeafCells {
     let n_leaves = graph.volumes.len();
@@ -81,7 +84,7 @@ pub(super) fn label_leaves(
     }
     let mut components = Sets::new(n_leaves);
     for f in &graph.facets {
-        if f.screen == NO_SCREEN {
+        if f.screen == NO_SCREEN && !f.is_narrow {
             components.join(f.leaves[0], f.leaves[1]);
         }
     }
@@ -126,7 +129,8 @@ pub(super) fn label_leaves(
 
     rejoin(graph, &mut sets, &mut label_of_set);
 
-    let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
+    let mut groups = merge_groups(graph, &mut sets, &label_of_set, settings);
+    give_away_crumbs(graph, &mut sets, &mut groups, has_seals);
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
     absorb_chips(graph, &mut cells, settings.min_volume);
@@ -191,7 +195,7 @@ fn grow_together(
     let mut order: Vec<u32> = (0..graph.facets.len() as u32)
         .filter(|&i| {
             let f = &graph.facets[i as usize];
-            f.screen == NO_SCREEN && leaked(f.leaves[0])
+            f.screen == NO_SCREEN && !f.is_narrow && leaked(f.leaves[0])
         })
         .collect();
     order.sort_by(|&a, &b| {
@@ -242,7 +246,7 @@ fn merge_groups(
         });
         group.volume += graph.volumes[leaf as usize];
     }
-    for f in &graph.facets {
+    for f in graph.facets.iter().filter(|f| !f.is_narrow) {
         let [a, b] = f.leaves.map(|l| sets.find(l));
         if a != b {
             for (from, to) in [(a, b), (b, a)] {
@@ -313,6 +317,75 @@ fn merge_groups(
         groups.insert(to, host);
     }
     groups.into_values().map(|g| (g.root, g)).collect()
+}
+
+/// Lets groups that open nowhere but through gaps join what they have the widest gaps to: crumbs, in which nothing
+/// has room, and, where gaps are not to be sealed, whatever is behind them.
+///
+/// What is left is matter. Least first, so that crumbs of one gap come together; O(F log F) in gaps.
+fn give_away_crumbs(
+    graph: &LeafGraph,
+    sets: &mut Sets,
+    groups: &mut BTreeMap<u32, Group>,
+    has_seals: bool,
+) {
+    let mut stays: BTreeMap<u32, bool> = groups.iter().map(|(&id, g)| (id, g.keeps)).collect();
+    if has_seals {
+        for leaf in (0..graph.volumes.len() as u32).filter(|&l| !graph.is_thin(l)) {
+            stays.insert(sets.find(leaf), true);
+        }
+    }
+    let mut gaps: BTreeMap<u32, BTreeMap<u32, f64>> = BTreeMap::new();
+    for f in graph.facets.iter().filter(|f| f.is_narrow) {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        if a != b {
+            for (from, to) in [(a, b), (b, a)] {
+                if !stays[&from] {
+                    *gaps.entry(from).or_default().entry(to).or_default() += f64::from(f.area);
+                }
+            }
+        }
+    }
+    let mut queue: BinaryHeap<Reverse<(u64, u32)>> = gaps
+        .keys()
+        .map(|id| Reverse((groups[id].volume.to_bits(), *id)))
+        .collect();
+    while let Some(Reverse((bits, id))) = queue.pop() {
+        if groups.get(&id).is_none_or(|g| g.volume.to_bits() != bits) {
+            continue;
+        }
+        let Some(around) = gaps.remove(&id) else {
+            continue;
+        };
+        let mut now: BTreeMap<u32, f64> = BTreeMap::new();
+        for (to, area) in around {
+            let to = sets.find(to);
+            if to != id {
+                *now.entry(to).or_default() += area;
+            }
+        }
+        let most = now
+            .iter()
+            .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)));
+        let Some((&to, _)) = most else { continue };
+        let (Some(crumb), Some(mut host)) = (groups.remove(&id), groups.remove(&to)) else {
+            continue;
+        };
+        let root = sets.join(id, to);
+        host.volume += crumb.volume;
+        let host_stays = stays[&to];
+        stays.insert(root, host_stays);
+        if !host_stays {
+            let mut both = gaps.remove(&to).unwrap_or_default();
+            for (other, area) in now.into_iter().filter(|n| n.0 != to) {
+                *both.entry(other).or_default() += area;
+            }
+            queue.push(Reverse((host.volume.to_bits(), root)));
+            gaps.insert(root, both);
+        }
+        host.root = root;
+        groups.insert(root, host);
+    }
 }
 
 /// Numbers the groups that are cells by label, then by falling volume; the rest is solid.

@@ -45,16 +45,21 @@ mod pieces;
 pub(crate) mod poly;
 mod seen;
 mod surface;
+mod thin;
 mod tree;
 
-use enfilade_geom::{Aabb, DVec3, Triangle, Winding};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, Winding};
 
 use facet::Visitor;
-use graph::LeafGraph;
+use graph::{Clearance, LeafGraph};
 use surface::{NO_PLANE, Source, Surface, SurfaceSet, Tolerance};
 use tree::Tree;
 
-pub use partition::{Leak, Partition, PartitionPortal, TriangleCells};
+pub use partition::{Leak, Partition, PartitionPortal, Seal, TriangleCells};
+
+/// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
+const CRACK_WIDTH: f64 = 0.05;
+
 
 /// What the complex is built from.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +72,11 @@ pub struct ComplexInput<'a> {
     pub screens: &'a [Winding],
     /// What to partition; grown to hold the triangles with a margin.
     pub bounds: Aabb,
+    /// Openings through which no ball of this diameter passes are gaps: they join no cells; 0 where there are none.
+    /// [Units: wu] [Limit: at least 0]
+    pub gap: f64,
+    /// Whether gaps are closed by seals. If not, they are portals, and matter behind them belongs to a cell.
+    pub has_seals: bool,
 }
 
 /// A statement that a point belongs to a region.
@@ -116,6 +126,9 @@ pub struct Complex {
     graph: LeafGraph,
     tolerance: Tolerance,
     n_triangles: usize,
+    bvh: Bvh,
+    /// Whether narrow openings are closed by seals.
+    has_seals: bool,
 }
 
 /// Builds the complex. The order of the triangles has no say in the result.
@@ -158,19 +171,25 @@ pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
     let extent = bounds.min.abs().max(bounds.max.abs()).max_element();
     let tolerance = Tolerance::for_extent(extent);
     let set = surface::gather(surfaces, &bounds, &tolerance);
-    let tree = tree::build(&set, bounds, &tolerance);
-    let visitor = Visitor {
-        tree: &tree,
+    let visitor = |tree| Visitor {
+        tree,
         surfaces: &set.surfaces,
         tolerance,
     };
-    let graph = LeafGraph::of(&visitor);
+    let tree = tree::build(&set, bounds, &tolerance);
+    let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap);
+    let bvh = Bvh::build(input.triangles);
+    let hole = input.gap;
+    let clearance = Clearance { bvh: &bvh, hole };
+    let graph = LeafGraph::of(&visitor(&tree), &clearance);
     Complex {
         set,
         tree,
         graph,
         tolerance,
         n_triangles: input.triangles.len(),
+        bvh,
+        has_seals: input.has_seals,
     }
 }
 
@@ -208,6 +227,13 @@ impl Complex {
         self.graph.volumes[leaf as usize]
     }
 
+    fn clearance(&self) -> Clearance<'_> {
+        Clearance {
+            bvh: &self.bvh,
+            hole: self.graph.hole,
+        }
+    }
+
     /// Openings narrower than this count as closed. [Units: wu]
     #[must_use]
     pub fn opening_tolerance(&self) -> f64 {
@@ -221,7 +247,8 @@ impl Complex {
     /// tree where cells meet. Deterministic for any number of threads.
     #[must_use]
     pub fn partition(&self, votes: &[Vote], settings: &LabelSettings) -> Partition {
-        let cells = label::label_leaves(&self.graph, votes, settings, |v| self.leaf_of(v.point));
+        let leaf_of = |v: &Vote| self.leaf_of(v.point);
+        let cells = label::label_leaves(&self.graph, votes, settings, self.has_seals, leaf_of);
         partition::realize(self, cells)
     }
 }

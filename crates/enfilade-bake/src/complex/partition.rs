@@ -7,16 +7,13 @@ use enfilade_cpg::{CellId, Locator, LocatorNode, PortalKind};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
-use super::graph::{box_faces, sides_of_border};
+use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
 use super::label::{LeafCells, SOLID};
-use super::pieces::{self, Opening, Piece};
+use super::pieces::{self, Opening, Piece, Rules};
 use super::tree::{Tree, leaf_index};
-use super::{Complex, seen};
+use super::{CRACK_WIDTH, Complex, poly, seen};
 
 pub use super::seen::TriangleCells;
-
-/// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
-const CRACK_WIDTH: f64 = 0.05;
 
 /// Cells and portals, exactly.
 #[derive(Clone, Debug)]
@@ -34,6 +31,8 @@ pub struct Partition {
     /// Openings narrower than [`Complex::opening_tolerance`]: slivers between planes that nearly
     /// coincide. Following sight lines to the last bit needs them; an `f32` file cannot hold them.
     pub hairlines: Vec<PartitionPortal>,
+    /// Gaps that are closed: what a bake adds to the model's own surfaces.
+    pub seals: Vec<Seal>,
     /// The portals that lie on no screen: where cells leak into each other.
     pub leaks: Vec<Leak>,
     /// The cells that see each triangle.
@@ -63,6 +62,17 @@ pub struct PartitionPortal {
     pub kind: PortalKind,
     /// It lies on no screen.
     pub is_leak: bool,
+}
+
+/// A polygon that closes a gap, through which no ball of the smallest hole passes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seal {
+    /// The cells on its two sides, ascending; [`u32::MAX`] is matter.
+    pub cells: [u32; 2],
+    /// Its plane; the normal points from the first side to the second.
+    pub plane: Plane,
+    /// Convex, counter-clockwise seen from the second side.
+    pub outline: Winding,
 }
 
 /// A place where two cells meet though no screen is there.
@@ -160,6 +170,9 @@ impl<'a> TaggedTree<'a> {
 struct Sink<'a> {
     tagged: &'a TaggedTree<'a>,
     visitor: &'a Visitor<'a>,
+    has_seals: bool,
+    graph: &'a LeafGraph,
+    clearance: Clearance<'a>,
     pieces: Vec<Piece>,
     boxes: BTreeMap<u32, Aabb>,
 }
@@ -192,18 +205,21 @@ impl FacetSink for Sink<'_> {
         for cell in cells {
             self.grow_box(cell, facet.points);
         }
-        if cells.contains(&SOLID) {
+        if !self.has_seals && cells.contains(&SOLID) {
             return;
         }
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let is_flipped = cells[0] < cells[1];
         let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
         for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+            let is_gap = self.graph.is_rim(facet.leaves, poly::width(&points))
+                || self.clearance.is_narrow(&points);
             self.pieces.push(Piece {
                 cells,
                 plane: facet.plane,
                 is_flipped,
                 screen,
+                is_gap,
                 points,
             });
         }
@@ -213,6 +229,9 @@ impl FacetSink for Sink<'_> {
         Self {
             tagged: self.tagged,
             visitor: self.visitor,
+            has_seals: self.has_seals,
+            graph: self.graph,
+            clearance: self.clearance,
             pieces: Vec::new(),
             boxes: BTreeMap::new(),
         }
@@ -241,6 +260,9 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
     let mut sink = Sink {
         tagged: &tagged,
         visitor: &visitor,
+        has_seals: complex.has_seals,
+        graph: &complex.graph,
+        clearance: complex.clearance(),
         pieces: Vec::new(),
         boxes: BTreeMap::new(),
     };
@@ -257,7 +279,18 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         );
     }
     let Sink { pieces, boxes, .. } = sink;
-    let (portals, hairlines): (Vec<_>, Vec<_>) = pieces::group(pieces, &tree.planes)
+    let rules = Rules {
+        planes: &tree.planes,
+        hole: complex.graph.hole,
+        has_seals: complex.has_seals,
+    };
+    let (gaps, openings): (Vec<Opening>, Vec<Opening>) = pieces::group(pieces, &rules)
+        .into_iter()
+        .partition(|o| o.is_seal);
+    let is_wide = |s: &Seal| poly::width(&s.outline.points) >= complex.tolerance.width;
+    let seals = gaps.into_iter().flat_map(seals_of).filter(is_wide);
+    let seals = seals.collect();
+    let (portals, hairlines): (Vec<_>, Vec<_>) = openings
         .into_iter()
         .map(
             |Opening {
@@ -268,6 +301,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
                  screen,
                  area,
                  width,
+                 ..
              }| {
                 let is_leak = screen.is_none();
                 let kind = if is_leak && width < CRACK_WIDTH {
@@ -319,8 +353,24 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         outside: cells.outside,
         portals,
         hairlines,
+        seals,
         leaks,
         triangle_cells,
         locator,
     }
+}
+
+/// A seal for each piece of a gap.
+fn seals_of(gap: Opening) -> impl Iterator<Item = Seal> {
+    let Opening {
+        cells,
+        plane,
+        pieces,
+        ..
+    } = gap;
+    pieces.into_iter().map(move |outline| Seal {
+        cells,
+        plane,
+        outline,
+    })
 }

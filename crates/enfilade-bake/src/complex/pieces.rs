@@ -2,10 +2,17 @@
 //!
 //! The tree cuts an opening wherever its planes happen to run; those cuts mean nothing and are
 //! taken back here.
+//!
+//! Gaps, through which no ball of the smallest hole passes, belong to an opening beside them only where they hardly
+//! widen its outline: the slit under a wall is no part of the door in it. All others are seals, or cracks
+//! where nothing is sealed: one a plane and pair of cells.
 
-use enfilade_geom::{DVec2, DVec3, Plane, Winding};
+use std::collections::BTreeMap;
+
+use enfilade_geom::{DVec2, DVec3, Plane, Sets, Winding};
 use rayon::prelude::*;
 
+use super::label::SOLID;
 use super::poly::Poly;
 
 /// Pieces of one plane this near to each other are one portal. [Units: wu]
@@ -25,6 +32,8 @@ pub(super) struct Piece {
     pub(super) is_flipped: bool,
     /// The screen that it lies on.
     pub(super) screen: Option<u32>,
+    /// It is a gap, see [`Clearance`](super::graph::Clearance).
+    pub(super) is_gap: bool,
     /// Counter-clockwise about the plane's normal.
     pub(super) points: Poly,
 }
@@ -38,10 +47,21 @@ pub(super) struct Opening {
     pub(super) screen: Option<u32>,
     pub(super) area: f64,
     pub(super) width: f64,
+    /// A gap, to be sealed.
+    pub(super) is_seal: bool,
+}
+
+/// What openings are told by.
+pub(super) struct Rules<'a> {
+    pub(super) planes: &'a [Plane],
+    /// Diameter of the smallest hole. [Units: wu]
+    pub(super) hole: f64,
+    /// Whether gaps are closed by seals.
+    pub(super) has_seals: bool,
 }
 
 /// Groups pieces into openings, ordered by cells, then plane, then the order of the tree.
-pub(super) fn group(mut pieces: Vec<Piece>, planes: &[Plane]) -> Vec<Opening> {
+pub(super) fn group(mut pieces: Vec<Piece>, rules: &Rules<'_>) -> Vec<Opening> {
     // Stable: within a key, the order of the tree stays.
     pieces.sort_by_key(|p| (p.cells, p.plane, p.is_flipped));
     let groups: Vec<&[Piece]> = pieces
@@ -49,7 +69,7 @@ pub(super) fn group(mut pieces: Vec<Piece>, planes: &[Plane]) -> Vec<Opening> {
         .collect();
     groups
         .into_par_iter()
-        .flat_map_iter(|g| openings_of(g, planes))
+        .flat_map_iter(|g| openings_of(g, rules))
         .collect()
 }
 
@@ -97,6 +117,16 @@ impl Flat {
         self.touches(other, TOGETHER)
             && !self.has_edge_apart(other, TOGETHER)
             && !other.has_edge_apart(self, TOGETHER)
+    }
+
+    /// Whether a point is inside, or at most `slack` outside of each edge.
+    fn is_within(&self, p: DVec2, slack: f64) -> bool {
+        let n = self.points.len();
+        (0..n).all(|i| {
+            let (a, b) = (self.points[i], self.points[(i + 1) % n]);
+            let inward = (b - a).perp().try_normalize();
+            inward.is_none_or(|inward| inward.dot(p - a) >= -slack)
+        })
     }
 
     fn width(&self) -> f64 {
@@ -204,86 +234,156 @@ fn merge_convex(mut flats: Vec<Flat>) -> Vec<Flat> {
     }
 }
 
-/// The openings among pieces of one plane, one pair of cells and one direction.
-fn openings_of(group: &[Piece], planes: &[Plane]) -> Vec<Opening> {
-    let own = planes[group[0].plane as usize];
-    let plane = if group[0].is_flipped {
-        own.flipped()
-    } else {
-        own
-    };
-    let (u, v) = plane.basis();
-    let origin = plane.project(group[0].points[0]);
-    let flat = |p: DVec3| DVec2::new(u.dot(p - origin), v.dot(p - origin));
-    let solid = |p: DVec2| origin + u * p.x + v * p.y;
-    let flats: Vec<Flat> = group
-        .iter()
-        .map(|piece| hull(piece.points.iter().map(|&p| flat(p))))
-        .collect();
+/// How much farther than its own area a gap may widen the outline of the opening beside it.
+const WIDENING: f64 = 2.0;
 
-    let mut set: Vec<usize> = (0..flats.len()).collect();
-    fn find(set: &mut [usize], mut x: usize) -> usize {
-        while set[x] != x {
-            set[x] = set[set[x]];
-            x = set[x];
+/// Pieces of one plane, one pair of cells and one direction, in the plane's own coordinates.
+struct Sheet<'a> {
+    pieces: &'a [Piece],
+    flats: Vec<Flat>,
+    plane: Plane,
+    axes: (DVec3, DVec3),
+    origin: DVec3,
+}
+
+impl<'a> Sheet<'a> {
+    fn new(pieces: &'a [Piece], planes: &[Plane]) -> Self {
+        let own = planes[pieces[0].plane as usize];
+        let plane = if pieces[0].is_flipped {
+            own.flipped()
+        } else {
+            own
+        };
+        let (u, v) = plane.basis();
+        let origin = plane.project(pieces[0].points[0]);
+        let flat = |p: &DVec3| DVec2::new(u.dot(*p - origin), v.dot(*p - origin));
+        Self {
+            pieces,
+            flats: pieces
+                .iter()
+                .map(|piece| hull(piece.points.iter().map(flat)))
+                .collect(),
+            plane,
+            axes: (u, v),
+            origin,
         }
-        x
     }
-    let mut first_on_screen = std::collections::BTreeMap::new();
-    for (i, piece) in group.iter().enumerate() {
-        if let Some(screen) = piece.screen {
-            let first = *first_on_screen.entry(screen).or_insert(i);
-            let (a, b) = (find(&mut set, first), find(&mut set, i));
-            set[a.max(b)] = a.min(b);
-        }
+
+    fn winding(&self, flat: &Flat) -> Winding {
+        let (u, v) = self.axes;
+        let solid = |p: &DVec2| self.origin + u * p.x + v * p.y;
+        Winding::new(flat.points.iter().map(solid).collect())
     }
-    let mut order: Vec<usize> = (0..flats.len()).collect();
-    order.sort_by(|&a, &b| flats[a].min.x.total_cmp(&flats[b].min.x).then(a.cmp(&b)));
-    for (k, &i) in order.iter().enumerate() {
-        for &j in &order[k + 1..] {
-            if flats[j].min.x > flats[i].max.x + TOGETHER {
-                break;
+
+    fn hull_of(&self, members: &[usize]) -> Flat {
+        let points = members.iter().flat_map(|&i| &self.flats[i].points);
+        hull(points.copied())
+    }
+
+    /// Pieces near each other, those on one screen together wherever they are; ordered by their least members.
+    fn clusters(&self, among: &[usize]) -> Vec<Vec<usize>> {
+        let mut sets = Sets::new(self.flats.len());
+        let mut first_on_screen = BTreeMap::new();
+        for &i in among {
+            if let Some(screen) = self.pieces[i].screen {
+                let first = *first_on_screen.entry(screen).or_insert(i);
+                sets.join(first as u32, i as u32);
             }
-            let (a, b) = (find(&mut set, i), find(&mut set, j));
-            if a != b && flats[i].is_near(&flats[j]) {
-                set[a.max(b)] = a.min(b);
-            }
         }
-    }
-    let mut members: std::collections::BTreeMap<usize, Vec<usize>> = Default::default();
-    for i in 0..flats.len() {
-        members.entry(find(&mut set, i)).or_default().push(i);
-    }
-    members
-        .into_values()
-        .map(|members| {
-            let mut on_screen = std::collections::BTreeMap::new();
-            for &i in &members {
-                if let Some(screen) = group[i].screen {
-                    *on_screen.entry(screen).or_insert(0.0) += flats[i].area;
+        let mut order = among.to_vec();
+        let left = |i: usize| self.flats[i].min.x;
+        order.sort_by(|&a, &b| left(a).total_cmp(&left(b)).then(a.cmp(&b)));
+        for (k, &i) in order.iter().enumerate() {
+            for &j in &order[k + 1..] {
+                if left(j) > self.flats[i].max.x + TOGETHER {
+                    break;
+                }
+                let is_apart = sets.find(i as u32) != sets.find(j as u32);
+                if is_apart && self.flats[i].is_near(&self.flats[j]) {
+                    sets.join(i as u32, j as u32);
                 }
             }
-            let screen = on_screen
-                .into_iter()
-                .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
-                .map(|(screen, _)| screen);
-            let outline = hull(
-                members
-                    .iter()
-                    .flat_map(|&i| flats[i].points.iter().copied()),
-            );
-            let mut merged = merge_convex(members.iter().map(|&i| flats[i].clone()).collect());
-            merged.sort_by(|a, b| b.area.total_cmp(&a.area));
-            let winding = |f: &Flat| Winding::new(f.points.iter().map(|&p| solid(p)).collect());
-            Opening {
-                cells: group[0].cells,
-                plane,
-                outline: winding(&outline),
-                area: merged.iter().map(|f| f.area).sum(),
-                width: merged.iter().map(Flat::width).fold(0.0, f64::max),
-                pieces: merged.iter().map(winding).collect(),
-                screen,
+        }
+        let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for &i in among {
+            members.entry(sets.find(i as u32)).or_default().push(i);
+        }
+        members.into_values().collect()
+    }
+
+    /// Gives each gap to the opening beside it whose outline it widens least, if little; the gaps that are left.
+    fn adopt(&self, openings: &mut [Vec<usize>], mut gaps: Vec<usize>, hole: f64) -> Vec<usize> {
+        let mut hulls: Vec<Flat> = openings.iter().map(|o| self.hull_of(o)).collect();
+        let area = |i: usize| self.flats[i].area;
+        gaps.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
+        gaps.retain(|&gap| {
+            let flat = &self.flats[gap];
+            let near = (0..openings.len()).filter(|&o| {
+                hulls[o].touches(flat, TOGETHER)
+                    && openings[o].iter().any(|&i| self.flats[i].is_near(flat))
+            });
+            let wider = near.map(|o| {
+                let points = hulls[o].points.iter().chain(&flat.points);
+                (o, hull(points.copied()))
+            });
+            let least = wider.min_by(|a, b| {
+                let growth = |(o, hull): &(usize, Flat)| hull.area - hulls[*o].area;
+                growth(a).total_cmp(&growth(b)).then(a.0.cmp(&b.0))
+            });
+            let Some((o, wider)) = least else { return true };
+            let is_rim = flat.points.iter().all(|&p| hulls[o].is_within(p, hole));
+            if is_rim || wider.area - hulls[o].area <= WIDENING * flat.area {
+                openings[o].push(gap);
+                hulls[o] = wider;
+                return false;
             }
-        })
-        .collect()
+            true
+        });
+        gaps
+    }
+
+    fn opening(&self, members: &[usize], is_seal: bool) -> Opening {
+        let mut on_screen = BTreeMap::new();
+        for &i in members {
+            if let Some(screen) = self.pieces[i].screen {
+                *on_screen.entry(screen).or_insert(0.0) += self.flats[i].area;
+            }
+        }
+        let screen = on_screen
+            .into_iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+            .map(|(screen, _)| screen);
+        let mut merged = merge_convex(members.iter().map(|&i| self.flats[i].clone()).collect());
+        merged.sort_by(|a, b| b.area.total_cmp(&a.area));
+        Opening {
+            cells: self.pieces[0].cells,
+            plane: self.plane,
+            outline: self.winding(&self.hull_of(members)),
+            area: merged.iter().map(|f| f.area).sum(),
+            width: merged.iter().map(Flat::width).fold(0.0, f64::max),
+            pieces: merged.iter().map(|f| self.winding(f)).collect(),
+            screen,
+            is_seal,
+        }
+    }
+}
+
+/// The openings among pieces of one plane, one pair of cells and one direction.
+fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
+    let sheet = Sheet::new(group, rules.planes);
+    let all: Vec<usize> = (0..group.len()).collect();
+    // Whatever opens to matter is to be closed, but for what nothing could close.
+    if group[0].cells[1] == SOLID {
+        return vec![sheet.opening(&all, true)];
+    }
+    let (gaps, wide): (Vec<usize>, Vec<usize>) = all
+        .into_iter()
+        .partition(|&i| group[i].is_gap);
+    let mut openings = sheet.clusters(&wide);
+    let gaps = sheet.adopt(&mut openings, gaps, rules.hole);
+    let mut out: Vec<Opening> = openings.iter().map(|o| sheet.opening(o, false)).collect();
+    if !gaps.is_empty() {
+        out.push(sheet.opening(&gaps, rules.has_seals));
+    }
+    out
 }

@@ -230,6 +230,8 @@ pub fn bake_session(
         triangles: &triangles,
         screens: &windings,
         bounds: around,
+        gap: config.common.smallest_hole.gap(),
+        has_seals: config.common.smallest_hole.has_seals(),
     });
     context.delaunay_stage(4)?;
     let mut votes = rooms.votes;

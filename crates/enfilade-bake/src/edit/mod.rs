@@ -165,6 +165,8 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         screens: &screens,
         // All of the scene's box, so that tolerances are those of the bake.
         bounds: old.locator.bounds,
+        gap: 0.0,
+        has_seals: false,
     });
 
     // 2. Its two parts.
@@ -418,7 +420,7 @@ impl Parts {
         for (b, batch) in out.batches.iter().enumerate() {
             let p = &batch.primitive;
             if batch.cells.binary_search(&self.cell).is_err() {
-                batches.add(batch.cells.clone(), p);
+                batches.add(batch.cells.clone(), p, batch.is_seal);
                 continue;
             }
             let mut by_list: BTreeMap<Vec<CellId>, Vec<u32>> = BTreeMap::new();
@@ -428,7 +430,7 @@ impl Parts {
                 by_list.entry(list).or_default().extend(corners);
             }
             for (list, indices) in by_list {
-                batches.add(list, &part_of(p, &indices));
+                batches.add(list, &part_of(p, &indices), batch.is_seal);
             }
         }
         out.batches = batches.finish();
@@ -470,7 +472,7 @@ impl Parts {
         for side in [FRONT, BACK] {
             let id = self.id(side);
             let mut triangles = 0;
-            for b in &out.batches {
+            for b in out.batches.iter().filter(|b| !b.is_seal) {
                 if b.cells.binary_search(&id).is_ok() {
                     triangles += b.primitive.indices.len() / 3;
                 }

@@ -61,10 +61,10 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     }
     let mut batches = Batches::default();
     for b in &world.batches {
-        batches.add(renumbered(&b.cells), &b.primitive);
+        batches.add(renumbered(&b.cells), &b.primitive, b.is_seal);
     }
     let batches = batches.finish();
-    for b in &batches {
+    for b in batches.iter().filter(|b| !b.is_seal) {
         for c in &b.cells {
             cells[c.0 as usize].n_triangles += (b.primitive.indices.len() / 3) as u32;
         }
@@ -87,27 +87,31 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     (out, cell_of)
 }
 
-/// Batches under way: one for each list of cells, material and set of attributes.
+/// Batches under way: one for each list of cells, material and set of attributes, seals apart.
 #[derive(Default)]
 pub(crate) struct Batches(BTreeMap<Key, Primitive>);
 
 impl Batches {
     /// Adds triangles that `cells`, ascending, see.
-    pub(crate) fn add(&mut self, cells: Vec<CellId>, primitive: &Primitive) {
-        let key = (cells, primitive.material, layout_of(primitive));
+    pub(crate) fn add(&mut self, cells: Vec<CellId>, primitive: &Primitive, is_seal: bool) {
+        let key = (is_seal, cells, primitive.material, layout_of(primitive));
         append(self.0.entry(key).or_default(), primitive);
     }
 
-    /// The batches in order of cells, material and attributes.
+    /// The batches in order of cells, material and attributes, seals last.
     pub(crate) fn finish(self) -> Vec<Batch> {
-        let batch = |((cells, ..), primitive): (Key, Primitive)| Batch { cells, primitive };
+        let batch = |((is_seal, cells, ..), primitive): (Key, Primitive)| Batch {
+            cells,
+            primitive,
+            is_seal,
+        };
         self.0.into_iter().map(batch).collect()
     }
 }
 
 /// Which attributes a primitive has; those that differ cannot share its lists.
 type Layout = (bool, bool, usize, bool);
-type Key = (Vec<CellId>, Option<u32>, Layout);
+type Key = (bool, Vec<CellId>, Option<u32>, Layout);
 
 fn layout_of(p: &Primitive) -> Layout {
     (

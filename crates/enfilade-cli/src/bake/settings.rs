@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use enfilade::bake::BakeConfig;
+use enfilade::bake::{BakeConfig, SmallestHole};
 use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
 use enfilade::bake::watershed::MergeSettings;
@@ -73,6 +73,9 @@ pub(crate) struct BakeOptions {
     /// Width in meters of the narrowest opening that must be found [default: 0.6].
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     min_opening: Option<f64>,
+    /// Narrower openings, in meters, are gaps of the model and closed by seals; 0 leaves them open, as cracks [default: 0.01].
+    #[arg(long, value_name = "METERS", value_parser = parse_hole, allow_hyphen_values = true)]
+    smallest_hole: Option<f64>,
     /// Threads to use; as many as there are cores if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) threads: Option<u16>,
@@ -125,6 +128,13 @@ fn parse_length(text: &str) -> Result<f64, String> {
         .parse()
         .map_err(|_| format!("'{text}' is not a number of meters"))?;
     check_length(number)
+}
+
+fn parse_hole(text: &str) -> Result<f64, String> {
+    let number: f64 = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number of meters"))?;
+    if number == 0.0 { Ok(0.0) } else { check_length(number) }
 }
 
 fn parse_unit(text: &str) -> Result<f64, String> {
@@ -235,6 +245,7 @@ impl<'de> Deserialize<'de> for Unit {
 struct ConfigFile {
     voxel: Option<Length>,
     min_opening: Option<Length>,
+    smallest_hole: Option<Amount>,
     max_voxels: Option<Budget>,
     noise: Option<Amount>,
     unit: Option<Unit>,
@@ -314,7 +325,7 @@ impl ConfigFile {
 fn resolve_bsp(
     options: &BakeOptions,
     table: BspTable,
-    merge: &MergeSettings,
+    common: &BakeConfig,
 ) -> anyhow::Result<BspConfig> {
     let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
         let normal = DVec3::new(nx, ny, nz).try_normalize();
@@ -381,7 +392,8 @@ fn resolve_bsp(
             Some(true) => Rooms::Always,
             Some(false) => Rooms::Never,
         },
-        merge: merge.clone(),
+        merge: common.merge.clone(),
+        smallest_hole: common.smallest_hole,
     })
 }
 
@@ -409,6 +421,9 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     if let Some(v) = options.min_opening.or(file.min_opening.map(|v| v.0)) {
         config.min_opening = v;
     }
+    if let Some(v) = options.smallest_hole.or(file.smallest_hole.map(|v| v.0)) {
+        config.smallest_hole = SmallestHole::of_width(v);
+    }
     if let Some(v) = file.max_voxels {
         config.max_voxels = v.0;
     }
@@ -432,7 +447,7 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     Ok(Resolved {
         import: import_options,
         merges_brushes_only: options.min_cost.is_none() && file.bsp.min_cost.is_none(),
-        bsp: resolve_bsp(options, file.bsp, &config.merge)?,
+        bsp: resolve_bsp(options, file.bsp, &config)?,
         watershed: config,
     })
 }

@@ -356,7 +356,11 @@ impl<'a> Reader<'a> {
                 ));
             }
         };
-        Ok(Batch { cells, primitive })
+        Ok(Batch {
+            cells,
+            primitive,
+            is_seal: batch.seal,
+        })
     }
 
     fn mesh(&mut self, mesh: u32) -> Result<Mesh, WireError> {

@@ -162,6 +162,7 @@ fn lay_out_batches<'a>(
             mesh: None,
             primitive: None,
             cells: ids(&b.cells),
+            seal: b.is_seal,
         })
         .collect();
     let mut groups: BTreeMap<&[CellId], Vec<usize>> = BTreeMap::new();

@@ -208,6 +208,8 @@ pub(super) struct Batch {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) primitive: Option<u32>,
     pub(super) cells: Vec<u32>,
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub(super) seal: bool,
 }
 
 #[derive(Serialize, Deserialize)]

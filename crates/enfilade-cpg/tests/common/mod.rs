@@ -120,6 +120,7 @@ pub(crate) fn two_rooms() -> World {
     let batch = |cells: &[u32], primitive| Batch {
         cells: cells.iter().copied().map(CellId).collect(),
         primitive,
+        is_seal: false,
     };
     let turned = [
         0.0, 0.0, -2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 1.0,
@@ -237,10 +238,11 @@ pub(crate) fn nasty_rooms() -> World {
     world.batches.push(Batch {
         cells: vec![CellId(2)],
         primitive: more,
+        is_seal: true,
     });
     world.batches.push(Batch {
         cells: vec![CellId(1)],
-        primitive: Primitive::default(),
+        ..Batch::default()
     });
     world.detail_meshes.push(Mesh {
         name: "nothing".into(),

@@ -102,6 +102,7 @@ pub(crate) fn batch(cells: &[CellId], quads: Vec<Vec<Quad>>) -> Batch {
     Batch {
         cells: cells.to_vec(),
         primitive,
+        is_seal: false,
     }
 }
 

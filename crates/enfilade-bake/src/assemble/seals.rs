@@ -1,0 +1,54 @@
+//! Seals as geometry: batches of their own, in the color of what they close.
+
+use std::collections::BTreeMap;
+
+use enfilade_cpg::{Batch, CellId};
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{DVec3, Winding};
+
+use super::{Cut, grown};
+use crate::complex::Seal;
+
+/// The seals by the cells that see them and the material of the surface nearest to each.
+///
+/// A seal is grown, so that rounding leaves no slit at its rim. `O(log n)` a seal.
+pub(super) fn batches(cut: &Cut<'_>) -> Vec<Batch> {
+    let mut by_look: BTreeMap<(Vec<CellId>, Option<u32>), Primitive> = BTreeMap::new();
+    for seal in &cut.partition.seals {
+        let is_cell = |c: &&u32| (**c as usize) < cut.partition.volumes.len();
+        let cells = seal.cells.iter().filter(is_cell).map(|&c| CellId(c));
+        let mut cells: Vec<CellId> = cells.collect();
+        cells.dedup();
+        let outline = grown(&seal.outline, &seal.plane, cut.outward);
+        let material = material_near(cut, seal);
+        let to = by_look.entry((cells, material)).or_default();
+        to.material = material;
+        add_fan(to, &outline);
+    }
+    by_look
+        .into_iter()
+        .map(|((cells, _), primitive)| Batch {
+            cells,
+            primitive,
+            is_seal: true,
+        })
+        .collect()
+}
+
+fn material_near(cut: &Cut<'_>, seal: &Seal) -> Option<u32> {
+    let n = seal.outline.points.len();
+    let middle = seal.outline.points.iter().sum::<DVec3>() / n as f64;
+    let nearest = cut.bvh.nearest(middle, f64::INFINITY)?;
+    let source = cut.sources[nearest.triangle as usize];
+    let mesh = cut.scene.objects[source.object as usize].mesh;
+    cut.scene.meshes[mesh as usize].primitives[source.primitive as usize].material
+}
+
+fn add_fan(to: &mut Primitive, outline: &Winding) {
+    let first = to.positions.len() as u32;
+    let corners = outline.points.iter().map(|p| p.as_vec3().to_array());
+    to.positions.extend(corners);
+    for i in 1..outline.points.len().saturating_sub(1) as u32 {
+        to.indices.extend([first, first + i, first + i + 1]);
+    }
+}
