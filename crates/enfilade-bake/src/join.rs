@@ -61,7 +61,9 @@ pub(crate) fn join_voids(partition: &mut Partition) {
         p.cells = p.cells.map(|c| number[c as usize]);
     }
     for s in &mut partition.seals {
-        s.cells = s.cells.map(|c| number.get(c as usize).copied().unwrap_or(c));
+        s.cells = s
+            .cells
+            .map(|c| number.get(c as usize).copied().unwrap_or(c));
     }
     for l in &mut partition.leaks {
         l.cells = l.cells.map(|c| number[c as usize]);

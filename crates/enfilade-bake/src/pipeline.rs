@@ -269,7 +269,10 @@ impl Cut<'_> {
             ("structural_triangles", self.sources.len() as f64),
             ("leaks", self.partition.leaks.len() as f64),
             ("seals", self.partition.seals.len() as f64),
-            ("seal_area", self.partition.seals.iter().map(|s| s.outline.area()).sum()),
+            (
+                "seal_area",
+                self.partition.seals.iter().map(|s| s.outline.area()).sum(),
+            ),
         ];
         let counts = common.iter().chain(counts);
         let provenance = Provenance {

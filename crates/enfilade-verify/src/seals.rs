@@ -21,7 +21,9 @@ pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
     let settings = &world.graph.provenance.settings;
     let said = settings.get("smallest_hole").and_then(|s| s.parse().ok());
     let Some(hole): Option<f64> = said else {
-        return vec!["there are seals, but the file does not say how wide: smallest_hole is missing".into()];
+        return vec![
+            "there are seals, but the file does not say how wide: smallest_hole is missing".into(),
+        ];
     };
     let model: Vec<Triangle> = match source {
         Some(source) => source.to_vec(),
@@ -32,7 +34,12 @@ pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
     let is_far = |p: DVec3| bvh.nearest(p, reach).is_none();
     let wide = seals.iter().filter(|(t, _)| {
         let middle = (t[0] + t[1] + t[2]) / 3.0;
-        let samples = [middle, t[0].lerp(middle, 0.2), t[1].lerp(middle, 0.2), t[2].lerp(middle, 0.2)];
+        let samples = [
+            middle,
+            t[0].lerp(middle, 0.2),
+            t[1].lerp(middle, 0.2),
+            t[2].lerp(middle, 0.2),
+        ];
         height(t) > hole + 2.0 * OVERLAP && samples.into_iter().any(is_far)
     });
     let mut out = Vec::new();
@@ -64,7 +71,12 @@ mod tests {
     fn sealed(width: f32) -> World {
         let strip = |x0: f32, x1: f32, is_seal| Batch {
             primitive: Primitive {
-                positions: vec![[x0, 0.0, 0.0], [x1, 0.0, 0.0], [x1, 3.0, 0.0], [x0, 3.0, 0.0]],
+                positions: vec![
+                    [x0, 0.0, 0.0],
+                    [x1, 0.0, 0.0],
+                    [x1, 3.0, 0.0],
+                    [x0, 3.0, 0.0],
+                ],
                 indices: vec![0, 1, 2, 0, 2, 3],
                 ..Primitive::default()
             },

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use enfilade_cpg::{Batch, CellId};
 use enfilade_geom::scene::Primitive;
-use enfilade_geom::{DVec3, Winding};
+use enfilade_geom::{DVec3, Plane, Winding};
 
-use super::{Cut, grown};
+use super::Cut;
 use crate::complex::Seal;
 
 /// The seals by the cells that see them and the material of the surface nearest to each.
@@ -18,6 +18,8 @@ pub(super) fn batches(cut: &Cut<'_>) -> Vec<Batch> {
         let is_cell = |c: &&u32| (**c as usize) < cut.partition.volumes.len();
         let cells = seal.cells.iter().filter(is_cell).map(|&c| CellId(c));
         let mut cells: Vec<CellId> = cells.collect();
+        // Where a void became part of a room both sides may be one cell.
+        cells.sort_unstable();
         cells.dedup();
         let outline = grown(&seal.outline, &seal.plane, cut.outward);
         let material = material_near(cut, seal);
@@ -42,6 +44,25 @@ fn material_near(cut: &Cut<'_>, seal: &Seal) -> Option<u32> {
     let source = cut.sources[nearest.triangle as usize];
     let mesh = cut.scene.objects[source.object as usize].mesh;
     cut.scene.meshes[mesh as usize].primitives[source.primitive as usize].material
+}
+
+/// At sharp corners a seal grows by no more than so many times as much as elsewhere.
+const MITER: f64 = 4.0;
+
+/// `outline` with its rim moved outward by about `by`.
+fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
+    let points = &outline.points;
+    let n = points.len();
+    let outward = |i: usize| {
+        let edge = points[(i + 1) % n] - points[i % n];
+        edge.cross(plane.normal).normalize_or_zero()
+    };
+    let moved = (0..n).map(|i| {
+        let both = outward(i + n - 1) + outward(i);
+        let length = both.length().max(2.0 / MITER);
+        points[i] + both * (2.0 * by / (length * length))
+    });
+    Winding::new(moved.collect())
 }
 
 fn add_fan(to: &mut Primitive, outline: &Winding) {

@@ -517,12 +517,14 @@ mod tests {
             width: area,
             area,
             screen: NO_SCREEN,
+            is_narrow: false,
         };
         let mut graph = LeafGraph {
             facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],
             volumes: vec![5.0, 1e-6, 5.0, 1e-6, 1e-6],
             at_border: vec![false; 5],
-            hairline: 1e-3,
+            faces: vec![1.0; 5],
+            hole: 0.01,
         };
         let cells = || LeafCells {
             cell_of_leaf: vec![0, 1, 2, 1, 1],

@@ -119,9 +119,9 @@ impl Clearance<'_> {
     /// Whether an opening, a convex polygon, lets no ball of the smallest hole pass: no point of it is farther than
     /// half the hole's width from matter.
     ///
-    /// Told by its middle, its corners and the middles of its edges. The width of the polygon says nothing: cuts of the tree
+    /// Told by its middle, its corners, the middles of its edges and what lies half way. The width of the polygon says nothing: cuts of the tree
     /// make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes there are wide ones.
-    /// One query of the triangles in the open, at most `2n + 1` in a gap.
+    /// One query of the triangles in the open, at most `4n + 1` in a gap.
     pub(super) fn is_narrow(&self, points: &[DVec3]) -> bool {
         self.is_narrow_at(points, true)
     }
@@ -137,7 +137,8 @@ impl Clearance<'_> {
         let between = (0..n).map(|i| points[i].midpoint(points[(i + 1) % n]));
         // Corners are where matter is: a tenth of the way to the middle tells more.
         let inner = points.iter().copied().chain(between);
-        let inner = inner.map(|p| p.lerp(middle, 0.1)).filter(|_| is_whole);
+        let inner = inner.flat_map(|p| [0.1, 0.5].map(|t| p.lerp(middle, t)));
+        let inner = inner.filter(|_| is_whole);
         // Distances change no faster than places do, so near a point that is known to be close no other is asked.
         let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
         std::iter::once(middle).chain(inner).all(|p| {

@@ -129,8 +129,8 @@ pub(super) fn label_leaves(
 
     rejoin(graph, &mut sets, &mut label_of_set);
 
-    let mut groups = merge_groups(graph, &mut sets, &label_of_set, settings);
-    give_away_crumbs(graph, &mut sets, &mut groups, has_seals);
+    let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
+    let groups = give_away_crumbs(graph, &mut sets, groups, has_seals);
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
     absorb_chips(graph, &mut cells, settings.min_volume);
@@ -225,6 +225,19 @@ fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
     }
 }
 
+/// The sets that have a label, or an opening to another set that is no gap: by their least leaves.
+fn open_sets(graph: &LeafGraph, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
+    let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != SOLID).collect();
+    for f in graph.facets.iter().filter(|f| !f.is_narrow) {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        if a != b {
+            is_open[a as usize] = true;
+            is_open[b as usize] = true;
+        }
+    }
+    is_open
+}
+
 /// Lets groups without a label, and small doubles of a label, join their neighbors.
 fn merge_groups(
     graph: &LeafGraph,
@@ -232,9 +245,13 @@ fn merge_groups(
     label_of_set: &[u32],
     settings: &LabelSettings,
 ) -> BTreeMap<u32, Group> {
+    let is_open = open_sets(graph, sets, label_of_set);
     let mut groups: BTreeMap<u32, Group> = BTreeMap::new();
     for leaf in 0..graph.volumes.len() as u32 {
         let set = sets.find(leaf);
+        if !is_open[set as usize] {
+            continue;
+        }
         let label = label_of_set[set as usize];
         let group = groups.entry(set).or_insert(Group {
             root: set,
@@ -319,73 +336,52 @@ fn merge_groups(
     groups.into_values().map(|g| (g.root, g)).collect()
 }
 
-/// Lets groups that open nowhere but through gaps join what they have the widest gaps to: crumbs, in which nothing
-/// has room, and, where gaps are not to be sealed, whatever is behind them.
+/// Gives crumbs, in which nothing has room, to what they have the largest gaps to; where gaps are not to be sealed,
+/// all that opens nowhere but through gaps.
 ///
-/// What is left is matter. Least first, so that crumbs of one gap come together; O(F log F) in gaps.
+/// Kruskal's forest over the gaps, largest first, never two in one tree that are cells or matter: little is left to be
+/// sealed. `O(F log F)` in gaps.
 fn give_away_crumbs(
     graph: &LeafGraph,
     sets: &mut Sets,
-    groups: &mut BTreeMap<u32, Group>,
+    groups: BTreeMap<u32, Group>,
     has_seals: bool,
-) {
-    let mut stays: BTreeMap<u32, bool> = groups.iter().map(|(&id, g)| (id, g.keeps)).collect();
+) -> BTreeMap<u32, Group> {
+    let n = graph.volumes.len();
+    let mut stays = vec![false; n];
+    for (&id, _) in groups.iter().filter(|g| g.1.keeps) {
+        stays[id as usize] = true;
+    }
     if has_seals {
-        for leaf in (0..graph.volumes.len() as u32).filter(|&l| !graph.is_thin(l)) {
-            stays.insert(sets.find(leaf), true);
+        for leaf in (0..n as u32).filter(|&l| !graph.is_thin(l)) {
+            stays[sets.find(leaf) as usize] = true;
         }
     }
-    let mut gaps: BTreeMap<u32, BTreeMap<u32, f64>> = BTreeMap::new();
-    for f in graph.facets.iter().filter(|f| f.is_narrow) {
-        let [a, b] = f.leaves.map(|l| sets.find(l));
-        if a != b {
-            for (from, to) in [(a, b), (b, a)] {
-                if !stays[&from] {
-                    *gaps.entry(from).or_default().entry(to).or_default() += f64::from(f.area);
-                }
-            }
-        }
-    }
-    let mut queue: BinaryHeap<Reverse<(u64, u32)>> = gaps
-        .keys()
-        .map(|id| Reverse((groups[id].volume.to_bits(), *id)))
+    // Areas are not negative, so their bits compare like the numbers.
+    let narrow = (0..).zip(&graph.facets).filter(|(_, f)| f.is_narrow);
+    let mut gaps: Vec<(Reverse<u32>, u32)> = narrow
+        .map(|(i, f)| (Reverse(f.area.to_bits()), i))
         .collect();
-    while let Some(Reverse((bits, id))) = queue.pop() {
-        if groups.get(&id).is_none_or(|g| g.volume.to_bits() != bits) {
-            continue;
+    gaps.par_sort_unstable();
+    for (_, i) in gaps {
+        let [a, b] = graph.facets[i as usize].leaves.map(|l| sets.find(l));
+        let [a_stays, b_stays] = [a, b].map(|s| stays[s as usize]);
+        if a != b && !(a_stays && b_stays) {
+            stays[sets.join(a, b) as usize] = a_stays || b_stays;
         }
-        let Some(around) = gaps.remove(&id) else {
-            continue;
-        };
-        let mut now: BTreeMap<u32, f64> = BTreeMap::new();
-        for (to, area) in around {
-            let to = sets.find(to);
-            if to != id {
-                *now.entry(to).or_default() += area;
-            }
-        }
-        let most = now
-            .iter()
-            .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)));
-        let Some((&to, _)) = most else { continue };
-        let (Some(crumb), Some(mut host)) = (groups.remove(&id), groups.remove(&to)) else {
-            continue;
-        };
-        let root = sets.join(id, to);
-        host.volume += crumb.volume;
-        let host_stays = stays[&to];
-        stays.insert(root, host_stays);
-        if !host_stays {
-            let mut both = gaps.remove(&to).unwrap_or_default();
-            for (other, area) in now.into_iter().filter(|n| n.0 != to) {
-                *both.entry(other).or_default() += area;
-            }
-            queue.push(Reverse((host.volume.to_bits(), root)));
-            gaps.insert(root, both);
-        }
-        host.root = root;
-        groups.insert(root, host);
     }
+    let mut out: BTreeMap<u32, Group> = BTreeMap::new();
+    for (_, mut group) in groups.into_iter().filter(|g| g.1.keeps) {
+        group.root = sets.find(group.root);
+        group.volume = 0.0;
+        out.insert(group.root, group);
+    }
+    for leaf in 0..n as u32 {
+        if let Some(group) = out.get_mut(&sets.find(leaf)) {
+            group.volume += graph.volumes[leaf as usize];
+        }
+    }
+    out
 }
 
 /// Numbers the groups that are cells by label, then by falling volume; the rest is solid.

@@ -60,7 +60,6 @@ pub use partition::{Leak, Partition, PartitionPortal, Seal, TriangleCells};
 /// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
 const CRACK_WIDTH: f64 = 0.05;
 
-
 /// What the complex is built from.
 #[derive(Clone, Copy, Debug)]
 pub struct ComplexInput<'a> {

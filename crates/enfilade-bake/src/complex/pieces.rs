@@ -376,9 +376,7 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     if group[0].cells[1] == SOLID {
         return vec![sheet.opening(&all, true)];
     }
-    let (gaps, wide): (Vec<usize>, Vec<usize>) = all
-        .into_iter()
-        .partition(|&i| group[i].is_gap);
+    let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
     let mut openings = sheet.clusters(&wide);
     let gaps = sheet.adopt(&mut openings, gaps, rules.hole);
     let mut out: Vec<Opening> = openings.iter().map(|o| sheet.opening(o, false)).collect();

@@ -207,6 +207,8 @@ fn build(triangles: &[Triangle], screens: &[Winding]) -> Complex {
         triangles,
         screens,
         bounds,
+        gap: 0.0,
+        has_seals: false,
     })
 }
 
@@ -525,6 +527,8 @@ fn no_input_at_all_is_one_leaf() {
         triangles: &[],
         screens: &[],
         bounds: Aabb::EMPTY,
+        gap: 0.0,
+        has_seals: false,
     });
     assert_eq!((c.n_leaves(), c.n_open_facets()), (1, 0));
     let p = c.partition(&[], &LabelSettings::default());
@@ -550,6 +554,8 @@ fn hostile_triangles_are_survived() {
         triangles: &t,
         screens: &[],
         bounds,
+        gap: 0.0,
+        has_seals: false,
     });
     let p = d.partition(&room_votes(&bounds), &LabelSettings::default());
     assert_eq!(p.triangle_cells.len(), t.len());

@@ -7,10 +7,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use enfilade::bake::{BakeConfig, SmallestHole};
 use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
-use enfilade::bake::watershed::MergeSettings;
+use enfilade::bake::{BakeConfig, SmallestHole};
 use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{ImportOptions, RoleRules, Up};
 use serde::de::{Deserialize, Deserializer, Error};
@@ -134,7 +133,11 @@ fn parse_hole(text: &str) -> Result<f64, String> {
     let number: f64 = text
         .parse()
         .map_err(|_| format!("'{text}' is not a number of meters"))?;
-    if number == 0.0 { Ok(0.0) } else { check_length(number) }
+    if number == 0.0 {
+        Ok(0.0)
+    } else {
+        check_length(number)
+    }
 }
 
 fn parse_unit(text: &str) -> Result<f64, String> {
