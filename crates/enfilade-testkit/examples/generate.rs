@@ -20,8 +20,8 @@ SCENE    house, tower, maze, cave, gjorup-optimised, gjorup-tessellated, gjorup-
          open-courtyard, room-within-room, l-corridor, stair-hall, rooms-with-closet,
          double-door-corridor, glass-facade-office, pitched-roof-attic;
          or one with a fault: walls-above-slabs, hung-ceilings, walls-to-ceiling, curtain-wall,
-         mullions, columns-in-walls, corner-doors, walls-alone, corridor-wide, corridor-medium,
-         corridor-narrow, corridor-l, corridor-t, corridor-cross, city-blocks, columns, boxes;
+         mullions, columns-in-walls, corner-doors, leaves-in-corridor, walls-alone, corridor-wide,
+         corridor-medium, corridor-narrow, corridor-l, corridor-t, corridor-cross, city-blocks, columns, boxes;
          faults: all of these, each in a folder of its own below DIR;
          or a folder with a scene.glb, to be spoilt
 OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave, spoiling (1)

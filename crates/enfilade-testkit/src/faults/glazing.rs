@@ -1,20 +1,25 @@
 //! Glass from wall to wall, between mullions.
 
 use crate::faults::plan::{Hole, OUT, OUTER, Plan, door, span, window};
+use crate::furniture::glaze;
 use crate::site::Generated;
 use crate::solid::aabb;
 use crate::truth::{OpeningKind, Side};
 
+/// Where the bays of [`curtain_wall`] begin along the long sides, the last one ends, and where the
+/// partition between hall and gallery stands. [Units: wu]
+const BAY: f64 = 3.0;
+const SIZE: [f64; 2] = [18.0, 9.0];
+const PARTITION: f64 = 12.0;
+const UPPER: [f64; 2] = [3.3, 6.6];
+/// Depth of mullions and transoms, and half their width. [Units: wu]
+const DEEP: f64 = 0.15;
+const HALF: f64 = 0.025;
+
 /// Two rooms below; above them a hall and a gallery, glazed on all sides from slab to slab in bays
-/// of 1.5 m between mullions of 6 × 15 cm.
+/// of 3 m between mullions, each of four panes between transoms. A bay is one window.
 pub(super) fn curtain_wall(name: &str) -> Generated {
-    const BAY: f64 = 1.5;
-    const N: [u8; 2] = [12, 6];
-    const SIZE: [f64; 2] = [18.0, 9.0];
-    const DEEP: f64 = 0.15;
     const GROUND: [f64; 2] = [0.0, 3.0];
-    const UPPER: [f64; 2] = [3.3, 6.6];
-    const PARTITION: [f64; 2] = [11.94, 12.06];
     let mut plan = Plan::new(name);
     let [length, depth] = SIZE;
     for y in [[-0.3, GROUND[0]], [GROUND[1], UPPER[0]], [UPPER[1], 6.9]] {
@@ -52,55 +57,78 @@ pub(super) fn curtain_wall(name: &str) -> Generated {
     );
 
     plan.storey = plan.site.storey("upper floor", UPPER[0]);
-    let hall = plan.room(
-        "hall",
-        [0.0, UPPER[0], 0.0],
-        [PARTITION[0], UPPER[1], depth],
-    );
+    let (before, behind) = (PARTITION - 2.0 * HALF, PARTITION + 2.0 * HALF);
+    let hall = plan.room("hall", [0.0, UPPER[0], 0.0], [before, UPPER[1], depth]);
     let gallery = plan.room(
         "gallery",
-        [PARTITION[1], UPPER[0], 0.0],
+        [behind, UPPER[0], 0.0],
         [length, UPPER[1], depth],
     );
     let between = Hole {
         up: [UPPER[0], UPPER[0] + 2.05],
         ..door(6.0, [hall, gallery])
     };
-    plan.wall(0, PARTITION, [0.0, depth], UPPER, &[between]);
+    plan.wall(0, [before, behind], [0.0, depth], UPPER, &[between]);
     for x in [[-DEEP, 0.0], [length, length + DEEP]] {
         for z in [[-DEEP, 0.0], [depth, depth + DEEP]] {
             plan.solid("mullion", span(0, x, z, UPPER));
         }
     }
     for axis in [0, 2] {
-        // The façades across x run along z, and the other way round.
-        let (n, end) = (N[1 - axis / 2], SIZE[1 - axis / 2]);
-        let far = SIZE[axis / 2];
+        // Façades across x run along z, and the other way round.
+        let (end, far) = (SIZE[1 - axis / 2], SIZE[axis / 2]);
         for (is_high, faces) in [(false, [-DEEP, 0.0]), (true, [far, far + DEEP])] {
-            for i in 1..n {
-                let at = f64::from(i) * BAY;
-                // The partition ends at a mullion as wide as itself.
-                let half = if axis == 2 && i == 8 { 0.06 } else { 0.03 };
-                plan.solid("mullion", span(axis, faces, [at - half, at + half], UPPER));
-            }
-            for i in 0..n {
-                let half = |i: u8| match i {
-                    0 => 0.0,
-                    i if i == n => 0.0,
-                    8 if axis == 2 => 0.06,
-                    _ => 0.03,
-                };
-                let low = f64::from(i) * BAY + half(i);
-                let high = (f64::from(i + 1) * BAY).min(end) - half(i + 1);
-                let is_hall = if axis == 2 { i < 8 } else { !is_high };
+            facade(&mut plan, axis, faces, end, |at| {
+                let is_hall = if axis == 2 { at < PARTITION } else { !is_high };
                 let room = if is_hall { hall } else { gallery };
-                let rooms = if is_high { [room, OUT] } else { [OUT, room] };
-                let pane = span(axis, faces, [low, high], UPPER);
-                plan.opening(OpeningKind::Window, pane, axis, rooms);
-            }
+                if is_high { [room, OUT] } else { [OUT, room] }
+            });
         }
     }
     plan.finish()
+}
+
+/// Bays of glass from 0 to `end` across `axis` between `faces`, and the rooms at a place.
+fn facade(
+    plan: &mut Plan,
+    axis: usize,
+    faces: [f64; 2],
+    end: f64,
+    rooms: impl Fn(f64) -> [Side; 2],
+) {
+    const PANES: u8 = 4;
+    let n = (end / BAY).round() as u8;
+    // The partition ends at a mullion as wide as itself; at the corners stand posts.
+    let half = |at: f64| match at {
+        at if at <= 0.0 || at >= end => 0.0,
+        at if axis == 2 && at == PARTITION => 2.0 * HALF,
+        _ => HALF,
+    };
+    for at in (1..n).map(|i| f64::from(i) * BAY) {
+        plan.solid(
+            "mullion",
+            span(axis, faces, [at - half(at), at + half(at)], UPPER),
+        );
+    }
+    for at in (0..n).map(|i| f64::from(i) * BAY) {
+        let along = [at + half(at), at + BAY - half(at + BAY)];
+        let bay = span(axis, faces, along, UPPER);
+        plan.site.opening(OpeningKind::Window, bay, axis, rooms(at));
+        let height = (UPPER[1] - UPPER[0]) / f64::from(PANES);
+        for k in 0..PANES {
+            let low = UPPER[0] + f64::from(k) * height;
+            if k > 0 {
+                plan.solid(
+                    "mullion",
+                    span(axis, faces, along, [low - HALF, low + HALF]),
+                );
+            }
+            let from = if k > 0 { low + HALF } else { low };
+            let to = low + height - if k + 1 < PANES { HALF } else { 0.0 };
+            let pane = span(axis, faces, along, [from, to]);
+            glaze(&mut plan.site, &plan.palette, &pane, axis);
+        }
+    }
 }
 
 /// Three offices behind a partition of panes in bays of 1.2 m between mullions of 6 cm, a door with
@@ -147,6 +175,7 @@ pub(super) fn mullions(name: &str) -> Generated {
                 along: [at + 0.025, at + 0.975],
                 up: [0.9, 2.4],
                 rooms: [office, OUT],
+                swing: 0.0,
             }
         }));
     }
@@ -196,12 +225,12 @@ fn glass_partition(
         if i == 1 {
             plan.solid("mullion", span(2, faces, along, [DOOR, DOOR + RAIL]));
             let way = span(2, faces, along, [0.0, DOOR]);
-            plan.opening(OpeningKind::Door, way, 2, rooms);
+            plan.opening(OpeningKind::Door, way, 2, rooms, 80.0);
             let above = span(2, faces, along, [DOOR + RAIL, height]);
-            plan.opening(OpeningKind::Window, above, 2, rooms);
+            plan.opening(OpeningKind::Window, above, 2, rooms, 0.0);
         } else {
             let pane = span(2, faces, along, [0.0, height]);
-            plan.opening(OpeningKind::Window, pane, 2, rooms);
+            plan.opening(OpeningKind::Window, pane, 2, rooms, 0.0);
         }
     }
 }

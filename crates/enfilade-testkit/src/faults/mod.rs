@@ -21,7 +21,7 @@ pub enum Fault {
     HungCeilings,
     /// Inner walls end at a hung ceiling; above it a plenum lies over all rooms.
     WallsToCeiling,
-    /// A storey is glazed from slab to slab on all sides, between mullions.
+    /// A storey is glazed from slab to slab on all sides, between mullions and transoms.
     CurtainWall,
     /// Partitions inside are panes between mullions, with a door in one bay; windows are parted.
     Mullions,
@@ -29,6 +29,8 @@ pub enum Fault {
     ColumnsInWalls,
     /// Four doorways around one post, each reaching into the corner of its rooms.
     CornerDoors,
+    /// Leaves of doors stand open into a corridor and take up most of its width.
+    LeavesInCorridor,
     /// Ten walls around seven rooms, without a floor or a ceiling.
     WallsAlone,
     /// Two rooms joined by 20 m of corridor, 1.6 m wide and as high as they.
@@ -53,7 +55,7 @@ pub enum Fault {
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::WallsAboveSlabs,
         Self::HungCeilings,
         Self::WallsToCeiling,
@@ -61,6 +63,7 @@ impl Fault {
         Self::Mullions,
         Self::ColumnsInWalls,
         Self::CornerDoors,
+        Self::LeavesInCorridor,
         Self::WallsAlone,
         Self::CorridorWide,
         Self::CorridorMedium,
@@ -84,6 +87,7 @@ impl Fault {
             Self::Mullions => "mullions",
             Self::ColumnsInWalls => "columns-in-walls",
             Self::CornerDoors => "corner-doors",
+            Self::LeavesInCorridor => "leaves-in-corridor",
             Self::WallsAlone => "walls-alone",
             Self::CorridorWide => "corridor-wide",
             Self::CorridorMedium => "corridor-medium",
@@ -109,6 +113,7 @@ impl Fault {
             Self::Mullions => glazing::mullions(name),
             Self::ColumnsInWalls => walls::columns_in_walls(name),
             Self::CornerDoors => walls::corner_doors(name),
+            Self::LeavesInCorridor => walls::leaves_in_corridor(name),
             Self::WallsAlone => walls::walls_alone(name),
             Self::CorridorWide => corridors::straight(name, 1.6),
             Self::CorridorMedium => corridors::straight(name, 1.2),

@@ -26,7 +26,12 @@ pub(super) struct Hole {
     pub(super) along: [f64; 2],
     pub(super) up: [f64; 2],
     pub(super) rooms: [Side; 2],
+    /// How far a door's leaf stands open towards its second side. [Units: degrees]
+    pub(super) swing: f64,
 }
+
+/// How far leaves stand open. [Units: degrees]
+const SWING: f64 = 80.0;
 
 /// A door of 0.9 × 2.05 m, its middle `at` along the wall.
 pub(super) fn door(at: f64, rooms: [Side; 2]) -> Hole {
@@ -35,6 +40,7 @@ pub(super) fn door(at: f64, rooms: [Side; 2]) -> Hole {
         along: [at - 0.45, at + 0.45],
         up: [0.0, 2.05],
         rooms,
+        swing: SWING,
     }
 }
 
@@ -45,6 +51,7 @@ pub(super) fn window(at: f64, rooms: [Side; 2]) -> Hole {
         along: [at - 0.7, at + 0.7],
         up: [0.9, 2.2],
         rooms,
+        swing: 0.0,
     }
 }
 
@@ -103,15 +110,22 @@ impl Plan {
         wall.carved(&[span(axis, faces, along, up)], &voids);
         self.site.structure("wall", wall);
         for (hole, void) in holes.iter().zip(&voids) {
-            self.opening(hole.kind, *void, axis, hole.rooms);
+            self.opening(hole.kind, *void, axis, hole.rooms, hole.swing);
         }
     }
 
     /// An opening in the truth, with a leaf that stands open or a pane.
-    pub(super) fn opening(&mut self, kind: OpeningKind, hole: Aabb, axis: usize, rooms: [Side; 2]) {
+    pub(super) fn opening(
+        &mut self,
+        kind: OpeningKind,
+        hole: Aabb,
+        axis: usize,
+        rooms: [Side; 2],
+        swing: f64,
+    ) {
         self.site.opening(kind, hole, axis, rooms);
         match kind {
-            OpeningKind::Door => hang_door(&mut self.site, &self.palette, &hole, axis, 80.0),
+            OpeningKind::Door => hang_door(&mut self.site, &self.palette, &hole, axis, swing),
             OpeningKind::Window => glaze(&mut self.site, &self.palette, &hole, axis),
             OpeningKind::Opening | OpeningKind::Virtual => {}
         }
@@ -142,9 +156,9 @@ pub(super) const OFFICE: [f64; 2] = [12.0, 8.0];
 /// Thickness of its outer walls. [Units: wu]
 pub(super) const OUTER: f64 = 0.3;
 
-/// Heights of [`office`]. [Units: wu]
-pub(super) struct Heights {
-    /// Where walls begin; the floor is at 0.
+/// What differs between offices; heights are above the floor. [Units: wu]
+pub(super) struct Office {
+    /// Where walls begin.
     pub(super) foot: f64,
     /// Where the rooms' air ends, at a slab or a hung ceiling.
     pub(super) ceiling: f64,
@@ -152,7 +166,24 @@ pub(super) struct Heights {
     pub(super) inner: f64,
     /// Underside of the slab above; outer walls end there.
     pub(super) slab: f64,
+    /// Leaves stand open into the corridor instead of the rooms beside it.
+    pub(super) has_leaves_in_corridor: bool,
 }
+
+impl Default for Office {
+    fn default() -> Self {
+        Self {
+            foot: 0.0,
+            ceiling: CEILING,
+            inner: CEILING,
+            slab: CEILING,
+            has_leaves_in_corridor: false,
+        }
+    }
+}
+
+/// Height of rooms. [Units: wu]
+pub(super) const CEILING: f64 = 2.7;
 
 /// Faces of the walls beside the corridor, and of the walls between the rooms on its two sides.
 pub(super) const BESIDE: [[f64; 2]; 2] = [[3.08, 3.2], [4.8, 4.92]];
@@ -162,7 +193,7 @@ pub(super) const BETWEEN: [[f64; 2]; 2] = [[5.94, 6.06], [3.94, 4.06]];
 /// inside, a front door at the corridor's end, a window a room. 0 is the floor.
 ///
 /// Returns the floor areas of the five rooms, as low and high corners (x, z).
-pub(super) fn office(plan: &mut Plan, h: &Heights) -> [[[f64; 2]; 2]; 5] {
+pub(super) fn office(plan: &mut Plan, h: &Office) -> [[[f64; 2]; 2]; 5] {
     let [length, depth] = OFFICE;
     let areas = [
         [[0.0, BESIDE[0][1]], [length, BESIDE[1][0]]],
@@ -208,20 +239,18 @@ pub(super) fn office(plan: &mut Plan, h: &Heights) -> [[[f64; 2]; 2]; 5] {
     );
     plan.wall(0, west, inner, outer_up, &[door(4.0, [OUT, corridor])]);
     plan.wall(0, east, inner, outer_up, &[]);
-    plan.wall(
-        2,
-        BESIDE[0],
-        [0.0, length],
-        inner_up,
-        &[door(1.5, [nw, corridor]), door(10.0, [ne, corridor])],
-    );
-    plan.wall(
-        2,
-        BESIDE[1],
-        [0.0, length],
-        inner_up,
-        &[door(2.5, [corridor, sw]), door(6.0, [corridor, se])],
-    );
+    let mut north = [door(1.5, [nw, corridor]), door(10.0, [ne, corridor])];
+    let mut south = [door(2.5, [corridor, sw]), door(6.0, [corridor, se])];
+    let doors = if h.has_leaves_in_corridor {
+        &mut south
+    } else {
+        &mut north
+    };
+    for door in doors {
+        door.swing = -door.swing;
+    }
+    plan.wall(2, BESIDE[0], [0.0, length], inner_up, &north);
+    plan.wall(2, BESIDE[1], [0.0, length], inner_up, &south);
     plan.wall(0, BETWEEN[0], [0.0, BESIDE[0][0]], inner_up, &[]);
     plan.wall(0, BETWEEN[1], [BESIDE[1][1], depth], inner_up, &[]);
     for [low, high] in [[-0.3, 0.0], [h.slab, h.slab + 0.3]] {

@@ -2,7 +2,7 @@
 
 use enfilade_geom::{Aabb, DVec2};
 
-use crate::faults::plan::{Heights, OFFICE, OUT, OUTER, Plan, at, door, office, window};
+use crate::faults::plan::{CEILING, OFFICE, OUT, OUTER, Office, Plan, at, door, office, window};
 use crate::site::Generated;
 use crate::solid::{MeshBuilder, aabb};
 use crate::truth::{Convex, Room};
@@ -92,7 +92,6 @@ pub(super) fn columns(name: &str) -> Generated {
 /// Boxes in an office: free, against walls, in corners, on each other, below the ceiling, and from
 /// floor to ceiling. Their names say nothing.
 pub(super) fn boxes(name: &str) -> Generated {
-    const CEILING: f64 = 2.7;
     let mut plan = Plan::new(name);
     let [length, depth] = OFFICE;
     let places = [
@@ -116,12 +115,6 @@ pub(super) fn boxes(name: &str) -> Generated {
     for b in places {
         plan.obstacle("block", b);
     }
-    let heights = Heights {
-        foot: 0.0,
-        ceiling: CEILING,
-        inner: CEILING,
-        slab: CEILING,
-    };
-    office(&mut plan, &heights);
+    office(&mut plan, &Office::default());
     plan.finish()
 }

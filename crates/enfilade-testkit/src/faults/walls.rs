@@ -1,14 +1,11 @@
 //! Walls with something in them, and walls with nothing around them.
 
 use crate::faults::plan::{
-    BESIDE, BETWEEN, Heights, Hole, OFFICE, OUT, OUTER, Plan, door, office, window,
+    BESIDE, BETWEEN, CEILING, Hole, OFFICE, OUT, OUTER, Office, Plan, door, office, window,
 };
 use crate::site::Generated;
 use crate::solid::aabb;
-use crate::truth::{OpeningKind, Side};
-
-/// Height of rooms. [Units: wu]
-const CEILING: f64 = 2.7;
+use crate::truth::Side;
 
 /// Columns of 40 cm in walls of 12 and 30 cm, in their middle, at their ends and where they meet.
 pub(super) fn columns_in_walls(name: &str) -> Generated {
@@ -35,13 +32,7 @@ pub(super) fn columns_in_walls(name: &str) -> Generated {
         let b = aabb([x - HALF, 0.0, z - HALF], [x + HALF, CEILING, z + HALF]);
         plan.obstacle("column", b);
     }
-    let heights = Heights {
-        foot: 0.0,
-        ceiling: CEILING,
-        inner: CEILING,
-        slab: CEILING,
-    };
-    office(&mut plan, &heights);
+    office(&mut plan, &Office::default());
     plan.finish()
 }
 
@@ -62,10 +53,8 @@ pub(super) fn corner_doors(name: &str) -> Generated {
     let before = [POST[0] - WIDTH, POST[0]];
     let behind = [POST[1], POST[1] + WIDTH];
     let doorway = |along: [f64; 2], rooms: [Side; 2]| Hole {
-        kind: OpeningKind::Door,
         along,
-        up: [0.0, 2.05],
-        rooms,
+        ..door(0.0, rooms)
     };
     plan.wall(0, POST, halves[0], up, &[doorway(before, [nw, ne])]);
     plan.wall(0, POST, halves[1], up, &[doorway(behind, [sw, se])]);
@@ -136,9 +125,13 @@ pub(super) fn walls_alone(name: &str) -> Generated {
             }
         };
         let middle = |i: usize| f64::midpoint(columns[i][0], columns[i][1]);
-        let doors: Vec<Hole> = (0..3)
+        let mut doors: Vec<Hole> = (0..3)
             .map(|i| door(middle(i) + 0.5, order(rooms[i], corridor)))
             .collect();
+        if side == 0 {
+            // Into the rooms, like those of the other side.
+            doors.iter_mut().for_each(|d| d.swing = -d.swing);
+        }
         let windows: Vec<Hole> = (0..3)
             .map(|i| window(middle(i), order(OUT, rooms[i])))
             .collect();
@@ -161,5 +154,16 @@ pub(super) fn walls_alone(name: &str) -> Generated {
         &[door(5.0, [OUT, corridor])],
     );
     plan.wall(0, [LENGTH, LENGTH + OUTER], [0.0, DEPTH], UP, &[]);
+    plan.finish()
+}
+
+/// A sound building, but leaves that stand open take up most of the corridor's width.
+pub(super) fn leaves_in_corridor(name: &str) -> Generated {
+    let mut plan = Plan::new(name);
+    let how = Office {
+        has_leaves_in_corridor: true,
+        ..Office::default()
+    };
+    office(&mut plan, &how);
     plan.finish()
 }
