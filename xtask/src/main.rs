@@ -227,3 +227,26 @@ fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<Strin
     }
     Ok(String::from_utf8(done.stdout)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messy_has_options_of_its_own() {
+        let parse = |line: &str| Task::parse(line.split(' ').map(str::to_owned));
+        let Some(Task::Messy(options)) =
+            parse("bench messy --json --rows moved,fault --scenes house --rays 100")
+        else {
+            panic!("not understood");
+        };
+        assert!(options.is_json);
+        assert_eq!(options.rows, ["moved", "fault"]);
+        assert_eq!(options.scenes, ["house"]);
+        assert_eq!(options.rays, Some(100));
+        assert!(matches!(parse("bench --write"), Some(Task::Bench { .. })));
+        assert!(parse("bench messy --write").is_none());
+        assert!(parse("bench --json").is_none());
+        assert!(parse("score messy --json").is_none());
+    }
+}

@@ -1,5 +1,6 @@
 //! One bake, and all that can be counted about it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -102,15 +103,13 @@ pub(super) fn n_indoors(graph: &Value, world: &Path, points: &[V3]) -> anyhow::R
     if points.is_empty() {
         return Ok(0);
     }
-    let cells = list(&graph["cells"]);
-    let is_indoor = |id: &String| {
-        let mut cells = cells.iter();
-        cells.any(|c| c["id"].to_string() == *id && c["outdoor"] != true)
-    };
-    Ok(locate(world, points)?
+    let indoors: BTreeSet<String> = list(&graph["cells"])
         .iter()
-        .filter(|&id| is_indoor(id))
-        .count())
+        .filter(|c| c["outdoor"] != true)
+        .map(|c| c["id"].to_string())
+        .collect();
+    let cells = locate(world, points)?;
+    Ok(cells.iter().filter(|&id| indoors.contains(id)).count())
 }
 
 /// Promises that `verify` finds broken; lines that the source's triangles block are not tried.
