@@ -5,6 +5,7 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_import::{ImportOptions, RoleRules, export_glb, import};
@@ -19,9 +20,7 @@ SCENE    house, tower, maze, cave, gjorup-optimised, gjorup-tessellated, gjorup-
          gjorup-cavern, or a small building: two-rooms, two-rooms-crack, zero-thickness-rooms,
          open-courtyard, room-within-room, l-corridor, stair-hall, rooms-with-closet,
          double-door-corridor, glass-facade-office, pitched-roof-attic;
-         or one with a fault: walls-above-slabs, hung-ceilings, walls-to-ceiling, curtain-wall,
-         mullions, columns-in-walls, corner-doors, leaves-in-corridor, walls-alone, corridor-wide,
-         corridor-medium, corridor-narrow, corridor-l, corridor-t, corridor-cross, city-blocks, columns, boxes;
+         or one with a fault: {FAULTS};
          faults: all of these, each in a folder of its own below DIR;
          or a folder with a scene.glb, to be spoilt
 OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave, spoiling (1)
@@ -32,6 +31,30 @@ SPOILT   --jitter M    each corner of each triangle moved, standard deviation M 
          --drop SHARE  that share of the triangles is missing
          --snap M      corners rounded to a grid of M meters per object
          --strip       names and materials gone; structure and detail are one file";
+
+/// The usage with the names of the faults.
+fn usage() -> String {
+    let indent = " ".repeat(9);
+    let mut names = String::new();
+    // Columns of the line so far: names stand behind a few words.
+    let mut used = indent.len() + "or one with a fault: ".len();
+    for name in Fault::ALL.map(Fault::name) {
+        if !names.is_empty() {
+            names.push(',');
+            used += 2 + name.len();
+            if used > 98 {
+                names += &format!("\n{indent}");
+                used = indent.len() + name.len();
+            } else {
+                names.push(' ');
+            }
+        } else {
+            used += name.len();
+        }
+        names += name;
+    }
+    USAGE.replace("{FAULTS}", &names)
+}
 
 /// What is asked for.
 #[derive(Default)]
@@ -55,7 +78,7 @@ impl Options {
         while let Some(option) = args.next() {
             let mut value = || {
                 args.next()
-                    .ok_or(format!("{option} needs a value\n{USAGE}"))
+                    .ok_or(format!("{option} needs a value\n{}", usage()))
             };
             match option.as_str() {
                 "-o" => folder = Some(PathBuf::from(value()?)),
@@ -71,10 +94,10 @@ impl Options {
                 "--drop" => o.spoilt.drop = value()?.parse()?,
                 "--snap" => o.spoilt.snap = value()?.parse()?,
                 "--strip" => o.spoilt.strip = true,
-                _ => return Err(format!("unknown option {option}\n{USAGE}").into()),
+                _ => return Err(format!("unknown option {option}\n{}", usage()).into()),
             }
         }
-        o.folder = folder.ok_or(USAGE)?;
+        o.folder = folder.ok_or_else(usage)?;
         o.tower = TowerParams {
             cracks: o.tower.cracks,
             double_walls: o.tower.double_walls,
@@ -184,9 +207,19 @@ fn write_or_remove(path: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
-    let name = args.next().ok_or(USAGE)?;
+    let name = args.next().ok_or_else(usage)?;
     let options = Options::parse(args)?;
     let seed = options.spoilt.seed;
     let generated = match name.as_str() {
@@ -213,7 +246,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             fault
                 .map(Fault::build)
                 .or_else(small)
-                .ok_or(format!("no scene {name}\n{USAGE}"))?
+                .ok_or(format!("no scene {name}\n{}", usage()))?
         }
     };
     let folder = options.folder.clone();
