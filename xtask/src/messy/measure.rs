@@ -224,11 +224,12 @@ mod tests {
         assert_eq!(unsaid(&closed, "1 room has No Doorway"), Some(0));
         let empty = json!({"cells": [cell(0, true)], "portals": []});
         assert_eq!(unsaid(&empty, "cells"), Some(1));
-        let cracked = [
-            portal([1, 2], "open", 0.0, 0.0),
-            portal([1, 2], "crack", 1.0, 0.0),
-        ];
-        let cracked = json!({"cells": rooms, "portals": cracked});
-        assert_eq!(unsaid(&cracked, ""), None);
+        let crack = |x| portal([1, 2], "crack", x, 0.0);
+        let door = || portal([1, 2], "open", 0.0, 0.0);
+        let cracked = |portals: &[Value]| json!({"cells": rooms, "portals": portals});
+        assert_eq!(unsaid(&cracked(&[door(), crack(1.0)]), ""), None);
+        let many = cracked(&[door(), crack(1.0), crack(2.0)]);
+        assert_eq!(unsaid(&many, ""), Some(1));
+        assert_eq!(unsaid(&many, "2 gaps let light through"), Some(0));
     }
 }
