@@ -6,6 +6,7 @@
 mod apt;
 mod bench;
 mod check;
+mod messy;
 mod score;
 mod tidy;
 
@@ -18,11 +19,15 @@ const USAGE: &str = "\
 usage: cargo xtask test
        cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
+       cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
   score   rooms and doors found, against the rooms that architects modeled
   bench   growth of time and memory with the size of an office tower; with --peers, the voxel
-          kernels beside other implementations too (scripts/bench_kernels.py)
+          kernels beside other implementations too (scripts/bench_kernels.py);
+          messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
+          (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
+          choose by how names begin
 
 --write puts the table into docs/benchmarks/. Real scenes (folders with a scene.glb) are looked for
 in $ENFILADE_SCENES, then in ../shared/scenes.";
@@ -35,6 +40,7 @@ fn main() -> ExitCode {
     let result = match task {
         Task::Test => check::run(),
         Task::Score { is_written, dirs } => score::run(&dirs, is_written),
+        Task::Messy(options) => messy::run(&options),
         Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
     };
     match result {
@@ -57,6 +63,7 @@ enum Task {
         is_written: bool,
         peers: Option<PathBuf>,
     },
+    Messy(messy::Options),
 }
 
 impl Task {
@@ -64,8 +71,21 @@ impl Task {
     fn parse(mut args: impl Iterator<Item = String>) -> Option<Self> {
         let name = args.next()?;
         let (mut is_written, mut dirs, mut peers) = (false, Vec::new(), None);
+        let mut messy: Option<messy::Options> = None;
         while let Some(arg) = args.next() {
             match (name.as_str(), arg.as_str()) {
+                ("bench", "messy") => messy = Some(messy::Options::default()),
+                ("bench", option) if messy.is_some() => {
+                    let options = messy.as_mut()?;
+                    let names = |list: String| list.split(',').map(str::to_owned).collect();
+                    match option {
+                        "--json" => options.is_json = true,
+                        "--rows" => options.rows = names(args.next()?),
+                        "--scenes" => options.scenes = names(args.next()?),
+                        "--rays" => options.rays = Some(args.next()?.parse().ok()?),
+                        _ => return None,
+                    }
+                }
                 ("score" | "bench", "--write") => is_written = true,
                 ("score", "--scenes") => dirs.extend(scenes_in(Path::new(&args.next()?))),
                 ("bench", "--peers") => peers = Some(PathBuf::from(args.next()?)),
@@ -76,6 +96,7 @@ impl Task {
         match name.as_str() {
             "test" => Some(Self::Test),
             "score" => Some(Self::Score { is_written, dirs }),
+            "bench" if messy.is_some() => messy.map(Self::Messy),
             "bench" => Some(Self::Bench { is_written, peers }),
             _ => None,
         }
@@ -205,4 +226,27 @@ fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<Strin
         );
     }
     Ok(String::from_utf8(done.stdout)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messy_has_options_of_its_own() {
+        let parse = |line: &str| Task::parse(line.split(' ').map(str::to_owned));
+        let Some(Task::Messy(options)) =
+            parse("bench messy --json --rows moved,fault --scenes house --rays 100")
+        else {
+            panic!("not understood");
+        };
+        assert!(options.is_json);
+        assert_eq!(options.rows, ["moved", "fault"]);
+        assert_eq!(options.scenes, ["house"]);
+        assert_eq!(options.rays, Some(100));
+        assert!(matches!(parse("bench --write"), Some(Task::Bench { .. })));
+        assert!(parse("bench messy --write").is_none());
+        assert!(parse("bench --json").is_none());
+        assert!(parse("score messy --json").is_none());
+    }
 }

@@ -16,12 +16,12 @@ use crate::{
     bake_command, binary, cargo, output_of, run_to_end, scenes, target_dir, write_between_marks,
 };
 
-type V3 = [f64; 3];
+pub(crate) type V3 = [f64; 3];
 
-fn sub(a: V3, b: V3) -> V3 {
+pub(crate) fn sub(a: V3, b: V3) -> V3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
-fn dot(a: V3, b: V3) -> f64 {
+pub(crate) fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 fn cross(a: V3, b: V3) -> V3 {
@@ -31,14 +31,14 @@ fn cross(a: V3, b: V3) -> V3 {
         a[0] * b[1] - a[1] * b[0],
     ]
 }
-fn unit(a: V3) -> V3 {
+pub(crate) fn unit(a: V3) -> V3 {
     a.map(|x| x / dot(a, a).sqrt())
 }
 fn along(a: V3, d: V3, t: f64) -> V3 {
     [a[0] + d[0] * t, a[1] + d[1] * t, a[2] + d[2] * t]
 }
 
-fn vec3(v: &Value) -> Option<V3> {
+pub(crate) fn vec3(v: &Value) -> Option<V3> {
     let a = v.as_array()?;
     Some([
         a.first()?.as_f64()?,
@@ -48,7 +48,7 @@ fn vec3(v: &Value) -> Option<V3> {
 }
 
 /// Centroid and area of a convex polygon.
-fn center_and_area(points: &[V3]) -> (V3, f64) {
+pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
     let (mut center, mut area) = ([0.0; 3], 0.0);
     for i in 1..points.len().saturating_sub(1) {
         let n = cross(sub(points[i], points[0]), sub(points[i + 1], points[0]));
@@ -66,10 +66,11 @@ fn center_and_area(points: &[V3]) -> (V3, f64) {
 }
 
 /// One row of the table; `None` where a scene has nothing of the kind.
-struct Row {
+pub(crate) struct Row {
     name: String,
     n_rooms: usize,
-    figures: [Option<f64>; 6],
+    /// By [`COLUMNS`].
+    pub(crate) figures: [Option<f64>; 6],
     seconds: f64,
     failed: Vec<String>,
 }
@@ -149,7 +150,8 @@ fn table(rows: &[Row], with_seconds: bool) -> String {
     out
 }
 
-fn locate(world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
+/// The cell of each point, `-` for none.
+pub(crate) fn locate(world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
     let text: String = points
         .iter()
         .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
@@ -192,6 +194,24 @@ fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
 }
 
 fn score_scene(dir: &Path) -> anyhow::Result<Row> {
+    let name = dir.file_name().unwrap_or_default().to_string_lossy();
+    let world = target_dir().join(format!("score-{name}.glb"));
+    let start = Instant::now();
+    output_of(&mut bake_command(dir, &world), None)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let row = score_world(dir, &world, &inspect(&world)?)?;
+    Ok(Row { seconds, ..row })
+}
+
+/// What `inspect --json` says.
+pub(crate) fn inspect(world: &Path) -> anyhow::Result<Value> {
+    let mut command = Command::new(binary("enfilade"));
+    command.arg("inspect").arg(world).arg("--json");
+    Ok(serde_json::from_str(&output_of(&mut command, None)?)?)
+}
+
+/// Scores a world, with what `inspect` says of it, against the truth in its scene's folder.
+pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Result<Row> {
     let name = dir
         .file_name()
         .unwrap_or_default()
@@ -199,18 +219,6 @@ fn score_scene(dir: &Path) -> anyhow::Result<Row> {
         .into_owned();
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)
         .with_context(|| format!("{name}/truth.json"))?;
-    let world = target_dir().join(format!("score-{name}.glb"));
-    let start = Instant::now();
-    output_of(&mut bake_command(dir, &world), None)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let said = output_of(
-        Command::new(binary("enfilade"))
-            .arg("inspect")
-            .arg(&world)
-            .arg("--json"),
-        None,
-    )?;
-    let graph: Value = serde_json::from_str(&said)?;
     let empty = Vec::new();
     let list = |v: &'_ Value| v.as_array().cloned().unwrap_or_else(|| empty.clone());
     let (rooms, openings) = (list(&truth["rooms"]), list(&truth["openings"]));
@@ -225,7 +233,7 @@ fn score_scene(dir: &Path) -> anyhow::Result<Row> {
             owner.push(text(&r["id"]));
         }
     }
-    let cells = locate(&world, &points)?;
+    let cells = locate(world, &points)?;
     // A point that is nowhere shares its cell with no other.
     let found: Vec<String> = cells
         .iter()
@@ -300,7 +308,7 @@ fn score_scene(dir: &Path) -> anyhow::Result<Row> {
         let (c, n, t) = place(o).context("an opening without place")?;
         probes.extend([along(c, n, 0.35 + t / 2.0), along(c, n, -0.35 - t / 2.0)]);
     }
-    let sides = locate(&world, &probes)?;
+    let sides = locate(world, &probes)?;
     let (mut hits, mut tried) = (
         BTreeMap::<String, usize>::new(),
         BTreeMap::<String, usize>::new(),
@@ -360,7 +368,7 @@ fn score_scene(dir: &Path) -> anyhow::Result<Row> {
             per_n(extra),
             pair_mcc(&owner, &owner_group, &found),
         ],
-        seconds,
+        seconds: f64::NAN,
         failed,
     })
 }

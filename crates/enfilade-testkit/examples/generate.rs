@@ -1,15 +1,17 @@
-//! Writes a generated scene as `scene.glb` (structure), `detail.glb` and `truth.json`:
+//! Writes a generated scene as `scene.glb` (structure), `detail.glb` and `truth.json`, on request
+//! spoilt, or spoils a scene that is there:
 //!
-//! `cargo run -p enfilade-testkit --example generate -- tower --rooms 64 -o DIR`
+//! `cargo run -p enfilade-testkit --example generate -- tower --rooms 64 --jitter 1e-4 -o DIR`
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
-use enfilade_geom::scene::Role;
-use enfilade_import::export_glb;
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_import::{ImportOptions, RoleRules, export_glb, import};
 use enfilade_testkit::{
-    Generated, TowerParams, Variant, cave, dirkse_maze, furnished_house, gjorup_cavern,
-    gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
+    Disturbance, Fault, Generated, TowerParams, Variant, cave, dirkse_maze, disturb, disturbed,
+    furnished_house, gjorup_cavern, gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
 };
 
 const USAGE: &str = "\
@@ -17,83 +19,236 @@ usage: generate SCENE [OPTIONS] -o DIR
 SCENE    house, tower, maze, cave, gjorup-optimised, gjorup-tessellated, gjorup-distorted,
          gjorup-cavern, or a small building: two-rooms, two-rooms-crack, zero-thickness-rooms,
          open-courtyard, room-within-room, l-corridor, stair-hall, rooms-with-closet,
-         double-door-corridor, glass-facade-office, pitched-roof-attic
-OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave (1)
+         double-door-corridor, glass-facade-office, pitched-roof-attic;
+         or one with a fault: {FAULTS};
+         faults: all of these, each in a folder of its own below DIR;
+         or a folder with a scene.glb, to be spoilt
+OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave, spoiling (1)
          --cracks, --double-walls, --leaves        of the tower
          --turn DEG    about +Y                    --scale F     about the origin
-         --shuffle N   triangles in another order, by seed";
+         --shuffle N   triangles in another order, by seed
+SPOILT   --jitter M    each corner of each triangle moved, standard deviation M meters
+         --drop SHARE  that share of the triangles is missing
+         --snap M      corners rounded to a grid of M meters per object
+         --strip       names and materials gone; structure and detail are one file";
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut args = std::env::args().skip(1);
-    let scene = args.next().ok_or(USAGE)?;
-    let mut folder = None;
-    let (mut rooms, mut seed, mut turn, mut scale, mut shuffle) = (64, 1, 0.0, 1.0, None);
-    let (mut cracks, mut double_walls, mut leaves) = (false, false, false);
-    while let Some(option) = args.next() {
-        let mut value = || {
-            args.next()
-                .ok_or(format!("{option} needs a value\n{USAGE}"))
+/// The usage with the names of the faults.
+fn usage() -> String {
+    let indent = " ".repeat(9);
+    let mut names = String::new();
+    // Columns of the line so far: names stand behind a few words.
+    let mut used = indent.len() + "or one with a fault: ".len();
+    for name in Fault::ALL.map(Fault::name) {
+        if !names.is_empty() {
+            names.push(',');
+            used += 2 + name.len();
+            if used > 98 {
+                names += &format!("\n{indent}");
+                used = indent.len() + name.len();
+            } else {
+                names.push(' ');
+            }
+        } else {
+            used += name.len();
+        }
+        names += name;
+    }
+    USAGE.replace("{FAULTS}", &names)
+}
+
+/// What is asked for.
+#[derive(Default)]
+struct Options {
+    folder: PathBuf,
+    tower: TowerParams,
+    turn: f64,
+    scale: f64,
+    shuffle: Option<u64>,
+    spoilt: Disturbance,
+}
+
+impl Options {
+    fn parse(mut args: impl Iterator<Item = String>) -> Result<Self, Box<dyn Error>> {
+        let (mut folder, mut rooms) = (None, 64);
+        let mut o = Self {
+            scale: 1.0,
+            ..Self::default()
         };
-        match option.as_str() {
-            "-o" => folder = Some(PathBuf::from(value()?)),
-            "--rooms" => rooms = value()?.parse()?,
-            "--seed" => seed = value()?.parse()?,
-            "--turn" => turn = value()?.parse()?,
-            "--scale" => scale = value()?.parse()?,
-            "--shuffle" => shuffle = Some(value()?.parse()?),
-            "--cracks" => cracks = true,
-            "--double-walls" => double_walls = true,
-            "--leaves" => leaves = true,
-            _ => return Err(format!("unknown option {option}\n{USAGE}").into()),
+        o.spoilt.seed = 1;
+        while let Some(option) = args.next() {
+            let mut value = || {
+                args.next()
+                    .ok_or(format!("{option} needs a value\n{}", usage()))
+            };
+            match option.as_str() {
+                "-o" => folder = Some(PathBuf::from(value()?)),
+                "--rooms" => rooms = value()?.parse()?,
+                "--seed" => o.spoilt.seed = value()?.parse()?,
+                "--turn" => o.turn = value()?.parse()?,
+                "--scale" => o.scale = value()?.parse()?,
+                "--shuffle" => o.shuffle = Some(value()?.parse()?),
+                "--cracks" => o.tower.cracks = true,
+                "--double-walls" => o.tower.double_walls = true,
+                "--leaves" => o.tower.leaves = true,
+                "--jitter" => o.spoilt.jitter = value()?.parse()?,
+                "--drop" => o.spoilt.drop = value()?.parse()?,
+                "--snap" => o.spoilt.snap = value()?.parse()?,
+                "--strip" => o.spoilt.strip = true,
+                _ => return Err(format!("unknown option {option}\n{}", usage()).into()),
+            }
+        }
+        o.folder = folder.ok_or_else(usage)?;
+        o.tower = TowerParams {
+            cracks: o.tower.cracks,
+            double_walls: o.tower.double_walls,
+            leaves: o.tower.leaves,
+            ..TowerParams::with_rooms(rooms, o.spoilt.seed)
+        };
+        Ok(o)
+    }
+
+    fn is_spoilt(&self) -> bool {
+        let d = &self.spoilt;
+        d.strip || [d.jitter, d.drop, d.snap].iter().any(|&x| x > 0.0)
+    }
+
+    /// Writes a scene with what is asked for done to it.
+    fn write(&self, mut generated: Generated, folder: &Path) -> Result<(), Box<dyn Error>> {
+        if self.turn != 0.0 {
+            generated = rotated(generated, self.turn);
+        }
+        if self.scale != 1.0 {
+            generated = scaled(generated, self.scale);
+        }
+        if let Some(seed) = self.shuffle {
+            generated = shuffled(generated, seed);
+        }
+        if self.is_spoilt() {
+            generated = disturbed(&generated, &self.spoilt);
+        }
+        std::fs::create_dir_all(folder)?;
+        let structure = generated.only(Role::Structural);
+        std::fs::write(folder.join("scene.glb"), export_glb(&structure))?;
+        write_or_remove(&folder.join("detail.glb"), &generated.only(Role::Detail))?;
+        std::fs::write(folder.join("truth.json"), generated.truth_json())?;
+        eprintln!(
+            "{} rooms, {} openings, {} structural and {} detail triangles in {}",
+            generated.truth.rooms.len(),
+            generated.truth.openings.len(),
+            generated.n_triangles(Role::Structural),
+            generated.n_triangles(Role::Detail),
+            folder.display()
+        );
+        Ok(())
+    }
+
+    /// Spoils the files of a folder, each by itself, and copies the truth.
+    fn spoil(&self, from: &Path) -> Result<(), Box<dyn Error>> {
+        // What is detail is judged when the result is read; here no object may be left out.
+        let options = ImportOptions {
+            roles: RoleRules {
+                is_manual: true,
+                ..RoleRules::default()
+            },
+            ..ImportOptions::default()
+        };
+        let read = |name: &str| -> Result<Scene, Box<dyn Error>> {
+            let path = from.join(name);
+            Ok(if path.is_file() {
+                import(&[path], &[], &options)?.scene
+            } else {
+                Scene::default()
+            })
+        };
+        let (scene, detail) = (read("scene.glb")?, read("detail.glb")?);
+        std::fs::create_dir_all(&self.folder)?;
+        let spoilt = |scene: &Scene, first: u64| {
+            let seed = self.spoilt.seed ^ (first << 32);
+            disturb(
+                scene,
+                &Disturbance {
+                    seed,
+                    ..self.spoilt
+                },
+            )
+        };
+        let (mut scene, mut detail) = (spoilt(&scene, 0), spoilt(&detail, 1));
+        if self.spoilt.strip {
+            append(&mut scene, std::mem::take(&mut detail));
+        }
+        std::fs::write(self.folder.join("scene.glb"), export_glb(&scene))?;
+        write_or_remove(&self.folder.join("detail.glb"), &detail)?;
+        let truth = from.join("truth.json");
+        if truth.is_file() {
+            std::fs::copy(truth, self.folder.join("truth.json"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Adds a scene without materials to another.
+fn append(scene: &mut Scene, other: Scene) {
+    let n_meshes = scene.meshes.len() as u32;
+    scene.meshes.extend(other.meshes);
+    for mut object in other.objects {
+        object.mesh += n_meshes;
+        object.name = format!("object-{}", scene.objects.len() + 1);
+        scene.objects.push(object);
+    }
+}
+
+/// A folder may hold the detail of an earlier scene.
+fn write_or_remove(path: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
+    if !scene.objects.is_empty() {
+        std::fs::write(path, export_glb(scene))?;
+    } else if path.exists() {
+        std::fs::remove_file(path)?;
+    }
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
         }
     }
-    let folder = folder.ok_or(USAGE)?;
-    let tower = || TowerParams {
-        cracks,
-        double_walls,
-        leaves,
-        ..TowerParams::with_rooms(rooms, seed)
-    };
-    let mut generated: Generated = match scene.as_str() {
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    let mut args = std::env::args().skip(1);
+    let name = args.next().ok_or_else(usage)?;
+    let options = Options::parse(args)?;
+    let seed = options.spoilt.seed;
+    let generated = match name.as_str() {
         "house" => furnished_house(),
-        "tower" => office_tower(&tower()),
+        "tower" => office_tower(&options.tower),
         "maze" => dirkse_maze(seed),
         "cave" => cave(seed),
         "gjorup-optimised" => gjorup_rooms(Variant::Optimised, [0.0; 3]),
         "gjorup-tessellated" => gjorup_rooms(Variant::Tessellated, [0.0; 3]),
         "gjorup-distorted" => gjorup_rooms(Variant::Distorted, [0.0; 3]),
         "gjorup-cavern" => gjorup_cavern([0.0; 3]),
+        "faults" => {
+            for fault in Fault::ALL {
+                options.write(fault.build(), &options.folder.join(fault.name()))?;
+            }
+            return Ok(());
+        }
+        name if Path::new(name).join("scene.glb").is_file() => {
+            return options.spoil(Path::new(name));
+        }
         name => {
-            let found = mixed::all().into_iter().find(|g| g.truth.scene == name);
-            found.ok_or(format!("no scene {name}\n{USAGE}"))?
+            let fault = Fault::ALL.into_iter().find(|f| f.name() == name);
+            let small = || mixed::all().into_iter().find(|g| g.truth.scene == name);
+            fault
+                .map(Fault::build)
+                .or_else(small)
+                .ok_or(format!("no scene {name}\n{}", usage()))?
         }
     };
-    if turn != 0.0 {
-        generated = rotated(generated, turn);
-    }
-    if scale != 1.0 {
-        generated = scaled(generated, scale);
-    }
-    if let Some(seed) = shuffle {
-        generated = shuffled(generated, seed);
-    }
-    std::fs::create_dir_all(&folder)?;
-    std::fs::write(
-        folder.join("scene.glb"),
-        export_glb(&generated.only(Role::Structural)),
-    )?;
-    let detail = generated.only(Role::Detail);
-    if !detail.objects.is_empty() {
-        std::fs::write(folder.join("detail.glb"), export_glb(&detail))?;
-    }
-    std::fs::write(folder.join("truth.json"), generated.truth_json())?;
-    eprintln!(
-        "{} rooms, {} openings, {} structural and {} detail triangles in {}",
-        generated.truth.rooms.len(),
-        generated.truth.openings.len(),
-        generated.n_triangles(Role::Structural),
-        generated.n_triangles(Role::Detail),
-        folder.display()
-    );
-    Ok(())
+    let folder = options.folder.clone();
+    options.write(generated, &folder)
 }

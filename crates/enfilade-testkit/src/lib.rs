@@ -16,6 +16,8 @@
 
 mod cave;
 mod clinic;
+mod disturb;
+mod faults;
 pub mod furniture;
 mod gjorup;
 mod graphs;
@@ -38,6 +40,8 @@ mod tubes;
 
 pub use cave::cave;
 pub use clinic::clinic;
+pub use disturb::{Disturbance, disturb, disturbed};
+pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use graphs::{GridParams, courtyard, room_grid, window_tower};
 pub use house::furnished_house;

@@ -241,6 +241,11 @@ impl Site {
         self.generated.truth.openings.push(opening);
     }
 
+    /// Adds a point to the truth that lies in matter.
+    pub fn matter(&mut self, point: DVec3) {
+        self.generated.truth.matter.push(point);
+    }
+
     /// The scene and its truth.
     #[must_use]
     pub fn finish(self) -> Generated {

@@ -16,6 +16,8 @@ pub struct Truth {
     pub openings: Vec<Opening>,
     /// Storeys as name and height of the floor, ascending. [Units: wu]
     pub storeys: Vec<(String, f64)>,
+    /// Points inside closed solids that might be taken for rooms.
+    pub matter: Vec<DVec3>,
 }
 
 /// A room.
@@ -359,6 +361,9 @@ impl Truth {
             o.width *= scale;
             o.height *= scale;
             o.thickness *= scale;
+        }
+        for p in &mut self.matter {
+            *p = by.transform_point3(*p);
         }
         for (_, elevation) in &mut self.storeys {
             *elevation = by.transform_point3(DVec3::Y * *elevation).y;

@@ -8,7 +8,7 @@ use crate::truth::{OpeningKind, Side, Truth};
 
 impl Truth {
     /// The truth as JSON, `schema_version` 1 of the shared scenes: rooms, openings, storeys,
-    /// bounds and counts. `occluder_triangles` is the number of structural triangles.
+    /// bounds and counts; besides them `matter`, points inside closed solids. `occluder_triangles` is the number of structural triangles.
     #[must_use]
     pub fn to_json(&self, occluder_triangles: usize) -> String {
         let mut out = String::new();
@@ -75,7 +75,7 @@ impl Truth {
             "{{\"scene\":{},\"schema_version\":1,\"units\":\"metre\",\"up\":\"+Y\",\
              \"handedness\":\"right\",\"bounds\":{},\"counts\":{{\"rooms\":{},\
              \"occluder_triangles\":{occluder_triangles},\"door\":{},\"window\":{},\"opening\":{},\
-             \"virtual\":{}}},\"storeys\":{storeys},\n\"rooms\":[\n{}\n],\n\"openings\":[\n{}\n]}}\n",
+             \"virtual\":{}}},\"storeys\":{storeys},\"matter\":{},\n\"rooms\":[\n{}\n],\n\"openings\":[\n{}\n]}}\n",
             text(&self.scene),
             bounds_json(&bounds),
             self.rooms.len(),
@@ -83,6 +83,7 @@ impl Truth {
             count(OpeningKind::Window),
             count(OpeningKind::Opening),
             count(OpeningKind::Virtual),
+            list(&self.matter, |p| point(*p)),
             rooms.join(",\n"),
             openings.join(",\n"),
         );

@@ -6,7 +6,7 @@ use enfilade_testkit::oracle::{
     FloodGrid, n_open_edges, segment_is_blocked, structural_triangles, winding_number,
 };
 use enfilade_testkit::{
-    Convex, Generated, OpeningKind, Rng, Side, TowerParams, Variant, cave, dirkse_maze,
+    Convex, Fault, Generated, OpeningKind, Rng, Side, TowerParams, Variant, cave, dirkse_maze,
     furnished_house, gjorup_cavern, gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
 };
 
@@ -274,6 +274,33 @@ fn small_buildings_are_sound() {
         check_openings_fill_their_holes(&g);
         check_rooms_are_apart(&g, 0.08, 1.0);
         check_volumes(&g);
+    }
+}
+
+#[test]
+fn buildings_with_faults_have_no_others() {
+    for fault in Fault::ALL {
+        let g = fault.build();
+        assert_eq!(g.truth.scene, fault.name());
+        check_solids_are_closed(&g);
+        check_truth_is_in_order(&g);
+        // A bay of a curtain wall is a window across which transoms run.
+        let share = if fault == Fault::CurtainWall {
+            0.8
+        } else {
+            1.0
+        };
+        check_openings_are_open(&g, share);
+        check_openings_fill_their_holes(&g);
+        // Without floors and ceilings all rooms are one with the sky; a city has none.
+        if fault != Fault::WallsAlone && !g.truth.rooms.is_empty() {
+            check_rooms_are_apart(&g, 0.08, 1.0);
+        }
+        check_volumes(&g);
+        let triangles = structural_triangles(&g.scene);
+        for &p in &g.truth.matter {
+            assert!(winding_number(&triangles, p) > 0, "{p} lies in no solid");
+        }
     }
 }
 

@@ -1,0 +1,139 @@
+//! Buildings with the faults of real models, baked with default settings, against their truth.
+//!
+//! Rooms and doors are judged as in `docs/benchmarks/rooms.md`; points in closed solids lie in no
+//! room.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
+use enfilade_cpg::{CellId, CellPortalGraph, Portal};
+use enfilade_geom::DVec3;
+use enfilade_testkit::{Fault, Generated, Opening, OpeningKind};
+
+/// Faults in spite of which all rooms and doors are found.
+const OVERCOME: [Fault; 6] = [
+    Fault::HungCeilings,
+    Fault::WallsToCeiling,
+    Fault::CurtainWall,
+    Fault::Mullions,
+    Fault::ColumnsInWalls,
+    Fault::CornerDoors,
+];
+
+/// Share of a room's points that lie in its cell, and of a cell's points that lie in its room.
+const MOST: f64 = 0.95;
+/// How far a portal's middle may lie from its door's, along the wall and beyond its faces.
+/// [Units: wu]
+const NEAR: f64 = 0.3;
+/// Before and behind a door's wall the rooms that it joins are asked for. [Units: wu]
+const BESIDE: f64 = 0.35;
+
+fn graph_of(g: &Generated) -> CellPortalGraph {
+    let context = BakeContext::new(&Silent, None);
+    let out = bake(&g.scene, &BakeConfig::default(), &context);
+    out.unwrap_or_else(|e| panic!("{}: {e}", g.truth.scene))
+        .world
+        .graph
+}
+
+/// What holds most of `items`, and its share.
+fn most<T: Copy + Ord>(items: &[T]) -> (T, f64) {
+    let mut count = BTreeMap::new();
+    for item in items {
+        *count.entry(*item).or_insert(0_usize) += 1;
+    }
+    let (item, n) = count.into_iter().max_by_key(|(_, n)| *n).expect("points");
+    (item, n as f64 / items.len() as f64)
+}
+
+/// Names of rooms that have no cell of their own.
+fn rooms_missed(graph: &CellPortalGraph, g: &Generated) -> Vec<String> {
+    let mut rooms_of_cell: BTreeMap<Option<CellId>, Vec<usize>> = BTreeMap::new();
+    let mut cells_of_room = Vec::new();
+    for (i, room) in g.truth.rooms.iter().enumerate() {
+        let locate = |&p: &DVec3| graph.locator.locate(p);
+        let cells: Vec<_> = room.sample_points.iter().map(locate).collect();
+        for c in &cells {
+            rooms_of_cell.entry(*c).or_default().push(i);
+        }
+        cells_of_room.push(cells);
+    }
+    let is_missed = |(i, cells): (usize, &Vec<Option<CellId>>)| {
+        let (cell, share) = most(cells);
+        let (room, alone) = most(&rooms_of_cell[&cell]);
+        let found = cell.is_some() && room == i && share.min(alone) >= MOST;
+        (!found).then(|| g.truth.rooms[i].name.clone())
+    };
+    cells_of_room
+        .iter()
+        .enumerate()
+        .filter_map(is_missed)
+        .collect()
+}
+
+/// Middle and area of a portal's outline.
+fn middle(p: &Portal) -> (DVec3, f64) {
+    let at: Vec<DVec3> = p
+        .outline
+        .iter()
+        .map(|q| DVec3::from(q.map(f64::from)))
+        .collect();
+    let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+    for k in 2..at.len() {
+        let a = 0.5 * (at[k - 1] - at[0]).cross(at[k] - at[0]).length();
+        sum += (at[0] + at[k - 1] + at[k]) / 3.0 * a;
+        area += a;
+    }
+    (sum / area, area)
+}
+
+fn lies_at(p: &Portal, o: &Opening) -> bool {
+    let normal = DVec3::from(p.normal.map(f64::from)).normalize();
+    let off = middle(p).0 - o.center;
+    let depth = off.dot(o.normal).abs();
+    depth <= NEAR + o.thickness * 0.5
+        && (off - o.normal * off.dot(o.normal)).length() <= NEAR
+        && normal.dot(o.normal).abs() >= 15.0_f64.to_radians().cos()
+}
+
+/// A portal of about the opening's size between the cells on its two sides.
+fn is_found(graph: &CellPortalGraph, o: &Opening) -> bool {
+    let reach = o.normal * (BESIDE + o.thickness * 0.5);
+    let sides = [o.center - reach, o.center + reach].map(|p| graph.locator.locate(p));
+    let want: BTreeSet<_> = sides.into_iter().collect();
+    want.len() == 2
+        && graph.portals.iter().any(|p| {
+            let share = middle(p).1 / o.area();
+            let cells: BTreeSet<_> = p.cells.map(Some).into_iter().collect();
+            lies_at(p, o) && (0.5..=2.0).contains(&share) && cells == want
+        })
+}
+
+#[test]
+fn rooms_and_doors_are_found_in_spite_of_faults() {
+    for fault in OVERCOME {
+        let g = fault.build();
+        let graph = graph_of(&g);
+        let what = fault.name();
+        assert_eq!(rooms_missed(&graph, &g), Vec::<String>::new(), "{what}");
+        let doors = g.truth.openings.iter();
+        for door in doors.filter(|o| o.kind == OpeningKind::Door) {
+            assert!(is_found(&graph, door), "{what}: {}", door.name);
+        }
+        let is_indoor = |c: &CellId| !graph.cells[c.0 as usize].outdoor;
+        let extra = graph
+            .portals
+            .iter()
+            .filter(|p| p.cells.iter().all(is_indoor))
+            .filter(|p| !g.truth.openings.iter().any(|o| lies_at(p, o)))
+            .count();
+        assert!(
+            extra as f64 <= 0.1 * g.truth.rooms.len() as f64,
+            "{what}: {extra} portals where no opening is"
+        );
+        for &p in &g.truth.matter {
+            let cell = graph.locator.locate(p).filter(is_indoor);
+            assert_eq!(cell, None, "{what}: {p} lies in a solid");
+        }
+    }
+}

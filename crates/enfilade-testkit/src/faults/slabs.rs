@@ -1,0 +1,58 @@
+//! Walls, slabs and ceilings that do not meet, or meet elsewhere than one would think.
+
+use crate::faults::plan::{CEILING, OFFICE, Office, Plan, office};
+use crate::site::Generated;
+use crate::solid::aabb;
+
+/// How far above its slab a wall begins. [Units: wu]
+const SLIT: f64 = 0.002;
+/// Between a hung ceiling and the walls around it. [Units: wu]
+const SHADOW_GAP: f64 = 0.107;
+/// Thickness of the hung ceilings, and the underside of the slab above them. [Units: wu]
+const BOARD: f64 = 0.02;
+const SLAB: f64 = 3.4;
+
+/// Walls begin 2 mm above the slab that they stand on, the outer ones, too.
+pub(super) fn walls_above_slabs(name: &str) -> Generated {
+    let mut plan = Plan::new(name);
+    let how = Office {
+        foot: SLIT,
+        ..Office::default()
+    };
+    office(&mut plan, &how);
+    plan.finish()
+}
+
+/// Walls from slab to slab; the ceiling of each room hangs free. The air above it is the room's.
+pub(super) fn hung_ceilings(name: &str) -> Generated {
+    let mut plan = Plan::new(name);
+    let how = Office {
+        inner: SLAB,
+        slab: SLAB,
+        ..Office::default()
+    };
+    for [low, high] in office(&mut plan, &how) {
+        let b = aabb(
+            [low[0] + SHADOW_GAP, CEILING, low[1] + SHADOW_GAP],
+            [high[0] - SHADOW_GAP, CEILING + BOARD, high[1] - SHADOW_GAP],
+        );
+        plan.solid("hung ceiling", b);
+    }
+    plan.finish()
+}
+
+/// Inner walls end at one ceiling over all rooms. The closed plenum above it is no room.
+pub(super) fn walls_to_ceiling(name: &str) -> Generated {
+    let mut plan = Plan::new(name);
+    let how = Office {
+        slab: SLAB,
+        ..Office::default()
+    };
+    office(&mut plan, &how);
+    let [length, depth] = OFFICE;
+    plan.solid(
+        "hung ceiling",
+        aabb([0.0, CEILING, 0.0], [length, CEILING + BOARD, depth]),
+    );
+    plan.finish()
+}

@@ -1,0 +1,509 @@
+//! `cargo xtask bench messy`: how rooms and doors survive spoilt models, figure by figure with its bar.
+//!
+//! Scenes with a truth are baked as they are and spoilt by the test kit's `generate`; what changes is
+//! compared. Each figure is a row: as JSON a line `{"row", "scene", "value", "bar", "ok"}`, where
+//! `value` and `ok` are null if something that it needs is not there, and `note` then says what.
+
+mod foreign;
+mod measure;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Context;
+use serde_json::json;
+
+use crate::{binary, cargo, output_of, run_to_end, scenes, scenes_in, target_dir};
+use measure::{Measured, measure};
+
+/// What is asked for.
+#[derive(Default)]
+pub(crate) struct Options {
+    /// A JSON object a line instead of a table.
+    pub(crate) is_json: bool,
+    /// Beginnings of rows; all where empty.
+    pub(crate) rows: Vec<String>,
+    /// Beginnings of scenes' names; all where empty.
+    pub(crate) scenes: Vec<String>,
+    /// Segments that `verify` tries, and as many rays.
+    pub(crate) rays: Option<u64>,
+}
+
+/// The rays of the promise.
+const RAYS: u64 = 1_000_000;
+
+/// Generated scenes that are spoilt like the real ones.
+const GENERATED: [&str; 7] = [
+    "house",
+    "tower",
+    "two-rooms",
+    "stair-hall",
+    "double-door-corridor",
+    "glass-facade-office",
+    "pitched-roof-attic",
+];
+
+/// A way to spoil scenes, or none.
+struct Case {
+    /// What its rows begin with.
+    label: &'static str,
+    /// For `generate`; `None` for `gltf-transform quantize`.
+    spoilt: Option<&'static [&'static str]>,
+    /// For `bake`.
+    settings: &'static [&'static str],
+    judge: fn(&mut Rows, &Measured, &Measured),
+}
+
+const CASES: [Case; 13] = [
+    moved("moved-1e-6", &["--jitter", "1e-6"], near_moved),
+    moved("moved-1e-5", &["--jitter", "1e-5"], near_moved),
+    moved("moved-1e-4", &["--jitter", "1e-4"], near_moved),
+    moved("moved-1e-3", &["--jitter", "1e-3"], near_moved),
+    moved("moved-5e-3", &["--jitter", "5e-3"], far_moved),
+    moved(
+        "missing-0.005",
+        &["--drop", "0.005"],
+        |rows, now, before| {
+            rows.at_least("rooms", now.rooms, before.rooms, 0.05);
+            rows.at_least("holes", Some(now.holes as f64), Some(1.0), 0.0);
+        },
+    ),
+    moved("missing-0.02", &["--drop", "0.02"], |rows, now, before| {
+        rows.at_least("rooms", now.rooms, before.rooms, 0.10);
+        rows.at_least("holes", Some(now.holes as f64), Some(1.0), 0.0);
+    }),
+    moved("quantized-2mm", &["--snap", "0.002"], quantized),
+    Case {
+        spoilt: None,
+        ..moved("quantized-gltf", &[], quantized)
+    },
+    moved("unnamed", &["--strip"], |rows, now, before| {
+        rows.at_least("rooms", now.rooms, before.rooms, 0.05);
+        rows.figure("doors", now.doors);
+        rows.figure("windows", now.windows);
+    }),
+    exact("exact-0", &[]),
+    exact("exact-1e-5", &["--jitter", "1e-5"]),
+    exact("exact-1e-3", &["--jitter", "1e-3"]),
+];
+
+const fn moved(
+    label: &'static str,
+    spoilt: &'static [&'static str],
+    judge: fn(&mut Rows, &Measured, &Measured),
+) -> Case {
+    Case {
+        label,
+        spoilt: Some(spoilt),
+        settings: &[],
+        judge,
+    }
+}
+
+const fn exact(label: &'static str, spoilt: &'static [&'static str]) -> Case {
+    Case {
+        settings: &["--smallest-hole", "0"],
+        ..moved(label, spoilt, |rows, now, before| {
+            rows.at_least("rooms", now.rooms, before.rooms, 0.03);
+            rows.at_most("cracks a pair and plane", now.cracks as f64, 1.0);
+            rows.broken(now);
+        })
+    }
+}
+
+fn near_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
+    rows.at_least("rooms", now.rooms, before.rooms, 0.03);
+    rows.at_least("doors", now.doors, before.doors, 0.03);
+    rows.at_most("portals ratio", now.portals_to(before), 1.2);
+    rows.at_most("time ratio", now.seconds / before.seconds, 2.0);
+    rows.broken(now);
+}
+
+/// Gaps are wider than the default hole: cracks are allowed, but not many.
+fn far_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
+    rows.at_least("rooms", now.rooms, before.rooms, 0.05);
+    rows.at_least("doors", now.doors, before.doors, 0.05);
+    rows.at_most("cracks a pair and plane", now.cracks as f64, 1.0);
+    rows.at_most("time ratio", now.seconds / before.seconds, 2.0);
+    rows.broken(now);
+}
+
+fn quantized(rows: &mut Rows, now: &Measured, before: &Measured) {
+    rows.at_least("rooms", now.rooms, before.rooms, 0.0);
+    rows.at_least("doors", now.doors, before.doors, 0.0);
+    rows.at_most("portals ratio", now.portals_to(before), 1.1);
+}
+
+/// Prints rows, and keeps figures for averages.
+struct Rows {
+    is_json: bool,
+    label: String,
+    scene: String,
+    /// The scene is a real one: its figures count for averages.
+    is_real: bool,
+    figures: BTreeMap<String, Vec<f64>>,
+    n: [usize; 3],
+}
+
+impl Rows {
+    fn print(&mut self, row: &str, value: Option<f64>, bar: &str, ok: Option<bool>, note: &str) {
+        let row = format!("{} {row}", self.label);
+        self.n[ok.map_or(2, usize::from)] += 1;
+        if self.is_json {
+            let mut line =
+                json!({"row": row, "scene": self.scene, "value": value, "bar": bar, "ok": ok});
+            if !note.is_empty() {
+                line["note"] = note.into();
+            }
+            println!("{line}");
+        } else {
+            let value = value.map_or_else(|| "–".to_owned(), shown);
+            let word = ok.map_or("–", |ok| if ok { "ok" } else { "NOT MET" });
+            println!(
+                "{row:<38} {:<22} {value:>10}  {bar:<8} {word} {note}",
+                self.scene
+            );
+        }
+    }
+
+    /// A share that may be lower by `slack` than `wanted`. No row where the scene has no such thing.
+    fn at_least(&mut self, row: &str, value: Option<f64>, wanted: Option<f64>, slack: f64) {
+        if let (Some(value), Some(wanted)) = (value, wanted) {
+            let least = (wanted - slack).max(0.0);
+            // Shares that are equal but for rounding are equal.
+            let ok = value >= least - 1e-9;
+            self.print(row, Some(value), &format!(">= {least:.2}"), Some(ok), "");
+        }
+    }
+
+    fn at_most(&mut self, row: &str, value: f64, most: f64) {
+        let ok = value <= most;
+        self.print(
+            row,
+            Some(value),
+            &format!("<= {}", shown(most)),
+            Some(ok),
+            "",
+        );
+    }
+
+    fn broken(&mut self, m: &Measured) {
+        match &m.broken {
+            Ok(n) => self.at_most("broken", *n as f64, 0.0),
+            Err(why) => self.print("broken", None, "<= 0", Some(false), why),
+        }
+    }
+
+    /// Kept for an average.
+    fn figure(&mut self, name: &str, value: Option<f64>) {
+        if let Some(value) = value.filter(|_| self.is_real) {
+            self.figures.entry(name.into()).or_default().push(value);
+        }
+    }
+
+    /// The average of what was kept, if anything was.
+    fn average(&mut self, name: &str, least: f64) {
+        let kept = self.figures.remove(name).unwrap_or_default();
+        if !kept.is_empty() {
+            self.scene = format!("average of {}", kept.len());
+            let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+            // Bars are given to two digits, and so it is compared.
+            let ok = (mean * 100.0).round() >= (least * 100.0).round();
+            self.print(name, Some(mean), &format!(">= {least:.2}"), Some(ok), "");
+        }
+    }
+
+    fn failed(&mut self, error: &anyhow::Error) {
+        let note = format!("{error:#}");
+        let first = note.lines().next().unwrap_or_default().to_owned();
+        self.print("bake", None, "", Some(false), &first);
+    }
+}
+
+fn shown(x: f64) -> String {
+    if x == x.trunc() {
+        format!("{x:.0}")
+    } else {
+        format!("{x:.3}")
+    }
+}
+
+/// A scene with a truth, and what it is as it is.
+struct Base {
+    name: String,
+    dir: PathBuf,
+    is_real: bool,
+    measured: Option<Measured>,
+}
+
+/// The bench at work.
+struct Bench<'a> {
+    options: &'a Options,
+    rows: Rows,
+    folder: PathBuf,
+}
+
+impl Bench<'_> {
+    fn wants_row(&self, label: &str) -> bool {
+        is_asked(&self.options.rows, label)
+    }
+
+    fn wants_scene(&self, name: &str) -> bool {
+        is_asked(&self.options.scenes, name)
+    }
+
+    fn rays(&self) -> u64 {
+        self.options.rays.unwrap_or(RAYS)
+    }
+
+    /// Bakes a scene folder and judges it, or says why not.
+    fn try_scene(
+        &mut self,
+        dir: &Path,
+        settings: &[&str],
+        rays: u64,
+        judge: impl FnOnce(&mut Rows, &Measured),
+    ) -> Option<Measured> {
+        let world = self.folder.join("world.glb");
+        match measure(dir, &world, settings, rays) {
+            Ok(m) => {
+                judge(&mut self.rows, &m);
+                if let Some(unsaid) = m.unsaid {
+                    self.rows.at_most("silence", unsaid as f64, 0.0);
+                }
+                Some(m)
+            }
+            Err(error) => {
+                self.rows.failed(&error);
+                None
+            }
+        }
+    }
+
+    /// The scenes that are spoilt: real ones with a truth, and generated ones.
+    fn bases(&self) -> anyhow::Result<Vec<Base>> {
+        let base = |dir: PathBuf, is_real| Base {
+            name: name_of(&dir),
+            dir,
+            is_real,
+            measured: None,
+        };
+        let mut all: Vec<Base> = scenes()
+            .into_iter()
+            .filter(|d| d.join("truth.json").is_file())
+            .map(|d| base(d, true))
+            .collect();
+        for name in GENERATED.into_iter().filter(|n| self.wants_scene(n)) {
+            let dir = self.folder.join("as-it-is").join(name);
+            generate(&[name, "--rooms", "16"], &dir)?;
+            all.push(base(dir, false));
+        }
+        all.retain(|b| self.wants_scene(&b.name));
+        Ok(all)
+    }
+
+    /// Rows of one way to spoil one scene.
+    fn case(&mut self, case: &Case, base: &mut Base) -> anyhow::Result<()> {
+        self.rows.label = "undisturbed".into();
+        self.rows.scene.clone_from(&base.name);
+        self.rows.is_real = base.is_real;
+        if base.measured.is_none() {
+            base.measured = self.try_scene(&base.dir, &[], 0, |_, _| ());
+        }
+        self.rows.label = case.label.into();
+        let Some(before) = base.measured.clone() else {
+            return Ok(());
+        };
+        let spoilt = self.folder.join(case.label).join(&base.name);
+        let dir = match case.spoilt {
+            Some([]) => base.dir.clone(),
+            Some(how) => {
+                let from = base.dir.display().to_string();
+                generate(&[&[from.as_str()], how].concat(), &spoilt)?;
+                spoilt
+            }
+            None => {
+                quantize(&base.dir, &spoilt)?;
+                spoilt
+            }
+        };
+        let rays = self.rays();
+        self.try_scene(&dir, case.settings, rays, |rows, now| {
+            (case.judge)(rows, now, &before);
+        });
+        Ok(())
+    }
+
+    fn undisturbed(&mut self, bases: &mut [Base]) {
+        self.rows.label = "undisturbed".into();
+        for base in bases.iter_mut().filter(|b| b.is_real) {
+            self.rows.scene.clone_from(&base.name);
+            self.rows.is_real = true;
+            if base.measured.is_none() {
+                base.measured = self.try_scene(&base.dir, &[], 0, |_, _| ());
+            }
+            if let Some(m) = &base.measured {
+                for (name, value) in [
+                    ("rooms", m.rooms),
+                    ("doors", m.doors),
+                    ("windows", m.windows),
+                ] {
+                    self.rows.figure(name, value);
+                }
+            }
+        }
+        self.rows.average("rooms", 0.92);
+        self.rows.average("doors", 0.98);
+        self.rows.average("windows", 0.99);
+    }
+
+    fn faults(&mut self) -> anyhow::Result<()> {
+        let folder = self.folder.join("faults");
+        generate(&["faults"], &folder)?;
+        self.rows.label = "fault".into();
+        for dir in scenes_in(&folder) {
+            let name = name_of(&dir);
+            if !self.wants_scene(&name) {
+                continue;
+            }
+            self.rows.scene = name;
+            self.try_scene(&dir, &[], 0, |rows, m| {
+                rows.at_least("rooms", m.rooms, Some(0.95), 0.0);
+                rows.at_least("doors", m.doors, Some(0.95), 0.0);
+                if let Some(extra) = m.extra {
+                    rows.at_most("extra portals a room", extra, 0.1);
+                }
+                if m.n_matter > 0 {
+                    rows.at_most("solids with air in them", m.in_matter as f64, 0.0);
+                }
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Measures what is asked for and prints a row a figure.
+pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
+    for example in [
+        &["enfilade-cli"][..],
+        &["enfilade-testkit", "--example", "generate"],
+    ] {
+        run_to_end(&mut cargo(
+            &[&["build", "--release", "-p"], example].concat(),
+        ))?;
+    }
+    let mut bench = Bench {
+        options,
+        rows: Rows {
+            is_json: options.is_json,
+            label: String::new(),
+            scene: String::new(),
+            is_real: false,
+            figures: BTreeMap::new(),
+            n: [0; 3],
+        },
+        folder: target_dir().join("messy"),
+    };
+    let has_hole = output_of(
+        Command::new(binary("enfilade")).args(["bake", "--help"]),
+        None,
+    )?
+    .contains("--smallest-hole");
+    let has_quantize = Command::new(QUANTIZE).arg("--version").output().is_ok();
+    let mut bases = bench.bases()?;
+    for case in &CASES {
+        if !bench.wants_row(case.label) {
+            continue;
+        }
+        let lacks = if !case.settings.is_empty() && !has_hole {
+            Some(("bake has no --smallest-hole", Some(false)))
+        } else if case.spoilt.is_none() && !has_quantize {
+            Some(("not installed: npm install -g @gltf-transform/cli", None))
+        } else {
+            None
+        };
+        if let Some((note, ok)) = lacks {
+            bench.rows.label = case.label.into();
+            bench.rows.scene = "all".into();
+            bench.rows.print("rooms", None, "", ok, note);
+            continue;
+        }
+        for base in &mut bases {
+            bench.case(case, base)?;
+        }
+        bench.rows.average("doors", 0.80);
+        bench.rows.average("windows", 0.75);
+    }
+    if bench.wants_row("undisturbed") {
+        bench.undisturbed(&mut bases);
+    }
+    if bench.wants_row("fault") {
+        bench.faults()?;
+    }
+    if bench.wants_row("foreign") {
+        foreign::run(&mut bench)?;
+    }
+    let [not_met, met, unknown] = bench.rows.n;
+    eprintln!("{met} met, {not_met} not met, {unknown} not measured");
+    Ok(())
+}
+
+fn is_asked(asked: &[String], name: &str) -> bool {
+    asked.is_empty() || asked.iter().any(|a| name.starts_with(a.as_str()))
+}
+
+fn name_of(dir: &Path) -> String {
+    let name = dir.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Runs the test kit's `generate`.
+fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
+    let example = target_dir().join("release/examples/generate");
+    let example = example.with_extension(std::env::consts::EXE_EXTENSION);
+    output_of(Command::new(example).args(args).arg("-o").arg(to), None).map(drop)
+}
+
+/// What quantizes, if it is there.
+const QUANTIZE: &str = "gltf-transform";
+
+/// Quantizes the files of a scene folder.
+fn quantize(from: &Path, to: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(to)?;
+    for name in ["scene.glb", "detail.glb"] {
+        let path = from.join(name);
+        if path.is_file() {
+            let mut command = Command::new(QUANTIZE);
+            command.arg("quantize").arg(path).arg(to.join(name));
+            output_of(&mut command, None)?;
+        }
+    }
+    let truth = "truth.json";
+    std::fs::copy(from.join(truth), to.join(truth))
+        .map(drop)
+        .context(truth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_and_scenes_are_asked_for_by_how_they_begin() {
+        let asked = |list: &[&str], name| {
+            let list: Vec<String> = list.iter().map(|s| (*s).to_owned()).collect();
+            is_asked(&list, name)
+        };
+        assert!(asked(&[], "moved-1e-5"));
+        assert!(asked(&["fault", "moved"], "moved-1e-5"));
+        assert!(!asked(&["moved-1e-3"], "moved-1e-5"));
+    }
+
+    #[test]
+    fn every_case_has_a_label_of_its_own() {
+        for (i, a) in CASES.iter().enumerate() {
+            assert!(CASES[..i].iter().all(|b| b.label != a.label), "{}", a.label);
+        }
+    }
+}
