@@ -5,13 +5,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
-use enfilade_cpg::{CellId, CellPortalGraph, Portal};
+use enfilade_bake::{BakeConfig, BakeContext, Silent, SmallestHole, bake};
+use enfilade_cpg::{CellId, CellPortalGraph, Portal, PortalKind, Seals, World};
 use enfilade_geom::DVec3;
-use enfilade_testkit::{Fault, Generated, Opening, OpeningKind};
+use enfilade_testkit::{
+    Disturbance, Fault, Generated, Opening, OpeningKind, disturbed, furnished_house,
+};
+use enfilade_verify::{VerifyOptions, verify_world};
 
 /// Faults in spite of which all rooms and doors are found.
-const OVERCOME: [Fault; 6] = [
+const OVERCOME: [Fault; 7] = [
+    Fault::WallsAboveSlabs,
     Fault::HungCeilings,
     Fault::WallsToCeiling,
     Fault::CurtainWall,
@@ -29,11 +33,13 @@ const NEAR: f64 = 0.3;
 const BESIDE: f64 = 0.35;
 
 fn graph_of(g: &Generated) -> CellPortalGraph {
-    let context = BakeContext::new(&Silent, None);
-    let out = bake(&g.scene, &BakeConfig::default(), &context);
+    world_of(g, &BakeConfig::default()).graph
+}
+
+fn world_of(g: &Generated, config: &BakeConfig) -> World {
+    let out = bake(&g.scene, config, &BakeContext::new(&Silent, None));
     out.unwrap_or_else(|e| panic!("{}: {e}", g.truth.scene))
         .world
-        .graph
 }
 
 /// What holds most of `items`, and its share.
@@ -136,4 +142,68 @@ fn rooms_and_doors_are_found_in_spite_of_faults() {
             assert_eq!(cell, None, "{what}: {p} lies in a solid");
         }
     }
+}
+
+/// Names of doors without a portal.
+fn doors_missed(graph: &CellPortalGraph, g: &Generated) -> Vec<String> {
+    let doors = g.truth.openings.iter();
+    doors
+        .filter(|o| o.kind == OpeningKind::Door && !is_found(graph, o))
+        .map(|o| o.name.clone())
+        .collect()
+}
+
+/// The same rooms and doors as `clean` has, and every promise kept.
+fn holds_up(clean: &CellPortalGraph, world: &World, g: &Generated, what: &str) {
+    let graph = &world.graph;
+    assert_eq!(rooms_missed(graph, g), rooms_missed(clean, g), "{what}");
+    assert_eq!(doors_missed(graph, g), doors_missed(clean, g), "{what}");
+    let options = VerifyOptions {
+        rays: 20_000,
+        ..VerifyOptions::default()
+    };
+    let report = verify_world(world, None, &options);
+    assert!(report.holds(), "{what}: {report}");
+}
+
+#[test]
+fn triangles_that_share_no_corners_leave_the_rooms_as_they_were() {
+    for g in [furnished_house(), Fault::HungCeilings.build()] {
+        let clean = graph_of(&g);
+        for jitter in [1e-5, 1e-4, 1e-3] {
+            let by = Disturbance {
+                jitter,
+                seed: 1,
+                ..Disturbance::default()
+            };
+            let g = disturbed(&g, &by);
+            let what = format!("{}, corners moved by {jitter} m", g.truth.scene);
+            let world = world_of(&g, &BakeConfig::default());
+            holds_up(&clean, &world, &g, &what);
+            let n = world.graph.portals.len();
+            assert!(5 * n <= 6 * clean.portals.len(), "{what}: {n} portals");
+            assert!(Seals::of(&world).count > 0, "{what}");
+        }
+    }
+}
+
+#[test]
+fn where_gaps_are_left_open_they_are_cracks_and_part_no_rooms() {
+    let g = furnished_house();
+    let clean = graph_of(&g);
+    let by = Disturbance {
+        jitter: 1e-3,
+        seed: 1,
+        ..Disturbance::default()
+    };
+    let g = disturbed(&g, &by);
+    let config = BakeConfig {
+        smallest_hole: SmallestHole::of_width(0.0),
+        ..BakeConfig::default()
+    };
+    let world = world_of(&g, &config);
+    holds_up(&clean, &world, &g, "gaps left open");
+    assert_eq!(Seals::of(&world).count, 0);
+    let is_crack = |p: &&Portal| p.kind == PortalKind::Crack;
+    assert!(world.graph.portals.iter().filter(is_crack).count() > 0);
 }

@@ -4,14 +4,15 @@
 //! taken back here.
 //!
 //! Gaps, through which no ball of the smallest hole passes, belong to an opening beside them only where they hardly
-//! widen its outline: the slit under a wall is no part of the door in it. All others are seals, or cracks
-//! where nothing is sealed: one a plane and pair of cells.
+//! widen its outline: the slit under a wall is no part of the door in it. All others are seals. Cracks, and gaps where
+//! nothing is sealed, are one portal a plane and pair of cells.
 
 use std::collections::BTreeMap;
 
 use enfilade_geom::{DVec2, DVec3, Plane, Sets, Winding};
 use rayon::prelude::*;
 
+use super::CRACK_WIDTH;
 use super::label::SOLID;
 use super::poly::Poly;
 
@@ -378,10 +379,23 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     }
     let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
     let mut openings = sheet.clusters(&wide);
-    let gaps = sheet.adopt(&mut openings, gaps, rules.hole);
-    let mut out: Vec<Opening> = openings.iter().map(|o| sheet.opening(o, false)).collect();
-    if !gaps.is_empty() {
-        out.push(sheet.opening(&gaps, rules.has_seals));
+    let mut gaps = sheet.adopt(&mut openings, gaps, rules.hole);
+    let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
+    for members in openings {
+        let opening = sheet.opening(&members, false);
+        if opening.screen.is_none() && opening.width < CRACK_WIDTH {
+            cracks.extend(members);
+        } else {
+            out.push(opening);
+        }
+    }
+    if !rules.has_seals {
+        cracks.append(&mut gaps);
+    }
+    for (members, is_seal) in [(cracks, false), (gaps, true)] {
+        if !members.is_empty() {
+            out.push(sheet.opening(&members, is_seal));
+        }
     }
     out
 }
