@@ -212,14 +212,15 @@ impl FacetSink for Sink<'_> {
         let is_flipped = cells[0] < cells[1];
         let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
         for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
-            let is_gap = self.graph.is_rim(facet.leaves, poly::width(&points))
-                || self.clearance.is_narrow(&points);
+            let is_narrow = self.clearance.is_narrow(&points);
+            let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, poly::width(&points));
             self.pieces.push(Piece {
                 cells,
                 plane: facet.plane,
                 is_flipped,
                 screen,
-                is_gap,
+                is_gap: is_narrow || is_rim,
+                is_rim,
                 points,
             });
         }

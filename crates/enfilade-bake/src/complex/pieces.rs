@@ -35,6 +35,8 @@ pub(super) struct Piece {
     pub(super) screen: Option<u32>,
     /// It is a gap, see [`Clearance`](super::graph::Clearance).
     pub(super) is_gap: bool,
+    /// A gap only because it is at the rim of a thin leaf: several together may be wider than a gap.
+    pub(super) is_rim: bool,
     /// Counter-clockwise about the plane's normal.
     pub(super) points: Poly,
 }
@@ -354,7 +356,12 @@ impl<'a> Sheet<'a> {
             .into_iter()
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
             .map(|(screen, _)| screen);
-        let mut merged = merge_convex(members.iter().map(|&i| self.flats[i].clone()).collect());
+        // No seal is wider than a gap.
+        let (apart, together): (Vec<usize>, Vec<usize>) =
+            members.iter().partition(|&&i| is_seal && self.pieces[i].is_rim);
+        let flats = |of: Vec<usize>| of.into_iter().map(|i| self.flats[i].clone()).collect();
+        let mut merged = merge_convex(flats(together));
+        merged.extend::<Vec<Flat>>(flats(apart));
         merged.sort_by(|a, b| b.area.total_cmp(&a.area));
         Opening {
             cells: self.pieces[0].cells,
