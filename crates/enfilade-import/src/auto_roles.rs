@@ -7,8 +7,13 @@
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, Bvh, DVec3, Sets, Triangle, triangle_area_normal};
+use fillers::Surroundings;
 use std::collections::HashMap;
 use std::ops::Range;
+use units::Unit;
+
+mod fillers;
+mod units;
 
 /// The reason of objects that no rule fitted.
 pub(crate) const DEFAULT: &str = "default";
@@ -79,23 +84,23 @@ pub(crate) fn judge(scene: &mut Scene) {
         return;
     }
     let (shapes, triangles, owners) = shapes_of(scene);
+    if n_open > MOST_OBJECTS {
+        return;
+    }
+    let bvh = Bvh::build(&triangles);
+    judge_fillers(scene, &shapes, &triangles, &bvh);
+    let shapes: Vec<Shape> = shapes
+        .into_iter()
+        .filter(|s| scene.objects[s.object].role == Role::Structural)
+        .collect();
     let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
     let small = SMALL.min(SMALL_SHARE * bounds.size().length());
-    let n_small = shapes
-        .iter()
-        .filter(|s| s.is_open && s.bounds.size().max_element() <= small)
-        .count();
-    let bvh = if n_small > 0 && n_small <= MOST_OBJECTS {
-        Some(Bvh::build(&triangles))
-    } else {
-        None
-    };
     let mut found: Vec<(usize, String)> = Vec::new();
     let mut detail_area = 0.0;
     for shape in shapes.iter().filter(|s| s.is_open) {
         let size = shape.bounds.size();
         let reason = if size.max_element() <= small {
-            bvh.as_ref().and_then(|bvh| {
+            let judged = || {
                 let touches = |b: &Aabb| {
                     let mut is_touched = false;
                     bvh.for_each_in_box(b, |t| {
@@ -106,11 +111,12 @@ pub(crate) fn judge(scene: &mut Scene) {
                 let reason = seen_around(&shape.bounds, &touches)?;
                 let own = &triangles[shape.triangles.clone()];
                 (!goes_on_at_its_rim(own, &shape.bounds, &touches)).then_some(reason)
-            })
+            };
+            judged()
         } else {
             let is_rail = size.min_element() <= FLAT
                 && fill(shape) < SPARSE
-                && parts(&triangles[shape.triangles.clone()]).iter().all(|b| {
+                && parts(&triangles[shape.triangles.clone()]).1.iter().all(|b| {
                     let mut edges = b.size().to_array();
                     edges.sort_by(f64::total_cmp);
                     edges[1] <= BAR
@@ -138,6 +144,43 @@ pub(crate) fn judge(scene: &mut Scene) {
         let object = &mut scene.objects[object];
         object.role = Role::Detail;
         object.reason = reason;
+    }
+}
+
+/// Objects all of whose things fill openings become detail.
+fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) {
+    let units: Vec<Unit> = shapes
+        .iter()
+        .flat_map(|s| {
+            let own = &triangles[s.triangles.clone()];
+            units::units_of(s.object as u32, s.triangles.start as u32, own)
+        })
+        .collect();
+    let mut unit_of = vec![0; triangles.len()];
+    for (i, unit) in (0..).zip(&units) {
+        for &t in &unit.triangles {
+            unit_of[t as usize] = i;
+        }
+    }
+    let around = Surroundings {
+        bvh,
+        triangles,
+        unit_of: &unit_of,
+    };
+    let is_open = |unit: &Unit| is_open(&scene.objects[unit.object as usize]);
+    let found = fillers::fillers(&units, &is_open, &around);
+    // An object's role is one, so all of it must fill openings but what is too small to be asked.
+    let mut n_left = vec![0; scene.objects.len()];
+    for unit in units.iter().filter(|u| !u.is_small()) {
+        n_left[unit.object as usize] += 1;
+    }
+    for (unit, reason) in found {
+        let object = units[unit as usize].object as usize;
+        n_left[object] -= 1;
+        if n_left[object] == 0 {
+            scene.objects[object].role = Role::Detail;
+            scene.objects[object].reason = reason;
+        }
     }
 }
 
@@ -218,8 +261,9 @@ fn key(p: DVec3) -> [u64; 3] {
     (p + 0.0).to_array().map(f64::to_bits)
 }
 
-/// Boxes of the connected parts: triangles that share a corner hang together.
-fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
+/// The connected part of each triangle, and the parts' boxes: triangles that share a corner hang
+/// together.
+fn parts(triangles: &[Triangle]) -> (Vec<u32>, Vec<Aabb>) {
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
     let mut sets = Sets::new(triangles.len());
     for (i, t) in (0..).zip(triangles) {
@@ -227,13 +271,22 @@ fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
             sets.join(i, *first_at.entry(key(*p)).or_insert(i));
         }
     }
-    let mut boxes = vec![Aabb::EMPTY; triangles.len()];
-    for (i, t) in (0..).zip(triangles) {
-        let r = sets.find(i) as usize;
-        boxes[r] = boxes[r].union(Aabb::of_points(t));
-    }
-    boxes.retain(|b| !b.is_empty());
-    boxes
+    let mut part_of = vec![u32::MAX; triangles.len()];
+    let mut boxes: Vec<Aabb> = Vec::new();
+    let of_triangles = (0..)
+        .zip(triangles)
+        .map(|(i, t)| {
+            let part = &mut part_of[sets.find(i) as usize];
+            if *part == u32::MAX {
+                *part = boxes.len() as u32;
+                boxes.push(Aabb::EMPTY);
+            }
+            let own = &mut boxes[*part as usize];
+            *own = own.union(Aabb::of_points(t));
+            *part
+        })
+        .collect();
+    (of_triangles, boxes)
 }
 
 /// Why one sees around a small object, if one does: it stands, hangs or leans, and stands between

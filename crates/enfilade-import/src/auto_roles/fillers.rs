@@ -1,0 +1,303 @@
+//! Door leaves and panes among objects that nothing is said about: what fills a hole in a wall.
+//!
+//! The question is the wall's, not the leaf's: *does the wall go on, in the plane of the thing, on
+//! three of its four sides, with air before and behind both of them?* A lintel has the wall on two
+//! sides, a wall between two others and two slabs on none or on two. What lies in such a hole is a
+//! filler if it is much thinner than the wall, or if a single connected surface goes round it: walls
+//! are built beside each other, and only openings are cut out of one.
+
+use super::units::Unit;
+use enfilade_geom::{Bvh, DVec3, Ray, Sets, Triangle, triangle_area_normal};
+
+/// How far before and behind it a wall may reach: no wall that people open is thicker. [Units: wu]
+const WALL: f64 = 0.6;
+/// How far beyond its rim the wall is looked for: as near as mullions are wide, and as far as joints
+/// are. [Units: wu]
+const STEPS: [f64; 2] = [0.015, 0.05];
+/// Where it is looked for along each side.
+const SAMPLES: usize = 8;
+/// A side is held if so much of it is: the rest is a threshold, a shutter's box, a round corner.
+const HELD: f64 = 0.7;
+/// The lintel and two jambs, or three sides of a window beside a pillar.
+const SIDES: usize = 3;
+/// What is thinner than this share of the wall around it, holes counted, is no piece of that wall.
+const THIN: f64 = 0.5;
+/// Rays along each edge of its face.
+const GRID: usize = 5;
+/// So far before and behind it is air: what hangs on a wall has none behind it. [Units: wu]
+const AIR: f64 = 0.2;
+/// … over this share of its face: furniture may stand before the rest.
+const OPEN: f64 = 0.5;
+/// Surfaces turned further from its face than 45° bound no wall in its plane.
+const FACING: f64 = 0.7;
+/// Hits nearer than this along a line are one, of two triangles that share an edge. [Units: wu]
+const SAME: f64 = 1e-4;
+
+/// The scene as rays see it.
+pub(super) struct Surroundings<'a> {
+    pub(super) bvh: &'a Bvh,
+    pub(super) triangles: &'a [Triangle],
+    /// The unit of each triangle.
+    pub(super) unit_of: &'a [u32],
+}
+
+/// Matter that goes on in the plane of a thing beyond its rim.
+#[derive(Clone, Copy)]
+struct Hold {
+    unit: u32,
+    /// Along the thing's thin axis. [Units: wu]
+    thickness: f64,
+}
+
+/// A thing that may fill an opening.
+struct Candidate {
+    unit: u32,
+    /// Matter along its thin axis, averaged over its face. [Units: wu]
+    thickness: f64,
+    /// What holds it at each sample of each side.
+    sides: [Vec<Vec<Hold>>; 4],
+}
+
+/// Units that fill openings, each with the reason.
+pub(super) fn fillers(
+    units: &[Unit],
+    is_open: &dyn Fn(&Unit) -> bool,
+    around: &Surroundings<'_>,
+) -> Vec<(u32, String)> {
+    let candidates: Vec<Candidate> = (0..units.len() as u32)
+        .filter(|&i| is_open(&units[i as usize]))
+        .filter_map(|i| candidate(units, i, around))
+        .collect();
+    let mut candidate_of = vec![None; units.len()];
+    for (i, c) in (0u32..).zip(&candidates) {
+        candidate_of[c.unit as usize] = Some(i);
+    }
+    // A leaf and its frame, a door and the light above it fill one opening together.
+    let mut sets = Sets::new(candidates.len());
+    for (i, c) in (0..).zip(&candidates) {
+        for hold in c.sides.iter().flatten().flatten() {
+            if let Some(other) = candidate_of[hold.unit as usize] {
+                sets.join(i, other);
+            }
+        }
+    }
+    let mut groups: Vec<Vec<u32>> = vec![Vec::new(); candidates.len()];
+    for i in 0..candidates.len() as u32 {
+        groups[sets.find(i) as usize].push(i);
+    }
+    let is_candidate = |unit: u32| candidate_of[unit as usize].is_some();
+    let mut found = Vec::new();
+    for group in groups {
+        let members: Vec<&Candidate> = group.iter().map(|&i| &candidates[i as usize]).collect();
+        let held = Held::of(&members, &is_candidate);
+        for c in members {
+            if let Some(why) = held.reason(c) {
+                let size = units[c.unit as usize].half * 2.0;
+                let text = format!(
+                    "fills an opening: {:.2} x {:.2} m, {:.2} m thick, {why}",
+                    size.y, size.z, size.x
+                );
+                found.push((c.unit, text));
+            }
+        }
+    }
+    found
+}
+
+/// How what is around a group holds it.
+struct Held {
+    n_sides: usize,
+    /// The thinnest of those sides. [Units: wu]
+    wall: f64,
+    /// Sides that one connected surface holds.
+    n_by_one: usize,
+}
+
+impl Held {
+    /// Samples that lie at another member or candidate are inside the group.
+    fn of(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> Self {
+        let mut held = Self {
+            n_sides: 0,
+            wall: f64::INFINITY,
+            n_by_one: 0,
+        };
+        let mut n_by: Vec<(u32, usize)> = Vec::new();
+        for side in 0..4 {
+            let mut n_outer = 0;
+            let mut walls = Vec::new();
+            let mut holders: Vec<(u32, usize)> = Vec::new();
+            for sample in members.iter().flat_map(|c| &c.sides[side]) {
+                let walls_here = sample.iter().filter(|h| !is_candidate(h.unit));
+                let thickness = walls_here.clone().map(|h| h.thickness).fold(0.0, f64::max);
+                if thickness == 0.0 && !sample.is_empty() {
+                    continue;
+                }
+                n_outer += 1;
+                if thickness > 0.0 {
+                    walls.push(thickness);
+                }
+                for h in walls_here {
+                    add_one(&mut holders, h.unit);
+                }
+            }
+            let enough = HELD * n_outer as f64;
+            if walls.is_empty() || (walls.len() as f64) < enough {
+                continue;
+            }
+            held.n_sides += 1;
+            walls.sort_by(f64::total_cmp);
+            held.wall = held.wall.min(walls[walls.len() / 2]);
+            for (unit, n) in holders {
+                if n as f64 >= enough {
+                    add_one(&mut n_by, unit);
+                }
+            }
+        }
+        held.n_by_one = n_by.iter().map(|h| h.1).max().unwrap_or(0);
+        held
+    }
+
+    fn reason(&self, c: &Candidate) -> Option<String> {
+        if self.n_sides < SIDES {
+            None
+        } else if c.thickness <= THIN * self.wall {
+            Some(format!(
+                "the wall around it {:.2} m on {} sides",
+                self.wall, self.n_sides
+            ))
+        } else if self.n_by_one >= SIDES {
+            Some(format!(
+                "one wall goes round it on {} sides",
+                self.n_by_one
+            ))
+        } else {
+            None
+        }
+    }
+}
+
+fn add_one(counts: &mut Vec<(u32, usize)>, key: u32) {
+    match counts.iter_mut().find(|c| c.0 == key) {
+        Some(c) => c.1 += 1,
+        None => counts.push((key, 1)),
+    }
+}
+
+/// What is known of a unit, if it may be a filler.
+fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Candidate> {
+    let unit = &units[index as usize];
+    let half = unit.half;
+    if unit.is_small() || half.x >= half.y.min(half.z) || half.x > WALL {
+        return None;
+    }
+    let sides = [0, 1, 2, 3].map(|side| holds(unit, index, side, around));
+    let share = |side: &Vec<Vec<Hold>>| {
+        side.iter().filter(|s| !s.is_empty()).count() as f64 / SAMPLES as f64
+    };
+    if sides.iter().filter(|s| share(s) >= HELD).count() < SIDES {
+        return None;
+    }
+    let thickness = thickness_between_air(unit, index, around)?;
+    Some(Candidate {
+        unit: index,
+        thickness,
+        sides,
+    })
+}
+
+/// What holds a side, at each of its samples.
+fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec<Vec<Hold>> {
+    let (k, other) = if side < 2 { (1, 2) } else { (2, 1) };
+    let sign = if side % 2 == 0 { -1.0 } else { 1.0 };
+    (0..SAMPLES)
+        .map(|i| {
+            let at = (i as f64 + 0.5) / SAMPLES as f64 * 2.0 - 1.0;
+            let mut found: Vec<Hold> = Vec::new();
+            for step in STEPS {
+                let p = unit.center
+                    + unit.axes[other] * (at * unit.half[other])
+                    + unit.axes[k] * (sign * (unit.half[k] + step));
+                for hold in matter_across(unit, index, p, around) {
+                    if !found.iter().any(|h| h.unit == hold.unit) {
+                        found.push(hold);
+                    }
+                }
+            }
+            found
+        })
+        .collect()
+}
+
+/// Others' matter along the thin axis through a point, in the unit's plane and with air on both
+/// sides of it.
+fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
+    let reach = unit.half.x + WALL;
+    let across = unit.axes[0];
+    let ray = Ray::segment(p - across * reach, p + across * reach);
+    let mut hits: Vec<(u32, f64, bool)> = Vec::new();
+    around.bvh.for_each_hit(&ray, |h| {
+        let owner = around.unit_of[h.triangle as usize];
+        let n = triangle_area_normal(&around.triangles[h.triangle as usize]);
+        if owner != index && n.dot(across).abs() > FACING * n.length() {
+            hits.push((owner, (2.0 * h.t - 1.0) * reach, h.front));
+        }
+    });
+    hits.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
+    hits.dedup_by(|b, a| a.0 == b.0 && b.1 - a.1 < SAME && a.2 == b.2);
+    let mut found = Vec::new();
+    for own in hits.chunk_by(|a, b| a.0 == b.0) {
+        for pair in own.windows(2) {
+            let [(_, from, front_in), (_, to, front_out)] = [pair[0], pair[1]];
+            // Of two surfaces there is matter between, however they are turned.
+            if own.len() > 2 && !(front_in && !front_out) {
+                continue;
+            }
+            let overlap = to.min(unit.half.x) - from.max(-unit.half.x);
+            // A picture's frame only touches the wall.
+            if overlap > 0.25 * (to - from).min(2.0 * unit.half.x) {
+                found.push(Hold {
+                    unit: own[0].0,
+                    thickness: to - from,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Matter of the unit itself along its thin axis, averaged over its face, if there is air before it
+/// and behind it.
+fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> Option<f64> {
+    let across = unit.axes[0];
+    let mut sum = 0.0;
+    let mut n_free = [0, 0];
+    for i in 0..GRID * GRID {
+        let at = |k: usize| (k as f64 + 0.5) / GRID as f64 * 2.0 - 1.0;
+        let p = unit.center
+            + unit.axes[1] * (at(i % GRID) * unit.half.y)
+            + unit.axes[2] * (at(i / GRID) * unit.half.z);
+        let (near, far) = (unit.half.x + STEPS[0], unit.half.x + AIR);
+        for (n, across) in n_free.iter_mut().zip([-across, across]) {
+            let is_hit = around.bvh.any_hit(p + across * near, p + across * far, |t| {
+                around.unit_of[t as usize] == index
+            });
+            *n += usize::from(!is_hit);
+        }
+        let (mut first, mut last) = (f64::MAX, f64::MIN);
+        let ray = Ray::segment(p - across * near, p + across * near);
+        around.bvh.for_each_hit(&ray, |h| {
+            if around.unit_of[h.triangle as usize] == index {
+                first = first.min(h.t);
+                last = last.max(h.t);
+            }
+        });
+        if last > first {
+            sum += (last - first) * 2.0 * near;
+        }
+    }
+    let n = (GRID * GRID) as f64;
+    n_free
+        .iter()
+        .all(|&free| free as f64 >= OPEN * n)
+        .then_some(sum / n)
+}

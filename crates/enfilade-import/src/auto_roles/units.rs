@@ -1,0 +1,154 @@
+//! Objects as what hangs together in them: all windows of a facade may be one mesh.
+
+use super::parts;
+use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
+
+/// Parts nearer than this are one thing: a handle and its leaf, the triangles of a mesh that shares
+/// no corners. [Units: wu]
+const TOGETHER: f64 = 0.01;
+/// Of more parts than this, all are one thing: parting them costs their number squared at worst.
+const MOST_PARTS: usize = 2_000;
+/// Normals that differ by less than 11° are one direction.
+const ONE_DIRECTION: f64 = 0.98;
+/// Directions told apart, so that a sphere costs no more than a box.
+const MOST_DIRECTIONS: usize = 64;
+
+/// Shorter than this is no door and no window. [Units: wu]
+const LEAST_EDGE: f64 = 0.35;
+
+/// A thing that hangs together, and its box along its own faces.
+pub(super) struct Unit {
+    pub(super) object: u32,
+    /// In the list of all.
+    pub(super) triangles: Vec<u32>,
+    pub(super) center: DVec3,
+    /// Right-handed: across the thing where it is thinnest, level along it, and up along it.
+    pub(super) axes: [DVec3; 3],
+    /// Half its edges along the axes. [Units: wu]
+    pub(super) half: DVec3,
+}
+
+impl Unit {
+    /// Whether it is too small to be a door or a window.
+    pub(super) fn is_small(&self) -> bool {
+        2.0 * self.half.y.min(self.half.z) < LEAST_EDGE
+    }
+}
+
+/// The things that an object's triangles make; `first` is the object's first triangle among all.
+pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<Unit> {
+    let (set_of, boxes) = parts(triangles);
+    let mut sets = Sets::new(boxes.len());
+    if boxes.len() > MOST_PARTS {
+        (1..boxes.len() as u32).for_each(|i| {
+            sets.join(0, i);
+        });
+    } else {
+        join_near(&boxes, &mut sets);
+    }
+    let mut slot = vec![usize::MAX; boxes.len()];
+    let mut members: Vec<Vec<u32>> = Vec::new();
+    for (i, part) in (0..).zip(set_of) {
+        let slot = &mut slot[sets.find(part) as usize];
+        if *slot == usize::MAX {
+            *slot = members.len();
+            members.push(Vec::new());
+        }
+        members[*slot].push(i);
+    }
+    members
+        .into_iter()
+        .map(|own| {
+            let own_triangles = own.iter().map(|&i| &triangles[i as usize]);
+            let (center, axes, half) = own_box(own_triangles);
+            Unit {
+                object,
+                triangles: own.iter().map(|i| first + i).collect(),
+                center,
+                axes,
+                half,
+            }
+        })
+        .collect()
+}
+
+/// Joins boxes that nearly touch.
+fn join_near(boxes: &[Aabb], sets: &mut Sets) {
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    order.sort_by(|&a, &b| boxes[a as usize].min.x.total_cmp(&boxes[b as usize].min.x));
+    for (k, &a) in order.iter().enumerate() {
+        let near = boxes[a as usize].expanded(TOGETHER);
+        for &b in order[k + 1..]
+            .iter()
+            .take_while(|&&b| boxes[b as usize].min.x <= near.max.x)
+        {
+            if near.overlaps(&boxes[b as usize]) {
+                sets.join(a, b);
+            }
+        }
+    }
+}
+
+/// The box along the directions that most of the surface faces.
+fn own_box<'t>(
+    triangles: impl Iterator<Item = &'t Triangle> + Clone,
+) -> (DVec3, [DVec3; 3], DVec3) {
+    let mut directions: Vec<(DVec3, f64)> = Vec::new();
+    for t in triangles.clone() {
+        let n = triangle_area_normal(t);
+        let area = n.length();
+        let Some(n) = n.try_normalize() else { continue };
+        if let Some(d) = directions
+            .iter_mut()
+            .find(|d| d.0.dot(n).abs() > ONE_DIRECTION)
+        {
+            d.1 += area;
+        } else if directions.len() < MOST_DIRECTIONS {
+            directions.push((n, area));
+        }
+    }
+    directions.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let extent = |d: DVec3| {
+        triangles
+            .clone()
+            .flatten()
+            .map(|p| d.dot(*p))
+            .fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)))
+    };
+    // Of the three that most of the surface faces, the one along which it is thinnest.
+    let width = |d: &DVec3| {
+        let (lo, hi) = extent(*d);
+        hi - lo
+    };
+    let across = directions
+        .iter()
+        .take(3)
+        .map(|d| d.0)
+        .min_by(|a, b| width(a).total_cmp(&width(b)))
+        .unwrap_or(DVec3::Y);
+    let across = canonical(across);
+    let level = if across.y.abs() > ONE_DIRECTION {
+        // What lies flat is turned as its sides are.
+        directions
+            .iter()
+            .find_map(|d| (d.0 - across * across.dot(d.0)).try_normalize())
+            .unwrap_or(DVec3::X)
+    } else {
+        DVec3::Y.cross(across).normalize()
+    };
+    let axes = [across, level, across.cross(level)];
+    let [x, y, z] = axes.map(extent);
+    let center = axes[0] * (0.5 * (x.0 + x.1))
+        + axes[1] * (0.5 * (y.0 + y.1))
+        + axes[2] * (0.5 * (z.0 + z.1));
+    let half = DVec3::new(x.1 - x.0, y.1 - y.0, z.1 - z.0) * 0.5;
+    (center, axes, half)
+}
+
+/// Of a direction and its reverse, always the same one.
+fn canonical(d: DVec3) -> DVec3 {
+    /// What rounding makes of zero.
+    const NONE: f64 = 1e-6;
+    let first = [d.x, d.z, d.y].into_iter().find(|c| c.abs() > NONE);
+    if first.is_some_and(|c| c < 0.0) { -d } else { d }
+}
