@@ -169,17 +169,22 @@ fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bv
     };
     let is_open = |unit: &Unit| is_open(&scene.objects[unit.object as usize]);
     let found = fillers::fillers(&units, &is_open, &around);
-    // An object's role is one, so all of it must fill openings but what is too small to be asked.
-    let mut n_left = vec![0; scene.objects.len()];
-    for unit in units.iter().filter(|u| !u.is_small()) {
-        n_left[unit.object as usize] += 1;
-    }
+    // An object's role is one, so each of its things must fill an opening, or belong to one that does.
+    let mut reasons = vec![None; units.len()];
     for (unit, reason) in found {
-        let object = units[unit as usize].object as usize;
-        n_left[object] -= 1;
-        if n_left[object] == 0 {
-            scene.objects[object].role = Role::Detail;
-            scene.objects[object].reason = reason;
+        reasons[unit as usize] = Some(reason);
+    }
+    let of_object = |a: &(&Unit, _), b: &(&Unit, _)| a.0.object == b.0.object;
+    let all: Vec<(&Unit, Option<String>)> = units.iter().zip(reasons).collect();
+    for own in all.chunk_by(of_object) {
+        let mut filling = own.iter().filter(|u| u.1.is_some());
+        let belongs = |unit: &Unit| filling.clone().any(|(filler, _)| filler.has_beside(unit));
+        if own.iter().all(|u| u.1.is_some() || belongs(u.0))
+            && let Some((unit, Some(reason))) = filling.next()
+        {
+            let object = &mut scene.objects[unit.object as usize];
+            object.role = Role::Detail;
+            object.reason.clone_from(reason);
         }
     }
 }

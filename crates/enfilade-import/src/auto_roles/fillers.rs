@@ -30,6 +30,9 @@ const AIR: f64 = 0.2;
 const OPEN: f64 = 0.5;
 /// Surfaces turned further from its face than 45° bound no wall in its plane.
 const FACING: f64 = 0.7;
+/// What holds it lies beside it in depth over this share of the thinner of the two: a frame of a
+/// picture lies before the wall.
+const OVERLAP: f64 = 0.25;
 /// Hits nearer than this along a line are one, of two triangles that share an edge. [Units: wu]
 const SAME: f64 = 1e-4;
 
@@ -228,36 +231,61 @@ fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec
         .collect()
 }
 
-/// Others' matter along the thin axis through a point, in the unit's plane and with air on both
-/// sides of it.
-fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
+/// Where a line across a unit's plane meets something.
+#[derive(Clone, Copy)]
+struct Crossing {
+    unit: u32,
+    /// From the unit's middle plane. [Units: wu]
+    at: f64,
+    front: bool,
+    /// The surface is nearly parallel to the unit's plane.
+    is_facing: bool,
+}
+
+/// Others' matter along a line across.
+struct Matter {
+    unit: u32,
+    from: f64,
+    to: f64,
+}
+
+/// All that the line through a point along the thin axis meets, by unit and in order.
+fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> {
     let reach = unit.half.x + WALL;
     let across = unit.axes[0];
     let ray = Ray::segment(p - across * reach, p + across * reach);
-    let mut hits: Vec<(u32, f64, bool)> = Vec::new();
+    let mut found: Vec<Crossing> = Vec::new();
     around.bvh.for_each_hit(&ray, |h| {
-        let owner = around.unit_of[h.triangle as usize];
         let n = triangle_area_normal(&around.triangles[h.triangle as usize]);
-        if owner != index && n.dot(across).abs() > FACING * n.length() {
-            hits.push((owner, (2.0 * h.t - 1.0) * reach, h.front));
-        }
+        found.push(Crossing {
+            unit: around.unit_of[h.triangle as usize],
+            at: (2.0 * h.t - 1.0) * reach,
+            front: h.front,
+            is_facing: n.dot(across).abs() > FACING * n.length(),
+        });
     });
-    hits.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
-    hits.dedup_by(|b, a| a.0 == b.0 && b.1 - a.1 < SAME && a.2 == b.2);
+    found.sort_by(|a, b| a.unit.cmp(&b.unit).then(a.at.total_cmp(&b.at)));
+    found.dedup_by(|b, a| a.unit == b.unit && b.at - a.at < SAME && a.front == b.front);
+    found
+}
+
+/// The matter of all but one unit, between surfaces that face along the line.
+fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
+    let facing: Vec<Crossing> = crossings
+        .iter()
+        .filter(|c| c.unit != but && c.is_facing)
+        .copied()
+        .collect();
     let mut found = Vec::new();
-    for own in hits.chunk_by(|a, b| a.0 == b.0) {
+    for own in facing.chunk_by(|a, b| a.unit == b.unit) {
+        // Of two surfaces there is matter between, however they are turned.
+        let is_any = own.len() == 2;
         for pair in own.windows(2) {
-            let [(_, from, front_in), (_, to, front_out)] = [pair[0], pair[1]];
-            // Of two surfaces there is matter between, however they are turned.
-            if own.len() > 2 && !(front_in && !front_out) {
-                continue;
-            }
-            let overlap = to.min(unit.half.x) - from.max(-unit.half.x);
-            // A picture's frame only touches the wall.
-            if overlap > 0.25 * (to - from).min(2.0 * unit.half.x) {
-                found.push(Hold {
-                    unit: own[0].0,
-                    thickness: to - from,
+            if is_any || pair[0].front && !pair[1].front {
+                found.push(Matter {
+                    unit: own[0].unit,
+                    from: pair[0].at,
+                    to: pair[1].at,
                 });
             }
         }
@@ -265,10 +293,24 @@ fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -
     found
 }
 
+/// Others' matter through a point, in the unit's plane and with air on both sides of it.
+fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
+    let half = unit.half.x;
+    matter(&crossings(unit, p, around), index)
+        .into_iter()
+        .map(|m| (m.to.min(half) - m.from.max(-half), m))
+        // A picture's frame only touches the wall.
+        .filter(|(overlap, m)| *overlap > OVERLAP * (m.to - m.from).min(2.0 * half))
+        .map(|(_, m)| Hold {
+            unit: m.unit,
+            thickness: m.to - m.from,
+        })
+        .collect()
+}
+
 /// Matter of the unit itself along its thin axis, averaged over its face, if there is air before it
 /// and behind it.
 fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> Option<f64> {
-    let across = unit.axes[0];
     let mut sum = 0.0;
     let mut n_free = [0, 0];
     for i in 0..GRID * GRID {
@@ -276,23 +318,22 @@ fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> 
         let p = unit.center
             + unit.axes[1] * (at(i % GRID) * unit.half.y)
             + unit.axes[2] * (at(i / GRID) * unit.half.z);
-        let (near, far) = (unit.half.x + STEPS[0], unit.half.x + AIR);
-        for (n, across) in n_free.iter_mut().zip([-across, across]) {
-            let is_hit = around.bvh.any_hit(p + across * near, p + across * far, |t| {
-                around.unit_of[t as usize] == index
-            });
-            *n += usize::from(!is_hit);
+        let met = crossings(unit, p, around);
+        let others = matter(&met, index);
+        for (n, sign) in n_free.iter_mut().zip([-1.0, 1.0]) {
+            let (near, far) = (unit.half.x + STEPS[0], unit.half.x + AIR);
+            let is_met = met
+                .iter()
+                .any(|c| c.unit != index && (near..far).contains(&(sign * c.at)));
+            // Inside a wall there is nothing to meet, either.
+            let is_inside = others
+                .iter()
+                .any(|m| m.from < sign * near && sign * near < m.to);
+            *n += usize::from(!is_met && !is_inside);
         }
-        let (mut first, mut last) = (f64::MAX, f64::MIN);
-        let ray = Ray::segment(p - across * near, p + across * near);
-        around.bvh.for_each_hit(&ray, |h| {
-            if around.unit_of[h.triangle as usize] == index {
-                first = first.min(h.t);
-                last = last.max(h.t);
-            }
-        });
-        if last > first {
-            sum += (last - first) * 2.0 * near;
+        let own = || met.iter().filter(|c| c.unit == index).map(|c| c.at);
+        if let (Some(first), Some(last)) = (own().next(), own().last()) {
+            sum += last - first;
         }
     }
     let n = (GRID * GRID) as f64;

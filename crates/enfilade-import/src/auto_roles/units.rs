@@ -16,6 +16,10 @@ const MOST_DIRECTIONS: usize = 64;
 /// Shorter than this is no door and no window. [Units: wu]
 const LEAST_EDGE: f64 = 0.35;
 
+/// How far casings, sills and handles stand out from what they belong to: across a thick wall, and
+/// along it by the width of a board. [Units: wu]
+const BESIDE: DVec3 = DVec3::new(0.6, 0.2, 0.2);
+
 /// A thing that hangs together, and its box along its own faces.
 pub(super) struct Unit {
     pub(super) object: u32,
@@ -32,6 +36,19 @@ impl Unit {
     /// Whether it is too small to be a door or a window.
     pub(super) fn is_small(&self) -> bool {
         2.0 * self.half.y.min(self.half.z) < LEAST_EDGE
+    }
+
+    /// Whether the other is a casing, a sill or a handle of this one: it lies before its face, in
+    /// the same wall.
+    pub(super) fn has_beside(&self, other: &Self) -> bool {
+        let reach = self.half + BESIDE;
+        (0..8).all(|corner| {
+            let sign = |k: usize| if corner >> k & 1 == 1 { 1.0 } else { -1.0 };
+            let p = (0..3).fold(other.center, |p, k| {
+                p + other.axes[k] * (sign(k) * other.half[k])
+            });
+            (0..3).all(|k| (p - self.center).dot(self.axes[k]).abs() <= reach[k])
+        })
     }
 }
 
