@@ -13,6 +13,7 @@ use std::ops::Range;
 use units::Unit;
 
 mod fillers;
+mod furniture;
 mod units;
 
 /// The reason of objects that no rule fitted.
@@ -55,6 +56,9 @@ const MOST: f64 = 0.3;
 /// So many small objects are no furniture, either; and looking at each takes time.
 const MOST_OBJECTS: usize = 50_000;
 
+/// How often what is left is asked again: a stack of so many boxes is furniture.
+const ROUNDS: usize = 4;
+
 /// What is known of one structural object.
 struct Shape {
     object: usize,
@@ -84,52 +88,48 @@ pub(crate) fn judge(scene: &mut Scene) {
         return;
     }
     let (shapes, triangles, owners) = shapes_of(scene);
-    if n_open > MOST_OBJECTS {
-        return;
+    let bvh = if n_open <= MOST_OBJECTS {
+        Some(Bvh::build(&triangles))
+    } else {
+        None
+    };
+    if let Some(bvh) = &bvh {
+        judge_fillers(scene, &shapes, &triangles, bvh);
     }
-    let bvh = Bvh::build(&triangles);
-    judge_fillers(scene, &shapes, &triangles, &bvh);
-    let shapes: Vec<Shape> = shapes
-        .into_iter()
-        .filter(|s| scene.objects[s.object].role == Role::Structural)
+    let is_gone: Vec<bool> = scene
+        .objects
+        .iter()
+        .map(|o| o.role == Role::Detail)
         .collect();
+    let shapes: Vec<Shape> = shapes.into_iter().filter(|s| !is_gone[s.object]).collect();
     let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
-    let small = SMALL.min(SMALL_SHARE * bounds.size().length());
+    let mut judge = Judge {
+        triangles: &triangles,
+        owners: &owners,
+        bvh: bvh.as_ref(),
+        diagonal: bounds.size().length(),
+        is_gone,
+    };
     let mut found: Vec<(usize, String)> = Vec::new();
     let mut detail_area = 0.0;
-    for shape in shapes.iter().filter(|s| s.is_open) {
-        let size = shape.bounds.size();
-        let reason = if size.max_element() <= small {
-            let judged = || {
-                let touches = |b: &Aabb| {
-                    let mut is_touched = false;
-                    bvh.for_each_in_box(b, |t| {
-                        is_touched |= owners[t as usize] != shape.object as u32;
-                    });
-                    is_touched
-                };
-                let reason = seen_around(&shape.bounds, &touches)?;
-                let own = &triangles[shape.triangles.clone()];
-                (!goes_on_at_its_rim(own, &shape.bounds, &touches)).then_some(reason)
-            };
-            judged()
-        } else {
-            let is_rail = size.min_element() <= FLAT
-                && fill(shape) < SPARSE
-                && parts(&triangles[shape.triangles.clone()]).1.iter().all(|b| {
-                    let mut edges = b.size().to_array();
-                    edges.sort_by(f64::total_cmp);
-                    edges[1] <= BAR
-                });
-            is_rail.then(|| {
-                let percent = fill(shape) * 100.0;
-                format!("hides little: bars that fill {percent:.0} % of their box")
-            })
-        };
-        if let Some(reason) = reason {
-            // The leaves of a plant are more surface than it hides.
-            detail_area += shape.area.min(shape.bounds.surface_area());
-            found.push((shape.object, reason));
+    // What stands on furniture, or below it, is seen when that is gone.
+    for _ in 0..ROUNDS {
+        let before = found.len();
+        for shape in shapes
+            .iter()
+            .filter(|s| s.is_open && !judge.is_gone[s.object])
+        {
+            if let Some(reason) = judge.reason(shape) {
+                // The leaves of a plant are more surface than it hides.
+                detail_area += shape.area.min(shape.bounds.surface_area());
+                found.push((shape.object, reason));
+            }
+        }
+        for (object, _) in &found[before..] {
+            judge.is_gone[*object] = true;
+        }
+        if found.len() == before {
+            break;
         }
     }
     let structural_area: f64 = shapes.iter().map(|s| s.area).sum();
@@ -145,6 +145,63 @@ pub(crate) fn judge(scene: &mut Scene) {
         object.role = Role::Detail;
         object.reason = reason;
     }
+}
+
+/// What is asked about each object that is no filler.
+struct Judge<'a> {
+    triangles: &'a [Triangle],
+    owners: &'a [u32],
+    bvh: Option<&'a Bvh>,
+    /// Of the structure. [Units: wu]
+    diagonal: f64,
+    /// Objects known to be detail.
+    is_gone: Vec<bool>,
+}
+
+impl Judge<'_> {
+    /// Why an object is detail, if it is.
+    fn reason(&self, shape: &Shape) -> Option<String> {
+        let own = &self.triangles[shape.triangles.clone()];
+        let size = shape.bounds.size();
+        let reach = SMALL_SHARE * self.diagonal;
+        if size.max_element() > SMALL.min(reach) && is_rail(shape, own) {
+            let percent = fill(shape) * 100.0;
+            return Some(format!(
+                "hides little: bars that fill {percent:.0} % of their box"
+            ));
+        }
+        let bvh = self.bvh?;
+        let is_own = |t: u32| self.owners[t as usize] == shape.object as u32;
+        let touches = |b: &Aabb| {
+            let mut is_touched = false;
+            bvh.for_each_in_box(b, |t| is_touched |= !is_own(t));
+            is_touched
+        };
+        let mut reason = None;
+        if size.max_element() <= SMALL.min(reach) {
+            reason = seen_around(&shape.bounds, &touches);
+        }
+        if reason.is_none() && size.y <= SMALL {
+            let meets = |a, b| {
+                bvh.any_hit(a, b, |t| {
+                    is_own(t) || self.is_gone[self.owners[t as usize] as usize]
+                })
+            };
+            reason = furniture::reason(&units::whole(shape.object as u32, own), reach, &meets);
+        }
+        // The rim is asked last, as it costs most.
+        reason.filter(|_| !goes_on_at_its_rim(own, &shape.bounds, &touches))
+    }
+}
+
+fn is_rail(shape: &Shape, own: &[Triangle]) -> bool {
+    shape.bounds.size().min_element() <= FLAT
+        && fill(shape) < SPARSE
+        && parts(own).1.iter().all(|b| {
+            let mut edges = b.size().to_array();
+            edges.sort_by(f64::total_cmp);
+            edges[1] <= BAR
+        })
 }
 
 /// Objects all of whose things fill openings become detail.

@@ -20,8 +20,11 @@ const SAMPLES: usize = 8;
 const HELD: f64 = 0.7;
 /// The lintel and two jambs, or three sides of a window beside a pillar.
 const SIDES: usize = 3;
-/// What is thinner than this share of the wall around it, holes counted, is no piece of that wall.
+/// What is thinner than this share of the wall around it, holes counted, is no piece of that wall,
 const THIN: f64 = 0.5;
+/// nor another wall: the thinnest partitions, set between columns and under beams, are thicker than
+/// this, and leaves are 4 to 6 cm. [Units: wu]
+const LEAF: f64 = 0.07;
 /// Rays along each edge of its face.
 const GRID: usize = 5;
 /// So far before and behind it is air: what hangs on a wall has none behind it. [Units: wu]
@@ -57,8 +60,15 @@ struct Candidate {
     unit: u32,
     /// Matter along its thin axis, averaged over its face. [Units: wu]
     thickness: f64,
-    /// What holds it at each sample of each side.
+    /// The same over the thinnest quarter of its face, holes not counted: a leaf or a pane, without
+    /// frame. 0 for what is a frame only. [Units: wu]
+    leaf: f64,
+    /// What holds it at each sample of each side: left, right, below, above.
     sides: [Vec<Vec<Hold>>; 4],
+    /// Left and right, whether anything at all is there.
+    ends: [bool; 2],
+    /// It does not lie flat.
+    is_upright: bool,
 }
 
 /// Units that fill openings, each with the reason.
@@ -109,7 +119,9 @@ pub(super) fn fillers(
 
 /// How what is around a group holds it.
 struct Held {
-    n_sides: usize,
+    sides: [bool; 4],
+    /// A leaf in a corner: a lintel and one jamb hold it, and another wall is in the jamb's place.
+    is_in_corner: bool,
     /// The thinnest of those sides. [Units: wu]
     wall: f64,
     /// Sides that one connected surface holds.
@@ -120,7 +132,8 @@ impl Held {
     /// Samples that lie at another member or candidate are inside the group.
     fn of(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> Self {
         let mut held = Self {
-            n_sides: 0,
+            sides: [false; 4],
+            is_in_corner: false,
             wall: f64::INFINITY,
             n_by_one: 0,
         };
@@ -147,7 +160,7 @@ impl Held {
             if walls.is_empty() || (walls.len() as f64) < enough {
                 continue;
             }
-            held.n_sides += 1;
+            held.sides[side] = true;
             walls.sort_by(f64::total_cmp);
             held.wall = held.wall.min(walls[walls.len() / 2]);
             for (unit, n) in holders {
@@ -157,22 +170,37 @@ impl Held {
             }
         }
         held.n_by_one = n_by.iter().map(|h| h.1).max().unwrap_or(0);
+        let [left, right, _, above] = held.sides;
+        let has_end = |k: usize| members.iter().any(|c| c.ends[k]);
+        held.is_in_corner = above
+            && (left && has_end(1) || right && has_end(0))
+            && members.iter().all(|c| c.is_upright);
         held
     }
 
+    fn n_sides(&self) -> usize {
+        self.sides.iter().filter(|&&is_held| is_held).count()
+    }
+
+    fn has_opening(&self, c: &Candidate) -> bool {
+        self.n_sides() >= SIDES || self.is_in_corner && c.leaf <= LEAF
+    }
+
+    fn is_thin(&self, c: &Candidate) -> bool {
+        c.leaf <= LEAF && c.thickness <= THIN * self.wall
+    }
+
     fn reason(&self, c: &Candidate) -> Option<String> {
-        if self.n_sides < SIDES {
+        if !self.has_opening(c) {
             None
-        } else if c.thickness <= THIN * self.wall {
+        } else if self.is_thin(c) {
             Some(format!(
                 "the wall around it {:.2} m on {} sides",
-                self.wall, self.n_sides
+                self.wall,
+                self.n_sides()
             ))
         } else if self.n_by_one >= SIDES {
-            Some(format!(
-                "one wall goes round it on {} sides",
-                self.n_by_one
-            ))
+            Some(format!("one wall goes round it on {} sides", self.n_by_one))
         } else {
             None
         }
@@ -194,18 +222,20 @@ fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Ca
         return None;
     }
     let sides = [0, 1, 2, 3].map(|side| holds(unit, index, side, around));
-    let share = |side: &Vec<Vec<Hold>>| {
-        side.iter().filter(|s| !s.is_empty()).count() as f64 / SAMPLES as f64
-    };
-    if sides.iter().filter(|s| share(s) >= HELD).count() < SIDES {
-        return None;
-    }
-    let thickness = thickness_between_air(unit, index, around)?;
-    Some(Candidate {
+    let is_upright = unit.axes[0].y.abs() < FACING;
+    let (thickness, leaf) = thickness_between_air(unit, index, around)?;
+    let candidate = Candidate {
         unit: index,
         thickness,
+        leaf,
         sides,
-    })
+        ends: [-1.0, 1.0].map(|sign| is_at_end(unit, index, sign, around)),
+        is_upright,
+    };
+    // Whatever holds it; what that is itself is asked when all candidates are known.
+    let held = Held::of(&[&candidate], &|_| false);
+    let may_be = held.is_thin(&candidate) || held.n_by_one >= SIDES - 1;
+    (held.has_opening(&candidate) && may_be).then_some(candidate)
 }
 
 /// What holds a side, at each of its samples.
@@ -229,6 +259,24 @@ fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec
             found
         })
         .collect()
+}
+
+/// Whether anything is where it ends, left or right.
+fn is_at_end(unit: &Unit, index: u32, sign: f64, around: &Surroundings<'_>) -> bool {
+    let out = unit.axes[1] * sign;
+    let end = unit.center + out * unit.half.y;
+    let n_met = (0..SAMPLES)
+        .filter(|&i| {
+            let at = (i as f64 + 0.5) / SAMPLES as f64 * 2.0 - 1.0;
+            let p = end + unit.axes[2] * (at * unit.half.z);
+            around
+                .bvh
+                .any_hit(p - out * STEPS[1], p + out * STEPS[1], |t| {
+                    around.unit_of[t as usize] == index
+                })
+        })
+        .count();
+    n_met as f64 >= HELD * SAMPLES as f64
 }
 
 /// Where a line across a unit's plane meets something.
@@ -308,10 +356,10 @@ fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -
         .collect()
 }
 
-/// Matter of the unit itself along its thin axis, averaged over its face, if there is air before it
-/// and behind it.
-fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> Option<f64> {
-    let mut sum = 0.0;
+/// Matter of the unit itself along its thin axis, averaged over its face and where it is thin, if
+/// there is air before it and behind it.
+fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> Option<(f64, f64)> {
+    let mut own_matter = Vec::new();
     let mut n_free = [0, 0];
     for i in 0..GRID * GRID {
         let at = |k: usize| (k as f64 + 0.5) / GRID as f64 * 2.0 - 1.0;
@@ -333,12 +381,19 @@ fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> 
         }
         let own = || met.iter().filter(|c| c.unit == index).map(|c| c.at);
         if let (Some(first), Some(last)) = (own().next(), own().last()) {
-            sum += last - first;
+            own_matter.push(last - first);
         }
     }
     let n = (GRID * GRID) as f64;
-    n_free
-        .iter()
-        .all(|&free| free as f64 >= OPEN * n)
-        .then_some(sum / n)
+    if n_free.iter().any(|&free| (free as f64) < OPEN * n) {
+        return None;
+    }
+    own_matter.sort_by(f64::total_cmp);
+    let is_frame = 2 * own_matter.len() < GRID * GRID;
+    let leaf = if is_frame {
+        0.0
+    } else {
+        own_matter[own_matter.len() / 4]
+    };
+    Some((own_matter.iter().sum::<f64>() / n, leaf))
 }

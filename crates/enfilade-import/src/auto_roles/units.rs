@@ -10,6 +10,8 @@ const TOGETHER: f64 = 0.01;
 const MOST_PARTS: usize = 2_000;
 /// Normals that differ by less than 11° are one direction.
 const ONE_DIRECTION: f64 = 0.98;
+/// … and by more than 45° when they are to give a box its second axis.
+const LEVEL: f64 = 0.7;
 /// Directions told apart, so that a sphere costs no more than a box.
 const MOST_DIRECTIONS: usize = 64;
 
@@ -89,6 +91,18 @@ pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<U
         .collect()
 }
 
+/// An object taken as one thing; without its triangles.
+pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
+    let (center, axes, half) = own_box(triangles.iter());
+    Unit {
+        object,
+        triangles: Vec::new(),
+        center,
+        axes,
+        half,
+    }
+}
+
 /// Joins boxes that nearly touch.
 fn join_near(boxes: &[Aabb], sets: &mut Sets) {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -148,6 +162,7 @@ fn own_box<'t>(
         // What lies flat is turned as its sides are.
         directions
             .iter()
+            .filter(|d| d.0.dot(across).abs() < LEVEL)
             .find_map(|d| (d.0 - across * across.dot(d.0)).try_normalize())
             .unwrap_or(DVec3::X)
     } else {
@@ -167,5 +182,9 @@ fn canonical(d: DVec3) -> DVec3 {
     /// What rounding makes of zero.
     const NONE: f64 = 1e-6;
     let first = [d.x, d.z, d.y].into_iter().find(|c| c.abs() > NONE);
-    if first.is_some_and(|c| c < 0.0) { -d } else { d }
+    if first.is_some_and(|c| c < 0.0) {
+        -d
+    } else {
+        d
+    }
 }
