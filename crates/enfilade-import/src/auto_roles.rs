@@ -194,14 +194,16 @@ impl Judge<'_> {
     }
 }
 
+/// Whether an object is a row of bars, level, upright or inclined.
 fn is_rail(shape: &Shape, own: &[Triangle]) -> bool {
-    shape.bounds.size().min_element() <= FLAT
-        && fill(shape) < SPARSE
-        && parts(own).1.iter().all(|b| {
-            let mut edges = b.size().to_array();
-            edges.sort_by(f64::total_cmp);
-            edges[1] <= BAR
-        })
+    if shape.bounds.size().min_element() > FLAT || fill(shape) >= SPARSE {
+        return false;
+    }
+    units::parts_of(own).iter().all(|part| {
+        let mut edges = (part.half * 2.0).to_array();
+        edges.sort_by(f64::total_cmp);
+        edges[1] <= BAR
+    })
 }
 
 /// Objects all of whose things fill openings become detail.

@@ -8,10 +8,10 @@ use super::units::Unit;
 use super::{INTO, NEAR, SMALL, SMALL_SHARE};
 use enfilade_geom::DVec3;
 
-/// Longer is no bed and no sofa, but a parapet or a stage. [Units: wu]
-const LONG: f64 = 3.0;
-/// Thinner things are boards: skirtings, sills, mullions, the floor's finish. [Units: wu]
-const BOARD: f64 = 0.2;
+/// Longer is no worktop and no corner sofa, but a parapet or a stage. [Units: wu]
+const LONG: f64 = 5.0;
+/// What has two thinner edges is a skirting, a sill or a mullion. [Units: wu]
+const BAR: f64 = 0.2;
 /// So much air is above it: what reaches the ceiling may hold it. [Units: wu]
 const HEAD: f64 = 0.3;
 /// A side is free or backed if so much of it is.
@@ -31,8 +31,9 @@ pub(super) fn reason(whole: &Unit, reach: f64, meets: &Meets<'_>) -> Option<Stri
     let up = (0..3).find(|&k| whole.axes[k].y.abs() > 1.0 - NEAR)?;
     let [a, b] = [(up + 1) % 3, (up + 2) % 3];
     let half = whole.half;
-    if 2.0 * half.min_element() < BOARD
-        || 2.0 * half[up] > SMALL
+    let n_thin = half.to_array().iter().filter(|&&h| 2.0 * h < BAR).count();
+    let is_bar = n_thin > 1;
+    if is_bar || 2.0 * half[up] > SMALL
         || 2.0 * half[a].max(half[b]) > LONG.min(reach)
     {
         return None;

@@ -91,6 +91,16 @@ pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<U
         .collect()
 }
 
+/// The connected parts of an object; without their triangles.
+pub(super) fn parts_of(triangles: &[Triangle]) -> Vec<Unit> {
+    let (part_of, boxes) = parts(triangles);
+    let mut members: Vec<Vec<Triangle>> = vec![Vec::new(); boxes.len()];
+    for (t, part) in triangles.iter().zip(part_of) {
+        members[part as usize].push(*t);
+    }
+    members.iter().map(|own| whole(0, own)).collect()
+}
+
 /// An object taken as one thing; without its triangles.
 pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
     let (center, axes, half) = own_box(triangles.iter());
