@@ -187,7 +187,8 @@ impl Judge<'_> {
                     is_own(t) || self.is_gone[self.owners[t as usize] as usize]
                 })
             };
-            reason = furniture::reason(&units::whole(shape.object as u32, own), reach, &meets);
+            let upright = units::upright(shape.object as u32, own);
+            reason = furniture::reason(&upright, &shape.bounds, reach, &meets, &touches);
         }
         // The rim is asked last, as it costs most.
         reason.filter(|_| !goes_on_at_its_rim(own, &shape.bounds, &touches))

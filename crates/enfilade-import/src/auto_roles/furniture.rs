@@ -5,8 +5,8 @@
 //! in other things, as walls do, stays.
 
 use super::units::Unit;
-use super::{INTO, NEAR, SMALL, SMALL_SHARE};
-use enfilade_geom::DVec3;
+use super::{GOES_ON, INTO, NEAR, SMALL, SMALL_SHARE, n_goes_on};
+use enfilade_geom::{Aabb, DVec3};
 
 /// Longer is no worktop and no corner sofa, but a parapet or a stage. [Units: wu]
 const LONG: f64 = 5.0;
@@ -27,31 +27,49 @@ const AROUND: usize = 5;
 type Meets<'m> = dyn Fn(DVec3, DVec3) -> bool + 'm;
 
 /// Why an object, taken as one thing, is furniture, if it is.
-pub(super) fn reason(whole: &Unit, reach: f64, meets: &Meets<'_>) -> Option<String> {
-    let up = (0..3).find(|&k| whole.axes[k].y.abs() > 1.0 - NEAR)?;
-    let [a, b] = [(up + 1) % 3, (up + 2) % 3];
+pub(super) fn reason(
+    whole: &Unit,
+    bounds: &Aabb,
+    reach: f64,
+    meets: &Meets<'_>,
+    touches: &dyn Fn(&Aabb) -> bool,
+) -> Option<String> {
+    // The box is upright.
+    let [a, b, up] = [0, 1, 2];
     let half = whole.half;
     let n_thin = half.to_array().iter().filter(|&&h| 2.0 * h < BAR).count();
     let is_bar = n_thin > 1;
-    if is_bar || 2.0 * half[up] > SMALL
+    // What lies on the floor so flat bounds nothing more than the floor.
+    if is_bar
+        || 2.0 * half[up] < NEAR
+        || 2.0 * half[up] > SMALL
         || 2.0 * half[a].max(half[b]) > LONG.min(reach)
     {
         return None;
     }
     let box_ = Whole { whole, meets };
-    let top = whole.axes[up].y.signum();
-    if box_.met(up, top, HEAD) > 1.0 - MOST_OF {
+    if box_.met(up, 1.0, HEAD) > 1.0 - MOST_OF {
         return None;
     }
     let touched = |k: usize, sign: f64| box_.met(k, sign, NEAR);
+    // What it stands on or hangs at goes on beyond it; the next piece of a wall does not.
+    let goes_on = |k: usize, sign: f64| {
+        let out = whole.axes[k] * sign;
+        let axis = out.abs().max_position();
+        n_goes_on(bounds, axis, out[axis] > 0.0, touches) >= GOES_ON
+    };
     let area = |k: usize| half[(k + 1) % 3] * half[(k + 2) % 3];
     let largest = area(a).max(area(b)).max(area(up));
     let hangs = || {
         [a, b].iter().any(|&k| {
-            area(k) >= BACK * largest && [-1.0, 1.0].iter().any(|&s| touched(k, s) >= MOST_OF)
+            area(k) >= BACK * largest
+                && [-1.0, 1.0]
+                    .iter()
+                    .any(|&s| touched(k, s) >= MOST_OF && goes_on(k, s))
         })
     };
-    let how = if touched(up, -top) >= MOST_OF {
+    // Legs and feet may stand out over an edge.
+    let how = if touched(up, -1.0) > 1.0 - MOST_OF && goes_on(up, -1.0) {
         "stands on others"
     } else if hangs() {
         "hangs at others"
@@ -67,7 +85,7 @@ pub(super) fn reason(whole: &Unit, reach: f64, meets: &Meets<'_>) -> Option<Stri
             && is_end(along, -1.0)
             && is_end(along, 1.0)
     };
-    if is_low_wall(a, b) || is_low_wall(b, a) || box_.n_higher(up, top, reach) < AROUND {
+    if is_low_wall(a, b) || is_low_wall(b, a) || box_.n_higher(up, reach) < AROUND {
         return None;
     }
     Some(format!(
@@ -106,11 +124,11 @@ impl Whole<'_> {
     }
 
     /// In how many of eight directions others rise above it.
-    fn n_higher(&self, up: usize, top: f64, reach: f64) -> usize {
+    fn n_higher(&self, up: usize, reach: f64) -> usize {
         let Unit {
             center, axes, half, ..
         } = self.whole;
-        let eye = *center + axes[up] * (top * (half[up] + HEAD));
+        let eye = *center + axes[up] * (half[up] + HEAD);
         let [a, b] = [axes[(up + 1) % 3], axes[(up + 2) % 3]];
         (0..8)
             .filter(|&i| {

@@ -113,6 +113,24 @@ pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
     }
 }
 
+/// An object taken as one thing, its box upright: the third axis is up.
+pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
+    let side = directions(triangles.iter())
+        .into_iter()
+        .map(|d| DVec3::new(d.0.x, 0.0, d.0.z))
+        .find(|d| d.length() > LEVEL)
+        .map_or(DVec3::X, |d| canonical(d.normalize()));
+    let axes = [side, DVec3::Y.cross(side), DVec3::Y];
+    let (center, half) = box_along(axes, triangles.iter());
+    Unit {
+        object,
+        triangles: Vec::new(),
+        center,
+        axes,
+        half,
+    }
+}
+
 /// Joins boxes that nearly touch.
 fn join_near(boxes: &[Aabb], sets: &mut Sets) {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -130,35 +148,52 @@ fn join_near(boxes: &[Aabb], sets: &mut Sets) {
     }
 }
 
+/// Directions that the surface faces, up to sign, those of most surface first.
+fn directions<'t>(triangles: impl Iterator<Item = &'t Triangle>) -> Vec<(DVec3, f64)> {
+    let mut found: Vec<(DVec3, f64)> = Vec::new();
+    for t in triangles {
+        let n = triangle_area_normal(t);
+        let area = n.length();
+        let Some(n) = n.try_normalize() else { continue };
+        if let Some(d) = found.iter_mut().find(|d| d.0.dot(n).abs() > ONE_DIRECTION) {
+            d.1 += area;
+        } else if found.len() < MOST_DIRECTIONS {
+            found.push((n, area));
+        }
+    }
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found
+}
+
+fn extent<'t>(d: DVec3, triangles: impl Iterator<Item = &'t Triangle>) -> (f64, f64) {
+    triangles
+        .flatten()
+        .map(|p| d.dot(*p))
+        .fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)))
+}
+
+/// Center of the box along three axes, and half its edges.
+fn box_along<'t>(
+    axes: [DVec3; 3],
+    triangles: impl Iterator<Item = &'t Triangle> + Clone,
+) -> (DVec3, DVec3) {
+    let mut center = DVec3::ZERO;
+    let half = axes.map(|d| {
+        let (lo, hi) = extent(d, triangles.clone());
+        center += d * (0.5 * (lo + hi));
+        0.5 * (hi - lo)
+    });
+    (center, DVec3::from_array(half))
+}
+
 /// The box along the directions that most of the surface faces.
 fn own_box<'t>(
     triangles: impl Iterator<Item = &'t Triangle> + Clone,
 ) -> (DVec3, [DVec3; 3], DVec3) {
-    let mut directions: Vec<(DVec3, f64)> = Vec::new();
-    for t in triangles.clone() {
-        let n = triangle_area_normal(t);
-        let area = n.length();
-        let Some(n) = n.try_normalize() else { continue };
-        if let Some(d) = directions
-            .iter_mut()
-            .find(|d| d.0.dot(n).abs() > ONE_DIRECTION)
-        {
-            d.1 += area;
-        } else if directions.len() < MOST_DIRECTIONS {
-            directions.push((n, area));
-        }
-    }
-    directions.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let extent = |d: DVec3| {
-        triangles
-            .clone()
-            .flatten()
-            .map(|p| d.dot(*p))
-            .fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)))
-    };
+    let directions = directions(triangles.clone());
     // Of the three that most of the surface faces, the one along which it is thinnest.
     let width = |d: &DVec3| {
-        let (lo, hi) = extent(*d);
+        let (lo, hi) = extent(*d, triangles.clone());
         hi - lo
     };
     let across = directions
@@ -179,11 +214,7 @@ fn own_box<'t>(
         DVec3::Y.cross(across).normalize()
     };
     let axes = [across, level, across.cross(level)];
-    let [x, y, z] = axes.map(extent);
-    let center = axes[0] * (0.5 * (x.0 + x.1))
-        + axes[1] * (0.5 * (y.0 + y.1))
-        + axes[2] * (0.5 * (z.0 + z.1));
-    let half = DVec3::new(x.1 - x.0, y.1 - y.0, z.1 - z.0) * 0.5;
+    let (center, half) = box_along(axes, triangles);
     (center, axes, half)
 }
 
