@@ -52,11 +52,12 @@ pub(super) fn reason(
         return None;
     }
     let touched = |k: usize, sign: f64| box_.met(k, sign, NEAR);
-    // What it stands on or hangs at goes on beyond it; the next piece of a wall does not.
-    let goes_on = |k: usize, sign: f64| {
+    // What it stands on goes on beyond it; the next piece of a wall does not. A wall it hangs at does
+    // so on all sides, and the next piece of a floor does not.
+    let n_on = |k: usize, sign: f64| {
         let out = whole.axes[k] * sign;
         let axis = out.abs().max_position();
-        n_goes_on(bounds, axis, out[axis] > 0.0, touches) >= GOES_ON
+        n_goes_on(bounds, axis, out[axis] > 0.0, touches)
     };
     let area = |k: usize| half[(k + 1) % 3] * half[(k + 2) % 3];
     let largest = area(a).max(area(b)).max(area(up));
@@ -65,11 +66,11 @@ pub(super) fn reason(
             area(k) >= BACK * largest
                 && [-1.0, 1.0]
                     .iter()
-                    .any(|&s| touched(k, s) >= MOST_OF && goes_on(k, s))
+                    .any(|&s| touched(k, s) >= MOST_OF && n_on(k, s) == 4)
         })
     };
     // Legs and feet may stand out over an edge.
-    let how = if touched(up, -1.0) > 1.0 - MOST_OF && goes_on(up, -1.0) {
+    let how = if touched(up, -1.0) > 1.0 - MOST_OF && n_on(up, -1.0) >= GOES_ON {
         "stands on others"
     } else if hangs() {
         "hangs at others"
