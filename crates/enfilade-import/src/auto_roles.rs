@@ -188,7 +188,7 @@ impl Judge<'_> {
                 })
             };
             let upright = units::upright(shape.object as u32, own);
-            reason = furniture::reason(&upright, &shape.bounds, reach, &meets, &touches);
+            reason = furniture::reason(&upright, &shape.bounds, self.diagonal, &meets, &touches);
         }
         // The rim is asked last, as it costs most.
         reason.filter(|_| !goes_on_at_its_rim(own, &shape.bounds, &touches))
@@ -450,5 +450,9 @@ fn n_goes_on(bounds: &Aabb, axis: usize, high: bool, touches: &dyn Fn(&Aabb) -> 
     n
 }
 
+#[cfg(test)]
+mod filler_tests;
+#[cfg(test)]
+mod furniture_tests;
 #[cfg(test)]
 mod tests;

@@ -5,11 +5,13 @@
 //! in other things, as walls do, stays.
 
 use super::units::Unit;
-use super::{GOES_ON, INTO, NEAR, SMALL, SMALL_SHARE, n_goes_on};
+use super::{GOES_ON, INTO, NEAR, SMALL, n_goes_on};
 use enfilade_geom::{Aabb, DVec3};
 
 /// Longer is no worktop and no corner sofa, but a parapet or a stage. [Units: wu]
 const LONG: f64 = 5.0;
+/// The same as a share of the scene's diagonal: a bed may be as long as its room is wide.
+const ROOM_SHARE: f64 = 0.5;
 /// What has two thinner edges is a skirting, a sill or a mullion. [Units: wu]
 const BAR: f64 = 0.2;
 /// So much air is above it: what reaches the ceiling may hold it. [Units: wu]
@@ -30,7 +32,7 @@ type Meets<'m> = dyn Fn(DVec3, DVec3) -> bool + 'm;
 pub(super) fn reason(
     whole: &Unit,
     bounds: &Aabb,
-    reach: f64,
+    diagonal: f64,
     meets: &Meets<'_>,
     touches: &dyn Fn(&Aabb) -> bool,
 ) -> Option<String> {
@@ -43,7 +45,7 @@ pub(super) fn reason(
     if is_bar
         || 2.0 * half[up] < NEAR
         || 2.0 * half[up] > SMALL
-        || 2.0 * half[a].max(half[b]) > LONG.min(reach)
+        || 2.0 * half[a].max(half[b]) > LONG.min(ROOM_SHARE * diagonal)
     {
         return None;
     }
@@ -86,7 +88,7 @@ pub(super) fn reason(
             && is_end(along, -1.0)
             && is_end(along, 1.0)
     };
-    if is_low_wall(a, b) || is_low_wall(b, a) || box_.n_higher(up, reach) < AROUND {
+    if is_low_wall(a, b) || is_low_wall(b, a) || box_.n_higher(up, diagonal) < AROUND {
         return None;
     }
     Some(format!(
@@ -125,7 +127,7 @@ impl Whole<'_> {
     }
 
     /// In how many of eight directions others rise above it.
-    fn n_higher(&self, up: usize, reach: f64) -> usize {
+    fn n_higher(&self, up: usize, diagonal: f64) -> usize {
         let Unit {
             center, axes, half, ..
         } = self.whole;
@@ -134,7 +136,7 @@ impl Whole<'_> {
         (0..8)
             .filter(|&i| {
                 let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_4).sin_cos();
-                (self.meets)(eye, eye + (a * cos + b * sin) * (reach / SMALL_SHARE))
+                (self.meets)(eye, eye + (a * cos + b * sin) * diagonal)
             })
             .count()
     }
