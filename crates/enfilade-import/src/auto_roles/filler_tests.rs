@@ -182,3 +182,49 @@ fn what_covers_a_niche_is_no_filler() {
     .block("board", [2.0, 0.8, 3.2], [4.0, 2.0, 3.24]);
     assert_eq!(b.details(), [""; 0]);
 }
+
+/// Sheets of 5 cm, side by side: the middle one might be a leaf, but for its neighbors.
+#[test]
+fn a_thin_piece_among_thin_pieces_is_no_filler() {
+    let mut b = shell();
+    b.block("left", [0.0, 0.0, 3.0], [2.0, 2.6, 3.05])
+        .block("right", [4.0, 0.0, 3.0], [6.0, 2.6, 3.05])
+        .block("above", [2.0, 2.0, 3.0], [4.0, 2.6, 3.05])
+        .block("middle", [2.0, 0.0, 3.0], [4.0, 2.0, 3.05]);
+    assert_eq!(b.details(), [""; 0]);
+}
+
+/// Boxes that reach into each other share no corner and are one wall all the same.
+#[test]
+fn a_wall_of_pieces_that_overlap_goes_round_its_hole() {
+    let mut b = shell();
+    b.blocks(
+        "wall",
+        &[
+            ([0.0, 0.0, 3.0], [1.0, 2.6, 3.24]),
+            ([0.9, 2.1, 3.01], [2.1, 2.5, 3.23]),
+            ([2.0, 0.0, 3.0], [6.0, 2.6, 3.24]),
+        ],
+    )
+    .block("door", [1.0, 0.0, 3.01], [2.0, 2.1, 3.23]);
+    assert_eq!(b.details(), ["door"]);
+}
+
+#[test]
+fn there_is_air_before_and_behind_a_filler() {
+    let mut b = two_rooms();
+    // The window is walled up from behind, 10 cm away.
+    b.block("board", [3.5, 0.9, 3.1], [5.0, 2.1, 3.14]).block(
+        "bricks",
+        [3.0, 0.0, 3.24],
+        [5.5, 2.6, 3.4],
+    );
+    assert_eq!(b.details(), [""; 0]);
+}
+
+#[test]
+fn a_screen_before_a_wall_is_no_filler() {
+    let mut b = two_rooms();
+    b.block("screen", [2.2, 0.0, 2.6], [3.4, 2.3, 2.64]);
+    assert_eq!(b.details(), [""; 0]);
+}
