@@ -1,6 +1,7 @@
-//! Roles of objects that nothing is said about, by size and by what they hide.
+//! Roles of objects that nothing is said about, by the openings they fill and by what they hide.
 //!
-//! Only small objects that one can see around, and large ones that one sees through, become detail.
+//! Door leaves and panes are found first (`fillers`), then what is small and one can see around, what
+//! is large and one sees through, and other furniture (`furniture`); only that becomes detail.
 //! The judge errs to *structural*: a chair taken for a wall costs a portal or two, a piece of a wall
 //! taken for a chair opens a room. So whatever stands between two things stays: the piece of a wall
 //! between floor and ceiling, the lintel between two jambs, the tile between its neighbors.

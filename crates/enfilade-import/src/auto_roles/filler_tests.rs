@@ -34,7 +34,7 @@ fn shell() -> Build {
 #[test]
 fn leaves_and_panes_fill_openings_with_frame_or_without() {
     let mut b = two_rooms();
-    b.block("leaf", [1.0, 0.0, 3.1], [2.0, 2.1, 3.14]).blocks(
+    b.block("leaf", [1.0, 0.0, 3.11], [2.0, 2.1, 3.15]).blocks(
         "window",
         &[
             ([3.5, 0.9, 3.08], [3.56, 2.1, 3.16]),
@@ -109,7 +109,7 @@ fn casings_handles_and_the_windows_of_a_whole_wall_go_together() {
     b.blocks(
         "door and window",
         &[
-            ([1.0, 0.0, 3.1], [2.0, 2.1, 3.14]),
+            ([1.0, 0.0, 3.11], [2.0, 2.1, 3.15]),
             // Casing on the other side, and a handle.
             ([0.95, 0.0, 3.24], [1.05, 2.15, 3.26]),
             ([1.95, 0.0, 3.24], [2.05, 2.15, 3.26]),
@@ -128,7 +128,7 @@ fn what_is_more_than_a_filler_stays() {
     b.blocks(
         "leaf and wall",
         &[
-            ([1.0, 0.0, 3.1], [2.0, 2.1, 3.14]),
+            ([1.0, 0.0, 3.11], [2.0, 2.1, 3.15]),
             ([3.0, 0.0, 4.0], [3.2, 2.6, 6.0]),
         ],
     );
@@ -183,14 +183,14 @@ fn what_covers_a_niche_is_no_filler() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// Sheets of 5 cm, side by side: the middle one might be a leaf, but for its neighbors.
+/// The middle one might be a leaf, but for its neighbors.
 #[test]
 fn a_thin_piece_among_thin_pieces_is_no_filler() {
     let mut b = shell();
-    b.block("left", [0.0, 0.0, 3.0], [2.0, 2.6, 3.05])
-        .block("right", [4.0, 0.0, 3.0], [6.0, 2.6, 3.05])
-        .block("above", [2.0, 2.0, 3.0], [4.0, 2.6, 3.05])
-        .block("middle", [2.0, 0.0, 3.0], [4.0, 2.0, 3.05]);
+    b.block("left", [0.0, 0.0, 3.0], [2.0, 2.0, 3.08])
+        .block("right", [4.0, 0.0, 3.0], [6.0, 2.0, 3.08])
+        .block("above", [0.0, 2.0, 3.0], [6.0, 2.6, 3.08])
+        .block("middle", [2.0, 0.0, 3.0], [4.0, 2.0, 3.06]);
     assert_eq!(b.details(), [""; 0]);
 }
 
@@ -214,7 +214,7 @@ fn a_wall_of_pieces_that_overlap_goes_round_its_hole() {
 fn there_is_air_before_and_behind_a_filler() {
     let mut b = two_rooms();
     // The window is walled up from behind, 10 cm away.
-    b.block("board", [3.5, 0.9, 3.1], [5.0, 2.1, 3.14]).block(
+    b.block("board", [3.5, 0.9, 3.1], [5.0, 2.1, 3.15]).block(
         "bricks",
         [3.0, 0.0, 3.24],
         [5.5, 2.6, 3.4],
@@ -226,5 +226,34 @@ fn there_is_air_before_and_behind_a_filler() {
 fn a_screen_before_a_wall_is_no_filler() {
     let mut b = two_rooms();
     b.block("screen", [2.2, 0.0, 2.6], [3.4, 2.3, 2.64]);
+    assert_eq!(b.details(), [""; 0]);
+}
+
+/// Between the two leaves of a cavity wall is air, not a thick wall.
+#[test]
+fn a_thin_piece_of_a_cavity_wall_is_no_filler() {
+    let mut b = shell();
+    for (name, x, y, tie) in [
+        ("left", [0.0, 2.0], [0.0, 2.0], 0.0),
+        ("right", [4.0, 6.0], [0.0, 2.0], 5.9),
+        ("above", [0.0, 6.0], [2.0, 2.6], 0.0),
+    ] {
+        b.blocks(
+            name,
+            &[
+                ([x[0], y[0], 3.0], [x[1], y[1], 3.08]),
+                ([x[0], y[0], 3.4], [x[1], y[1], 3.48]),
+                ([tie, y[0], 3.08], [tie + 0.1, y[1], 3.4]),
+            ],
+        );
+    }
+    b.block("middle", [2.0, 0.0, 3.04], [4.0, 2.0, 3.1]);
+    assert_eq!(b.details(), [""; 0]);
+}
+
+#[test]
+fn what_goes_through_a_wall_is_no_filler() {
+    let mut b = two_rooms();
+    b.block("duct", [3.5, 0.9, 2.8], [5.0, 2.1, 3.5]);
     assert_eq!(b.details(), [""; 0]);
 }

@@ -199,7 +199,8 @@ impl Held {
                 self.wall,
                 self.n_sides()
             ))
-        } else if self.n_by_one >= SIDES {
+        } else if self.n_by_one >= SIDES && c.thickness <= self.wall + STEPS[1] {
+            // With a sill or a shutter it may stand out a little; a thing through a wall is none.
             Some(format!("one wall goes round it on {} sides", self.n_by_one))
         } else {
             None
@@ -218,7 +219,7 @@ fn add_one(counts: &mut Vec<(u32, usize)>, key: u32) {
 fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Candidate> {
     let unit = &units[index as usize];
     let half = unit.half;
-    if unit.is_small() || half.x >= half.y.min(half.z) || half.x > WALL {
+    if unit.is_small() || half.x >= half.y.min(half.z) {
         return None;
     }
     let sides = [0, 1, 2, 3].map(|side| holds(unit, index, side, around));
@@ -241,7 +242,7 @@ fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Ca
 /// What holds a side, at each of its samples.
 fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec<Vec<Hold>> {
     let (k, other) = if side < 2 { (1, 2) } else { (2, 1) };
-    let sign = if side % 2 == 0 { -1.0 } else { 1.0 };
+    let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
     (0..SAMPLES)
         .map(|i| {
             let at = (i as f64 + 0.5) / SAMPLES as f64 * 2.0 - 1.0;
@@ -285,7 +286,6 @@ struct Crossing {
     unit: u32,
     /// From the unit's middle plane. [Units: wu]
     at: f64,
-    front: bool,
     /// The surface is nearly parallel to the unit's plane.
     is_facing: bool,
 }
@@ -308,12 +308,11 @@ fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> 
         found.push(Crossing {
             unit: around.unit_of[h.triangle as usize],
             at: (2.0 * h.t - 1.0) * reach,
-            front: h.front,
             is_facing: n.dot(across).abs() > FACING * n.length(),
         });
     });
     found.sort_by(|a, b| a.unit.cmp(&b.unit).then(a.at.total_cmp(&b.at)));
-    found.dedup_by(|b, a| a.unit == b.unit && b.at - a.at < SAME && a.front == b.front);
+    found.dedup_by(|b, a| a.unit == b.unit && b.at - a.at < SAME);
     found
 }
 
@@ -326,16 +325,13 @@ fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
         .collect();
     let mut found = Vec::new();
     for own in facing.chunk_by(|a, b| a.unit == b.unit) {
-        // Of two surfaces there is matter between, however they are turned.
-        let is_any = own.len() == 2;
+        // However they are turned. What lies in the gap of two walls is not between air, either.
         for pair in own.windows(2) {
-            if is_any || pair[0].front && !pair[1].front {
-                found.push(Matter {
-                    unit: own[0].unit,
-                    from: pair[0].at,
-                    to: pair[1].at,
-                });
-            }
+            found.push(Matter {
+                unit: own[0].unit,
+                from: pair[0].at,
+                to: pair[1].at,
+            });
         }
     }
     found
@@ -380,7 +376,7 @@ fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> 
             *n += usize::from(!is_met && !is_inside);
         }
         let own = || met.iter().filter(|c| c.unit == index).map(|c| c.at);
-        if let (Some(first), Some(last)) = (own().next(), own().last()) {
+        if let (Some(first), Some(last)) = (own().next(), own().next_back()) {
             own_matter.push(last - first);
         }
     }

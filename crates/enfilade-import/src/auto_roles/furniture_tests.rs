@@ -50,7 +50,14 @@ fn what_reaches_the_ceiling_or_is_a_low_wall_stays() {
 #[test]
 fn what_people_stand_on_stays() {
     let mut b = Build::room();
-    b.block("gallery", [0.0, 1.5, 1.0], [2.2, 1.6, 3.0]);
+    b.block("gallery", [0.0, 1.5, 1.0], [2.2, 1.6, 3.0]).block(
+        "finish",
+        [2.0, 0.0, 0.0],
+        [5.0, 0.02, 3.0],
+    );
+    assert_eq!(b.details(), [""; 0]);
+    let mut b = Build::room();
+    b.block("step", [0.2, 0.0, 0.0], [4.7, 0.2, 4.0]);
     assert_eq!(b.details(), [""; 0]);
     let mut b = Build::default();
     b.block("floor", [0.0, -0.2, 0.0], [20.0, 0.0, 20.0])
@@ -68,7 +75,7 @@ fn what_people_stand_on_stays() {
 #[test]
 fn walls_without_a_ceiling_stay() {
     let mut b = Build::default();
-    b.block("floor", [-1.0, -0.2, -1.0], [9.0, 0.0, 5.0]);
+    b.block("floor", [-20.0, -0.2, -20.0], [28.0, 0.0, 24.0]);
     for x in [0.0, 4.0, 8.0] {
         b.block("wall", [x, 0.0, 0.0], [x + 0.2, 1.9, 4.0]);
     }

@@ -79,7 +79,7 @@ pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<U
         .into_iter()
         .map(|own| {
             let own_triangles = own.iter().map(|&i| &triangles[i as usize]);
-            let (center, axes, half) = own_box(own_triangles);
+            let (center, axes, half) = own_box(&own_triangles);
             Unit {
                 object,
                 triangles: own.iter().map(|i| first + i).collect(),
@@ -103,7 +103,7 @@ pub(super) fn parts_of(triangles: &[Triangle]) -> Vec<Unit> {
 
 /// An object taken as one thing; without its triangles.
 pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
-    let (center, axes, half) = own_box(triangles.iter());
+    let (center, axes, half) = own_box(&triangles.iter());
     Unit {
         object,
         triangles: Vec::new(),
@@ -121,7 +121,7 @@ pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
         .find(|d| d.length() > LEVEL)
         .map_or(DVec3::X, |d| canonical(d.normalize()));
     let axes = [side, DVec3::Y.cross(side), DVec3::Y];
-    let (center, half) = box_along(axes, triangles.iter());
+    let (center, half) = box_along(axes, &triangles.iter());
     Unit {
         object,
         triangles: Vec::new(),
@@ -175,7 +175,7 @@ fn extent<'t>(d: DVec3, triangles: impl Iterator<Item = &'t Triangle>) -> (f64, 
 /// Center of the box along three axes, and half its edges.
 fn box_along<'t>(
     axes: [DVec3; 3],
-    triangles: impl Iterator<Item = &'t Triangle> + Clone,
+    triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
 ) -> (DVec3, DVec3) {
     let mut center = DVec3::ZERO;
     let half = axes.map(|d| {
@@ -188,7 +188,7 @@ fn box_along<'t>(
 
 /// The box along the directions that most of the surface faces.
 fn own_box<'t>(
-    triangles: impl Iterator<Item = &'t Triangle> + Clone,
+    triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
 ) -> (DVec3, [DVec3; 3], DVec3) {
     let directions = directions(triangles.clone());
     // Of the three that most of the surface faces, the one along which it is thinnest.
