@@ -2,6 +2,7 @@
 
 mod curved;
 pub(crate) mod delaunay;
+mod doorless;
 pub(crate) mod settings;
 
 use std::io::{self, IsTerminal, Write};
@@ -339,6 +340,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     }
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
+    doorless::write_doorless(&mut err, &baked.world.graph)?;
     Ok(())
 }
 

@@ -1,14 +1,21 @@
-//! Roles of objects that nothing is said about, by size and by what they hide.
+//! Roles of objects that nothing is said about, by the openings they fill and by what they hide.
 //!
-//! Only small objects that one can see around, and large ones that one sees through, become detail.
+//! Door leaves and panes are found first (`fillers`), then what is small and one can see around, what
+//! is large and one sees through, and other furniture (`furniture`); only that becomes detail.
 //! The judge errs to *structural*: a chair taken for a wall costs a portal or two, a piece of a wall
 //! taken for a chair opens a room. So whatever stands between two things stays: the piece of a wall
 //! between floor and ceiling, the lintel between two jambs, the tile between its neighbors.
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, Bvh, DVec3, Sets, Triangle, triangle_area_normal};
+use fillers::Surroundings;
 use std::collections::HashMap;
 use std::ops::Range;
+use units::Unit;
+
+mod fillers;
+mod furniture;
+mod units;
 
 /// The reason of objects that no rule fitted.
 pub(crate) const DEFAULT: &str = "default";
@@ -50,6 +57,9 @@ const MOST: f64 = 0.3;
 /// So many small objects are no furniture, either; and looking at each takes time.
 const MOST_OBJECTS: usize = 50_000;
 
+/// How often what is left is asked again: a stack of so many boxes is furniture.
+const ROUNDS: usize = 4;
+
 /// What is known of one structural object.
 struct Shape {
     object: usize,
@@ -79,51 +89,48 @@ pub(crate) fn judge(scene: &mut Scene) {
         return;
     }
     let (shapes, triangles, owners) = shapes_of(scene);
-    let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
-    let small = SMALL.min(SMALL_SHARE * bounds.size().length());
-    let n_small = shapes
-        .iter()
-        .filter(|s| s.is_open && s.bounds.size().max_element() <= small)
-        .count();
-    let bvh = if n_small > 0 && n_small <= MOST_OBJECTS {
+    let bvh = if n_open <= MOST_OBJECTS {
         Some(Bvh::build(&triangles))
     } else {
         None
     };
+    if let Some(bvh) = &bvh {
+        judge_fillers(scene, &shapes, &triangles, bvh);
+    }
+    let is_gone: Vec<bool> = scene
+        .objects
+        .iter()
+        .map(|o| o.role == Role::Detail)
+        .collect();
+    let shapes: Vec<Shape> = shapes.into_iter().filter(|s| !is_gone[s.object]).collect();
+    let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
+    let mut judge = Judge {
+        triangles: &triangles,
+        owners: &owners,
+        bvh: bvh.as_ref(),
+        diagonal: bounds.size().length(),
+        is_gone,
+    };
     let mut found: Vec<(usize, String)> = Vec::new();
     let mut detail_area = 0.0;
-    for shape in shapes.iter().filter(|s| s.is_open) {
-        let size = shape.bounds.size();
-        let reason = if size.max_element() <= small {
-            bvh.as_ref().and_then(|bvh| {
-                let touches = |b: &Aabb| {
-                    let mut is_touched = false;
-                    bvh.for_each_in_box(b, |t| {
-                        is_touched |= owners[t as usize] != shape.object as u32;
-                    });
-                    is_touched
-                };
-                let reason = seen_around(&shape.bounds, &touches)?;
-                let own = &triangles[shape.triangles.clone()];
-                (!goes_on_at_its_rim(own, &shape.bounds, &touches)).then_some(reason)
-            })
-        } else {
-            let is_rail = size.min_element() <= FLAT
-                && fill(shape) < SPARSE
-                && parts(&triangles[shape.triangles.clone()]).iter().all(|b| {
-                    let mut edges = b.size().to_array();
-                    edges.sort_by(f64::total_cmp);
-                    edges[1] <= BAR
-                });
-            is_rail.then(|| {
-                let percent = fill(shape) * 100.0;
-                format!("hides little: bars that fill {percent:.0} % of their box")
-            })
-        };
-        if let Some(reason) = reason {
-            // The leaves of a plant are more surface than it hides.
-            detail_area += shape.area.min(shape.bounds.surface_area());
-            found.push((shape.object, reason));
+    // What stands on furniture, or below it, is seen when that is gone.
+    for _ in 0..ROUNDS {
+        let before = found.len();
+        for shape in shapes
+            .iter()
+            .filter(|s| s.is_open && !judge.is_gone[s.object])
+        {
+            if let Some(reason) = judge.reason(shape) {
+                // The leaves of a plant are more surface than it hides.
+                detail_area += shape.area.min(shape.bounds.surface_area());
+                found.push((shape.object, reason));
+            }
+        }
+        for (object, _) in &found[before..] {
+            judge.is_gone[*object] = true;
+        }
+        if found.len() == before {
+            break;
         }
     }
     let structural_area: f64 = shapes.iter().map(|s| s.area).sum();
@@ -138,6 +145,108 @@ pub(crate) fn judge(scene: &mut Scene) {
         let object = &mut scene.objects[object];
         object.role = Role::Detail;
         object.reason = reason;
+    }
+}
+
+/// What is asked about each object that is no filler.
+struct Judge<'a> {
+    triangles: &'a [Triangle],
+    owners: &'a [u32],
+    bvh: Option<&'a Bvh>,
+    /// Of the structure. [Units: wu]
+    diagonal: f64,
+    /// Objects known to be detail.
+    is_gone: Vec<bool>,
+}
+
+impl Judge<'_> {
+    /// Why an object is detail, if it is.
+    fn reason(&self, shape: &Shape) -> Option<String> {
+        let own = &self.triangles[shape.triangles.clone()];
+        let size = shape.bounds.size();
+        let reach = SMALL_SHARE * self.diagonal;
+        if size.max_element() > SMALL.min(reach) && is_rail(shape, own) {
+            let percent = fill(shape) * 100.0;
+            return Some(format!(
+                "hides little: bars that fill {percent:.0} % of their box"
+            ));
+        }
+        let bvh = self.bvh?;
+        let is_own = |t: u32| self.owners[t as usize] == shape.object as u32;
+        let touches = |b: &Aabb| {
+            let mut is_touched = false;
+            bvh.for_each_in_box(b, |t| is_touched |= !is_own(t));
+            is_touched
+        };
+        let mut reason = None;
+        if size.max_element() <= SMALL.min(reach) {
+            reason = seen_around(&shape.bounds, &touches);
+        }
+        if reason.is_none() && size.y <= SMALL {
+            let meets = |a, b| {
+                bvh.any_hit(a, b, |t| {
+                    is_own(t) || self.is_gone[self.owners[t as usize] as usize]
+                })
+            };
+            let upright = units::upright(shape.object as u32, own);
+            reason = furniture::reason(&upright, &shape.bounds, self.diagonal, &meets, &touches);
+        }
+        // The rim is asked last, as it costs most.
+        reason.filter(|_| !goes_on_at_its_rim(own, &shape.bounds, &touches))
+    }
+}
+
+/// Whether an object is a row of bars, level, upright or inclined.
+fn is_rail(shape: &Shape, own: &[Triangle]) -> bool {
+    if shape.bounds.size().min_element() > FLAT || fill(shape) >= SPARSE {
+        return false;
+    }
+    units::parts_of(own).iter().all(|part| {
+        let mut edges = (part.half * 2.0).to_array();
+        edges.sort_by(f64::total_cmp);
+        edges[1] <= BAR
+    })
+}
+
+/// Objects all of whose things fill openings become detail.
+fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) {
+    let units: Vec<Unit> = shapes
+        .iter()
+        .flat_map(|s| {
+            let own = &triangles[s.triangles.clone()];
+            units::units_of(s.object as u32, s.triangles.start as u32, own)
+        })
+        .collect();
+    let mut unit_of = vec![0; triangles.len()];
+    for (i, unit) in (0..).zip(&units) {
+        for &t in &unit.triangles {
+            unit_of[t as usize] = i;
+        }
+    }
+    let around = Surroundings {
+        bvh,
+        triangles,
+        unit_of: &unit_of,
+    };
+    let is_open = |unit: &Unit| is_open(&scene.objects[unit.object as usize]);
+    let found = fillers::fillers(&units, &is_open, &around);
+    // An object's role is one, so each of its things must fill an opening, or belong to one that does.
+    let mut reasons = vec![None; units.len()];
+    for (unit, reason) in found {
+        reasons[unit as usize] = Some(reason);
+    }
+    let of_object = |a: &(&Unit, _), b: &(&Unit, _)| a.0.object == b.0.object;
+    let all: Vec<(&Unit, Option<String>)> = units.iter().zip(reasons).collect();
+    for own in all.chunk_by(of_object) {
+        let mut filling = own.iter().filter(|u| u.1.is_some());
+        let belongs = |unit: &Unit| filling.clone().any(|(filler, _)| filler.has_beside(unit));
+        if own.iter().all(|u| u.1.is_some() || belongs(u.0))
+            && let Some((unit, Some(reason))) = filling.next()
+        {
+            let object = &mut scene.objects[unit.object as usize];
+            object.role = Role::Detail;
+            object.reason.clone_from(reason);
+        }
     }
 }
 
@@ -218,8 +327,9 @@ fn key(p: DVec3) -> [u64; 3] {
     (p + 0.0).to_array().map(f64::to_bits)
 }
 
-/// Boxes of the connected parts: triangles that share a corner hang together.
-fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
+/// The connected part of each triangle, and the parts' boxes: triangles that share a corner hang
+/// together.
+fn parts(triangles: &[Triangle]) -> (Vec<u32>, Vec<Aabb>) {
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
     let mut sets = Sets::new(triangles.len());
     for (i, t) in (0..).zip(triangles) {
@@ -227,13 +337,22 @@ fn parts(triangles: &[Triangle]) -> Vec<Aabb> {
             sets.join(i, *first_at.entry(key(*p)).or_insert(i));
         }
     }
-    let mut boxes = vec![Aabb::EMPTY; triangles.len()];
-    for (i, t) in (0..).zip(triangles) {
-        let r = sets.find(i) as usize;
-        boxes[r] = boxes[r].union(Aabb::of_points(t));
-    }
-    boxes.retain(|b| !b.is_empty());
-    boxes
+    let mut part_of = vec![u32::MAX; triangles.len()];
+    let mut boxes: Vec<Aabb> = Vec::new();
+    let of_triangles = (0..)
+        .zip(triangles)
+        .map(|(i, t)| {
+            let part = &mut part_of[sets.find(i) as usize];
+            if *part == u32::MAX {
+                *part = boxes.len() as u32;
+                boxes.push(Aabb::EMPTY);
+            }
+            let own = &mut boxes[*part as usize];
+            *own = own.union(Aabb::of_points(t));
+            *part
+        })
+        .collect();
+    (of_triangles, boxes)
 }
 
 /// Why one sees around a small object, if one does: it stands, hangs or leans, and stands between
@@ -332,5 +451,9 @@ fn n_goes_on(bounds: &Aabb, axis: usize, high: bool, touches: &dyn Fn(&Aabb) -> 
     n
 }
 
+#[cfg(test)]
+mod filler_tests;
+#[cfg(test)]
+mod furniture_tests;
 #[cfg(test)]
 mod tests;

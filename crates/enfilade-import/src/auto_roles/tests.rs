@@ -6,15 +6,15 @@ use enfilade_geom::scene::{Mesh, Object, Primitive};
 use proptest::prelude::*;
 
 #[derive(Debug, Default)]
-struct Build(Scene);
+pub(super) struct Build(Scene);
 
 impl Build {
-    fn block(&mut self, name: &str, min: [f64; 3], max: [f64; 3]) -> &mut Self {
+    pub(super) fn block(&mut self, name: &str, min: [f64; 3], max: [f64; 3]) -> &mut Self {
         self.blocks(name, &[(min, max)])
     }
 
     /// Boxes as one object that nothing is said about.
-    fn blocks(&mut self, name: &str, boxes: &[([f64; 3], [f64; 3])]) -> &mut Self {
+    pub(super) fn blocks(&mut self, name: &str, boxes: &[([f64; 3], [f64; 3])]) -> &mut Self {
         let mut p = Primitive::default();
         for (min, max) in boxes {
             let first = p.positions.len() as u32;
@@ -49,7 +49,7 @@ impl Build {
     }
 
     /// A room of 5 x 4 x 2.6 m, its east wall with a doorway made of three pieces.
-    fn room() -> Self {
+    pub(super) fn room() -> Self {
         let mut b = Self::default();
         b.block("floor", [0.0, -0.2, 0.0], [5.0, 0.0, 4.0])
             .block("ceiling", [0.0, 2.6, 0.0], [5.0, 2.8, 4.0])
@@ -64,7 +64,7 @@ impl Build {
         b
     }
 
-    fn details(mut self) -> Vec<String> {
+    pub(super) fn details(mut self) -> Vec<String> {
         judge(&mut self.0);
         let is_detail = |o: &&Object| o.role == Role::Detail;
         self.0
@@ -72,6 +72,15 @@ impl Build {
             .iter()
             .filter(is_detail)
             .map(|o| o.name.clone())
+            .collect()
+    }
+
+    /// Name and reason of what is detail.
+    pub(super) fn reasons(mut self) -> Vec<String> {
+        judge(&mut self.0);
+        let details = self.0.objects.iter().filter(|o| o.role == Role::Detail);
+        details
+            .map(|o| format!("{}: {}", o.name, o.reason))
             .collect()
     }
 }
@@ -313,7 +322,7 @@ proptest! {
                 prop_assert_eq!(format!("{o:?}"), format!("{was:?}"));
             } else {
                 prop_assert_eq!((&o.name, o.transform), (&was.name, was.transform));
-                prop_assert!(o.role == Role::Structural || o.reason.contains("hides little"));
+                prop_assert!(o.role == Role::Structural || o.reason.contains(" m, "));
             }
         }
     }

@@ -1,0 +1,58 @@
+//! Rooms that no doorway leads to: mostly ones whose door leaf was taken for a wall.
+
+use std::io::{self, Write};
+
+use enfilade::cpg::{Cell, CellPortalGraph, PortalKind};
+
+/// Rooms worth a line.
+const SHOWN: usize = 5;
+/// Lower or narrower cells are ducts and hollow walls: nobody stands in them. [Units: wu]
+const PERSON: [f32; 3] = [0.6, 1.8, 0.6];
+
+/// Says which rooms have windows and cracks at most, if any, largest first; whether there are any.
+pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
+    let mut rooms: Vec<(usize, &Cell)> = graph
+        .cells
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| !c.outdoor && is_room(c) && !has_doorway(graph, c))
+        .collect();
+    if rooms.is_empty() {
+        return Ok(false);
+    }
+    rooms.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume));
+    let (n, noun) = match rooms.len() {
+        1 => (1, "room has"),
+        n => (n, "rooms have"),
+    };
+    writeln!(
+        out,
+        "{n} {noun} no doorway: if door leaves are objects of their own, \
+         use --detail-name 'PATTERN' (-v prints names)"
+    )?;
+    for (id, cell) in rooms.iter().take(SHOWN) {
+        let [x, y, z] = [0, 1, 2].map(|k| 0.5 * (cell.aabb[0][k] + cell.aabb[1][k]));
+        writeln!(
+            out,
+            "  cell {id}: {:.1} m³ around {x:.2} {y:.2} {z:.2}",
+            cell.volume
+        )?;
+    }
+    if rooms.len() > SHOWN {
+        writeln!(out, "  and {} more", rooms.len() - SHOWN)?;
+    }
+    Ok(true)
+}
+
+fn is_room(cell: &Cell) -> bool {
+    (0..3).all(|k| cell.aabb[1][k] - cell.aabb[0][k] >= PERSON[k])
+}
+
+fn has_doorway(graph: &CellPortalGraph, cell: &Cell) -> bool {
+    cell.portals.iter().any(|p| {
+        matches!(
+            graph.portals[p.0 as usize].kind,
+            PortalKind::Open | PortalKind::Door
+        )
+    })
+}

@@ -1,0 +1,395 @@
+//! Door leaves and panes among objects that nothing is said about: what fills a hole in a wall.
+//!
+//! The question is the wall's, not the leaf's: *does the wall go on, in the plane of the thing, on
+//! three of its four sides, with air before and behind both of them?* A lintel has the wall on two
+//! sides, a wall between two others and two slabs on none or on two. What lies in such a hole is a
+//! filler if it is much thinner than the wall, or if a single connected surface goes round it: walls
+//! are built beside each other, and only openings are cut out of one.
+
+use super::units::Unit;
+use enfilade_geom::{Bvh, DVec3, Ray, Sets, Triangle, triangle_area_normal};
+
+/// How far before and behind it a wall may reach: no wall that people open is thicker. [Units: wu]
+const WALL: f64 = 0.6;
+/// How far beyond its rim the wall is looked for: as near as mullions are wide, and as far as joints
+/// are. [Units: wu]
+const STEPS: [f64; 2] = [0.015, 0.05];
+/// Where it is looked for along each side.
+const SAMPLES: usize = 8;
+/// A side is held if so much of it is: the rest is a threshold, a shutter's box, a round corner.
+const HELD: f64 = 0.7;
+/// The lintel and two jambs, or three sides of a window beside a pillar.
+const SIDES: usize = 3;
+/// What is thinner than this share of the wall around it, holes counted, is no piece of that wall,
+const THIN: f64 = 0.5;
+/// nor another wall: the thinnest partitions, set between columns and under beams, are thicker than
+/// this, and leaves are 4 to 6 cm. [Units: wu]
+const LEAF: f64 = 0.07;
+/// Rays along each edge of its face.
+const GRID: usize = 5;
+/// So far before and behind it is air: what hangs on a wall has none behind it. [Units: wu]
+const AIR: f64 = 0.2;
+/// … over this share of its face: furniture may stand before the rest.
+const OPEN: f64 = 0.5;
+/// Surfaces turned further from its face than 45° bound no wall in its plane.
+const FACING: f64 = 0.7;
+/// What holds it lies beside it in depth over this share of the thinner of the two: a frame of a
+/// picture lies before the wall.
+const OVERLAP: f64 = 0.25;
+/// Hits nearer than this along a line are one, of two triangles that share an edge. [Units: wu]
+const SAME: f64 = 1e-4;
+
+/// The scene as rays see it.
+pub(super) struct Surroundings<'a> {
+    pub(super) bvh: &'a Bvh,
+    pub(super) triangles: &'a [Triangle],
+    /// The unit of each triangle.
+    pub(super) unit_of: &'a [u32],
+}
+
+/// Matter that goes on in the plane of a thing beyond its rim.
+#[derive(Clone, Copy)]
+struct Hold {
+    unit: u32,
+    /// Along the thing's thin axis. [Units: wu]
+    thickness: f64,
+}
+
+/// A thing that may fill an opening.
+struct Candidate {
+    unit: u32,
+    /// Matter along its thin axis, averaged over its face. [Units: wu]
+    thickness: f64,
+    /// The same over the thinnest quarter of its face, holes not counted: a leaf or a pane, without
+    /// frame. 0 for what is a frame only. [Units: wu]
+    leaf: f64,
+    /// What holds it at each sample of each side: left, right, below, above.
+    sides: [Vec<Vec<Hold>>; 4],
+    /// Left and right, whether anything at all is there.
+    ends: [bool; 2],
+    /// It does not lie flat.
+    is_upright: bool,
+}
+
+/// Units that fill openings, each with the reason.
+pub(super) fn fillers(
+    units: &[Unit],
+    is_open: &dyn Fn(&Unit) -> bool,
+    around: &Surroundings<'_>,
+) -> Vec<(u32, String)> {
+    let candidates: Vec<Candidate> = (0..units.len() as u32)
+        .filter(|&i| is_open(&units[i as usize]))
+        .filter_map(|i| candidate(units, i, around))
+        .collect();
+    let mut candidate_of = vec![None; units.len()];
+    for (i, c) in (0u32..).zip(&candidates) {
+        candidate_of[c.unit as usize] = Some(i);
+    }
+    // A leaf and its frame, a door and the light above it fill one opening together.
+    let mut sets = Sets::new(candidates.len());
+    for (i, c) in (0..).zip(&candidates) {
+        for hold in c.sides.iter().flatten().flatten() {
+            if let Some(other) = candidate_of[hold.unit as usize] {
+                sets.join(i, other);
+            }
+        }
+    }
+    let mut groups: Vec<Vec<u32>> = vec![Vec::new(); candidates.len()];
+    for i in 0..candidates.len() as u32 {
+        groups[sets.find(i) as usize].push(i);
+    }
+    let is_candidate = |unit: u32| candidate_of[unit as usize].is_some();
+    let mut found = Vec::new();
+    for group in groups {
+        let members: Vec<&Candidate> = group.iter().map(|&i| &candidates[i as usize]).collect();
+        let held = Held::of(&members, &is_candidate);
+        for c in members {
+            if let Some(why) = held.reason(c) {
+                let size = units[c.unit as usize].half * 2.0;
+                let text = format!(
+                    "fills an opening: {:.2} x {:.2} m, {:.2} m thick, {why}",
+                    size.y, size.z, size.x
+                );
+                found.push((c.unit, text));
+            }
+        }
+    }
+    found
+}
+
+/// How what is around a group holds it.
+struct Held {
+    sides: [bool; 4],
+    /// A leaf in a corner: a lintel and one jamb hold it, and another wall is in the jamb's place.
+    is_in_corner: bool,
+    /// The thinnest of those sides. [Units: wu]
+    wall: f64,
+    /// Sides that one connected surface holds.
+    n_by_one: usize,
+}
+
+impl Held {
+    /// Samples that lie at another member or candidate are inside the group.
+    fn of(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> Self {
+        let mut held = Self {
+            sides: [false; 4],
+            is_in_corner: false,
+            wall: f64::INFINITY,
+            n_by_one: 0,
+        };
+        let mut n_by: Vec<(u32, usize)> = Vec::new();
+        for side in 0..4 {
+            let mut n_outer = 0;
+            let mut walls = Vec::new();
+            let mut holders: Vec<(u32, usize)> = Vec::new();
+            for sample in members.iter().flat_map(|c| &c.sides[side]) {
+                let walls_here = sample.iter().filter(|h| !is_candidate(h.unit));
+                let thickness = walls_here.clone().map(|h| h.thickness).fold(0.0, f64::max);
+                if thickness == 0.0 && !sample.is_empty() {
+                    continue;
+                }
+                n_outer += 1;
+                if thickness > 0.0 {
+                    walls.push(thickness);
+                }
+                for h in walls_here {
+                    add_one(&mut holders, h.unit);
+                }
+            }
+            let enough = HELD * n_outer as f64;
+            if walls.is_empty() || (walls.len() as f64) < enough {
+                continue;
+            }
+            held.sides[side] = true;
+            walls.sort_by(f64::total_cmp);
+            held.wall = held.wall.min(walls[walls.len() / 2]);
+            for (unit, n) in holders {
+                if n as f64 >= enough {
+                    add_one(&mut n_by, unit);
+                }
+            }
+        }
+        held.n_by_one = n_by.iter().map(|h| h.1).max().unwrap_or(0);
+        let [left, right, _, above] = held.sides;
+        let has_end = |k: usize| members.iter().any(|c| c.ends[k]);
+        held.is_in_corner = above
+            && (left && has_end(1) || right && has_end(0))
+            && members.iter().all(|c| c.is_upright);
+        held
+    }
+
+    fn n_sides(&self) -> usize {
+        self.sides.iter().filter(|&&is_held| is_held).count()
+    }
+
+    fn has_opening(&self, c: &Candidate) -> bool {
+        self.n_sides() >= SIDES || self.is_in_corner && c.leaf <= LEAF
+    }
+
+    fn is_thin(&self, c: &Candidate) -> bool {
+        c.leaf <= LEAF && c.thickness <= THIN * self.wall
+    }
+
+    fn reason(&self, c: &Candidate) -> Option<String> {
+        if !self.has_opening(c) {
+            None
+        } else if self.is_thin(c) {
+            Some(format!(
+                "the wall around it {:.2} m on {} sides",
+                self.wall,
+                self.n_sides()
+            ))
+        } else if self.n_by_one >= SIDES && c.thickness <= self.wall + STEPS[1] {
+            // With a sill or a shutter it may stand out a little; a thing through a wall is none.
+            Some(format!("one wall goes round it on {} sides", self.n_by_one))
+        } else {
+            None
+        }
+    }
+}
+
+fn add_one(counts: &mut Vec<(u32, usize)>, key: u32) {
+    match counts.iter_mut().find(|c| c.0 == key) {
+        Some(c) => c.1 += 1,
+        None => counts.push((key, 1)),
+    }
+}
+
+/// What is known of a unit, if it may be a filler.
+fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Candidate> {
+    let unit = &units[index as usize];
+    let half = unit.half;
+    if unit.is_small() || half.x >= half.y.min(half.z) {
+        return None;
+    }
+    let sides = [0, 1, 2, 3].map(|side| holds(unit, index, side, around));
+    let is_upright = unit.axes[0].y.abs() < FACING;
+    let (thickness, leaf) = thickness_between_air(unit, index, around)?;
+    let candidate = Candidate {
+        unit: index,
+        thickness,
+        leaf,
+        sides,
+        ends: [-1.0, 1.0].map(|sign| is_at_end(unit, index, sign, around)),
+        is_upright,
+    };
+    // Whatever holds it; what that is itself is asked when all candidates are known.
+    let held = Held::of(&[&candidate], &|_| false);
+    let may_be = held.is_thin(&candidate) || held.n_by_one >= SIDES - 1;
+    (held.has_opening(&candidate) && may_be).then_some(candidate)
+}
+
+/// What holds a side, at each of its samples.
+fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec<Vec<Hold>> {
+    let (k, other) = if side < 2 { (1, 2) } else { (2, 1) };
+    let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
+    (0..SAMPLES)
+        .map(|i| {
+            let at = (i as f64 + 0.5) / SAMPLES as f64 * 2.0 - 1.0;
+            let mut found: Vec<Hold> = Vec::new();
+            for step in STEPS {
+                let p = unit.center
+                    + unit.axes[other] * (at * unit.half[other])
+                    + unit.axes[k] * (sign * (unit.half[k] + step));
+                for hold in matter_across(unit, index, p, around) {
+                    if !found.iter().any(|h| h.unit == hold.unit) {
+                        found.push(hold);
+                    }
+                }
+            }
+            found
+        })
+        .collect()
+}
+
+/// Whether anything is where it ends, left or right.
+fn is_at_end(unit: &Unit, index: u32, sign: f64, around: &Surroundings<'_>) -> bool {
+    let out = unit.axes[1] * sign;
+    let end = unit.center + out * unit.half.y;
+    let n_met = (0..SAMPLES)
+        .filter(|&i| {
+            let at = (i as f64 + 0.5) / SAMPLES as f64 * 2.0 - 1.0;
+            let p = end + unit.axes[2] * (at * unit.half.z);
+            around
+                .bvh
+                .any_hit(p - out * STEPS[1], p + out * STEPS[1], |t| {
+                    around.unit_of[t as usize] == index
+                })
+        })
+        .count();
+    n_met as f64 >= HELD * SAMPLES as f64
+}
+
+/// Where a line across a unit's plane meets something.
+#[derive(Clone, Copy)]
+struct Crossing {
+    unit: u32,
+    /// From the unit's middle plane. [Units: wu]
+    at: f64,
+    /// The surface is nearly parallel to the unit's plane.
+    is_facing: bool,
+}
+
+/// Others' matter along a line across.
+struct Matter {
+    unit: u32,
+    from: f64,
+    to: f64,
+}
+
+/// All that the line through a point along the thin axis meets, by unit and in order.
+fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> {
+    let reach = unit.half.x + WALL;
+    let across = unit.axes[0];
+    let ray = Ray::segment(p - across * reach, p + across * reach);
+    let mut found: Vec<Crossing> = Vec::new();
+    around.bvh.for_each_hit(&ray, |h| {
+        let n = triangle_area_normal(&around.triangles[h.triangle as usize]);
+        found.push(Crossing {
+            unit: around.unit_of[h.triangle as usize],
+            at: (2.0 * h.t - 1.0) * reach,
+            is_facing: n.dot(across).abs() > FACING * n.length(),
+        });
+    });
+    found.sort_by(|a, b| a.unit.cmp(&b.unit).then(a.at.total_cmp(&b.at)));
+    found.dedup_by(|b, a| a.unit == b.unit && b.at - a.at < SAME);
+    found
+}
+
+/// The matter of all but one unit, between surfaces that face along the line.
+fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
+    let facing: Vec<Crossing> = crossings
+        .iter()
+        .filter(|c| c.unit != but && c.is_facing)
+        .copied()
+        .collect();
+    let mut found = Vec::new();
+    for own in facing.chunk_by(|a, b| a.unit == b.unit) {
+        // However they are turned. What lies in the gap of two walls is not between air, either.
+        for pair in own.windows(2) {
+            found.push(Matter {
+                unit: own[0].unit,
+                from: pair[0].at,
+                to: pair[1].at,
+            });
+        }
+    }
+    found
+}
+
+/// Others' matter through a point, in the unit's plane and with air on both sides of it.
+fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
+    let half = unit.half.x;
+    matter(&crossings(unit, p, around), index)
+        .into_iter()
+        .map(|m| (m.to.min(half) - m.from.max(-half), m))
+        // A picture's frame only touches the wall.
+        .filter(|(overlap, m)| *overlap > OVERLAP * (m.to - m.from).min(2.0 * half))
+        .map(|(_, m)| Hold {
+            unit: m.unit,
+            thickness: m.to - m.from,
+        })
+        .collect()
+}
+
+/// Matter of the unit itself along its thin axis, averaged over its face and where it is thin, if
+/// there is air before it and behind it.
+fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> Option<(f64, f64)> {
+    let mut own_matter = Vec::new();
+    let mut n_free = [0, 0];
+    for i in 0..GRID * GRID {
+        let at = |k: usize| (k as f64 + 0.5) / GRID as f64 * 2.0 - 1.0;
+        let p = unit.center
+            + unit.axes[1] * (at(i % GRID) * unit.half.y)
+            + unit.axes[2] * (at(i / GRID) * unit.half.z);
+        let met = crossings(unit, p, around);
+        let others = matter(&met, index);
+        for (n, sign) in n_free.iter_mut().zip([-1.0, 1.0]) {
+            let (near, far) = (unit.half.x + STEPS[0], unit.half.x + AIR);
+            let is_met = met
+                .iter()
+                .any(|c| c.unit != index && (near..far).contains(&(sign * c.at)));
+            // Inside a wall there is nothing to meet, either.
+            let is_inside = others
+                .iter()
+                .any(|m| m.from < sign * near && sign * near < m.to);
+            *n += usize::from(!is_met && !is_inside);
+        }
+        let own = || met.iter().filter(|c| c.unit == index).map(|c| c.at);
+        if let (Some(first), Some(last)) = (own().next(), own().next_back()) {
+            own_matter.push(last - first);
+        }
+    }
+    let n = (GRID * GRID) as f64;
+    if n_free.iter().any(|&free| (free as f64) < OPEN * n) {
+        return None;
+    }
+    own_matter.sort_by(f64::total_cmp);
+    let is_frame = 2 * own_matter.len() < GRID * GRID;
+    let leaf = if is_frame {
+        0.0
+    } else {
+        own_matter[own_matter.len() / 4]
+    };
+    Some((own_matter.iter().sum::<f64>() / n, leaf))
+}

@@ -1,0 +1,231 @@
+//! Objects as what hangs together in them: all windows of a facade may be one mesh.
+
+use super::parts;
+use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
+
+/// Parts nearer than this are one thing: a handle and its leaf, the triangles of a mesh that shares
+/// no corners. [Units: wu]
+const TOGETHER: f64 = 0.01;
+/// Of more parts than this, all are one thing: parting them costs their number squared at worst.
+const MOST_PARTS: usize = 2_000;
+/// Normals that differ by less than 11° are one direction.
+const ONE_DIRECTION: f64 = 0.98;
+/// … and by more than 45° when they are to give a box its second axis.
+const LEVEL: f64 = 0.7;
+/// Directions told apart, so that a sphere costs no more than a box.
+const MOST_DIRECTIONS: usize = 64;
+
+/// Shorter than this is no door and no window. [Units: wu]
+const LEAST_EDGE: f64 = 0.35;
+
+/// How far casings, sills and handles stand out from what they belong to: across a thick wall, and
+/// along it by the width of a board. [Units: wu]
+const BESIDE: DVec3 = DVec3::new(0.6, 0.2, 0.2);
+
+/// A thing that hangs together, and its box along its own faces.
+pub(super) struct Unit {
+    pub(super) object: u32,
+    /// In the list of all.
+    pub(super) triangles: Vec<u32>,
+    pub(super) center: DVec3,
+    /// Right-handed: across the thing where it is thinnest, level along it, and up along it.
+    pub(super) axes: [DVec3; 3],
+    /// Half its edges along the axes. [Units: wu]
+    pub(super) half: DVec3,
+}
+
+impl Unit {
+    /// Whether it is too small to be a door or a window.
+    pub(super) fn is_small(&self) -> bool {
+        2.0 * self.half.y.min(self.half.z) < LEAST_EDGE
+    }
+
+    /// Whether the other is a casing, a sill or a handle of this one: it lies before its face, in
+    /// the same wall.
+    pub(super) fn has_beside(&self, other: &Self) -> bool {
+        let reach = self.half + BESIDE;
+        (0..8).all(|corner| {
+            let sign = |k: usize| if corner >> k & 1 == 1 { 1.0 } else { -1.0 };
+            let p = (0..3).fold(other.center, |p, k| {
+                p + other.axes[k] * (sign(k) * other.half[k])
+            });
+            (0..3).all(|k| (p - self.center).dot(self.axes[k]).abs() <= reach[k])
+        })
+    }
+}
+
+/// The things that an object's triangles make; `first` is the object's first triangle among all.
+pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<Unit> {
+    let (set_of, boxes) = parts(triangles);
+    let mut sets = Sets::new(boxes.len());
+    if boxes.len() > MOST_PARTS {
+        (1..boxes.len() as u32).for_each(|i| {
+            sets.join(0, i);
+        });
+    } else {
+        join_near(&boxes, &mut sets);
+    }
+    let mut slot = vec![usize::MAX; boxes.len()];
+    let mut members: Vec<Vec<u32>> = Vec::new();
+    for (i, part) in (0..).zip(set_of) {
+        let slot = &mut slot[sets.find(part) as usize];
+        if *slot == usize::MAX {
+            *slot = members.len();
+            members.push(Vec::new());
+        }
+        members[*slot].push(i);
+    }
+    members
+        .into_iter()
+        .map(|own| {
+            let own_triangles = own.iter().map(|&i| &triangles[i as usize]);
+            let (center, axes, half) = own_box(&own_triangles);
+            Unit {
+                object,
+                triangles: own.iter().map(|i| first + i).collect(),
+                center,
+                axes,
+                half,
+            }
+        })
+        .collect()
+}
+
+/// The connected parts of an object; without their triangles.
+pub(super) fn parts_of(triangles: &[Triangle]) -> Vec<Unit> {
+    let (part_of, boxes) = parts(triangles);
+    let mut members: Vec<Vec<Triangle>> = vec![Vec::new(); boxes.len()];
+    for (t, part) in triangles.iter().zip(part_of) {
+        members[part as usize].push(*t);
+    }
+    members.iter().map(|own| whole(0, own)).collect()
+}
+
+/// An object taken as one thing; without its triangles.
+pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
+    let (center, axes, half) = own_box(&triangles.iter());
+    Unit {
+        object,
+        triangles: Vec::new(),
+        center,
+        axes,
+        half,
+    }
+}
+
+/// An object taken as one thing, its box upright: the third axis is up.
+pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
+    let side = directions(triangles.iter())
+        .into_iter()
+        .map(|d| DVec3::new(d.0.x, 0.0, d.0.z))
+        .find(|d| d.length() > LEVEL)
+        .map_or(DVec3::X, |d| canonical(d.normalize()));
+    let axes = [side, DVec3::Y.cross(side), DVec3::Y];
+    let (center, half) = box_along(axes, &triangles.iter());
+    Unit {
+        object,
+        triangles: Vec::new(),
+        center,
+        axes,
+        half,
+    }
+}
+
+/// Joins boxes that nearly touch.
+fn join_near(boxes: &[Aabb], sets: &mut Sets) {
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    order.sort_by(|&a, &b| boxes[a as usize].min.x.total_cmp(&boxes[b as usize].min.x));
+    for (k, &a) in order.iter().enumerate() {
+        let near = boxes[a as usize].expanded(TOGETHER);
+        for &b in order[k + 1..]
+            .iter()
+            .take_while(|&&b| boxes[b as usize].min.x <= near.max.x)
+        {
+            if near.overlaps(&boxes[b as usize]) {
+                sets.join(a, b);
+            }
+        }
+    }
+}
+
+/// Directions that the surface faces, up to sign, those of most surface first.
+fn directions<'t>(triangles: impl Iterator<Item = &'t Triangle>) -> Vec<(DVec3, f64)> {
+    let mut found: Vec<(DVec3, f64)> = Vec::new();
+    for t in triangles {
+        let n = triangle_area_normal(t);
+        let area = n.length();
+        let Some(n) = n.try_normalize() else { continue };
+        if let Some(d) = found.iter_mut().find(|d| d.0.dot(n).abs() > ONE_DIRECTION) {
+            d.1 += area;
+        } else if found.len() < MOST_DIRECTIONS {
+            found.push((n, area));
+        }
+    }
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found
+}
+
+fn extent<'t>(d: DVec3, triangles: impl Iterator<Item = &'t Triangle>) -> (f64, f64) {
+    triangles
+        .flatten()
+        .map(|p| d.dot(*p))
+        .fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)))
+}
+
+/// Center of the box along three axes, and half its edges.
+fn box_along<'t>(
+    axes: [DVec3; 3],
+    triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
+) -> (DVec3, DVec3) {
+    let mut center = DVec3::ZERO;
+    let half = axes.map(|d| {
+        let (lo, hi) = extent(d, triangles.clone());
+        center += d * (0.5 * (lo + hi));
+        0.5 * (hi - lo)
+    });
+    (center, DVec3::from_array(half))
+}
+
+/// The box along the directions that most of the surface faces.
+fn own_box<'t>(
+    triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
+) -> (DVec3, [DVec3; 3], DVec3) {
+    let directions = directions(triangles.clone());
+    // Of the three that most of the surface faces, the one along which it is thinnest.
+    let width = |d: &DVec3| {
+        let (lo, hi) = extent(*d, triangles.clone());
+        hi - lo
+    };
+    let across = directions
+        .iter()
+        .take(3)
+        .map(|d| d.0)
+        .min_by(|a, b| width(a).total_cmp(&width(b)))
+        .unwrap_or(DVec3::Y);
+    let across = canonical(across);
+    let level = if across.y.abs() > ONE_DIRECTION {
+        // What lies flat is turned as its sides are.
+        directions
+            .iter()
+            .filter(|d| d.0.dot(across).abs() < LEVEL)
+            .find_map(|d| (d.0 - across * across.dot(d.0)).try_normalize())
+            .unwrap_or(DVec3::X)
+    } else {
+        DVec3::Y.cross(across).normalize()
+    };
+    let axes = [across, level, across.cross(level)];
+    let (center, half) = box_along(axes, triangles);
+    (center, axes, half)
+}
+
+/// Of a direction and its reverse, always the same one.
+fn canonical(d: DVec3) -> DVec3 {
+    /// What rounding makes of zero.
+    const NONE: f64 = 1e-6;
+    let first = [d.x, d.z, d.y].into_iter().find(|c| c.abs() > NONE);
+    if first.is_some_and(|c| c < 0.0) {
+        -d
+    } else {
+        d
+    }
+}
