@@ -10,6 +10,7 @@ use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
 use super::label::{LeafCells, SOLID};
 use super::pieces::{self, Opening, Piece, Rules};
+use super::surface::{NO_PLANE, Source};
 use super::tree::{Tree, leaf_index};
 use super::{CRACK_WIDTH, Complex, poly, seen};
 
@@ -171,6 +172,8 @@ struct Sink<'a> {
     tagged: &'a TaggedTree<'a>,
     visitor: &'a Visitor<'a>,
     has_seals: bool,
+    /// The plane of each screen's surface.
+    plane_of_screen: &'a [u32],
     graph: &'a LeafGraph,
     clearance: Clearance<'a>,
     pieces: Vec<Piece>,
@@ -214,10 +217,14 @@ impl FacetSink for Sink<'_> {
         for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let is_narrow = self.clearance.is_narrow(&points);
             let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, poly::width(&points));
+            // Where surfaces lie within a tolerance of it, parts of a screen were put into their planes; a portal has one.
+            let own = screen.and_then(|s| self.plane_of_screen.get(s as usize).copied());
+            let plane = own.filter(|&p| p != NO_PLANE).unwrap_or(facet.plane);
+            let turns = self.visitor.tree.planes[plane as usize].normal.dot(normal) < 0.0;
             self.pieces.push(Piece {
                 cells,
-                plane: facet.plane,
-                is_flipped,
+                plane,
+                is_flipped: is_flipped != turns,
                 screen,
                 is_gap: is_narrow || is_rim,
                 is_rim,
@@ -231,6 +238,7 @@ impl FacetSink for Sink<'_> {
             tagged: self.tagged,
             visitor: self.visitor,
             has_seals: self.has_seals,
+            plane_of_screen: self.plane_of_screen,
             graph: self.graph,
             clearance: self.clearance,
             pieces: Vec::new(),
@@ -258,10 +266,19 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         surfaces: &complex.set.surfaces,
         tolerance: complex.tolerance,
     };
+    let mut plane_of_screen: Vec<u32> = Vec::new();
+    for surface in &complex.set.surfaces {
+        if let Source::Screen(id) = surface.source {
+            let n = plane_of_screen.len().max(id as usize + 1);
+            plane_of_screen.resize(n, NO_PLANE);
+            plane_of_screen[id as usize] = surface.plane;
+        }
+    }
     let mut sink = Sink {
         tagged: &tagged,
         visitor: &visitor,
         has_seals: complex.has_seals,
+        plane_of_screen: &plane_of_screen,
         graph: &complex.graph,
         clearance: complex.clearance(),
         pieces: Vec::new(),

@@ -357,8 +357,9 @@ impl<'a> Sheet<'a> {
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
             .map(|(screen, _)| screen);
         // No seal is wider than a gap.
-        let (apart, together): (Vec<usize>, Vec<usize>) =
-            members.iter().partition(|&&i| is_seal && self.pieces[i].is_rim);
+        let (apart, together): (Vec<usize>, Vec<usize>) = members
+            .iter()
+            .partition(|&&i| is_seal && self.pieces[i].is_rim);
         let flats = |of: Vec<usize>| of.into_iter().map(|i| self.flats[i].clone()).collect();
         let mut merged = merge_convex(flats(together));
         merged.extend::<Vec<Flat>>(flats(apart));
