@@ -19,7 +19,7 @@ use crate::voxel::{
 };
 use crate::watershed::{
     Flooded, Frame, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches,
-    cut_at_slabs, find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins,
+    cut_at_slabs, find_lids, find_matter, find_stairs, fit_screen, flood_closures, merge_basins,
     opening_of, rim_caps, shallow_voids, slab_heights,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
@@ -37,6 +37,8 @@ pub struct BakeOutput {
     pub times: Vec<(&'static str, Duration)>,
     /// Where cells meet though no opening was foreseen: cracks and holes of the model.
     pub leaks: Vec<Leak>,
+    /// What the builder assumed or decided in doubt, one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Finds the rooms and doorways of a scene.
@@ -129,7 +131,7 @@ pub fn bake(
     };
     let regions = merge_basins(flooded, &saddles, &config.merge);
     drop(shut);
-    let hollow = hollow_regions(
+    let matter = find_matter(
         &grid,
         &labels,
         &regions,
@@ -146,7 +148,7 @@ pub fn bake(
         &grid,
         &labels,
         &regions,
-        &hollow,
+        &matter.regions,
         &inside_of(&stairs, &grid, &bvh),
     );
     let mut voids = shallow_voids(&walls, &bvh, &|p| {
@@ -250,6 +252,7 @@ pub fn bake(
         dims: grid.dims,
         times: context.times(),
         leaks,
+        notes: matter.notes,
     })
 }
 

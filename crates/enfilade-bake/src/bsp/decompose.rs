@@ -187,6 +187,7 @@ pub fn bake_bsp(
         dims: [0; 3],
         times: context.times(),
         leaks,
+        notes: Vec::new(),
     })
 }
 

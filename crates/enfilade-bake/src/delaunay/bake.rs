@@ -281,5 +281,6 @@ pub fn bake_session(
         dims: [0; 3],
         times: context.times(),
         leaks,
+        notes: Vec::new(),
     })
 }
