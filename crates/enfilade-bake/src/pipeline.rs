@@ -80,13 +80,14 @@ pub fn bake(
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
     let closures = voxelize(&grid, &frame.triangles_to_grid(&closure_triangles(scene)));
-    // Where a building has no roof or a tube just ends, a lid or a cap takes its place.
+    // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
     let lids = find_lids(&grid, &occupied);
     let mut shut = voxelize(&grid, &rim_caps(&walls, config.min_opening.powi(2)));
     shut.union_with(&closures);
-    if let Some(voxels) = &lids.voxels {
+    for voxels in lids.lids.iter().chain(&lids.floors) {
         shut.union_with(voxels);
     }
+    let mut notes = lids.notes(&grid);
 
     // 2. How far every voxel of air is from a surface; door leaves count as surfaces here.
     context.stage(1)?;
@@ -139,6 +140,7 @@ pub fn bake(
         &bvh,
         config.merge.min_radius,
     );
+    notes.extend(matter.notes);
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
@@ -151,11 +153,14 @@ pub fn bake(
         &matter.regions,
         &inside_of(&stairs, &grid, &bvh),
     );
-    let mut voids = shallow_voids(&walls, &bvh, &|p| {
-        grid.voxel_at(p).map_or(0, |[x, y, z]| {
-            regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
-        })
-    });
+    let mut voids = Vec::new();
+    if matter.fronts_face_air {
+        voids = shallow_voids(&walls, &bvh, &|p| {
+            grid.voxel_at(p).map_or(0, |[x, y, z]| {
+                regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
+            })
+        });
+    }
     drop((walls, labels));
     // From here on all is where the scene has it.
     for screen in &mut screens {
@@ -252,7 +257,7 @@ pub fn bake(
         dims: grid.dims,
         times: context.times(),
         leaks,
-        notes: matter.notes,
+        notes,
     })
 }
 

@@ -242,3 +242,47 @@ fn panes_close_a_hall_however_many_they_are() {
     assert_eq!(n_indoors(&with_panes), 1);
     assert!(is_indoors(&with_panes, [8.0, 1.5, 5.0]));
 }
+
+/// Seven rooms of ten walls, 2.7 m high, with doors: nothing below, nothing above.
+fn walls_alone() -> Scene {
+    let mut scene = Scene::default();
+    let wall = |min: [f64; 2], max: [f64; 2]| aabb([min[0], 0.0, min[1]], [max[0], 2.7, max[1]]);
+    let door = |min: [f64; 2], max: [f64; 2]| aabb([min[0], 0.0, min[1]], [max[0], 2.1, max[1]]);
+    add(&mut scene, Role::Structural, |m| {
+        m.carved(
+            &[
+                wall([0.0, 0.0], [12.2, 0.2]),
+                wall([0.0, 10.2], [12.2, 10.4]),
+                wall([0.0, 0.0], [0.2, 10.4]),
+                wall([12.0, 0.0], [12.2, 10.4]),
+                wall([0.0, 4.0], [12.2, 4.2]),
+                wall([0.0, 6.0], [12.2, 6.2]),
+                wall([4.0, 0.0], [4.2, 4.0]),
+                wall([8.0, 0.0], [8.2, 4.0]),
+                wall([4.0, 6.2], [4.2, 10.4]),
+                wall([8.0, 6.2], [8.2, 10.4]),
+            ],
+            &[
+                door([1.5, 4.0], [2.4, 4.2]),
+                door([5.5, 4.0], [6.4, 4.2]),
+                door([9.5, 4.0], [10.4, 4.2]),
+                door([1.5, 6.0], [2.4, 6.2]),
+                door([5.5, 6.0], [6.4, 6.2]),
+                door([9.5, 6.0], [10.4, 6.2]),
+                door([0.0, 4.6], [0.2, 5.5]),
+            ],
+        );
+    });
+    scene
+}
+
+#[test]
+fn walls_alone_enclose_rooms_and_what_was_supplied_is_said() {
+    let scene = walls_alone();
+    let baked = baked(&scene);
+    assert_eq!(n_indoors(&baked), 7);
+    for (what, ends) in [("lids", "top"), ("floors", "foot")] {
+        let is_said = |n: &String| n.starts_with(what) && n.contains(ends);
+        assert!(baked.notes.iter().any(is_said), "{:?}", baked.notes);
+    }
+}

@@ -60,6 +60,8 @@ pub struct Matter {
     pub regions: Vec<u32>,
     /// What was decided in doubt, one sentence each.
     pub notes: Vec<String>,
+    /// Whether surfaces show their fronts to air and their backs to matter.
+    pub fronts_face_air: bool,
 }
 
 /// Finds the regions that are no rooms; `min_radius` is that of the largest ball that fits into a
@@ -117,7 +119,9 @@ pub fn find_matter(
     let mut matter = Matter {
         regions: narrow,
         notes: Vec::new(),
+        fronts_face_air: facing == Facing::Outward,
     };
+    matter.regions.sort_unstable();
     let n = doubtful.len();
     if n == 0 {
         return matter;
