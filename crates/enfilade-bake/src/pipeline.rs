@@ -20,7 +20,7 @@ use crate::voxel::{
 use crate::watershed::{
     Flooded, Frame, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches,
     cut_at_slabs, find_lids, find_matter, find_stairs, fit_screen, flood_closures, merge_basins,
-    opening_of, rim_caps, shallow_voids, slab_heights,
+    opening_of, rim_caps, shallow_voids, slab_heights, split_limbs,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -130,7 +130,15 @@ pub fn bake(
         closures: Some(&shut),
         slabs: &slabs,
     };
-    let regions = merge_basins(flooded, &saddles, &config.merge);
+    let mut regions = merge_basins(flooded, &saddles, &config.merge);
+    split_limbs(
+        &grid,
+        &mut labels,
+        &mut regions,
+        &mut peaks,
+        &shut,
+        &config.merge,
+    );
     drop(shut);
     let matter = find_matter(
         &grid,

@@ -10,6 +10,7 @@ mod fit;
 mod frame;
 mod hollow;
 mod lids;
+mod limbs;
 mod regions;
 mod rims;
 mod sections;
@@ -22,6 +23,7 @@ pub use fit::{Screen, fit_screen, fit_screen_at};
 pub use frame::Frame;
 pub use hollow::{Matter, find_matter};
 pub use lids::{Lids, find_lids};
+pub use limbs::split_limbs;
 pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,
