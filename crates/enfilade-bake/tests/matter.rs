@@ -134,6 +134,22 @@ fn a_room_behind_walls_stays_a_room_without_any_opening() {
 }
 
 #[test]
+fn a_room_sunk_into_solid_ground_stays_a_room() {
+    // Ground that no one has dug out, and a vault in it, beside a house.
+    let mut scene = house(&[]);
+    block(&mut scene, [14.0, -1.0, -2.0], [24.0, 8.0, 8.0]);
+    add(&mut scene, Role::Structural, |m| {
+        m.carved(
+            &[aabb([16.0, 0.0, 0.0], [22.0, 4.0, 6.0])],
+            &[aabb([16.4, 0.4, 0.4], [21.6, 3.6, 5.6])],
+        );
+    });
+    let baked = baked(&scene);
+    assert!(is_indoors(&baked, [19.0, 2.0, 3.0]));
+    assert!(!is_indoors(&baked, [15.0, 2.0, 3.0]));
+}
+
+#[test]
 fn blocks_on_open_land_have_no_rooms() {
     let mut scene = Scene::default();
     add(&mut scene, Role::Structural, |m| {

@@ -36,8 +36,8 @@ const POINTS: usize = 32;
 /// From inside matter this share of the rays leave it: all but those that slip through a crack or
 /// along an edge.
 const LEAVING: f64 = 0.9;
-/// … and most see a back first. In a shell of one sheet with partitions of two, a room sees the
-/// partitions' fronts.
+/// … and most see a back first: from a room sunk into ground that no one has dug out all rays leave
+/// the ground in the end, but its walls show their fronts.
 const BACKS: f64 = 0.6;
 /// Surfaces are trusted where known air sees at most this share of backs, and turned where it sees at
 /// most this share of fronts: half of what surfaces that face anywhere show.

@@ -241,7 +241,8 @@ impl Plan {
         while THICKER * half_width <= thickest {
             let reach = THICKER * half_width;
             let to_core = self.distance_to(|c| thickness(c) >= reach);
-            let is_core = |c: usize| f64::from(to_core[c]) <= reach && rest[c];
+            // Rounded outward by half a cell, or a lining of single cells would be left along walls.
+            let is_core = |c: usize| f64::from(to_core[c]) <= reach + 0.5 && rest[c];
             let core = self.components(is_core);
             let narrow = self.components(|c| rest[c] && !is_core(c));
             let mut found = Vec::new();
