@@ -93,7 +93,7 @@ pub fn find_matter(
         .collect();
     let view = |group: &[u32]| {
         let of = group.iter().filter_map(|r| seen.get(r));
-        of.fold(Seen::default(), |sum, s| sum.and(s))
+        of.fold(Seen::default(), Seen::and)
     };
     let indoors: Vec<u32> = open.iter().copied().filter(|&r| r != OUTDOORS).collect();
     let facing = Facing::of(&view(&indoors), &view(&[OUTDOORS]));
