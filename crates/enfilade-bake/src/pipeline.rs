@@ -19,8 +19,8 @@ use crate::voxel::{
 };
 use crate::watershed::{
     Flooded, Frame, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches,
-    cut_at_slabs, find_lids, find_stairs, fit_screen, flood_closures, hollow_regions, merge_basins,
-    opening_of, rim_caps, shallow_voids, slab_heights,
+    cut_at_slabs, find_lids, find_matter, find_stairs, fit_screen, flood_closures, merge_basins,
+    opening_of, rim_caps, shallow_voids, slab_heights, split_limbs,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -37,6 +37,8 @@ pub struct BakeOutput {
     pub times: Vec<(&'static str, Duration)>,
     /// Where cells meet though no opening was foreseen: cracks and holes of the model.
     pub leaks: Vec<Leak>,
+    /// What the builder assumed or decided in doubt, one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Finds the rooms and doorways of a scene.
@@ -78,13 +80,14 @@ pub fn bake(
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
     let closures = voxelize(&grid, &frame.triangles_to_grid(&closure_triangles(scene)));
-    // Where a building has no roof or a tube just ends, a lid or a cap takes its place.
+    // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
     let lids = find_lids(&grid, &occupied);
     let mut shut = voxelize(&grid, &rim_caps(&walls, config.min_opening.powi(2)));
     shut.union_with(&closures);
-    if let Some(voxels) = &lids.voxels {
+    for voxels in lids.lids.iter().chain(&lids.floors) {
         shut.union_with(voxels);
     }
+    let mut notes = lids.notes(&grid);
 
     // 2. How far every voxel of air is from a surface; door leaves count as surfaces here.
     context.stage(1)?;
@@ -127,9 +130,17 @@ pub fn bake(
         closures: Some(&shut),
         slabs: &slabs,
     };
-    let regions = merge_basins(flooded, &saddles, &config.merge);
+    let mut regions = merge_basins(flooded, &saddles, &config.merge);
+    split_limbs(
+        &grid,
+        &mut labels,
+        &mut regions,
+        &mut peaks,
+        &shut,
+        &config.merge,
+    );
     drop(shut);
-    let hollow = hollow_regions(
+    let matter = find_matter(
         &grid,
         &labels,
         &regions,
@@ -137,6 +148,7 @@ pub fn bake(
         &bvh,
         config.merge.min_radius,
     );
+    notes.extend(matter.notes);
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
@@ -146,14 +158,17 @@ pub fn bake(
         &grid,
         &labels,
         &regions,
-        &hollow,
+        &matter.regions,
         &inside_of(&stairs, &grid, &bvh),
     );
-    let mut voids = shallow_voids(&walls, &bvh, &|p| {
-        grid.voxel_at(p).map_or(0, |[x, y, z]| {
-            regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
-        })
-    });
+    let mut voids = Vec::new();
+    if matter.fronts_face_air {
+        voids = shallow_voids(&walls, &bvh, &|p| {
+            grid.voxel_at(p).map_or(0, |[x, y, z]| {
+                regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
+            })
+        });
+    }
     drop((walls, labels));
     // From here on all is where the scene has it.
     for screen in &mut screens {
@@ -252,6 +267,7 @@ pub fn bake(
         dims: grid.dims,
         times: context.times(),
         leaks,
+        notes,
     })
 }
 

@@ -308,6 +308,9 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             config.max_voxels
         )?;
     }
+    for note in &baked.notes {
+        writeln!(err, "{note}")?;
+    }
     if verbose || io::stderr().is_terminal() {
         for (stage, time) in &baked.times {
             writeln!(err, "{stage:>20} {:>8.3} s", time.as_secs_f64())?;

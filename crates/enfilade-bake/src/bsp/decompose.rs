@@ -191,6 +191,7 @@ pub fn bake_bsp(
         dims: [0; 3],
         times: context.times(),
         leaks,
+        notes: Vec::new(),
     })
 }
 

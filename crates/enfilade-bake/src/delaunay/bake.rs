@@ -283,5 +283,6 @@ pub fn bake_session(
         dims: [0; 3],
         times: context.times(),
         leaks,
+        notes: Vec::new(),
     })
 }

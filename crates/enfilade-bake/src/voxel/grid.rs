@@ -175,6 +175,12 @@ impl BitVolume {
         &self.words[row * n..(row + 1) * n]
     }
 
+    /// Sets one row: bits past its end must be 0.
+    pub(crate) fn set_row(&mut self, row: usize, words: &[u64]) {
+        let n = self.row_words();
+        self.words_mut()[row * n..][..n].copy_from_slice(words);
+    }
+
     /// The bit of voxel `(i, j, k)`.
     ///
     /// # Panics

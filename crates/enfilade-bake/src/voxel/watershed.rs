@@ -50,6 +50,23 @@ pub enum Labels {
 }
 
 impl Labels {
+    /// Makes sure that labels below `n` can be set.
+    pub(crate) fn make_room_for(&mut self, n: usize) {
+        if n > usize::from(u16::MAX) + 1
+            && let Self::U16(v) = self
+        {
+            *self = Self::U32(v.iter().map(|&l| l.into()).collect());
+        }
+    }
+
+    /// Labels the voxel at `index`; see [`Self::make_room_for`].
+    pub(crate) fn set(&mut self, index: usize, label: u32) {
+        match self {
+            Self::U16(v) => v[index] = label as u16,
+            Self::U32(v) => v[index] = label,
+        }
+    }
+
     /// Label of the voxel at `index`; 0 when it is occupied.
     #[must_use]
     pub fn get(&self, index: usize) -> u32 {

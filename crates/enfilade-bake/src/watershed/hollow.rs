@@ -1,17 +1,28 @@
-//! Which regions are rooms, and which are the insides of walls.
+//! Which regions are rooms, and which are matter: insides of walls and of closed solids.
 //!
-//! The hollow between the two faces of a wall is as empty as a room. It is told apart by two things:
-//! nothing can get in, and from inside one sees the backs of the surfaces. What is connected with the
-//! outdoors through openings is always air. Closed models with their faces turned inside out, and
-//! models without consistent faces, must not lose their rooms: a region that nothing can get into is
-//! dropped only when it is narrow, or when the scene's faces can be trusted because the outdoors sees
-//! fronts.
+//! The hollow between the two faces of a wall is as empty as a room, and so is the inside of a block,
+//! a column or a piece of furniture. They are told apart by two things: nothing can get in, and the
+//! surfaces around them face away. What is connected with the outdoors through openings is always air.
 //!
-//! Cost: 14 rays from up to 32 points of each region that nothing can get into.
+//! Which way surfaces face is asked along rays, as a winding number is (Jacobson, Kavan &
+//! Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers", 2013), but
+//! one ray at a time: a ray from matter leaves one solid more than it enters, wherever solids overlap
+//! or stand on a sheet of land, and a ray from a room never does, because it enters a wall first. The
+//! sum over a whole sphere of a scene's open sheets is a fraction that means nothing.
+//!
+//! Not every model can be asked. What the known air (what is open to the outdoors, or else the
+//! outdoors) sees decides: fronts, and surfaces are trusted; backs, and they are turned; some of each,
+//! and only what is open to what counts: then what nothing can get into is matter if nothing but a
+//! sheet parts it from what surrounds it, and a room if walls do or fronts look at it from all sides
+//! (as in a vessel or a level, modelled from inside).
+//!
+//! A scene that is nothing but such a shell is a building and not a boulder: kept, and said.
+//!
+//! Cost: 14 rays from up to 32 points of each region, each through all that it meets.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Bvh, DVec3, Ray, Sets};
+use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Sets};
 use rayon::prelude::*;
 
 use crate::voxel::{Grid, Labels};
@@ -22,89 +33,307 @@ use super::regions::{OUTDOORS, Regions};
 const NARROW: f64 = 0.5;
 /// Points that ask around in each region.
 const POINTS: usize = 32;
+/// From inside matter this share of the rays leave it: all but those that slip through a crack or
+/// along an edge.
+const LEAVING: f64 = 0.9;
+/// … and most see a back first: from a room sunk into ground that no one has dug out all rays leave
+/// the ground in the end, but its walls show their fronts.
+const BACKS: f64 = 0.6;
+/// Surfaces are trusted where known air sees at most this share of backs, and turned where it sees at
+/// most this share of fronts: half of what surfaces that face anywhere show.
+const ASTRAY: f64 = 0.25;
+/// Two surfaces nearer than this are the two faces of a wall. [Units: wu]
+const WALL: f64 = 0.5;
+/// … and nearer than this are one sheet that is there twice. [Units: wu]
+const TWICE: f64 = 0.01;
+/// Surfaces nearer than this along a ray are at one place: that of rounding. [Units: wu]
+const SAME: f64 = 1e-5;
+/// Where this share of all structure bounds closed shells, the scene is these shells.
+const ALL_THERE_IS: f64 = 0.9;
 
-/// The region labels that are no rooms, ascending: solid matter, and closed-off spaces in which no
-/// ball of `min_radius` fits (bays between rafters, gaps in the construction). What of the latter
-/// leaks into a room is part of that room after all: the cell complex sees to it.
+/// What is no room.
+#[derive(Clone, Debug, Default)]
+pub struct Matter {
+    /// Regions, ascending: solid matter, and closed-off spaces in which no ball of the least radius
+    /// fits (bays between rafters, gaps in the construction). What of the latter leaks into a room is
+    /// part of that room after all: the cell complex sees to it.
+    pub regions: Vec<u32>,
+    /// What was decided in doubt, one sentence each.
+    pub notes: Vec<String>,
+    /// Whether surfaces show their fronts to air and their backs to matter.
+    pub fronts_face_air: bool,
+}
+
+/// Finds the regions that are no rooms; `min_radius` is that of the largest ball that fits into a
+/// room at least.
 #[must_use]
-pub fn hollow_regions(
+pub fn find_matter(
     grid: &Grid,
     labels: &Labels,
     regions: &Regions,
     peaks: &[f32],
     bvh: &Bvh,
     min_radius: f64,
-) -> Vec<u32> {
-    let enclosed = enclosed_groups(regions);
+) -> Matter {
     let mut radius: BTreeMap<u32, f32> = BTreeMap::new();
     for (basin, &region) in regions.region_of_basin.iter().enumerate() {
         let r = radius.entry(region).or_insert(0.0);
         *r = r.max(peaks[basin]);
     }
-    let wanted: Vec<u32> = enclosed
-        .iter()
-        .flatten()
-        .copied()
-        .chain([OUTDOORS])
-        .collect();
+    let (open, enclosed): (Vec<_>, Vec<_>) =
+        groups(regions).into_iter().partition(|g| g[0] == OUTDOORS);
+    let open: Vec<u32> = open.into_iter().flatten().collect();
+    let wanted: Vec<u32> = enclosed.iter().flatten().chain(&open).copied().collect();
     let points = sample_points(grid, labels, regions, &wanted);
-    let backs: BTreeMap<u32, (f64, f64)> = points
+    let seen: BTreeMap<u32, Seen> = points
         .par_iter()
-        .map(|(&region, at)| (region, count_backs(bvh, at)))
+        .map(|(&region, at)| (region, Seen::from(bvh, at)))
         .collect::<Vec<_>>()
         .into_iter()
         .collect();
-    let share = |group: &[u32]| {
-        let (back, all) = group
-            .iter()
-            .filter_map(|r| backs.get(r))
-            .fold((0.0, 0.0), |(b, a), &(back, all)| (b + back, a + all));
-        if all == 0.0 { 0.0 } else { back / all }
+    let view = |group: &[u32]| {
+        let of = group.iter().filter_map(|r| seen.get(r));
+        of.fold(Seen::default(), Seen::and)
     };
-    let trusted = share(&[OUTDOORS]) < 0.1;
-    let mut hollow: Vec<u32> = Vec::new();
-    let mut doubtful: Vec<u32> = Vec::new();
-    let mut any_room = enclosed.len() < n_groups(regions);
-    for group in &enclosed {
+    let indoors: Vec<u32> = open.iter().copied().filter(|&r| r != OUTDOORS).collect();
+    let facing = Facing::of(&view(&indoors), &view(&[OUTDOORS]));
+
+    let (mut narrow, mut doubtful) = (Vec::new(), Vec::new());
+    let mut any_room = !indoors.is_empty();
+    for group in enclosed {
         // A voxel center next to a wall is already half a voxel away from it at least.
         let widest = group
             .iter()
             .map(|r| f64::from(radius[r]) - 0.5)
             .fold(0.0, f64::max)
             * grid.voxel;
-        let back = share(group);
-        if widest < min_radius || (back > 0.6 && widest < NARROW) {
-            hollow.extend(group);
-        } else if back > 0.9 && trusted {
-            doubtful.extend(group);
+        let view = view(&group);
+        if widest < min_radius || (view.backs() > BACKS && widest < NARROW) {
+            narrow.extend(group);
+        } else if facing.is_matter(&view) {
+            doubtful.push(group);
         } else {
             any_room = true;
         }
     }
-    // A closed shell of a building, with nothing modelled inside, is a building and not a boulder.
-    if any_room {
-        hollow.extend(doubtful);
+    let mut matter = Matter {
+        regions: narrow,
+        notes: Vec::new(),
+        fronts_face_air: facing == Facing::Outward,
+    };
+    matter.regions.sort_unstable();
+    let n = doubtful.len();
+    if n == 0 {
+        return matter;
     }
-    hollow.sort_unstable();
-    hollow
+    if !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing) {
+        matter.notes.push(format!(
+            "{n} closed shell{} without any opening {} all there is: taken for rooms and not for solids",
+            if n == 1 { "" } else { "s" },
+            if n == 1 { "is" } else { "are" },
+        ));
+    } else {
+        matter.notes.push(format!(
+            "the inside{} of {n} closed solid{} {} no room{}",
+            if n == 1 { "" } else { "s" },
+            if n == 1 { "" } else { "s" },
+            if n == 1 { "is" } else { "are" },
+            facing.reason(),
+        ));
+        matter.regions.extend(doubtful.into_iter().flatten());
+    }
+    matter.regions.sort_unstable();
+    matter
 }
 
-/// Groups of regions that open to each other but not, over any number of openings, to outdoors.
-fn enclosed_groups(regions: &Regions) -> Vec<Vec<u32>> {
-    groups(regions)
-        .into_iter()
-        .filter(|g| g[0] != OUTDOORS)
-        .collect()
+/// Which way the surfaces of a scene face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Facing {
+    /// Away from matter.
+    Outward,
+    /// Into matter.
+    Inward,
+    /// Any way.
+    Anyhow,
 }
 
-/// Number of groups besides the one of the outdoors alone.
-fn n_groups(regions: &Regions) -> usize {
-    groups(regions)
-        .iter()
-        .filter(|g| g.as_slice() != [OUTDOORS])
-        .count()
+impl Facing {
+    /// By what indoor air that is open to the outdoors sees, where there is any: sheets modelled from
+    /// inside show the outdoors nothing but backs.
+    fn of(indoors: &Seen, outdoors: &Seen) -> Self {
+        if indoors.all > 0.0 {
+            match indoors.backs() {
+                b if b <= ASTRAY => Self::Outward,
+                b if b >= 1.0 - ASTRAY => Self::Inward,
+                _ => Self::Anyhow,
+            }
+        } else if outdoors.backs() <= ASTRAY {
+            Self::Outward
+        } else {
+            Self::Anyhow
+        }
+    }
+
+    /// Whether what nothing can get into, and from which one sees this, is matter.
+    fn is_matter(self, seen: &Seen) -> bool {
+        match self {
+            Self::Outward => {
+                seen.leaving[0] > LEAVING * seen.aside && seen.back_aside > BACKS * seen.aside
+            }
+            Self::Inward => {
+                seen.leaving[1] > LEAVING * seen.aside
+                    && seen.aside - seen.back_aside > BACKS * seen.aside
+            }
+            Self::Anyhow => seen.backs() > ASTRAY && seen.walled < 0.5 * seen.all,
+        }
+    }
+
+    fn reason(self) -> &'static str {
+        match self {
+            Self::Outward => "",
+            Self::Inward => " (surfaces of this model face into what they bound)",
+            Self::Anyhow => {
+                " (surfaces of this model face either way; nothing opens to these, and only a sheet \
+                 bounds them)"
+            }
+        }
+    }
 }
 
+/// What rays from inside a region meet.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// Rays that meet anything.
+    all: f64,
+    /// … a back first.
+    back: f64,
+    /// … and a second surface right behind the first.
+    walled: f64,
+    /// Rays that meet anything and do not go down: what stands on a sheet of land, or is sunk into
+    /// it, has a floor like a room's.
+    aside: f64,
+    /// … a back first.
+    back_aside: f64,
+    /// … and leave one solid more than they enter: with surfaces that face outward, and inward.
+    leaving: [f64; 2],
+}
+
+impl Seen {
+    fn from(bvh: &Bvh, points: &[DVec3]) -> Self {
+        let mut seen = Self::default();
+        let mut hits: Vec<(f64, bool)> = Vec::new();
+        for ray in rays_from(points) {
+            hits.clear();
+            bvh.for_each_hit(&ray, |hit| hits.push((hit.t, hit.front)));
+            // At one place a back counts as first: where two solids touch, one is left before the
+            // other is entered.
+            hits.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            seen.add(&hits, ray.direction.y > -0.5);
+        }
+        seen
+    }
+
+    /// Adds a ray. It goes about 1 wu along one axis or all in a unit of its parameter, which therefore
+    /// is the distance across walls along the grid.
+    fn add(&mut self, hits: &[(f64, bool)], goes_aside: bool) {
+        let Some(&(at, is_front)) = hits.first() else {
+            return;
+        };
+        let one = |is: bool| f64::from(u8::from(is));
+        self.all += 1.0;
+        self.back += one(!is_front);
+        let next = hits.iter().map(|h| h.0 - at).find(|&d| d > TWICE);
+        self.walled += one(next.is_some_and(|d| d < WALL));
+        if !goes_aside {
+            return;
+        }
+        self.aside += 1.0;
+        self.back_aside += one(!is_front);
+        let (mut left, mut least, mut most) = (0, 0, 0);
+        for sheet in hits.chunk_by(|a, b| b.0 - a.0 < SAME) {
+            left += sheet.iter().map(|h| if h.1 { -1 } else { 1 }).sum::<i32>();
+            (least, most) = (least.min(left), most.max(left));
+        }
+        self.leaving[0] += one(most > 0);
+        self.leaving[1] += one(least < 0);
+    }
+
+    fn and(mut self, other: &Self) -> Self {
+        self.all += other.all;
+        self.back += other.back;
+        self.walled += other.walled;
+        self.aside += other.aside;
+        self.back_aside += other.back_aside;
+        self.leaving[0] += other.leaving[0];
+        self.leaving[1] += other.leaving[1];
+        self
+    }
+
+    /// Share of backs among what is seen.
+    fn backs(&self) -> f64 {
+        self.back / self.all.max(1.0)
+    }
+}
+
+/// Whether closed shells are the whole scene: next to all structure bounds them, and where surfaces
+/// face outward they hang together (a group of blocks is no building).
+fn are_all_there_is(
+    grid: &Grid,
+    labels: &Labels,
+    regions: &Regions,
+    shells: &[Vec<u32>],
+    facing: Facing,
+) -> bool {
+    let members: BTreeSet<u32> = shells.iter().flatten().copied().collect();
+    let is_inside = |i: usize| {
+        let region = regions.region_of_basin[labels.get(i) as usize];
+        members.contains(&region).then_some(region)
+    };
+    // Surfaces are at most three voxels thick.
+    const REACH: usize = 3;
+    let [nx, ny, nz] = grid.dims;
+    let strides = [1, nx, nx * ny];
+    let mut bounds: BTreeMap<u32, Aabb> = BTreeMap::new();
+    let (mut n_solid, mut n_bounding) = (0_usize, 0_usize);
+    for i in 0..labels.len() {
+        if labels.get(i) != 0 {
+            if let Some(region) = is_inside(i) {
+                let [x, y, z] = grid.coords(i);
+                let b = bounds.entry(region).or_insert(Aabb::EMPTY);
+                *b = b.including(grid.center(x, y, z));
+            }
+            continue;
+        }
+        n_solid += 1;
+        let at = grid.coords(i);
+        let near = (0..3).any(|k| {
+            (1..=REACH).any(|d| {
+                (at[k] >= d && is_inside(i - d * strides[k]).is_some())
+                    || (at[k] + d < [nx, ny, nz][k] && is_inside(i + d * strides[k]).is_some())
+            })
+        });
+        n_bounding += usize::from(near);
+    }
+    if (n_bounding as f64) < ALL_THERE_IS * n_solid as f64 {
+        return false;
+    }
+    if facing != Facing::Outward {
+        return true;
+    }
+    let boxes: Vec<Aabb> = bounds.into_values().collect();
+    let mut sets = Sets::new(boxes.len());
+    for i in 0..boxes.len() {
+        for j in 0..i {
+            if boxes[i].expanded(WALL).overlaps(&boxes[j]) {
+                sets.join(i as u32, j as u32);
+            }
+        }
+    }
+    (1..boxes.len() as u32).all(|i| sets.find(i) == sets.find(0))
+}
+
+/// Groups of regions that open to each other, over any number of openings; that of the outdoors
+/// begins with it.
 fn groups(regions: &Regions) -> Vec<Vec<u32>> {
     let n = regions.region_of_basin.len();
     let mut sets = Sets::new(n);
@@ -158,32 +387,31 @@ fn sample_points(
     points
 }
 
+/// Along the axes and the diagonals of each point.
+fn rays_from(points: &[DVec3]) -> impl Iterator<Item = Ray> {
+    let steps = || (-1..=1).map(f64::from);
+    let directions: Vec<DVec3> = steps()
+        .flat_map(|x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z))))
+        .filter(|d| d.length_squared() == 1.0 || d.length_squared() == 3.0)
+        // Off the axes a little, so that rays do not run along edges.
+        .map(|d| d + DVec3::new(0.013, 0.007, -0.011))
+        .collect();
+    points.iter().flat_map(move |&origin| {
+        directions.clone().into_iter().map(move |direction| Ray {
+            origin,
+            direction,
+            t_max: f64::INFINITY,
+        })
+    })
+}
+
 /// Rays that meet a back, and rays that meet anything.
 pub(super) fn count_backs(bvh: &Bvh, points: &[DVec3]) -> (f64, f64) {
-    let mut directions = Vec::new();
-    for x in -1..=1 {
-        for y in -1..=1 {
-            for z in -1..=1 {
-                let d = DVec3::new(f64::from(x), f64::from(y), f64::from(z));
-                if d.length_squared() == 1.0 || d.length_squared() == 3.0 {
-                    // Off the axes a little, so that rays do not run along edges.
-                    directions.push(d + DVec3::new(0.013, 0.007, -0.011));
-                }
-            }
-        }
-    }
     let (mut back, mut all) = (0.0, 0.0);
-    for &p in points {
-        for &direction in &directions {
-            let ray = Ray {
-                origin: p,
-                direction,
-                t_max: f64::INFINITY,
-            };
-            if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
-                all += 1.0;
-                back += f64::from(u8::from(!hit.front));
-            }
+    for ray in rays_from(points) {
+        if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
+            all += 1.0;
+            back += f64::from(u8::from(!hit.front));
         }
     }
     (back, all)

@@ -1,10 +1,13 @@
-//! Lids: what closes a building that has no roof.
+//! Lids and floors: what closes a building that has no roof, or no floor.
 //!
 //! Worlds for robots, doll's houses and half-finished models have walls and no ceiling. Seen as a
 //! volume such a room is a bay of the outdoors: the farther up, the wider. Yet anyone who looks at it
 //! sees rooms. So where walls end at one height all around, and there is nothing above but sky, a
 //! lid is laid just below the tops of the walls; the flood treats it like a door leaf (see
 //! `closures`), and it becomes an open portal between the room and the outdoors.
+//!
+//! Walls alone, as floor plans pulled up have them, end at the foot as they do at the top: a floor is
+//! laid there by the same rule, upside down, and becomes an open portal, too.
 //!
 //! Courtyards, roof terraces and gardens stay outdoors: a lid is laid only on a group of walls that
 //! encloses next to nothing with a roof.
@@ -33,70 +36,114 @@ const MAX_HOLLOW: f64 = 0.25;
 /// Lids smaller than this are left out. [Units: wu²]
 const MIN_AREA: f64 = 1.0;
 
-/// The lids of a scene.
+/// What is laid where walls just end. One voxel thick, each at its height; `None` when there is none.
 #[derive(Clone, Debug, Default)]
 pub struct Lids {
-    /// One voxel thick, each at its height; `None` when there is none.
-    pub voxels: Option<BitVolume>,
+    /// Below the tops of walls.
+    pub lids: Option<BitVolume>,
+    /// Above the feet of walls.
+    pub floors: Option<BitVolume>,
 }
 
 impl Lids {
-    /// The screen for an opening that lies in a lid for the most part: level, around its faces.
+    /// The screen for an opening that lies in a lid or floor for the most part: level, around its faces.
     #[must_use]
     pub fn screen_of(&self, grid: &Grid, faces: &[u64], regions: [u32; 2]) -> Option<Screen> {
-        let voxels = self.voxels.as_ref()?;
-        let mut rows: Vec<usize> = Vec::new();
-        for &face in faces {
-            let [x, y, z] = grid.coords((face / 4) as usize);
-            if face % 4 == 1 {
-                // The face lies between rows y and y + 1, the lid in either.
-                rows.extend((y..=y + 1).filter(|&r| voxels.get(x, r, z)));
-            }
-        }
-        rows.sort_unstable();
-        let row = rows
-            .chunk_by(|a, b| a == b)
-            .max_by_key(|run| run.len())
-            .filter(|run| run.len() * 10 >= faces.len() * 8)?[0];
-        // A third into the voxel from above: under all the tops that end in the row above.
-        let height = grid.center(0, row, 0).y + grid.voxel / 6.0;
-        let plane = Plane {
-            normal: DVec3::Y,
-            d: -height,
-        };
-        let reach = 1.5 * grid.voxel;
-        let corners: Vec<_> = faces
-            .iter()
-            .flat_map(|&f| {
-                let [x, _, z] = grid.coords((f / 4) as usize);
-                let c = grid.center(x, row, z);
-                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-                    .map(|(dx, dz)| c + DVec3::new(dx * reach, 0.0, dz * reach))
-            })
-            .collect();
-        let winding = Winding::hull_in_plane(&plane, &corners);
-        Some(Screen {
-            regions,
-            area: winding.area(),
-            winding,
-            bounded: true,
-            closed: 0.0,
+        // A third into the voxel from without: under all the tops that end in the row above, over all
+        // the feet that end in the row below.
+        let sheets = [(&self.lids, 1.0), (&self.floors, -1.0)];
+        sheets.into_iter().find_map(|(voxels, side)| {
+            let row = row_of(voxels.as_ref()?, grid, faces)?;
+            let height = grid.center(0, row, 0).y + side * grid.voxel / 6.0;
+            Some(level_screen(grid, faces, regions, row, height))
         })
+    }
+
+    /// What was laid, in words.
+    #[must_use]
+    pub fn notes(&self, grid: &Grid) -> Vec<String> {
+        let note = |what: &str, ends: &str, voxels: &BitVolume| {
+            let area = voxels.count() as f64 * grid.voxel * grid.voxel;
+            format!(
+                "{what} of {area:.0} m² supplied where walls end at {ends} and nothing is {}: open portals",
+                if ends == "the top" { "above" } else { "below" }
+            )
+        };
+        let lids = self.lids.as_ref().map(|v| note("lids", "the top", v));
+        let floors = self.floors.as_ref().map(|v| note("floors", "the foot", v));
+        lids.into_iter().chain(floors).collect()
     }
 }
 
-/// Lays the lids of a scene whose structure fills `occupied`.
+/// The row of the lid or floor that most of the faces lie in, if nearly all do.
+fn row_of(voxels: &BitVolume, grid: &Grid, faces: &[u64]) -> Option<usize> {
+    let mut rows: Vec<usize> = Vec::new();
+    for &face in faces {
+        let [x, y, z] = grid.coords((face / 4) as usize);
+        if face % 4 == 1 {
+            // The face lies between rows y and y + 1, the lid in either.
+            rows.extend((y..=y + 1).filter(|&r| voxels.get(x, r, z)));
+        }
+    }
+    rows.sort_unstable();
+    let most = rows.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
+    (most.len() * 10 >= faces.len() * 8).then_some(most[0])
+}
+
+fn level_screen(grid: &Grid, faces: &[u64], regions: [u32; 2], row: usize, height: f64) -> Screen {
+    let plane = Plane {
+        normal: DVec3::Y,
+        d: -height,
+    };
+    let reach = 1.5 * grid.voxel;
+    let corners: Vec<_> = faces
+        .iter()
+        .flat_map(|&f| {
+            let [x, _, z] = grid.coords((f / 4) as usize);
+            let c = grid.center(x, row, z);
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(dx, dz)| c + DVec3::new(dx * reach, 0.0, dz * reach))
+        })
+        .collect();
+    let winding = Winding::hull_in_plane(&plane, &corners);
+    Screen {
+        regions,
+        area: winding.area(),
+        winding,
+        bounded: true,
+        closed: 0.0,
+    }
+}
+
+/// Lays the lids and floors of a scene whose structure fills `occupied`.
 #[must_use]
 pub fn find_lids(grid: &Grid, occupied: &BitVolume) -> Lids {
+    Lids {
+        lids: lids_of(grid, occupied),
+        floors: lids_of(grid, &upside_down(occupied)).map(|v| upside_down(&v)),
+    }
+}
+
+fn upside_down(volume: &BitVolume) -> BitVolume {
+    let [nx, ny, nz] = volume.dims();
+    let mut out = BitVolume::new([nx, ny, nz]);
+    for z in 0..nz {
+        for y in 0..ny {
+            out.set_row(ny - 1 - y + ny * z, volume.row(y + ny * z));
+        }
+    }
+    out
+}
+
+fn lids_of(grid: &Grid, occupied: &BitVolume) -> Option<BitVolume> {
     let columns = Columns::of(grid, occupied);
-    let mut lids = Lids::default();
+    let mut lids: Option<BitVolume> = None;
     let mut is_lidded = vec![false; columns.top.len()];
     for row in columns.wall_ends(grid) {
         for column in columns.enclosed(grid, occupied, row) {
             if !std::mem::replace(&mut is_lidded[column], true) {
                 let (x, z) = (column % grid.dims[0], column / grid.dims[0]);
-                lids.voxels
-                    .get_or_insert_with(|| BitVolume::new(grid.dims))
+                lids.get_or_insert_with(|| BitVolume::new(grid.dims))
                     .set(x, row - 1, z, true);
             }
         }
@@ -352,7 +399,27 @@ mod tests {
     }
 
     fn lidded(volume: &BitVolume) -> usize {
-        find_lids(&grid(), volume).voxels.map_or(0, |v| v.count())
+        find_lids(&grid(), volume).lids.map_or(0, |v| v.count())
+    }
+
+    #[test]
+    fn walls_alone_get_floors_at_their_feet_and_a_crawl_space_none() {
+        let mut walls = roofless();
+        for z in 0..N[2] {
+            for x in 0..N[0] {
+                if !walls.get(x, 20, z) {
+                    walls.set(x, 10, z, false);
+                }
+            }
+        }
+        let both = find_lids(&grid(), &walls);
+        let (lids, floors) = (both.lids.unwrap(), both.floors.unwrap());
+        assert_eq!((lids.count(), floors.count()), (94 * 76, 94 * 76));
+        assert!(floors.iter_set().all(|i| grid().coords(i)[1] == 11));
+        // A floor 1.2 m above the feet of the walls: what lies below is the land's.
+        fill(&mut walls, [10, 22, 10], [110, 23, 90]);
+        assert!(find_lids(&grid(), &walls).floors.is_none());
+        assert!(find_lids(&grid(), &roofless()).floors.is_none());
     }
 
     #[test]
@@ -365,7 +432,7 @@ mod tests {
                 v.set(11, y, z, false);
             }
         }
-        let lids = find_lids(&grid(), &v).voxels.unwrap();
+        let lids = find_lids(&grid(), &v).lids.unwrap();
         let inner = (48 + 46) * 76;
         // Half of the gap (2 × 9 columns) may count as inside.
         assert!((inner..=inner + 18).contains(&lids.count()));

@@ -10,6 +10,7 @@ mod fit;
 mod frame;
 mod hollow;
 mod lids;
+mod limbs;
 mod regions;
 mod rims;
 mod sections;
@@ -20,8 +21,9 @@ mod voids;
 pub use closures::{bounds_of, closure_triangles, flood_closures};
 pub use fit::{Screen, fit_screen, fit_screen_at};
 pub use frame::Frame;
-pub use hollow::hollow_regions;
+pub use hollow::{Matter, find_matter};
 pub use lids::{Lids, find_lids};
+pub use limbs::split_limbs;
 pub use regions::{
     Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
     group_faces, merge_basins, opening_of,

@@ -160,7 +160,7 @@ pub fn merge_basins(
 }
 
 /// Collects the faces between differently labelled voxels, by pair, in order of the voxels.
-fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
+pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
     let [nx, ny, nz] = dims;
     let layer = nx * ny;
     let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..nz)

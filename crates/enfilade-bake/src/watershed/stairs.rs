@@ -23,6 +23,9 @@ const STEP_AREA: std::ops::RangeInclusive<f64> = 0.03..=4.0;
 const LEVEL: f64 = 0.99;
 /// Treads are at least this share of the area that faces up.
 const MIN_LEVEL_SHARE: f64 = 0.5;
+/// … and at least this share of all area: of a narrow flight that is massive down to the ground an
+/// eighth is treads, of a wall whose arched top runs in level strips a thirtieth.
+const MIN_TREAD_SHARE: f64 = 0.1;
 /// Steps in a row that make a flight.
 const MIN_STEPS: usize = 4;
 /// Objects with a larger plan are looked at shell by shell: a whole building may be one. [Units: wu²]
@@ -106,13 +109,14 @@ struct Level {
 }
 
 fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
-    let mut upward = 0.0;
+    let (mut upward, mut total) = (0.0, 0.0);
     let mut flat: Vec<(f64, DVec3, f64)> = members
         .iter()
         .filter_map(|&t| {
             let n = triangle_area_normal(&triangles[t]);
             let area = n.length() * 0.5;
             let slope = n.y * side;
+            total += area;
             if slope > 0.5 * n.length() {
                 upward += area;
             }
@@ -123,7 +127,8 @@ fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
         })
         .collect();
     // Anything round has level spots at all heights; treads are most of what faces up.
-    if flat.iter().map(|f| f.2).sum::<f64>() < MIN_LEVEL_SHARE * upward {
+    let level = flat.iter().map(|f| f.2).sum::<f64>();
+    if level < MIN_LEVEL_SHARE * upward || level < MIN_TREAD_SHARE * total {
         return Vec::new();
     }
     flat.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -206,6 +211,30 @@ mod tests {
         assert!(!find_stairs(&sources(16), &shelf).iter().any(|&s| s));
         let two_steps = treads(3, 0.28);
         assert!(!find_stairs(&sources(6), &two_steps).iter().any(|&s| s));
+    }
+
+    #[test]
+    fn a_wall_whose_top_runs_in_level_strips_is_no_flight() {
+        // Half a meter thick, both faces, as an arched roof cuts it: the strips step down by 0.18 m.
+        let mut wall = Vec::new();
+        for i in 0..8 {
+            let at = DVec3::new(f64::from(i) * 0.5, 0.0, 0.0);
+            let up = DVec3::Y * (5.0 - f64::from(i) * 0.1875);
+            quad(&mut wall, at + up, DVec3::Z * 0.5, DVec3::X * 0.5);
+            quad(&mut wall, at, DVec3::X * 0.5, up);
+            quad(&mut wall, at + DVec3::Z * 0.5, up, DVec3::X * 0.5);
+        }
+        assert!(!find_stairs(&sources(48), &wall).iter().any(|&s| s));
+        // A narrow flight that is massive down to the ground has as much of a wall as a flight can.
+        let mut massive = Vec::new();
+        for i in 0..16 {
+            let at = DVec3::new(f64::from(i) * 0.28, 0.0, 0.0);
+            let up = DVec3::Y * (f64::from(i + 1) * 0.18);
+            quad(&mut massive, at + up, DVec3::Z * 0.7, DVec3::X * 0.28);
+            quad(&mut massive, at, DVec3::X * 0.28, up);
+            quad(&mut massive, at + DVec3::Z * 0.7, up, DVec3::X * 0.28);
+        }
+        assert!(find_stairs(&sources(96), &massive).iter().all(|&s| s));
     }
 
     #[test]

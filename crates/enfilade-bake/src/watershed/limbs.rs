@@ -1,0 +1,474 @@
+//! Limbs: corridors that open to rooms without a frame.
+//!
+//! At the mouth of a corridor as high as the room nothing is narrower than the corridor itself, so no
+//! ratio of an opening to what lies beside it tells where the room ends, and the flood meets in the
+//! dead middle. What tells is the local thickness in plan: a limb is what no disc of twice its own
+//! width fits into, and it is a room when it is at least two of its widths long. An alcove is shorter;
+//! a bend or a crossing of corridors of equal width has no room for the larger disc, so that corridors
+//! that meet are one limb.
+//!
+//! What two floods share in the dead middle of a corridor is joined again. Doors are not: they are
+//! narrower than the corridor.
+//!
+//! What begins and ends in the same room (beside a column, a counter or a partition that stands free)
+//! is part of that room.
+//!
+//! The plan of a region is its largest layer of voxels, and a limb takes all that is above and below.
+//! Cost: a distance transform of the plan for each width that is tried.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::Sets;
+
+use crate::voxel::{BitVolume, Grid, Labels, distance};
+
+use super::regions::{Flooded, MergeSettings, OUTDOORS, Regions, contact_faces, group_faces};
+use super::sections::section_ratio;
+
+/// A limb opens to what is at least this many times as thick: its section is at most half of that.
+const THICKER: f64 = 2.0;
+/// … and is at least this many of its widths long.
+const LONG: f64 = 2.0;
+/// From one width that is tried to the next.
+const STEP: f64 = 1.15;
+
+/// Makes rooms of the limbs of rooms, of what `flooded` was before it is cut. Half-widths from
+/// `settings.min_radius` on count; `shut` is what door leaves and panes fill.
+pub fn split_limbs(
+    grid: &Grid,
+    labels: &mut Labels,
+    regions: &mut Regions,
+    peaks: &mut Vec<f32>,
+    shut: &BitVolume,
+    settings: &MergeSettings,
+) {
+    let least = settings.min_radius / grid.voxel;
+    let mut limbs: Vec<(u32, usize, Vec<[usize; 2]>)> = Vec::new();
+    // Greatest half-width of each region, in plan. [Units: vx]
+    let mut thickness: BTreeMap<u32, f64> = BTreeMap::new();
+    let n = regions.region_of_basin.len();
+    for (region, plan) in plans(grid, labels, regions) {
+        let (thickest, found) = plan.limbs(least);
+        thickness.insert(region, thickest);
+        for limb in found {
+            thickness.insert((n + limbs.len()) as u32, limb.half_width);
+            let columns = limb.cells.iter().map(|&c| plan.column(c)).collect();
+            limbs.push((region, plan.row, columns));
+            peaks.push((limb.half_width + 0.5) as f32);
+        }
+    }
+    if limbs.is_empty() {
+        return;
+    }
+    labels.make_room_for(n + limbs.len());
+    for (k, (region, row, columns)) in limbs.into_iter().enumerate() {
+        let of = |labels: &Labels, i: usize| {
+            // Basins from `n` on are limbs that were cut off before.
+            let basin = labels.get(i) as usize;
+            basin < n && regions.region_of_basin[basin] == region
+        };
+        for [x, z] in columns {
+            let at = |y: usize| grid.index(x, y, z);
+            let down = (0..=row).rev().take_while(|&y| of(labels, at(y))).count();
+            let up = (row + 1..grid.dims[1])
+                .take_while(|&y| of(labels, at(y)))
+                .count();
+            for y in row + 1 - down..=row + up {
+                labels.set(at(y), (n + k) as u32);
+            }
+        }
+    }
+    regions.region_of_basin.extend(n as u32..peaks.len() as u32);
+    let by_basin = contact_faces(grid.dims, labels);
+    regions.contacts = contacts_of(regions, &by_basin);
+    let flooded = Flooded {
+        grid,
+        labels,
+        peaks,
+        closures: Some(shut),
+        slabs: &[],
+    };
+    if join_limbs(flooded, regions, &thickness, n as u32, settings) {
+        regions.contacts = contacts_of(regions, &by_basin);
+    }
+}
+
+type Contacts = BTreeMap<(u32, u32), Vec<u64>>;
+
+/// The faces between regions, given those between basins.
+fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
+    let mut contacts = Contacts::new();
+    for (&(a, b), faces) in by_basin {
+        let [a, b] = [a, b].map(|l| regions.region_of_basin[l as usize]);
+        if a != b {
+            let of = contacts.entry((a.min(b), a.max(b))).or_default();
+            of.extend_from_slice(faces);
+        }
+    }
+    contacts.values_mut().for_each(|f| f.sort_unstable());
+    contacts
+}
+
+/// Joins limbs (from label `first` on) with what they open to over their whole width and what is not
+/// so much thicker as to be a room for them: the halves of a corridor in whose dead middle two floods
+/// met, the arms of a crossing. Returns whether there was any.
+fn join_limbs(
+    flooded: Flooded<'_>,
+    regions: &mut Regions,
+    thickness: &BTreeMap<u32, f64>,
+    first: u32,
+    settings: &MergeSettings,
+) -> bool {
+    let region_of = |basin: u32| regions.region_of_basin[basin as usize];
+    let mut sets = Sets::new(regions.region_of_basin.len());
+    let mut any = false;
+    for (&(a, b), faces) in &regions.contacts {
+        let (Some(&s), Some(&t)) = (thickness.get(&a), thickness.get(&b)) else {
+            continue;
+        };
+        if b < first || s.max(t) >= THICKER * s.min(t) {
+            continue;
+        }
+        let is_lesser = |i: usize| region_of(flooded.labels.get(i)) == a;
+        let openings = group_faces(flooded.grid, faces, &is_lesser, flooded.closures);
+        let Some(opening) = openings.first() else {
+            continue;
+        };
+        if opening.closed < settings.closed_share
+            && section_ratio(flooded, settings, opening, [a, b], &region_of).0
+                >= settings.wall_threshold
+        {
+            sets.join(a, b);
+            any = true;
+        }
+    }
+    for region in regions.region_of_basin.iter_mut().filter(|r| **r != 0) {
+        *region = sets.find(*region);
+    }
+    any
+}
+
+/// The largest layer of a region.
+struct Plan {
+    row: usize,
+    /// Column of the first cell.
+    first: [usize; 2],
+    /// Cells along x and z, with a rim of cells that are not the region's.
+    side: [usize; 2],
+    is_free: Vec<bool>,
+}
+
+/// A limb of a plan.
+struct Limb {
+    cells: Vec<usize>,
+    /// [Units: vx]
+    half_width: f64,
+}
+
+/// The plan of each region but the outdoors.
+fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
+    let ny = grid.dims[1];
+    let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
+    let mut count: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let mut last = (0, 0);
+    let mut run = 0_u32;
+    // Counted in runs: neighbors along a row are of one region as a rule.
+    let mut flush = |(region, y): (u32, usize), run: &mut u32| {
+        if region > OUTDOORS && *run > 0 {
+            count.entry(region).or_insert_with(|| vec![0; ny])[y] += *run;
+        }
+        *run = 0;
+    };
+    for i in 0..labels.len() {
+        let here = (region_at(i), i / grid.dims[0] % ny);
+        if here != last {
+            flush(last, &mut run);
+            last = here;
+        }
+        run += 1;
+    }
+    flush(last, &mut run);
+    count
+        .into_iter()
+        .map(|(region, per_row)| {
+            let most = per_row.iter().copied().max().unwrap_or(0);
+            let row = per_row.iter().position(|&n| n == most).unwrap_or(0);
+            (region, Plan::of(grid, row, &|i| region_at(i) == region))
+        })
+        .collect()
+}
+
+impl Plan {
+    fn of(grid: &Grid, row: usize, is_free: &dyn Fn(usize) -> bool) -> Self {
+        let [nx, _, nz] = grid.dims;
+        let free: Vec<[usize; 2]> = (0..nz)
+            .flat_map(|z| (0..nx).map(move |x| [x, z]))
+            .filter(|&[x, z]| is_free(grid.index(x, row, z)))
+            .collect();
+        let bound = |k: usize| {
+            let of = || free.iter().map(move |c| c[k]);
+            (of().min().unwrap_or(0), of().max().unwrap_or(0))
+        };
+        let (x, z) = (bound(0), bound(1));
+        let side = [x.1 - x.0 + 3, z.1 - z.0 + 3];
+        let mut plan = Self {
+            row,
+            first: [x.0, z.0],
+            side,
+            is_free: vec![false; side[0] * side[1]],
+        };
+        for [cx, cz] in free {
+            plan.is_free[cx - x.0 + 1 + (cz - z.0 + 1) * side[0]] = true;
+        }
+        plan
+    }
+
+    fn column(&self, cell: usize) -> [usize; 2] {
+        let [x, z] = [cell % self.side[0], cell / self.side[0]];
+        [x + self.first[0] - 1, z + self.first[1] - 1]
+    }
+
+    /// The greatest half-width, and the limbs whose half-width is at least `least`, narrow ones first.
+    /// [Units: vx]
+    fn limbs(&self, least: f64) -> (f64, Vec<Limb>) {
+        let to_wall = self.distance_to(|c| !self.is_free[c]);
+        // A cell center next to a wall is already half a cell away from it.
+        let thickness = |c: usize| f64::from(to_wall[c]) - 0.5;
+        let thickest = (0..to_wall.len()).map(thickness).fold(0.0, f64::max);
+        let mut rest = self.is_free.clone();
+        let mut out = Vec::new();
+        let mut half_width = least;
+        while THICKER * half_width <= thickest {
+            let reach = THICKER * half_width;
+            let to_core = self.distance_to(|c| thickness(c) >= reach);
+            // Rounded outward by half a cell, or a lining of single cells would be left along walls.
+            let is_core = |c: usize| f64::from(to_core[c]) <= reach + 0.5 && rest[c];
+            let core = self.components(is_core);
+            let narrow = self.components(|c| rest[c] && !is_core(c));
+            let mut found = Vec::new();
+            for cells in narrow.1 {
+                let widest = cells.iter().map(|&c| thickness(c)).fold(0.0, f64::max);
+                if widest >= least
+                    && widest <= half_width
+                    && self.length(&cells, &core.0) >= LONG * 2.0 * widest
+                {
+                    found.push(Limb {
+                        cells,
+                        half_width: widest,
+                    });
+                }
+            }
+            for limb in found {
+                limb.cells.iter().for_each(|&c| rest[c] = false);
+                out.push(limb);
+            }
+            half_width *= STEP;
+        }
+        (thickest, out)
+    }
+
+    /// Length of what the thicker parts `core` leave over: from mouth to mouth, or to its end. 0 where
+    /// it has no mouth, or more than one to the same part.
+    fn length(&self, cells: &[usize], core: &[u32]) -> f64 {
+        let mut steps: BTreeMap<usize, u32> = cells.iter().map(|&c| (c, u32::MAX)).collect();
+        let mut front: Vec<usize> = Vec::new();
+        let mut opens_to: Vec<u32> = Vec::new();
+        for &c in cells {
+            if let Some(part) = self.around(c).map(|d| core[d]).find(|&p| p != 0) {
+                steps.insert(c, 0);
+                front.push(c);
+                opens_to.push(part);
+            }
+        }
+        let mut is_mouth = vec![false; self.is_free.len()];
+        front.iter().for_each(|&c| is_mouth[c] = true);
+        // Mouths are wider than a step: corners that touch by an edge are one mouth.
+        let n_mouths = self.count_patches(&front, &is_mouth);
+        opens_to.sort_unstable();
+        opens_to.dedup();
+        if n_mouths == 0 || n_mouths > opens_to.len() {
+            return 0.0;
+        }
+        // By edges and by edges or corners in turn: right along the axes, short by a tenth at most
+        // elsewhere, and never too long, so that the corner of a room is no limb whatever its angle.
+        let mut far = 0;
+        while !front.is_empty() {
+            let mut next = Vec::new();
+            for c in front {
+                let n = if far % 2 == 0 { 4 } else { 8 };
+                for d in self.neighbors(c).into_iter().take(n) {
+                    if let Some(s) = steps.get_mut(&d)
+                        && *s == u32::MAX
+                    {
+                        *s = far + 1;
+                        next.push(d);
+                    }
+                }
+            }
+            far += u32::from(!next.is_empty());
+            front = next;
+        }
+        // Between mouths the farthest cell is half way.
+        f64::from(far + 1) * if n_mouths > 1 { 2.0 } else { 1.0 }
+    }
+
+    /// How many patches cells make that touch by edges or corners.
+    fn count_patches(&self, cells: &[usize], is_in: &[bool]) -> usize {
+        let mut left = is_in.to_vec();
+        let mut n = 0;
+        for &start in cells {
+            if !std::mem::replace(&mut left[start], false) {
+                continue;
+            }
+            n += 1;
+            let mut stack = vec![start];
+            while let Some(c) = stack.pop() {
+                for d in self.neighbors(c) {
+                    if std::mem::replace(&mut left[d], false) {
+                        stack.push(d);
+                    }
+                }
+            }
+        }
+        n
+    }
+
+    /// The neighbors of a cell that is not on the rim: four by edges, then four by corners.
+    fn neighbors(&self, c: usize) -> [usize; 8] {
+        let (up, down) = (c + self.side[0], c - self.side[0]);
+        let beside = [c - 1, c + 1, down, up];
+        let diagonal = [down - 1, down + 1, up - 1, up + 1];
+        let mut out = [0; 8];
+        out[..4].copy_from_slice(&beside);
+        out[4..].copy_from_slice(&diagonal);
+        out
+    }
+
+    /// The four neighbors by edges of a cell that is not on the rim.
+    fn around(&self, c: usize) -> impl Iterator<Item = usize> + use<> {
+        self.neighbors(c).into_iter().take(4)
+    }
+
+    /// Parts that hang together by edges: the number of each cell's part from 1 on, and their cells.
+    fn components(&self, is_in: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<Vec<usize>>) {
+        let mut part = vec![0_u32; self.is_free.len()];
+        let mut parts = Vec::new();
+        for start in 0..part.len() {
+            if part[start] != 0 || !is_in(start) {
+                continue;
+            }
+            let number = parts.len() as u32 + 1;
+            part[start] = number;
+            let mut cells = vec![start];
+            let mut at = 0;
+            while at < cells.len() {
+                for d in self.around(cells[at]) {
+                    if part[d] == 0 && is_in(d) {
+                        part[d] = number;
+                        cells.push(d);
+                    }
+                }
+                at += 1;
+            }
+            parts.push(cells);
+        }
+        (part, parts)
+    }
+
+    /// Distance of each cell to the nearest for which `is_there` holds. [Units: vx]
+    fn distance_to(&self, is_there: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
+        let [nx, nz] = self.side;
+        distance(&BitVolume::from_fn([nx, 1, nz], is_there))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plan of boxes, low and one past the high corner; 10 cells to the meter.
+    fn plan(boxes: &[[usize; 4]]) -> Plan {
+        let side = [400, 200];
+        let mut is_free = vec![false; side[0] * side[1]];
+        for &[x0, z0, x1, z1] in boxes {
+            for z in z0..z1 {
+                is_free[z * side[0] + x0..z * side[0] + x1].fill(true);
+            }
+        }
+        Plan {
+            row: 0,
+            first: [1, 1],
+            side,
+            is_free,
+        }
+    }
+
+    /// Least and greatest x of each limb.
+    fn spans(plan: &Plan) -> Vec<[usize; 2]> {
+        let (_, limbs) = plan.limbs(3.0);
+        let span = |l: &Limb| {
+            let x = || l.cells.iter().map(|c| c % plan.side[0]);
+            [x().min().unwrap(), x().max().unwrap()]
+        };
+        limbs.iter().map(span).collect()
+    }
+
+    #[test]
+    fn a_corridor_between_rooms_is_a_limb_and_an_alcove_is_none() {
+        for half in [4, 6, 8] {
+            let corridor = [70, 100 - half, 270, 100 + half];
+            let rooms = [[10, 70, 70, 130], [270, 70, 330, 130]];
+            let found = spans(&plan(&[rooms[0], rooms[1], corridor]));
+            assert_eq!(found.len(), 1, "{half}");
+            let [lo, hi] = found[0];
+            assert!(lo.abs_diff(70) <= 4 && hi.abs_diff(269) <= 4, "{lo} {hi}");
+            // Dead ends: three widths long, and one.
+            let dead = [70, 100 - half, 70 + 6 * half, 100 + half];
+            assert_eq!(spans(&plan(&[rooms[0], dead])).len(), 1);
+            let alcove = [70, 100 - half, 70 + 2 * half, 100 + half];
+            assert!(spans(&plan(&[rooms[0], alcove])).is_empty());
+        }
+    }
+
+    #[test]
+    fn corners_of_rooms_are_no_limbs_whatever_their_angle() {
+        for slope in [0.3, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0] {
+            let mut p = plan(&[]);
+            for x in 10..150 {
+                let height = (f64::from(x as u32 - 10) * slope) as usize;
+                for z in 10..10 + height.min(150) {
+                    p.is_free[z * p.side[0] + x] = true;
+                }
+            }
+            assert!(spans(&p).is_empty(), "{slope}: {:?}", spans(&p));
+        }
+    }
+
+    #[test]
+    fn corridors_that_cross_are_one_limb() {
+        let found = spans(&plan(&[
+            [10, 70, 70, 130],
+            [270, 70, 330, 130],
+            [70, 92, 270, 108],
+            [160, 20, 176, 180],
+        ]));
+        assert_eq!(found.len(), 1);
+    }
+
+    #[test]
+    fn what_is_half_as_wide_as_its_room_or_wider_is_none() {
+        assert!(spans(&plan(&[[10, 70, 70, 130], [70, 82, 270, 118]])).is_empty());
+    }
+
+    #[test]
+    fn the_way_around_what_stands_free_is_none() {
+        // A room of 12 m by 10 m with a partition 1 m from its wall.
+        let mut p = plan(&[[10, 50, 130, 150]]);
+        for x in 40..100 {
+            for z in 60..62 {
+                p.is_free[z * p.side[0] + x] = false;
+            }
+        }
+        assert!(spans(&p).is_empty());
+    }
+}
