@@ -343,6 +343,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     }
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
+    doorless::write_roomless(&mut err, &baked.world.graph)?;
     doorless::write_doorless(&mut err, &baked.world.graph)?;
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Rooms that no doorway leads to: mostly ones whose door leaf was taken for a wall.
+//! What a bake says of scenes without rooms, and of rooms that no doorway leads to: mostly ones whose door leaf was taken for
+//! a wall.
 
 use std::io::{self, Write};
 
@@ -41,6 +42,24 @@ pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> i
     if rooms.len() > SHOWN {
         writeln!(out, "  and {} more", rooms.len() - SHOWN)?;
     }
+    Ok(true)
+}
+
+/// Says that a scene has no room, if it has none, and what is mostly the reason; whether it has none.
+pub(super) fn write_roomless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
+    if graph.cells.iter().any(|c| !c.outdoor) {
+        return Ok(false);
+    }
+    let size = graph.cells.first().map_or([0.0; 3], |c| {
+        [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k])
+    });
+    let [x, y, z] = size;
+    writeln!(
+        out,
+        "no room was found: all air in these {x:.1} × {y:.1} × {z:.1} m is open to outdoors. If that size is wrong, give \
+         --unit or --up; if rooms have openings as wide as they are, there is nothing to part them; if what encloses them \
+         was taken for furniture, see -v and use --structural-name 'PATTERN'"
+    )?;
     Ok(true)
 }
 
