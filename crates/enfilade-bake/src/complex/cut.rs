@@ -327,7 +327,7 @@ fn cut(
             };
             let cost = units(if f.screen == NO_SCREEN {
                 // A gap makes no portal: a border of many is better than one that shows.
-                let each = if f.is_narrow { 0.0 } else { PER_FACET };
+                let each = if f.is_gap { 0.0 } else { PER_FACET };
                 f64::from(f.area) + each
             } else {
                 f64::from(f.area) * SCREEN
@@ -518,6 +518,7 @@ mod tests {
             area,
             screen: NO_SCREEN,
             is_narrow: false,
+            is_gap: false,
         };
         let mut graph = LeafGraph {
             facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],

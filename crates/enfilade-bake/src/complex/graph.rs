@@ -10,6 +10,9 @@ use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
 use super::poly::{self, Poly, Sides};
 use super::tree::{Tree, leaf_index};
 
+/// Openings up to so many gaps wide are cracks, with the default gap as wide as [`CRACK_WIDTH`](super::CRACK_WIDTH).
+const CRACK_GAPS: f64 = 5.0;
+
 /// No screen.
 pub(super) const NO_SCREEN: u32 = u32::MAX;
 
@@ -24,8 +27,10 @@ pub(super) struct OpenFacet {
     pub(super) area: f32,
     /// The screen that it lies on, or [`NO_SCREEN`].
     pub(super) screen: u32,
-    /// No piece of it lets a ball of the smallest hole pass.
+    /// No piece of it is wider than a crack.
     pub(super) is_narrow: bool,
+    /// No piece of it lets a ball of the smallest hole pass: it may be sealed.
+    pub(super) is_gap: bool,
 }
 
 /// What the first visit finds out.
@@ -89,15 +94,20 @@ impl LeafGraph {
         };
         for i in 0..graph.facets.len() {
             let f = graph.facets[i];
-            graph.facets[i].is_narrow |= graph.is_rim(f.leaves, f64::from(f.width));
+            let (width, hole) = (f64::from(f.width), graph.hole);
+            graph.facets[i].is_gap |= graph.is_rim(f.leaves, width, hole);
+            graph.facets[i].is_narrow |=
+                f.is_gap || graph.is_rim(f.leaves, width, CRACK_GAPS * hole);
         }
         graph
     }
 
     /// Whether an opening so wide is at the rim of a thin leaf, through which nothing passes that has room: that goes
-    /// through the leaf's wide faces.
-    pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64) -> bool {
-        width < self.hole && leaves.iter().any(|&l| self.is_thin(l))
+    /// through the leaf's wide faces. A leaf is thin, but for a factor of three, that is thinner than `limit`.
+    pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64, limit: f64) -> bool {
+        let is_thin =
+            |l: &u32| self.volumes[*l as usize] < limit * f64::from(self.faces[*l as usize]);
+        width < limit && leaves.iter().any(is_thin)
     }
 
     /// Whether no ball of the smallest hole fits into a leaf, but for a factor of three.
@@ -122,16 +132,16 @@ impl Clearance<'_> {
     /// Told by its middle, its corners, the middles of its edges and what lies half way. The width of the polygon says nothing: cuts of the tree
     /// make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes there are wide ones.
     /// One query of the triangles in the open, at most `4n + 1` in a gap.
-    pub(super) fn is_narrow(&self, points: &[DVec3]) -> bool {
-        self.is_narrow_at(points, true)
+    pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
+        self.is_narrower(points, self.hole, true)
     }
 
-    /// The same, by the middle alone where the rest does not count.
-    fn is_narrow_at(&self, points: &[DVec3], is_whole: bool) -> bool {
-        if self.hole <= 0.0 {
+    /// Whether an opening lets no ball of so large a diameter pass; by its middle alone where the rest does not count.
+    fn is_narrower(&self, points: &[DVec3], diameter: f64, is_whole: bool) -> bool {
+        if diameter <= 0.0 {
             return false;
         }
-        let reach = 0.5 * self.hole;
+        let reach = 0.5 * diameter;
         let n = points.len();
         let middle = points.iter().sum::<DVec3>() / n as f64;
         let between = (0..n).map(|i| points[i].midpoint(points[(i + 1) % n]));
@@ -223,16 +233,19 @@ impl FacetSink for Sink<'_> {
         for (piece, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let screen = screen.unwrap_or(NO_SCREEN);
             let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
-            let is_narrow = if f64::from(width) < self.clearance.hole {
-                self.clearance.is_narrow_at(&piece, false)
-            } else {
-                self.clearance.is_narrow_at(&piece, true)
+            let is_narrower = |diameter: f64| {
+                let is_whole = f64::from(width) >= diameter;
+                self.clearance.is_narrower(&piece, diameter, is_whole)
             };
+            let hole = self.clearance.hole;
+            let is_gap = is_narrower(hole);
+            let is_narrow = is_gap || is_narrower(CRACK_GAPS * hole);
             match self.facets[first..].iter_mut().find(|f| f.screen == screen) {
                 Some(f) => {
                     f.width = f.width.max(width);
                     f.area += area;
                     f.is_narrow &= is_narrow;
+                    f.is_gap &= is_gap;
                 }
                 None => {
                     self.facets.push(OpenFacet {
@@ -241,6 +254,7 @@ impl FacetSink for Sink<'_> {
                         area,
                         screen,
                         is_narrow,
+                        is_gap,
                     });
                 }
             }

@@ -1,14 +1,15 @@
 //! From votes to cells: which leaves make up which cell.
 //!
 //! 1. Leaves open to each other other than through screens and gaps form components. A gap is an opening through
-//!    which no ball of the smallest hole passes.
+//!    which no ball of the smallest hole passes. Where rooms run into each other so, cracks are left out as well, which
+//!    are a few times as wide.
 //! 2. A component in which one label rules belongs to it. One with several strong labels has a
 //!    leak: it is grown together along its openings, widest first, unless that would join two
 //!    labels (Kruskal's forest), so that cells meet at the narrowest places.
 //! 3. Parts of one label that open to each other are one again, screen or not.
 //! 4. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
 //!    most, through a screen if need be. What opens nowhere but through gaps and nobody votes for is matter.
-//! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the widest gaps to, matter included.
+//! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the largest gaps to, matter included.
 //!
 //! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
 
@@ -82,15 +83,16 @@ pub(super) fn label_leaves(
             *tally.entry((leaf, vote.label)).or_default() += f64::from(vote.weight);
         }
     }
-    let mut components = Sets::new(n_leaves);
-    for f in &graph.facets {
-        if f.screen == NO_SCREEN && !f.is_narrow {
-            components.join(f.leaves[0], f.leaves[1]);
-        }
+    let mut component_of = components(graph, |_| false);
+    let mut strong = strong_labels(graph, &tally, &component_of, settings);
+    let has_leak =
+        |strong: &BTreeMap<u32, Vec<u32>>, c: u32| strong.get(&c).is_some_and(|s| s.len() > 1);
+    if strong.keys().any(|&c| has_leak(&strong, c)) {
+        // Rooms that run into each other: perhaps through nothing but cracks.
+        let leaked: Vec<bool> = component_of.iter().map(|&c| has_leak(&strong, c)).collect();
+        component_of = components(graph, |leaf| leaked[leaf as usize]);
+        strong = strong_labels(graph, &tally, &component_of, settings);
     }
-    let component_of: Vec<u32> = (0..n_leaves as u32).map(|l| components.find(l)).collect();
-    drop(components);
-    let strong = strong_labels(graph, &tally, &component_of, settings);
 
     // Leaves of components with several strong labels are grown together; all others at once.
     let mut sets = Sets::new(n_leaves);
@@ -125,7 +127,7 @@ pub(super) fn label_leaves(
     for (&leaf, &(_, label)) in &best_of_leaf {
         label_of_set[leaf as usize] = label;
     }
-    grow_together(graph, &mut sets, &mut label_of_set, leaked);
+    grow_together(graph, &mut sets, &mut label_of_set, &component_of, leaked);
 
     rejoin(graph, &mut sets, &mut label_of_set);
 
@@ -151,6 +153,20 @@ fn keep_border_outside(graph: &LeafGraph, cells: &mut LeafCells) {
             cells.volumes[outside as usize] += graph.volumes[leaf];
         }
     }
+}
+
+/// The component of each leaf: what hangs together other than through screens, gaps and, where `parts_cracks` says so of
+/// a leaf, cracks.
+fn components(graph: &LeafGraph, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
+    let n_leaves = graph.volumes.len() as u32;
+    let mut sets = Sets::new(n_leaves as usize);
+    for f in &graph.facets {
+        let is_crack = f.is_narrow && parts_cracks(f.leaves[0]);
+        if f.screen == NO_SCREEN && !f.is_gap && !is_crack {
+            sets.join(f.leaves[0], f.leaves[1]);
+        }
+    }
+    (0..n_leaves).map(|l| sets.find(l)).collect()
 }
 
 /// The labels that stand for a region in each component; components without any are left out.
@@ -190,12 +206,14 @@ fn grow_together(
     graph: &LeafGraph,
     sets: &mut Sets,
     label_of_set: &mut [u32],
+    component_of: &[u32],
     leaked: impl Fn(u32) -> bool,
 ) {
     let mut order: Vec<u32> = (0..graph.facets.len() as u32)
         .filter(|&i| {
             let f = &graph.facets[i as usize];
-            f.screen == NO_SCREEN && !f.is_narrow && leaked(f.leaves[0])
+            let [a, b] = f.leaves.map(|l| component_of[l as usize]);
+            f.screen == NO_SCREEN && !f.is_gap && a == b && leaked(f.leaves[0])
         })
         .collect();
     order.sort_by(|&a, &b| {
@@ -228,7 +246,7 @@ fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
 /// The sets that have a label, or an opening to another set that is no gap: by their least leaves.
 fn open_sets(graph: &LeafGraph, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
     let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != SOLID).collect();
-    for f in graph.facets.iter().filter(|f| !f.is_narrow) {
+    for f in graph.facets.iter().filter(|f| !f.is_gap) {
         let [a, b] = f.leaves.map(|l| sets.find(l));
         if a != b {
             is_open[a as usize] = true;
@@ -263,7 +281,7 @@ fn merge_groups(
         });
         group.volume += graph.volumes[leaf as usize];
     }
-    for f in graph.facets.iter().filter(|f| !f.is_narrow) {
+    for f in graph.facets.iter().filter(|f| !f.is_gap) {
         let [a, b] = f.leaves.map(|l| sets.find(l));
         if a != b {
             for (from, to) in [(a, b), (b, a)] {
@@ -358,13 +376,13 @@ fn give_away_crumbs(
         }
     }
     // Areas are not negative, so their bits compare like the numbers.
-    let narrow = (0..).zip(&graph.facets).filter(|(_, f)| f.is_narrow);
-    let mut gaps: Vec<(Reverse<u32>, u32)> = narrow
-        .map(|(i, f)| (Reverse(f.area.to_bits()), i))
+    let gaps = graph.facets.iter().filter(|f| f.is_gap);
+    let mut gaps: Vec<(Reverse<u32>, [u32; 2])> = gaps
+        .map(|f| (Reverse(f.area.to_bits()), f.leaves))
         .collect();
     gaps.par_sort_unstable();
-    for (_, i) in gaps {
-        let [a, b] = graph.facets[i as usize].leaves.map(|l| sets.find(l));
+    for (_, leaves) in gaps {
+        let [a, b] = leaves.map(|l| sets.find(l));
         let [a_stays, b_stays] = [a, b].map(|s| stays[s as usize]);
         if a != b && !(a_stays && b_stays) {
             stays[sets.join(a, b) as usize] = a_stays || b_stays;

@@ -215,8 +215,9 @@ impl FacetSink for Sink<'_> {
         let is_flipped = cells[0] < cells[1];
         let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
         for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
-            let is_narrow = self.clearance.is_narrow(&points);
-            let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, poly::width(&points));
+            let is_narrow = self.clearance.is_gap(&points);
+            let (width, hole) = (poly::width(&points), self.graph.hole);
+            let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, width, hole);
             // Where surfaces lie within a tolerance of it, parts of a screen were put into their planes; a portal has one.
             let own = screen.and_then(|s| self.plane_of_screen.get(s as usize).copied());
             let plane = own.filter(|&p| p != NO_PLANE).unwrap_or(facet.plane);
