@@ -110,5 +110,9 @@ fn a_scene_without_rooms_says_so() {
     let done = bake(&obj("slab.obj", &slab), &[]);
     assert!(said(&done).contains("no room was found"), "{}", said(&done));
     let done = bake(&shut_rooms("rooms.obj", "door"), &[]);
-    assert!(!said(&done).contains("no room was found"), "{}", said(&done));
+    assert!(
+        !said(&done).contains("no room was found"),
+        "{}",
+        said(&done)
+    );
 }

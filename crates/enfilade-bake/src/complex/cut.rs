@@ -526,6 +526,7 @@ mod tests {
             at_border: vec![false; 5],
             faces: vec![1.0; 5],
             hole: 0.01,
+            rounding: 1e-5,
         };
         let cells = || LeafCells {
             cell_of_leaf: vec![0, 1, 2, 1, 1],

@@ -45,6 +45,8 @@ pub(super) struct LeafGraph {
     pub(super) at_border: Vec<bool>,
     /// Openings through which no ball of this diameter passes are narrow. [Units: wu]
     pub(super) hole: f64,
+    /// Openings narrower than this may be steps between surfaces that were put into planes. [Units: wu]
+    pub(super) rounding: f64,
 }
 
 impl LeafGraph {
@@ -91,6 +93,7 @@ impl LeafGraph {
             faces,
             at_border,
             hole: clearance.hole,
+            rounding: visitor.tolerance.width,
         };
         for i in 0..graph.facets.len() {
             let f = graph.facets[i];
@@ -103,11 +106,11 @@ impl LeafGraph {
     }
 
     /// Whether an opening so wide is at the rim of a thin leaf, through which nothing passes that has room: that goes
-    /// through the leaf's wide faces. A leaf is thin, but for a factor of three, that is thinner than `limit`.
+    /// through the leaf's wide faces; or no wider than a rounding, which parts nothing either. A leaf is thin, but for a factor of three, that is thinner than `limit`.
     pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64, limit: f64) -> bool {
         let is_thin =
             |l: &u32| self.volumes[*l as usize] < limit * f64::from(self.faces[*l as usize]);
-        width < limit && leaves.iter().any(is_thin)
+        width < limit && (width < self.rounding || leaves.iter().any(is_thin))
     }
 
     /// Whether no ball of the smallest hole fits into a leaf, but for a factor of three.

@@ -50,9 +50,10 @@ pub(super) fn write_roomless(out: &mut impl Write, graph: &CellPortalGraph) -> i
     if graph.cells.iter().any(|c| !c.outdoor) {
         return Ok(false);
     }
-    let size = graph.cells.first().map_or([0.0; 3], |c| {
-        [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k])
-    });
+    let size = graph
+        .cells
+        .first()
+        .map_or([0.0; 3], |c| [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]));
     let [x, y, z] = size;
     writeln!(
         out,
