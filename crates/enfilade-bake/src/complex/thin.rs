@@ -38,6 +38,8 @@ struct Edge {
     to: DVec3,
     /// Into the leaf, along the facet's normal.
     inward: DVec3,
+    /// A seam closes the facet there. Between two seams the leaf runs through the surface, however short they are.
+    is_at_seam: bool,
 }
 
 /// A strip across a leaf.
@@ -99,6 +101,7 @@ impl FacetSink for Edges<'_> {
         let tolerance = &self.visitor.tolerance;
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let open = OpenPieces::of(facet, normal, tolerance);
+        let is_at_seam = facet.covers.iter().any(|c| c.is_seam);
         for (i, (piece, _)) in open.pieces.iter().enumerate() {
             for (k, &a) in piece.iter().enumerate() {
                 let b = piece[(k + 1) % piece.len()];
@@ -122,6 +125,7 @@ impl FacetSink for Edges<'_> {
                             from: a,
                             to: b,
                             inward,
+                            is_at_seam,
                         });
                     }
                 }
@@ -219,7 +223,7 @@ impl Cutter<'_> {
                 let is_thin = poly::area(&points) < 0.99 * length * self.gap;
                 let normal = (e.to - e.from).cross(e.inward).try_normalize()?;
                 let is_there = poly::width(&points) > 2.0 * self.tolerance.cut;
-                let is_long = length > SHORT * self.gap;
+                let is_long = e.is_at_seam || length > SHORT * self.gap;
                 (is_thin && is_there && is_long)
                     .then(|| (length, Plane::through(e.from, normal), points))
             })
