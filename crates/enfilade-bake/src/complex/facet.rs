@@ -20,8 +20,6 @@ const PARALLEL_LEAVES: u32 = 2048;
 pub(super) struct Cover {
     /// Screen, or `None` for a structural triangle.
     pub(super) screen: Option<u32>,
-    /// A seam: no part of the scene.
-    pub(super) is_seam: bool,
     /// Where it is, counter-clockwise about the plane's normal.
     pub(super) points: Poly,
     bounds: Aabb,
@@ -141,7 +139,6 @@ impl Visitor<'_> {
                 };
                 bounds.overlaps(&reach).then_some(Cover {
                     screen,
-                    is_seam: surface.source == Source::Seam,
                     points,
                     bounds,
                 })
@@ -297,7 +294,6 @@ mod tests {
         let bounds = Aabb::of_points(&points);
         let beside = |screen| Cover {
             screen,
-            is_seam: false,
             points: points.clone(),
             bounds,
         };

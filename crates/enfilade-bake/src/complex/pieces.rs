@@ -3,8 +3,8 @@
 //! The tree cuts an opening wherever its planes happen to run; those cuts mean nothing and are
 //! taken back here.
 //!
-//! Gaps, through which no ball of the smallest hole passes, belong to an opening beside them only where they hardly
-//! widen its outline: the slit under a wall is no part of the door in it. All others are seals. Cracks, and gaps where
+//! What lies beside a screen, and gaps, through which no ball of the smallest hole passes, belong to an opening only where
+//! they hardly widen its outline: the slit under a wall is no part of the door in it. All others are seals. Cracks, and gaps where
 //! nothing is sealed, are one portal a plane and pair of cells.
 
 use std::collections::BTreeMap;
@@ -237,7 +237,7 @@ fn merge_convex(mut flats: Vec<Flat>) -> Vec<Flat> {
     }
 }
 
-/// How much farther than its own area a gap may widen the outline of the opening beside it.
+/// How much more than its own area something may widen the outline of the opening beside it.
 const WIDENING: f64 = 2.0;
 
 /// Pieces of one plane, one pair of cells and one direction, in the plane's own coordinates.
@@ -314,19 +314,27 @@ impl<'a> Sheet<'a> {
         members.into_values().collect()
     }
 
-    /// Gives each gap to the opening beside it whose outline it widens least, if little; the gaps that are left.
-    fn adopt(&self, openings: &mut [Vec<usize>], mut gaps: Vec<usize>, hole: f64) -> Vec<usize> {
+    /// Gives each part to the opening beside it whose outline it widens least, if by no more than `widening` times its own
+    /// area or by less than the hole; the parts that are left.
+    fn adopt(
+        &self,
+        openings: &mut [Vec<usize>],
+        mut parts: Vec<Vec<usize>>,
+        widening: f64,
+        hole: f64,
+    ) -> Vec<Vec<usize>> {
         let mut hulls: Vec<Flat> = openings.iter().map(|o| self.hull_of(o)).collect();
-        let area = |i: usize| self.flats[i].area;
-        gaps.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
-        gaps.retain(|&gap| {
-            let flat = &self.flats[gap];
-            let near = (0..openings.len()).filter(|&o| {
-                hulls[o].touches(flat, TOGETHER)
-                    && openings[o].iter().any(|&i| self.flats[i].is_near(flat))
-            });
-            let wider = near.map(|o| {
-                let points = hulls[o].points.iter().chain(&flat.points);
+        let area = |part: &[usize]| part.iter().map(|&i| self.flats[i].area).sum::<f64>();
+        parts.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a.cmp(b)));
+        parts.retain(|part| {
+            let own = self.hull_of(part);
+            let is_beside = |o: usize| {
+                let is_near =
+                    |&i: &usize| part.iter().any(|&j| self.flats[i].is_near(&self.flats[j]));
+                hulls[o].touches(&own, TOGETHER) && openings[o].iter().any(is_near)
+            };
+            let wider = (0..openings.len()).filter(|&o| is_beside(o)).map(|o| {
+                let points = hulls[o].points.iter().chain(&own.points);
                 (o, hull(points.copied()))
             });
             let least = wider.min_by(|a, b| {
@@ -334,15 +342,15 @@ impl<'a> Sheet<'a> {
                 growth(a).total_cmp(&growth(b)).then(a.0.cmp(&b.0))
             });
             let Some((o, wider)) = least else { return true };
-            let is_rim = flat.points.iter().all(|&p| hulls[o].is_within(p, hole));
-            if is_rim || wider.area - hulls[o].area <= WIDENING * flat.area {
-                openings[o].push(gap);
+            let is_rim = own.points.iter().all(|&p| hulls[o].is_within(p, hole));
+            if is_rim || wider.area - hulls[o].area <= widening * area(part) {
+                openings[o].extend(part);
                 hulls[o] = wider;
                 return false;
             }
             true
         });
-        gaps
+        parts
     }
 
     fn opening(&self, members: &[usize], is_seal: bool) -> Opening {
@@ -386,8 +394,16 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
         return vec![sheet.opening(&all, true)];
     }
     let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
-    let mut openings = sheet.clusters(&wide);
-    let mut gaps = sheet.adopt(&mut openings, gaps, rules.hole);
+    // What lies on screens makes the openings; what is open beside them belongs to them or stands for itself.
+    let (foreseen, beside): (Vec<usize>, Vec<usize>) =
+        wide.into_iter().partition(|&i| group[i].screen.is_some());
+    let mut openings = sheet.clusters(&foreseen);
+    let beside = sheet.adopt(&mut openings, sheet.clusters(&beside), WIDENING, rules.hole);
+    openings.extend(beside);
+    let gaps = gaps.into_iter().map(|i| vec![i]).collect();
+    // A gap beside a door can be as large as the wall: the sliver between two triangles of it.
+    let gaps = sheet.adopt(&mut openings, gaps, 0.0, rules.hole);
+    let mut gaps = gaps.concat();
     let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
     for members in openings {
         let opening = sheet.opening(&members, false);

@@ -9,7 +9,8 @@
 //! not rest on these cuts, see [`Clearance`](super::graph::Clearance).
 //!
 //! **Which edges:** those between the closed and the open part of a facet at which the leaf behind the facet is thinner
-//! than a gap somewhere. Walls that end in the open are left alone.
+//! than a gap somewhere. Walls that end in the open are left alone, and so are edges shorter than a gap: what they leave
+//! uncut is no wider.
 //!
 //! **Complexity:** one visit of all facets, one clip for each such edge and side; `k` edges in one leaf make up
 //! to `k²` leaves of it, at most [`MAX_CUTS`] are made. **What can go wrong:** cuts within a rounding
@@ -24,10 +25,6 @@ use super::poly::{self, Poly, Sides};
 use super::surface::Tolerance;
 use super::tree::{Node, Tree, leaf_index};
 
-/// Edges shorter than so many gaps cut nothing: what closes the leaf whole is hardly larger than what a cut would leave to
-/// close. On a building moved by a millimeter that spares two thirds of the leaves for a fifth more area of seals.
-const SHORT: f64 = 10.0;
-
 /// Most cuts through one leaf; the longest are made.
 const MAX_CUTS: usize = 256;
 
@@ -38,8 +35,6 @@ struct Edge {
     to: DVec3,
     /// Into the leaf, along the facet's normal.
     inward: DVec3,
-    /// A seam closes the facet there. Between two seams the leaf runs through the surface, however short they are.
-    is_at_seam: bool,
 }
 
 /// A strip across a leaf.
@@ -101,7 +96,6 @@ impl FacetSink for Edges<'_> {
         let tolerance = &self.visitor.tolerance;
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let open = OpenPieces::of(facet, normal, tolerance);
-        let is_at_seam = facet.covers.iter().any(|c| c.is_seam);
         for (i, (piece, _)) in open.pieces.iter().enumerate() {
             for (k, &a) in piece.iter().enumerate() {
                 let b = piece[(k + 1) % piece.len()];
@@ -125,7 +119,6 @@ impl FacetSink for Edges<'_> {
                             from: a,
                             to: b,
                             inward,
-                            is_at_seam,
                         });
                     }
                 }
@@ -223,7 +216,7 @@ impl Cutter<'_> {
                 let is_thin = poly::area(&points) < 0.99 * length * self.gap;
                 let normal = (e.to - e.from).cross(e.inward).try_normalize()?;
                 let is_there = poly::width(&points) > 2.0 * self.tolerance.cut;
-                let is_long = e.is_at_seam || length > SHORT * self.gap;
+                let is_long = length > self.gap;
                 (is_thin && is_there && is_long)
                     .then(|| (length, Plane::through(e.from, normal), points))
             })
