@@ -180,13 +180,10 @@ fn triangles_that_share_no_corners_leave_the_rooms_as_they_were() {
             let what = format!("{}, corners moved by {jitter} m", g.truth.scene);
             let world = world_of(&g, &BakeConfig::default());
             holds_up(&clean, &world, &g, &what);
-            // Gaps as wide as what counts as one plane (8 µm here) are the hardest: a few cracks are left of them.
-            let n = world.graph.portals.len();
-            let is_told = jitter > 1e-5;
-            assert!(
-                !is_told || 5 * n <= 6 * clean.portals.len(),
-                "{what}: {n} portals"
-            );
+            // Gaps as wide as what counts as one plane (8 µm here) are the hardest: some cracks are left of them.
+            let is_counted = |p: &&Portal| jitter > 1e-5 || p.kind != PortalKind::Crack;
+            let n = world.graph.portals.iter().filter(is_counted).count();
+            assert!(5 * n <= 6 * clean.portals.len(), "{what}: {n} portals");
             assert!(Seals::of(&world).count > 0, "{what}");
         }
     }
