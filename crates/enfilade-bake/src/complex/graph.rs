@@ -96,26 +96,29 @@ impl LeafGraph {
             rounding: visitor.tolerance.width,
         };
         for i in 0..graph.facets.len() {
-            let f = graph.facets[i];
-            let (width, hole) = (f64::from(f.width), graph.hole);
-            graph.facets[i].is_gap |= graph.is_rim(f.leaves, width, hole);
-            graph.facets[i].is_narrow |=
-                f.is_gap || graph.is_rim(f.leaves, width, CRACK_GAPS * hole);
+            let mut f = graph.facets[i];
+            let width = f64::from(f.width);
+            f.is_gap |= graph.is_rim(f.leaves, width, graph.hole);
+            f.is_narrow |= f.is_gap || graph.is_rim(f.leaves, width, CRACK_GAPS * graph.hole);
+            graph.facets[i] = f;
         }
         graph
     }
 
-    /// Whether an opening so wide is at the rim of a thin leaf, through which nothing passes that has room: that goes
-    /// through the leaf's wide faces; or no wider than a rounding, which parts nothing either. A leaf is thin, but for a factor of three, that is thinner than `limit`.
+    /// Whether an opening of this width, narrower than `limit`, is at the rim of a leaf thinner than that, or no wider than
+    /// a rounding. Nothing that has room passes there: it passes through the wide faces of the leaf.
     pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64, limit: f64) -> bool {
-        let is_thin =
-            |l: &u32| self.volumes[*l as usize] < limit * f64::from(self.faces[*l as usize]);
+        let is_thin = |&l: &u32| self.is_thinner(l, limit);
         width < limit && (width < self.rounding || leaves.iter().any(is_thin))
     }
 
     /// Whether no ball of the smallest hole fits into a leaf, but for a factor of three.
     pub(super) fn is_thin(&self, leaf: u32) -> bool {
-        self.volumes[leaf as usize] < self.hole * f64::from(self.faces[leaf as usize])
+        self.is_thinner(leaf, self.hole)
+    }
+
+    fn is_thinner(&self, leaf: u32, limit: f64) -> bool {
+        self.volumes[leaf as usize] < limit * f64::from(self.faces[leaf as usize])
     }
 }
 
@@ -132,8 +135,9 @@ impl Clearance<'_> {
     /// Whether an opening, a convex polygon, lets no ball of the smallest hole pass: no point of it is farther than
     /// half the hole's width from matter.
     ///
-    /// Told by its middle, its corners, the middles of its edges and what lies half way. The width of the polygon says nothing: cuts of the tree
-    /// make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes there are wide ones.
+    /// Sampled at its middle, its corners, the middles of its edges and half way. The width of the polygon says nothing:
+    /// cuts of the tree make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes
+    /// there are wide ones.
     /// One query of the triangles in the open, at most `4n + 1` in a gap.
     pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
         self.is_narrower(points, self.hole, true)

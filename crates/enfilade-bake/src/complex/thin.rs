@@ -107,11 +107,10 @@ impl FacetSink for Edges<'_> {
                     let others = open.pieces.iter().enumerate();
                     others
                         .filter(|(j, _)| *j != i)
-                        .any(|(_, (other, _))| is_within(other, normal, beyond(t), 0.0))
+                        .any(|(_, (other, _))| is_within(other, normal, beyond(t)))
                 };
                 let samples = [1.0 / 6.0, 0.5, 5.0 / 6.0];
-                let is_inner =
-                    |&t: &f64| is_within(facet.points, normal, beyond(t), 0.0) && !is_open(t);
+                let is_inner = |&t: &f64| is_within(facet.points, normal, beyond(t)) && !is_open(t);
                 if (b - a).length() > tolerance.width && samples.iter().any(is_inner) {
                     for (leaf, inward) in [(facet.leaves[0], normal), (facet.leaves[1], -normal)] {
                         self.found.push(Edge {
@@ -139,14 +138,14 @@ impl FacetSink for Edges<'_> {
     }
 }
 
-/// Whether a point in the plane of a convex polygon, counter-clockwise about `normal`, is farther than `by` inside.
-fn is_within(points: &[DVec3], normal: DVec3, p: DVec3, by: f64) -> bool {
+/// Whether a point in the plane of a convex polygon, counter-clockwise about `normal`, is inside.
+fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
     (0..points.len()).all(|i| {
         let (a, b) = (points[i], points[(i + 1) % points.len()]);
         normal
             .cross(b - a)
             .try_normalize()
-            .is_none_or(|inward| inward.dot(p - a) >= by)
+            .is_none_or(|inward| inward.dot(p - a) >= 0.0)
     })
 }
 

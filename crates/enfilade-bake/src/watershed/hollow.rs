@@ -95,11 +95,7 @@ pub fn find_matter(
         let of = group.iter().filter_map(|r| seen.get(r));
         of.fold(Seen::default(), Seen::and)
     };
-    // A crevice of the outside is no room that says how rooms are modelled.
-    let is_room = |r: &u32| {
-        *r != OUTDOORS && (f64::from(radius[r]) - 0.5) * grid.voxel >= min_radius.max(NARROW)
-    };
-    let indoors: Vec<u32> = open.iter().copied().filter(is_room).collect();
+    let indoors: Vec<u32> = open.iter().copied().filter(|&r| r != OUTDOORS).collect();
     let facing = Facing::of(&view(&indoors), &view(&[OUTDOORS]));
 
     let (mut narrow, mut doubtful) = (Vec::new(), Vec::new());
@@ -130,18 +126,11 @@ pub fn find_matter(
     if n == 0 {
         return matter;
     }
-    // What tells that surfaces face inward must not be less than what would be lost by it: a crevice outside of a cave.
-    let is_outvoted = facing == Facing::Inward && {
-        let volume = |of: &BTreeSet<u32>| {
-            let is_in = |&i: &usize| {
-                let label = labels.get(i);
-                label != 0 && of.contains(&regions.region_of_basin[label as usize])
-            };
-            (0..labels.len()).filter(is_in).count()
-        };
-        volume(&doubtful.iter().flatten().copied().collect())
-            > volume(&indoors.iter().copied().collect())
-    };
+    // What tells that surfaces face inward must hold more than what would be lost by it: beside a cave it may be a crevice
+    // of the outside.
+    let lost: Vec<u32> = doubtful.iter().flatten().copied().collect();
+    let is_outvoted = facing == Facing::Inward
+        && n_voxels(labels, regions, &lost) > n_voxels(labels, regions, &indoors);
     if is_outvoted || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing) {
         matter.notes.push(format!(
             "{n} closed shell{} without any opening {} all there is: taken for rooms and not for solids",
@@ -160,6 +149,16 @@ pub fn find_matter(
     }
     matter.regions.sort_unstable();
     matter
+}
+
+/// Voxels of some regions.
+fn n_voxels(labels: &Labels, regions: &Regions, of: &[u32]) -> usize {
+    let of: BTreeSet<u32> = of.iter().copied().collect();
+    let is_in = |&i: &usize| {
+        let label = labels.get(i) as usize;
+        label != 0 && of.contains(&regions.region_of_basin[label])
+    };
+    (0..labels.len()).filter(is_in).count()
 }
 
 /// Which way the surfaces of a scene face.
