@@ -13,16 +13,9 @@ use enfilade_testkit::{
 };
 use enfilade_verify::{VerifyOptions, verify_world};
 
-/// Faults in spite of which all rooms and doors are found.
-const OVERCOME: [Fault; 7] = [
-    Fault::WallsAboveSlabs,
-    Fault::HungCeilings,
-    Fault::WallsToCeiling,
-    Fault::CurtainWall,
-    Fault::Mullions,
-    Fault::ColumnsInWalls,
-    Fault::CornerDoors,
-];
+/// Faults that are not overcome yet: four columns part a cell off, open leaves cut a corridor, and of boxes that count as
+/// structure some are air.
+const LEFT: [Fault; 3] = [Fault::Columns, Fault::LeavesInCorridor, Fault::Boxes];
 
 /// Share of a room's points that lie in its cell, and of a cell's points that lie in its room.
 const MOST: f64 = 0.95;
@@ -117,7 +110,7 @@ fn is_found(graph: &CellPortalGraph, o: &Opening) -> bool {
 
 #[test]
 fn rooms_and_doors_are_found_in_spite_of_faults() {
-    for fault in OVERCOME {
+    for fault in Fault::ALL.into_iter().filter(|f| !LEFT.contains(f)) {
         let g = fault.build();
         let graph = graph_of(&g);
         let what = fault.name();
@@ -166,6 +159,19 @@ fn holds_up(clean: &CellPortalGraph, world: &World, g: &Generated, what: &str) {
     assert!(report.holds(), "{what}: {report}");
 }
 
+/// Area of the triangles that are no seals. [Units: wu²]
+fn model_area(world: &World) -> f64 {
+    let mut area = 0.0;
+    for batch in world.batches.iter().filter(|b| !b.is_seal) {
+        let at = |i: u32| DVec3::from(batch.primitive.positions[i as usize].map(f64::from));
+        for t in batch.primitive.indices.chunks_exact(3) {
+            let [a, b, c] = [at(t[0]), at(t[1]), at(t[2])];
+            area += 0.5 * (b - a).cross(c - a).length();
+        }
+    }
+    area
+}
+
 #[test]
 fn triangles_that_share_no_corners_leave_the_rooms_as_they_were() {
     for g in [furnished_house(), Fault::HungCeilings.build()] {
@@ -184,7 +190,12 @@ fn triangles_that_share_no_corners_leave_the_rooms_as_they_were() {
             let is_counted = |p: &&Portal| jitter > 1e-5 || p.kind != PortalKind::Crack;
             let n = world.graph.portals.iter().filter(is_counted).count();
             assert!(5 * n <= 6 * clean.portals.len(), "{what}: {n} portals");
-            assert!(Seals::of(&world).count > 0, "{what}");
+            // Slits are closed, not the walls beside them: uncut slivers would have to be sealed over half of each wall.
+            let share = Seals::of(&world).area / model_area(&world);
+            assert!(
+                share > 0.0 && share < 0.02,
+                "{what}: {share} of the model's area is seals"
+            );
         }
     }
 }
