@@ -18,9 +18,9 @@ use crate::voxel::{
     BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
 };
 use crate::watershed::{
-    Flooded, Frame, Lids, Regions, Screen, bounds_of, closure_triangles, connected_patches,
-    cut_at_slabs, find_lids, find_matter, find_stairs, fit_screen, flood_closures, merge_basins,
-    opening_of, rim_caps, shallow_voids, slab_heights, split_limbs,
+    Flooded, Frame, Lids, Regions, Screen, bounds_of, connected_patches, cut_at_slabs, find_lids,
+    find_matter, find_stairs, fit_screen, flood_closures, merge_basins, opening_of, plates,
+    rim_caps, shallow_voids, slab_heights, split_limbs, without_open_leaves,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -79,7 +79,11 @@ pub fn bake(
     };
     let (walls, stairs) = (part(false), part(true));
     let occupied = voxelize(&grid, &walls);
-    let closures = voxelize(&grid, &frame.triangles_to_grid(&closure_triangles(scene)));
+    let plates = plates(scene);
+    let plates = plates
+        .iter()
+        .map(|p| frame.triangles_to_grid(p).into_owned());
+    let closures = voxelize(&grid, &without_open_leaves(plates.collect(), &bvh).concat());
     // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
     let lids = find_lids(&grid, &occupied);
     let mut shut = voxelize(&grid, &rim_caps(&walls, config.min_opening.powi(2)));

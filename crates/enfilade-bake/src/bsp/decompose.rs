@@ -102,7 +102,7 @@ pub fn bake_bsp(
         let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
         let evidence = Evidence {
             shapes: &shapes,
-            closures: &Bvh::build(&closure_triangles(scene)),
+            closures: &Bvh::build(&closure_triangles(scene, &Bvh::build(&walls))),
             slabs: &slab_heights(&walls),
         };
         let parted = rooms::part(&bsp, separator::find_in_walls(&bsp), &evidence, settings);

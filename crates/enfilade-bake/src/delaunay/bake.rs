@@ -93,8 +93,8 @@ impl Session {
             walls.clone_from(&triangles);
         }
         let walls = in_own_order(&walls);
-        let closures = in_own_order(&closure_triangles(scene));
         let bvh = Bvh::build(&walls);
+        let closures = in_own_order(&closure_triangles(scene, &bvh));
         let space = divide(&walls, &closures, &bvh, opening)?;
         context.delaunay_stage(1)?;
         let cells = with_branches(

@@ -8,7 +8,7 @@
 //! two rooms, so it changes nothing.
 
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
 
 use crate::voxel::{BitVolume, Labels};
 
@@ -18,10 +18,28 @@ const MAX_THICKNESS: f64 = 0.4;
 const MIN_EXTENT: f64 = 0.35;
 /// … and at least this many times wider than thick.
 const MIN_FLATNESS: f64 = 2.0;
+/// Leaves of doors are higher. [Units: wu]
+const MIN_LEAF_HEIGHT: f64 = 1.6;
+/// … and fill at least this share of the rectangle around them; the bars of a railing do not.
+const MIN_FILL: f64 = 0.5;
+/// What is this near to a plate's rim holds it. [Units: wu] Frames are as thick.
+const HELD_WITHIN: f64 = 0.2;
+/// Share of its rim by which a plate is held that shuts something: three of four sides, nearly.
+const MIN_HELD: f64 = 0.7;
+/// Samples along each side of a plate's rim.
+const RIM_SAMPLES: usize = 8;
 
-/// Triangles of the detail objects that are flat enough to close an opening.
+/// Triangles of the detail objects that may close an opening: flat, and no leaves that stand open.
+///
+/// `walls` are the structural triangles, in the scene's frame.
 #[must_use]
-pub fn closure_triangles(scene: &Scene) -> Vec<Triangle> {
+pub fn closure_triangles(scene: &Scene, walls: &Bvh) -> Vec<Triangle> {
+    without_open_leaves(plates(scene), walls).concat()
+}
+
+/// The detail objects that are flat enough to close an opening, each by its triangles.
+#[must_use]
+pub fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
     let mut out = Vec::new();
     let mut object: Vec<Triangle> = Vec::new();
     let mut current = None;
@@ -34,7 +52,7 @@ pub fn closure_triangles(scene: &Scene) -> Vec<Triangle> {
     for source in sources {
         if current != Some(source.object) {
             if is_flat(&object) {
-                out.append(&mut object);
+                out.push(std::mem::take(&mut object));
             }
             object.clear();
             current = Some(source.object);
@@ -46,26 +64,105 @@ pub fn closure_triangles(scene: &Scene) -> Vec<Triangle> {
     out
 }
 
-fn is_flat(triangles: &[Triangle]) -> bool {
-    if triangles.is_empty() {
-        return false;
-    }
-    let n = thin_direction(triangles);
-    let points = || triangles.iter().flatten();
-    let extent = |d: DVec3| {
-        let (lo, hi) = points().fold((f64::MAX, f64::MIN), |(lo, hi), p| {
-            let t = d.dot(*p);
-            (lo.min(t), hi.max(t))
-        });
-        hi - lo
+/// All plates but the leaves of doors that stand open: those whose rim does not run along walls or other plates nearly all
+/// around, but is held below and at the hinges alone. They shut nothing, and would cut a corridor in two.
+///
+/// [`RIM_SAMPLES`] queries of box trees a side.
+#[must_use]
+pub fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Vec<Vec<Triangle>> {
+    let owner: Vec<usize> = (0..plates.len())
+        .flat_map(|i| std::iter::repeat_n(i, plates[i].len()))
+        .collect();
+    let all = Bvh::build(&plates.concat());
+    let is_held = |(i, plate): (usize, &Vec<Triangle>)| {
+        let is_near = |p: DVec3| {
+            let reach = Aabb::new(p, p).expanded(HELD_WITHIN);
+            let mut is_near_other = false;
+            all.for_each_in_box(&reach, |t| is_near_other |= owner[t as usize] != i);
+            is_near_other || walls.any_within(p, HELD_WITHIN).is_some()
+        };
+        let area: f64 = plate
+            .iter()
+            .map(|t| 0.5 * triangle_area_normal(t).length())
+            .sum();
+        let plate = Plate::of(plate);
+        if !plate.is_leaf(area) {
+            return true;
+        }
+        let rim = plate.rim();
+        let n_held = rim.iter().filter(|&&p| is_near(p)).count();
+        n_held as f64 >= MIN_HELD * rim.len() as f64
     };
-    let thickness = extent(n);
-    // The two other extents along the horizontal and the vertical of the plate.
-    let level = if n.y.abs() > 0.7 { DVec3::X } else { DVec3::Y };
-    let u = (level - n * n.dot(level)).normalize();
-    let (a, b) = (extent(u), extent(n.cross(u)));
-    let least = a.min(b);
-    thickness < MAX_THICKNESS && least > MIN_EXTENT && least > MIN_FLATNESS * thickness
+    let held: Vec<bool> = plates.iter().enumerate().map(is_held).collect();
+    let mut held = held.into_iter();
+    let mut plates = plates;
+    plates.retain(|_| held.next() == Some(true));
+    plates
+}
+
+/// The box around an object, along the direction in which it is thin.
+struct Plate {
+    center: DVec3,
+    /// Half of the extents along the two sides of the plate.
+    sides: [DVec3; 2],
+    thickness: f64,
+}
+
+impl Plate {
+    fn of(triangles: &[Triangle]) -> Self {
+        let n = thin_direction(triangles);
+        // The two other extents along the horizontal and the vertical of the plate.
+        let level = if n.y.abs() > 0.7 { DVec3::X } else { DVec3::Y };
+        let u = (level - n * n.dot(level)).normalize();
+        let range = |d: DVec3| {
+            let points = triangles.iter().flatten();
+            points.fold((f64::MAX, f64::MIN), |(lo, hi), p| {
+                let t = d.dot(*p);
+                (lo.min(t), hi.max(t))
+            })
+        };
+        let axes = [n, u, n.cross(u)];
+        let ranges = axes.map(range);
+        let half = |k: usize| axes[k] * (0.5 * (ranges[k].1 - ranges[k].0));
+        Self {
+            center: (0..3)
+                .map(|k| axes[k] * (0.5 * (ranges[k].0 + ranges[k].1)))
+                .sum(),
+            sides: [half(1), half(2)],
+            thickness: ranges[0].1 - ranges[0].0,
+        }
+    }
+
+    fn is_flat(&self) -> bool {
+        let least = 2.0 * self.sides[0].length().min(self.sides[1].length());
+        self.thickness < MAX_THICKNESS
+            && least > MIN_EXTENT
+            && least > MIN_FLATNESS * self.thickness
+    }
+
+    /// Whether it may be the leaf of a door, given its area on all sides: upright, not as low as a counter, and no railing.
+    fn is_leaf(&self, area: f64) -> bool {
+        let [u, v] = self.sides;
+        let height = 2.0 * u.y.abs().max(v.y.abs());
+        // Two sides of half extents u and v.
+        height >= MIN_LEAF_HEIGHT && area >= MIN_FILL * 8.0 * u.length() * v.length()
+    }
+
+    /// Points along its rim, evenly by side in number.
+    fn rim(&self) -> Vec<DVec3> {
+        let [u, v] = self.sides;
+        let corners = [u + v, v - u, -u - v, u - v].map(|c| self.center + c);
+        let along = |k: usize| {
+            (0..RIM_SAMPLES).map(move |i| {
+                corners[k].lerp(corners[(k + 1) % 4], (i as f64 + 0.5) / RIM_SAMPLES as f64)
+            })
+        };
+        (0..4).flat_map(along).collect()
+    }
+}
+
+fn is_flat(triangles: &[Triangle]) -> bool {
+    !triangles.is_empty() && Plate::of(triangles).is_flat()
 }
 
 /// The direction that most of the surface faces, up to sign.
@@ -187,6 +284,32 @@ mod tests {
                 [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
             })
             .collect()
+    }
+
+    #[test]
+    fn a_leaf_that_stands_open_shuts_nothing() {
+        let at = |origin: DVec3, size: DVec3| -> Vec<Triangle> {
+            let corners = |t: Triangle| t.map(|p| p + origin);
+            box_triangles(size).into_iter().map(corners).collect()
+        };
+        // A wall with a doorway 0.9 m wide and 2 m high, and the floor.
+        let walls = [
+            at(DVec3::new(-3.0, 0.0, 0.0), DVec3::new(3.0, 2.5, 0.1)),
+            at(DVec3::new(0.9, 0.0, 0.0), DVec3::new(3.0, 2.5, 0.1)),
+            at(DVec3::new(0.0, 2.0, 0.0), DVec3::new(0.9, 0.5, 0.1)),
+            at(DVec3::new(-3.0, -0.1, -3.0), DVec3::new(7.0, 0.1, 6.0)),
+        ];
+        let walls = Bvh::build(&walls.concat());
+        let shut = at(DVec3::ZERO, DVec3::new(0.9, 2.0, 0.04));
+        let ajar = at(DVec3::ZERO, DVec3::new(0.04, 2.0, 0.9));
+        // As high as a railing: where it stands, it stands.
+        let low = at(DVec3::ZERO, DVec3::new(0.04, 1.0, 0.9));
+        for (plate, stays) in [(shut, true), (ajar, false), (low, true)] {
+            assert_eq!(
+                without_open_leaves(vec![plate], &walls).len(),
+                usize::from(stays)
+            );
+        }
     }
 
     #[test]

@@ -18,7 +18,7 @@ mod slabs;
 mod stairs;
 mod voids;
 
-pub use closures::{bounds_of, closure_triangles, flood_closures};
+pub use closures::{bounds_of, closure_triangles, flood_closures, plates, without_open_leaves};
 pub use fit::{Screen, fit_screen, fit_screen_at};
 pub use frame::Frame;
 pub use hollow::{Matter, find_matter};

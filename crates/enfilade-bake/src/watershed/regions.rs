@@ -20,7 +20,7 @@
 //! Cost: one evaluation looks at a few ten thousand lattice points around an opening; their number
 //! grows with the basins, that is with the building. Errs towards too many cells.
 
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use enfilade_geom::{DVec3, Plane, Sets};
@@ -56,6 +56,9 @@ pub struct MergeSettings {
     /// Radius of the largest ball that fits into a room at least. [Units: wu] What is narrower
     /// everywhere is a crevice, and belongs to the room it opens to most.
     pub min_radius: f64,
+    /// A cell with this share of its sides open is a bay of what it opens to. [Limit: 0 to 1] A square of columns a fifth as
+    /// thick as they stand apart is open by 0.8, a vestibule of 1.5 m with a doorway on each side by 0.5.
+    pub bay_share: f64,
 }
 
 impl Default for MergeSettings {
@@ -70,6 +73,7 @@ impl Default for MergeSettings {
             outdoor_gain: 0.8,
             closed_share: 0.6,
             min_radius: 0.3,
+            bay_share: 0.7,
         }
     }
 }
@@ -156,6 +160,7 @@ pub fn merge_basins(
         merger.run(&mut merges);
     }
     merger.absorb_crevices(&mut merges);
+    merger.absorb_bays(&mut merges);
     merger.finish(merges)
 }
 
@@ -315,25 +320,112 @@ impl Merger<'_> {
             // What only closures shut off (the space under a table top) is no room either.
             let open_faces = |n: u32| {
                 let faces = &self.contacts[&(c.min(n), c.max(n))];
-                let open = match self.flooded.closures {
-                    Some(bits) => faces
-                        .iter()
-                        .filter(|&&f| !bits.get_index((f / 4) as usize))
-                        .count(),
-                    None => faces.len(),
-                };
-                (open, faces.len())
+                (self.open_faces(faces).count(), faces.len())
             };
             let home = self.neighbors[c as usize]
                 .iter()
-                .map(|&n| (open_faces(n), std::cmp::Reverse(n)))
+                .map(|&n| (open_faces(n), Reverse(n)))
                 .max();
-            if let Some((_, std::cmp::Reverse(n))) = home {
+            if let Some((_, Reverse(n))) = home {
                 merges.push((c.min(n), c.max(n), 1.0));
                 self.merge(c.min(n), c.max(n));
             }
         }
         self.queue.clear();
+    }
+
+    /// Joins cells whose sides are hardly walled to the neighbor that they open to most, least walled first: bays between
+    /// the columns of a hall.
+    ///
+    /// One look at all voxels, and one at all pairs for each cell so joined.
+    fn absorb_bays(&mut self, merges: &mut Vec<(u32, u32, f32)>) {
+        let mut sides = self.side_faces();
+        let is_upright = |f: &&u64| **f % 4 != 1;
+        let n_open = |merger: &Self, pair: (u32, u32)| {
+            let faces = &merger.contacts[&pair];
+            merger.open_faces(faces).filter(is_upright).count()
+        };
+        let mut open: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+        for &pair in self.contacts.keys() {
+            open.insert(pair, n_open(self, pair));
+        }
+        loop {
+            let bays = (OUTDOORS + 1..self.parent.len() as u32).filter_map(|c| {
+                let neighbors = self.neighbors[c as usize].iter();
+                let open = neighbors.map(|&n| (open[&(c.min(n), c.max(n))], Reverse(n)));
+                let (all, most) =
+                    open.fold((0, None), |(all, most), o| (all + o.0, most.max(Some(o))));
+                let share = all as f64 / sides[c as usize].max(1) as f64;
+                let Reverse(home) = most?.1;
+                (share >= self.settings.bay_share).then_some((share, Reverse(c), home))
+            });
+            let order = |a: &(f64, Reverse<u32>, u32), b: &(f64, Reverse<u32>, u32)| {
+                a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+            };
+            let Some((share, Reverse(bay), home)) = bays.max_by(order) else {
+                break;
+            };
+            let pair = (bay.min(home), bay.max(home));
+            let shared = self.contacts[&pair].iter().filter(is_upright).count();
+            let rest = sides[bay as usize] + sides[home as usize] - 2 * shared;
+            merges.push((pair.0, pair.1, share as f32));
+            self.merge(pair.0, pair.1);
+            let whole = self.find(bay);
+            sides[whole as usize] = rest;
+            for &n in &self.neighbors[whole as usize] {
+                let pair = (whole.min(n), whole.max(n));
+                open.insert(pair, n_open(self, pair));
+            }
+        }
+        self.queue.clear();
+    }
+
+    /// The faces that no door leaf or pane fills.
+    fn open_faces<'a>(&'a self, faces: &'a [u64]) -> impl Iterator<Item = &'a u64> {
+        let [nx, ny, _] = self.flooded.grid.dims;
+        let strides = [1, nx, nx * ny];
+        faces.iter().filter(move |&&f| {
+            let (i, step) = ((f / 4) as usize, strides[(f % 4) as usize]);
+            let is_shut = |bits: &BitVolume| bits.get_index(i) || bits.get_index(i + step);
+            !self.flooded.closures.is_some_and(is_shut)
+        })
+    }
+
+    /// Number of upright faces around each cell.
+    fn side_faces(&self) -> Vec<usize> {
+        let [nx, ny, nz] = self.flooded.grid.dims;
+        let labels = self.flooded.labels;
+        let cell_of: Vec<u32> = (0..self.parent.len() as u32)
+            .map(|b| self.find(b))
+            .collect();
+        let count = |z: usize| {
+            let mut sides = vec![0usize; cell_of.len()];
+            for i in z * nx * ny..(z + 1) * nx * ny {
+                let cell = cell_of[labels.get(i) as usize];
+                let x = i % nx;
+                let nexts = [
+                    (x > 0, i.wrapping_sub(1)),
+                    (x + 1 < nx, i + 1),
+                    (z > 0, i.wrapping_sub(nx * ny)),
+                    (z + 1 < nz, i + nx * ny),
+                ];
+                if cell > OUTDOORS {
+                    let is_side = |&(exists, next): &(bool, usize)| {
+                        !exists || cell_of[labels.get(next) as usize] != cell
+                    };
+                    sides[cell as usize] += nexts.iter().filter(|n| is_side(n)).count();
+                }
+            }
+            sides
+        };
+        let add = |mut sum: Vec<usize>, part: Vec<usize>| {
+            for (s, p) in sum.iter_mut().zip(part) {
+                *s += p;
+            }
+            sum
+        };
+        let zero = || vec![0; cell_of.len()];
+        (0..nz).into_par_iter().map(count).reduce(zero, add)
     }
 
     /// Joins two cells. The one with more neighbors survives, except that outdoors always does.
