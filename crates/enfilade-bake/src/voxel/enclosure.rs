@@ -178,7 +178,7 @@ fn neighbors(dims: [usize; 3], of: usize) -> impl Iterator<Item = [usize; 3]> {
     let at = coords(dims, of);
     (0..6).filter_map(move |k: usize| {
         let (axis, mut next) = (k / 2, at);
-        next[axis] = if k % 2 == 0 {
+        next[axis] = if k.is_multiple_of(2) {
             at[axis].checked_sub(1)?
         } else {
             Some(at[axis] + 1).filter(|&c| c < dims[axis])?
