@@ -85,6 +85,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         materials: scene.materials.clone(),
         textures: scene.textures.clone(),
         images: scene.images.clone(),
+        leak_path: Vec::new(),
     }
 }
 

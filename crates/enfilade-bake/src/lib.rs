@@ -13,6 +13,7 @@ pub mod delaunay;
 pub mod edit;
 mod error;
 mod join;
+pub mod leak;
 pub mod pipeline;
 pub mod simplify;
 pub mod vis;

@@ -15,7 +15,7 @@ use crate::assemble::{Cut, assemble};
 use crate::complex::{ComplexInput, LabelSettings, Leak, Partition, Vote, build_complex};
 use crate::join::{VOID, join_unparted, join_voids};
 use crate::voxel::{
-    BitVolume, Grid, Labels, WatershedOptions, distance_squared, voxelize, watershed,
+    BitVolume, Grid, Labels, WatershedOptions, border, distance_squared, voxelize, watershed,
 };
 use crate::watershed::{
     Flooded, Frame, Lids, Regions, Screen, bounds_of, connected_patches, cut_at_slabs, find_lids,
@@ -104,7 +104,7 @@ pub fn bake(
     context.stage(2)?;
     let options = WatershedOptions {
         h: config.noise / grid.voxel,
-        outdoors: Some(border_of(grid.dims)),
+        outdoors: Some(border(grid.dims)), // which the padding keeps empty
     };
     let flood = watershed(grid.dims, distances, options);
     let mut labels = flood.labels;
@@ -347,15 +347,6 @@ pub(crate) fn in_own_order(triangles: &[Triangle]) -> Vec<Triangle> {
         by(0).then_with(|| by(1)).then_with(|| by(2))
     });
     out
-}
-
-/// The outermost layer of voxels, which the padding keeps empty.
-fn border_of(dims: [usize; 3]) -> BitVolume {
-    let [nx, ny, nz] = dims;
-    BitVolume::from_fn(dims, |i| {
-        let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
-        x == 0 || y == 0 || z == 0 || x + 1 == nx || y + 1 == ny || z + 1 == nz
-    })
 }
 
 /// Openings smaller than this many voxel faces are left to the complex, which finds them as cracks.

@@ -1,8 +1,10 @@
 //! `enfilade bake`: a scene becomes a world.
 
+mod cracks;
 mod curved;
 pub(crate) mod delaunay;
 mod doorless;
+mod leak_path;
 pub(crate) mod settings;
 
 use std::io::{self, IsTerminal, Write};
@@ -58,6 +60,15 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
     refuse_leak(scene, options)?;
+    let mut leak_path = match options.leak_path {
+        Some(from) => Some(leak_path::look_as_asked(
+            scene,
+            config,
+            from,
+            options.threads,
+        )?),
+        None => None,
+    };
     let (method, reason) = method_for(scene, options.method);
     let mut baked = bake_by(method, &reason, scene, options, &settings)?;
     if options.method == settings::Method::Auto
@@ -81,9 +92,17 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
             writeln!(io::stderr(), "there are none: the watershed's is kept")?;
         }
     }
+    if let Some(path) = &leak_path {
+        baked.world.leak_path = path.points();
+    } else if n_indoors(&baked) == 0 {
+        leak_path = Some(leak_path::look_unasked(scene, config, options.threads)?);
+    }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
+    if let Some(path) = &leak_path {
+        path.write(&mut io::stderr().lock())?;
+    }
     if baked.world.graph.statistics.counts.get("separators") == Some(&0.0)
         && baked.world.graph.cells.len() > 1
     {
@@ -283,7 +302,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     let wanted = if nx > 0 {
         writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
         config.voxel.unwrap_or(config.min_opening / 6.0)
-    } else {
+    } else if baked.voxel > 0.0 {
         writeln!(
             err,
             "surfaces have points for all air at least {:.3} m in radius",
@@ -298,6 +317,8 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             )?;
         }
         f64::INFINITY
+    } else {
+        f64::INFINITY // planes need neither
     };
     // The grid grows its voxels by tenths, if at all.
     if baked.voxel > wanted * 1.05 {
@@ -341,6 +362,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
         }
     }
+    cracks::write_cracks(&mut err, baked)?;
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
     doorless::write_roomless(&mut err, &baked.world.graph)?;

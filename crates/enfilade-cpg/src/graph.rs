@@ -115,6 +115,9 @@ pub struct World {
     pub textures: Vec<Texture>,
     /// Pictures.
     pub images: Vec<Image>,
+    /// A line for people to look at: the way out of air that should be a room, where it is widest. Of two points or more, in
+    /// world space; empty where none was asked for. No matter to anything that reads a world. [Units: wu]
+    pub leak_path: Vec<[f32; 3]>,
 }
 
 /// Structural triangles of one material that are seen from exactly the same cells.

@@ -58,6 +58,9 @@ pub enum GraphError {
         /// What it should list there.
         actual: Vec<u32>,
     },
+    /// The leak path has a single point, or one that is not finite.
+    #[error("the leak path must be of two finite points or more, or empty")]
+    LeakPath,
     /// A portal joins a cell to itself or to a cell that does not exist.
     #[error("portal {portal} joins cells {cells:?}; they must differ and lie below {n_cells}")]
     PortalCells {
@@ -349,6 +352,10 @@ impl World {
             } else if [t[3], t[7], t[11], t[15]] != [0.0, 0.0, 0.0, 1.0] {
                 problem("the transform's last row is not 0 0 0 1".into());
             }
+        }
+        let is_finite = self.leak_path.as_flattened().iter().all(|v| v.is_finite());
+        if self.leak_path.len() == 1 || !is_finite {
+            found.push(GraphError::LeakPath);
         }
         crate::look::check(self, &mut |owner, problem| {
             found.push(GraphError::Look { owner, problem });

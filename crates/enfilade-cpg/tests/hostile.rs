@@ -212,6 +212,18 @@ fn a_detail_whose_mesh_is_not_its_nodes_is_an_error() {
     ));
 }
 
+#[test]
+fn a_leak_path_that_is_no_line_is_an_error() {
+    // Node 1 is a cell with triangles, node 0 has no mesh, and the last is not there.
+    for node in [1, 0, 999] {
+        let bad = with(
+            "\"provenance\":",
+            &format!("\"leakPath\":{node},\"provenance\":"),
+        );
+        assert!(matches!(bad, Err(WireError::Structure { .. })), "{node}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 

@@ -47,6 +47,10 @@ breaks! {
         => GraphError::CellPortals { cell: 1, .. },
     a_cell_lists_its_portals_ascending: |w| w.graph.cells[1].portals.reverse()
         => GraphError::CellPortals { cell: 1, .. },
+    a_leak_path_is_a_line: |w| w.leak_path = vec![[0.0; 3]]
+        => GraphError::LeakPath,
+    a_leak_path_is_finite: |w| w.leak_path = vec![[0.0; 3], [f32::NAN, 0.0, 0.0]]
+        => GraphError::LeakPath,
     a_normal_is_of_unit_length: |w| w.graph.portals[1].normal = [1.0, 0.01, 0.0]
         => GraphError::PortalNormal { portal: 1, .. },
     a_normal_is_a_number: |w| w.graph.portals[1].normal = [f32::NAN; 3]

@@ -39,6 +39,15 @@ fn the_validator_finds_nothing_in_two_rooms() {
 }
 
 #[test]
+fn the_validator_finds_nothing_in_a_leak_path() {
+    let world = World {
+        leak_path: vec![[0.0, 1.0, 2.0], [1.0, 1.0, 2.0], [9.0, 1.0, 2.5]],
+        ..two_rooms()
+    };
+    validate("leak.glb", &world, true);
+}
+
+#[test]
 fn the_validator_finds_nothing_in_an_empty_world() {
     validate("empty.glb", &World::default(), true);
 }

@@ -143,7 +143,11 @@ fn extension(world: &World) -> Value {
 #[test]
 fn encoded_worlds_follow_the_schema() {
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
-    for world in [two_rooms(), nasty_rooms(), World::default()] {
+    let leaking = World {
+        leak_path: vec![[0.0; 3], [1.0; 3]],
+        ..two_rooms()
+    };
+    for world in [two_rooms(), nasty_rooms(), World::default(), leaking] {
         assert_eq!(check(&schema, &schema, &extension(&world), ""), Ok(()));
     }
 }
@@ -152,9 +156,12 @@ fn encoded_worlds_follow_the_schema() {
 fn the_schema_names_every_field_that_is_written() {
     // Taking any field away, or adding one, is noticed unless the schema calls it optional.
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
-    let good = extension(&two_rooms());
+    let good = extension(&World {
+        leak_path: vec![[0.0; 3], [1.0; 3]],
+        ..two_rooms()
+    });
     for (pointer, optional) in [
-        ("", &["portalCorners"][..]),
+        ("", &["portalCorners", "leakPath"][..]),
         ("/cells/2", &["outdoor"]),
         ("/portals/1", &[]),
         ("/batches/0", &[]),

@@ -32,6 +32,39 @@ fn a_world_comes_back_as_it_was() {
 }
 
 #[test]
+fn a_leak_path_comes_back_as_a_line_that_is_no_surface() {
+    let mut world = two_rooms();
+    let without = json(&encode_glb(&world).unwrap());
+    world.leak_path = vec![[1.0, 1.5, 2.0], [4.0, 1.0, 2.5], [12.0, 1.0, 2.5]];
+    let bytes = encode_glb(&world).unwrap();
+    let back = decode_glb(&bytes).unwrap();
+    assert_eq!(back.leak_path, world.leak_path);
+    assert!(geometry(&back) == geometry(&world));
+    assert_eq!(encode_glb(&back).unwrap(), bytes);
+    // Any viewer finds it as a line of its own under the world.
+    let root = json(&bytes);
+    let nodes = root["nodes"].as_array().unwrap();
+    let node = nodes
+        .iter()
+        .position(|n| n["name"] == "enfilade leak path")
+        .unwrap();
+    assert!(
+        nodes[0]["children"]
+            .as_array()
+            .unwrap()
+            .contains(&node.into())
+    );
+    let primitive =
+        &root["meshes"][nodes[node]["mesh"].as_u64().unwrap() as usize]["primitives"][0];
+    assert_eq!(primitive["mode"], 3);
+    assert!(primitive.get("indices").is_none());
+    let position = primitive["attributes"]["POSITION"].as_u64().unwrap() as usize;
+    assert_eq!(root["accessors"][position]["count"], 3);
+    // Where none is asked for nothing tells of it.
+    assert!(!without.to_string().contains("leak"));
+}
+
+#[test]
 fn materials_come_back_verbatim() {
     let world = two_rooms();
     let back = decode_glb(&encode_glb(&world).unwrap()).unwrap();

@@ -58,7 +58,7 @@ use tree::Tree;
 pub use partition::{Leak, Partition, PartitionPortal, Seal, TriangleCells};
 
 /// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
-const CRACK_WIDTH: f64 = 0.05;
+pub const CRACK_WIDTH: f64 = 0.05;
 
 /// What the complex is built from.
 #[derive(Clone, Copy, Debug)]

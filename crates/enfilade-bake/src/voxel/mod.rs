@@ -1,5 +1,5 @@
-//! Kernels on dense voxel grids: surface voxelization, exact distances, connected components and
-//! the watershed of the distance field.
+//! Kernels on dense voxel grids: surface voxelization, exact distances, connected components, the
+//! watershed of the distance field and the widest path in it.
 //!
 //! **Layout, everywhere:** x runs fastest, then y, then z: voxel `(i, j, k)` of a box of
 //! `[nx, ny, nz]` voxels has the index `i + nx * (j + ny * k)`. Voxel `(i, j, k)` is the closed
@@ -11,14 +11,20 @@
 
 mod components;
 mod edt;
+mod enclosure;
 mod grid;
 mod voxelize;
 mod watershed;
+mod widest;
 
 pub use components::{Components, Connectivity, components, flood};
 pub use edt::{distance, distance_squared};
+pub use enclosure::enclosure;
+pub(crate) use enclosure::{ENCLOSED, ascend, deepest_enclosed};
 pub use grid::{BitVolume, Grid};
 pub use voxelize::voxelize;
 pub use watershed::{
     Basin, Labels, Saddle, Watershed, WatershedOptions, levels_per_voxel, mark_dams, watershed,
 };
+pub(crate) use widest::border;
+pub use widest::{WidestPath, widest_path};

@@ -59,6 +59,10 @@ pub(crate) struct BakeOptions {
     /// Go on although the map leaks.
     #[arg(long)]
     pub(super) allow_leak: bool,
+    /// Say where the widest way from a room to outdoors is narrowest, and write it into the world as a line: from the middle of
+    /// the largest air with walls around, or from a point of the world that should be in a room.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, num_args = 0..=1, require_equals = true)]
+    pub(super) leak_path: Option<Option<DVec3>>,
     /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50 in
     /// levels of brushes, 0 elsewhere].
     #[arg(long, value_name = "N")]

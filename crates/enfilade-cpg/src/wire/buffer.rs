@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Image, Primitive};
 
-use super::json::{self, FLOAT, TRIANGLES, U16, U32, VERTICES};
+use super::json::{self, FLOAT, LINE_STRIP, TRIANGLES, U16, U32, VERTICES};
 use crate::World;
 
 /// A stretch of the buffer that holds one kind of vertex data or indices for all primitives.
@@ -161,6 +161,34 @@ impl<'a> Layout<'a> {
             attributes,
             indices: index_accessor,
             material,
+            mode: None,
+        }
+    }
+
+    /// A polyline of two points or more.
+    pub(super) fn push_line(&mut self, name: &str, points: &[[f32; 3]]) -> json::Mesh {
+        let position = self.accessor(Section::Positions, points.len());
+        let (min, max) = extent(points);
+        self.accessors[position as usize].min = Some(min.to_vec());
+        self.accessors[position as usize].max = Some(max.to_vec());
+        self.prepared.push(Prepared {
+            primitive: Cow::Owned(Primitive {
+                positions: points.to_vec(),
+                ..Primitive::default()
+            }),
+            has_normals: false,
+            has_tangents: false,
+            n_missing_uvs: 0,
+            indices: Section::Indices16,
+        });
+        json::Mesh {
+            name: name.to_owned(),
+            primitives: vec![json::Primitive {
+                attributes: [("POSITION".to_owned(), position)].into(),
+                indices: None,
+                material: None,
+                mode: Some(LINE_STRIP),
+            }],
         }
     }
 

@@ -11,7 +11,7 @@ use enfilade_geom::{Aabb, DVec3};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use super::json::{self, FLOAT, TEXTURE_EXTENSIONS, U8, U16, U32};
+use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
 use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError};
 use crate::look::material_of_text;
 use crate::{
@@ -197,6 +197,7 @@ impl<'a> Reader<'a> {
             })
         });
         let images = images.collect::<Result<_, _>>()?;
+        let leak_path = self.leak_path()?;
         let graph = self.graph()?;
         Ok(World {
             graph,
@@ -206,7 +207,23 @@ impl<'a> Reader<'a> {
             materials,
             textures,
             images,
+            leak_path,
         })
+    }
+
+    fn leak_path(&mut self) -> Result<Vec<[f32; 3]>, WireError> {
+        let root = self.root;
+        let Some(node) = root.extensions.graph.leak_path else {
+            return Ok(Vec::new());
+        };
+        let mesh = root.nodes.get(node as usize).and_then(|n| n.mesh);
+        let line = mesh
+            .and_then(|m| root.meshes.get(m as usize))
+            .and_then(|m| m.primitives.first())
+            .filter(|p| p.mode == Some(LINE_STRIP) && p.indices.is_none())
+            .and_then(|p| p.attributes.get("POSITION"));
+        let line = line.ok_or_else(|| broken("the leak path", "its node is no polyline"))?;
+        self.rows(*line)
     }
 
     fn graph(&mut self) -> Result<CellPortalGraph, WireError> {

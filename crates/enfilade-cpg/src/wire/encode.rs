@@ -12,7 +12,9 @@ use serde_json::value::RawValue;
 use super::buffer::{Layout, image_bytes, mime};
 use super::json::{self, TEXTURE_EXTENSIONS};
 use super::transform::{IDENTITY, is_trs, transformed};
-use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError};
+use super::{
+    CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, LEAK_PATH, VERSION, WireError,
+};
 use crate::look::{add_extensions, material_text, n_texcoord_sets, sampler_text};
 use crate::{CellId, PortalKind, World};
 
@@ -77,6 +79,16 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
     let batches = lay_out_batches(layout, world, &mut meshes, &mut nodes, &mut top);
     let (details, detail_meshes) =
         lay_out_details(layout, world, &mut meshes, &mut nodes, &mut top);
+    let leak_path = (!world.leak_path.is_empty()).then(|| {
+        meshes.push(layout.push_line(LEAK_PATH, &world.leak_path));
+        nodes.push(json::Node {
+            name: LEAK_PATH.into(),
+            mesh: Some(meshes.len() as u32 - 1),
+            ..Default::default()
+        });
+        nodes.len() as u32 - 1
+    });
+    top.extend(leak_path);
     nodes[0].children = top;
     layout.close_sections();
 
@@ -135,6 +147,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 details,
                 detail_meshes,
                 locator,
+                leak_path,
                 provenance: json::Provenance {
                     generator: graph.provenance.generator.clone(),
                     method: graph.provenance.method.clone(),

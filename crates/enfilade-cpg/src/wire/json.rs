@@ -74,9 +74,12 @@ pub(super) struct Mesh {
 #[derive(Serialize, Deserialize)]
 pub(super) struct Primitive {
     pub(super) attributes: BTreeMap<String, u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) indices: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) material: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) mode: Option<u32>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -162,6 +165,9 @@ pub(super) struct Graph {
     /// glTF mesh by detail mesh; null for a mesh without triangles.
     pub(super) detail_meshes: Vec<Option<u32>>,
     pub(super) locator: Locator,
+    /// Node of the leak path.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) leak_path: Option<u32>,
     pub(super) provenance: Provenance,
     pub(super) statistics: BTreeMap<String, f64>,
 }
@@ -258,6 +264,8 @@ pub(super) const U8: u32 = 5121;
 pub(super) const U16: u32 = 5123;
 /// `UNSIGNED_INT`.
 pub(super) const U32: u32 = 5125;
+/// `LINE_STRIP`.
+pub(super) const LINE_STRIP: u32 = 3;
 /// `ARRAY_BUFFER`.
 pub(super) const VERTICES: u32 = 34962;
 /// `ELEMENT_ARRAY_BUFFER`.

@@ -8,7 +8,8 @@
 //! world ─┬─ cell-0, cell-1, …   one node a cell: what is seen from that cell only
 //!        ├─ shared ── shared-0, …   one node a set of cells: what is seen from several
 //!        ├─ unseen                  what no cell sees, such as the inside of walls
-//!        └─ details ── …            placed detail objects; instances share their mesh
+//!        ├─ details ── …            placed detail objects; instances share their mesh
+//!        └─ enfilade leak path      a polyline for people, only where it was asked for
 //! ```
 //!
 //! Every triangle is drawn exactly once. Equal worlds give equal bytes, and
@@ -41,6 +42,9 @@ use crate::GraphError;
 
 /// Name of the glTF extension.
 pub const EXTENSION: &str = "ENFILADE_cell_portal_graph";
+
+/// Name of the node that draws [`World::leak_path`](crate::World::leak_path).
+pub const LEAK_PATH: &str = "enfilade leak path";
 
 /// Version of the extension that this program writes and reads.
 pub const VERSION: u64 = 1;

@@ -207,6 +207,7 @@ pub(crate) fn two_rooms() -> World {
             mime: "image/png".into(),
             bytes: Vec::new(),
         }],
+        leak_path: Vec::new(),
     }
 }
 

@@ -1,0 +1,117 @@
+//! What a bake says of the way out of air that should be a room.
+
+use std::io::{self, Write};
+
+use enfilade::bake::BakeConfig;
+use enfilade::bake::leak::{LeakTrail, NoTrail, find_leak_trail};
+use enfilade::geom::DVec3;
+use enfilade::geom::scene::Scene;
+
+use crate::progress::StageBar;
+
+/// A way out that was looked for, or why there is none to show.
+pub(super) struct LeakPath {
+    found: Result<LeakTrail, NoTrail>,
+    /// It is written into the world, too.
+    is_asked: bool,
+}
+
+/// Looks for the widest way out that `--leak-path` asks for.
+///
+/// # Errors
+/// When no room can be at the point that it gives; what else may be wrong is told with the bake's results.
+pub(super) fn look_as_asked(
+    scene: &Scene,
+    config: &BakeConfig,
+    from: Option<DVec3>,
+    threads: Option<u16>,
+) -> anyhow::Result<LeakPath> {
+    let found = look(scene, config, from, threads)?;
+    match found {
+        Err(why @ (NoTrail::Outside { .. } | NoTrail::InMatter { .. })) => {
+            anyhow::bail!("--leak-path: {why}")
+        }
+        found => Ok(LeakPath {
+            found,
+            is_asked: true,
+        }),
+    }
+}
+
+/// Looks for the widest way out after a bake that found no room.
+pub(super) fn look_unasked(
+    scene: &Scene,
+    config: &BakeConfig,
+    threads: Option<u16>,
+) -> anyhow::Result<LeakPath> {
+    Ok(LeakPath {
+        found: look(scene, config, None, threads)?,
+        is_asked: false,
+    })
+}
+
+fn look(
+    scene: &Scene,
+    config: &BakeConfig,
+    from: Option<DVec3>,
+    threads: Option<u16>,
+) -> anyhow::Result<Result<LeakTrail, NoTrail>> {
+    let bar = StageBar::new();
+    bar.start("looking for the way out", 0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.map_or(0, usize::from))
+        .build()?;
+    let found = pool.install(|| find_leak_trail(scene, config, from));
+    bar.finish();
+    Ok(found)
+}
+
+impl LeakPath {
+    /// The line for the world, if one was asked for and found.
+    pub(super) fn points(&self) -> Vec<[f32; 3]> {
+        match &self.found {
+            Ok(trail) if self.is_asked => {
+                let rounded = |p: &DVec3| p.as_vec3().to_array();
+                trail.points.iter().map(rounded).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Says where the way out is, and what to do about it.
+    pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let trail = match &self.found {
+            Ok(trail) => trail,
+            Err(why) => return writeln!(out, "no way out can be shown: {why}"),
+        };
+        let at = |p: DVec3| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z);
+        writeln!(
+            out,
+            "the widest way out, {:.1} m long: from {}, narrowest at {} (a ball of {:.2} m passes), out at {}",
+            trail.length(),
+            at(trail.points[0]),
+            at(trail.narrowest),
+            trail.width,
+            at(trail.exit),
+        )?;
+        let advice = if trail.is_wide_open() {
+            "it is nowhere much narrower than the room: a wall, floor or roof is missing there, or was taken for furniture \
+             (look with -v, then --structural-name 'PATTERN')"
+        } else {
+            "if that is a hole of the model, close it there; if what closes it was taken for furniture, use --structural-name \
+             'PATTERN'; if it is a doorway or a window, the model is tight"
+        };
+        writeln!(out, "  {advice}")?;
+        if self.is_asked {
+            writeln!(
+                out,
+                "  it is the object 'enfilade leak path' of the world, a line"
+            )
+        } else {
+            writeln!(
+                out,
+                "  --leak-path writes it into the world as a line, --leak-path=X,Y,Z from a point that should be in a room"
+            )
+        }
+    }
+}
