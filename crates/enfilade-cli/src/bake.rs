@@ -9,8 +9,10 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use enfilade::bake::bound::keep_bounds;
 use enfilade::bake::bsp::{bake_bsp, find_leak};
 use enfilade::bake::delaunay::{LEAST_BALL, bake_delaunay};
+use enfilade::bake::simplify::SimplifySettings;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
@@ -57,6 +59,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
+    settings.bsp.simplify.cost.check(&scene.materials)?;
     refuse_leak(scene, options)?;
     let (method, reason) = method_for(scene, options.method);
     let mut baked = bake_by(method, &reason, scene, options, &settings)?;
@@ -80,6 +83,9 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         } else {
             writeln!(io::stderr(), "there are none: the watershed's is kept")?;
         }
+    }
+    if method != Builder::Bsp {
+        keep_costs(&mut baked, &settings.costs_of_rooms());
     }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
@@ -129,9 +135,8 @@ fn bake_by(
         Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
         Builder::Bsp => {
             let mut config = settings.bsp.clone();
-            if settings.merges_brushes_only && scene.solids.is_empty() {
-                // A room of a building has few triangles; the shape of its openings says that it is one.
-                config.simplify.min_cost = 0.0;
+            if scene.solids.is_empty() {
+                config.simplify = settings.costs_of_rooms();
             }
             pool.install(|| bake_bsp(scene, &config, &ctx))
         }
@@ -141,6 +146,23 @@ fn bake_by(
         }
     }?;
     Ok(baked)
+}
+
+/// Cuts and merges cells of a builder that knows of no costs, where bounds are given.
+pub(crate) fn keep_costs(baked: &mut BakeOutput, asked: &SimplifySettings) {
+    let nothing = SimplifySettings {
+        cost: asked.cost.clone(),
+        outdoors: asked.outdoors,
+        ..SimplifySettings::default()
+    };
+    if *asked == nothing {
+        return;
+    }
+    let bounded = keep_bounds(&baked.world, asked);
+    baked.notes.extend(bounded.note());
+    baked.world = bounded.world;
+    let told = &mut baked.world.graph.provenance.settings;
+    told.extend(asked.to_settings());
 }
 
 fn n_indoors(baked: &BakeOutput) -> usize {
@@ -283,6 +305,8 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     let wanted = if nx > 0 {
         writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
         config.voxel.unwrap_or(config.min_opening / 6.0)
+    } else if baked.voxel == 0.0 {
+        f64::INFINITY
     } else {
         writeln!(
             err,
