@@ -339,16 +339,17 @@ fn resolve_bsp(
         let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
         Ok(Plane::through(DVec3::new(x, y, z), normal))
     };
+    let max_cost = options
+        .max_cost
+        .map(f64::from)
+        .or(table.max_cost.map(|v| v.0));
     let simplify = SimplifySettings {
         min_cost: options
             .min_cost
             .map(f64::from)
             .or(table.min_cost.map(|v| v.0))
-            .unwrap_or(MERGE_BELOW),
-        max_cost: options
-            .max_cost
-            .map(f64::from)
-            .or(table.max_cost.map(|v| v.0)),
+            .unwrap_or_else(|| max_cost.unwrap_or(MERGE_BELOW).min(MERGE_BELOW)),
+        max_cost,
         outdoors: options.split_outdoors || table.split_outdoors == Some(true),
         max_cells: table.max_cells,
         max_portals: table.max_portals,
