@@ -50,7 +50,6 @@ fn a_grid_makes_cells_in_a_vessel_whichever_way_it_faces() {
             config.guide.grid = Some(grid);
             let world = baked(&g, &config);
             let n = n_indoors(&world);
-            println!("{grid} {is_turned}: {n}");
             assert!(n >= least, "{grid} {is_turned}: {n}");
             let cell = |x: f64| world.graph.locator.locate(DVec3::new(x, 0.1, 0.1));
             assert_ne!(cell(-0.5), cell(0.5), "{grid}");

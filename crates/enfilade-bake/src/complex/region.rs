@@ -75,5 +75,5 @@ pub(crate) fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
         .iter()
         .map(|(face, points)| poly::area(points) * face.signed_distance(middle) / 3.0)
         .sum();
-    (volume > 0.0).then(|| Shape { middle, volume })
+    (volume > 0.0).then_some(Shape { middle, volume })
 }
