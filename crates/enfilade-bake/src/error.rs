@@ -45,6 +45,9 @@ pub enum BakeError {
         /// Width of the narrowest opening that must be found. [Units: wu]
         min_opening: f64,
     },
+    /// A cost is given for a material that the scene has not.
+    #[error(transparent)]
+    Material(#[from] crate::simplify::UnknownMaterial),
     /// The scene has no tetrahedra.
     #[error(transparent)]
     Tetrahedra(#[from] crate::delaunay::DelaunayError),

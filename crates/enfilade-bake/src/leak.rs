@@ -124,7 +124,8 @@ pub fn find_leak_trail(
     }
     let frame = Frame::of(&matter);
     let grid = config.grid(&bounds_of(&frame.triangles_to_grid(&matter)))?;
-    matter.extend(closure_triangles(scene));
+    let leaves = closure_triangles(scene, &Bvh::build(&matter));
+    matter.extend(leaves);
     let matter = frame.triangles_to_grid(&matter);
     let distances = distance_squared(&voxelize(&grid, &matter));
     let enclosure = enclosure(grid.dims, &distances);

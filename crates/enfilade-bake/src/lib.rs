@@ -5,6 +5,7 @@
 //! ([`complex`]), so that the promises hold whatever the voxels missed.
 
 mod assemble;
+pub mod bound;
 pub mod bsp;
 pub mod complex;
 mod config;

@@ -54,6 +54,7 @@ fn merged_worlds_keep_their_promises_and_bounds() {
                 area: 0.1,
                 ..CostModel::default()
             },
+            ..SimplifySettings::default()
         };
         let bound = simplify(
             &world,

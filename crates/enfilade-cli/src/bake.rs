@@ -11,8 +11,10 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use enfilade::bake::bound::keep_bounds;
 use enfilade::bake::bsp::{bake_bsp, find_leak};
 use enfilade::bake::delaunay::{LEAST_BALL, bake_delaunay};
+use enfilade::bake::simplify::SimplifySettings;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
@@ -59,6 +61,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
+    settings.bsp.simplify.cost.check(&scene.materials)?;
     refuse_leak(scene, options)?;
     let mut leak_path = match options.leak_path {
         Some(from) => Some(leak_path::look_as_asked(
@@ -96,6 +99,9 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         baked.world.leak_path = path.points();
     } else if n_indoors(&baked) == 0 {
         leak_path = Some(leak_path::look_unasked(scene, config, options.threads)?);
+    }
+    if method != Builder::Bsp {
+        keep_costs(&mut baked, &settings.costs_of_rooms());
     }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
@@ -148,9 +154,8 @@ fn bake_by(
         Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
         Builder::Bsp => {
             let mut config = settings.bsp.clone();
-            if settings.merges_brushes_only && scene.solids.is_empty() {
-                // A room of a building has few triangles; the shape of its openings says that it is one.
-                config.simplify.min_cost = 0.0;
+            if scene.solids.is_empty() {
+                config.simplify = settings.costs_of_rooms();
             }
             pool.install(|| bake_bsp(scene, &config, &ctx))
         }
@@ -160,6 +165,23 @@ fn bake_by(
         }
     }?;
     Ok(baked)
+}
+
+/// Cuts and merges cells of a builder that knows of no costs, where bounds are given.
+pub(crate) fn keep_costs(baked: &mut BakeOutput, asked: &SimplifySettings) {
+    let nothing = SimplifySettings {
+        cost: asked.cost.clone(),
+        outdoors: asked.outdoors,
+        ..SimplifySettings::default()
+    };
+    if *asked == nothing {
+        return;
+    }
+    let bounded = keep_bounds(&baked.world, asked);
+    baked.notes.extend(bounded.note());
+    baked.world = bounded.world;
+    let told = &mut baked.world.graph.provenance.settings;
+    told.extend(asked.to_settings());
 }
 
 fn n_indoors(baked: &BakeOutput) -> usize {

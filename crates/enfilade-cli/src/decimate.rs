@@ -9,13 +9,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::bake::delaunay::{DelaunayConfig, JOINED, Session, Step, bake_session};
+use enfilade::bake::simplify::SimplifySettings;
 use enfilade::bake::{BakeContext, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 use enfilade::import::import;
 
 use crate::bake::delaunay::choices_text;
-use crate::bake::{print_summary, settings};
+use crate::bake::{keep_costs, print_summary, settings};
 use crate::output::{check_target, write_atomically};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
@@ -47,6 +48,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     let config = args.options.delaunay.resolve(&settings.watershed)?;
     let imported = import(&args.inputs, &args.options.detail, &settings.import)?;
     let scene = &imported.scene;
+    settings.bsp.simplify.cost.check(&scene.materials)?;
     let session = Session::begin(scene, &config, &BakeContext::new(&Silent, None))?;
     let n = session.decimation.steps.len();
     if let Some(at) = args.at.filter(|&at| at > n) {
@@ -57,6 +59,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         at: args.at.unwrap_or(session.decimation.stop),
         session,
         config,
+        costs: settings.costs_of_rooms(),
         made: Vec::new(),
         is_saved: true,
     };
@@ -99,6 +102,8 @@ struct Walk<'a> {
     scene: &'a Scene,
     session: Session,
     config: DelaunayConfig,
+    /// Bounds on the cells that a bake makes.
+    costs: SimplifySettings,
     /// Steps taken.
     at: usize,
     /// Decisions of this walk, true to keep, in order.
@@ -266,7 +271,11 @@ impl Walk<'_> {
 
     fn bake(&self, path: &Path, out: &mut impl Write) -> anyhow::Result<()> {
         let context = BakeContext::new(&Silent, None);
-        let baked = bake_session(self.scene, &self.session, self.at, &self.config, &context)?;
+        let mut baked = bake_session(self.scene, &self.session, self.at, &self.config, &context)?;
+        keep_costs(&mut baked, &self.costs);
+        for note in &baked.notes {
+            writeln!(out, "{note}")?;
+        }
         let bytes =
             encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
         write_atomically(path, &bytes)?;
@@ -301,6 +310,7 @@ mod tests {
             scene: &scene,
             session,
             config,
+            costs: SimplifySettings::default(),
             at: stop,
             made: Vec::new(),
             is_saved: true,

@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
+use enfilade::bake::simplify::{CostModel, portal_scores};
 use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
 use serde::Serialize;
 
@@ -62,6 +63,9 @@ struct PortalReport<'a> {
     width: f32,
     height: f32,
     pieces: usize,
+    visible_volume: f64,
+    balance: f64,
+    score: f64,
     normal: [f32; 3],
     outline: &'a [[f32; 3]],
 }
@@ -108,20 +112,29 @@ fn report(world: &World) -> Report<'_> {
         portals: c.portals.iter().map(|p| p.0).collect(),
         outdoor: c.outdoor,
     });
-    let portals = graph.portals.iter().enumerate().map(|(id, p)| {
-        let [width, height] = p.size();
-        PortalReport {
-            id,
-            cells: p.cells.map(|c| c.0),
-            kind: kind_name(p.kind),
-            area: p.area,
-            width,
-            height,
-            pieces: p.pieces.len(),
-            normal: p.normal,
-            outline: &p.outline,
-        }
-    });
+    let scores = portal_scores(world, &CostModel::default());
+    let portals = graph
+        .portals
+        .iter()
+        .zip(&scores)
+        .enumerate()
+        .map(|(id, (p, s))| {
+            let [width, height] = p.size();
+            PortalReport {
+                id,
+                cells: p.cells.map(|c| c.0),
+                kind: kind_name(p.kind),
+                area: p.area,
+                width,
+                height,
+                pieces: p.pieces.len(),
+                visible_volume: s.visible_volume,
+                balance: s.balance,
+                score: s.score(),
+                normal: p.normal,
+                outline: &p.outline,
+            }
+        });
     let holes = graph.suspected_holes().into_iter().map(|h| HoleReport {
         portal: h.portal.0,
         position: h.position,
@@ -193,19 +206,32 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     }
     writeln!(
         out,
-        "\n{:>6}  {:<8} {:>15} {:>9} {:>9} {:>10} {:>7}  middle in m",
-        "portal", "kind", "cells", "width m", "height m", "area m²", "pieces"
+        "\n{:>6}  {:<8} {:>15} {:>9} {:>9} {:>10} {:>7} {:>10} {:>8} {:>9}  middle in m",
+        "portal",
+        "kind",
+        "cells",
+        "width m",
+        "height m",
+        "area m²",
+        "pieces",
+        "seen m³",
+        "balance",
+        "score"
     )?;
-    for (id, p) in graph.portals.iter().enumerate() {
+    let scores = portal_scores(world, &CostModel::default());
+    for (id, (p, s)) in graph.portals.iter().zip(&scores).enumerate() {
         let [width, height] = p.size();
         let [x, y, z] = p.center();
         let cells = format!("{} – {}", p.cells[0].0, p.cells[1].0);
         writeln!(
             out,
-            "{id:>6}  {:<8} {cells:>15} {width:>9.2} {height:>9.2} {:>10.3} {:>7}  {x:.2} {y:.2} {z:.2}",
+            "{id:>6}  {:<8} {cells:>15} {width:>9.2} {height:>9.2} {:>10.3} {:>7} {:>10.1} {:>8.0} {:>9.2e}  {x:.2} {y:.2} {z:.2}",
             kind_name(p.kind),
             p.area,
-            p.pieces.len()
+            p.pieces.len(),
+            s.visible_volume,
+            s.balance,
+            s.score()
         )?;
     }
     writeln!(out)?;

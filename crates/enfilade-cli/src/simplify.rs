@@ -1,17 +1,18 @@
-//! `enfilade simplify`: a graph becomes a simpler one.
+//! `enfilade simplify`: a graph becomes a simpler one, of cells within bounds.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::simplify::{CostModel, Metric, Simplified, SimplifySettings, simplify};
+use enfilade::bake::bound::keep_bounds;
+use enfilade::bake::simplify::{CostModel, Metric, Simplified, SimplifySettings};
 use enfilade::cpg::World;
 use enfilade::cpg::wire::encode_glb;
 
 use crate::output::{check_target, write_atomically};
 use crate::world::read_world;
 
-/// Merges cells of a world until their costs are within bounds.
+/// Merges and cuts cells of a world until their costs are within bounds.
 #[derive(clap::Args)]
 pub(crate) struct Simplify {
     /// World, whatever built it.
@@ -29,9 +30,12 @@ pub(crate) struct Simplify {
     /// Merge cells that cost less than this, as far as the upper bound allows.
     #[arg(long, value_name = "COST", value_parser = parse_cost)]
     min_cost: Option<f64>,
-    /// No merge makes a cell that costs more than this.
+    /// Cells that cost more than this are cut, and none is merged to more; what cannot be met is told.
     #[arg(long, value_name = "COST", value_parser = parse_cost)]
     max_cost: Option<f64>,
+    /// With `--max-cost`: cut the outdoors, too.
+    #[arg(long)]
+    split_outdoors: bool,
     /// How portals are compared.
     #[arg(long, value_enum, default_value_t = MetricName::ExpectedTriangles)]
     metric: MetricName,
@@ -76,8 +80,9 @@ fn parse_material(text: &str) -> Result<(String, f64), String> {
 }
 
 pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
-    if args.max_cells.is_none() && args.max_portals.is_none() && args.min_cost.is_none() {
-        bail!("nothing to do: give --max-cells, --max-portals or --min-cost");
+    let numbers = args.max_cells.or(args.max_portals);
+    if numbers.is_none() && args.min_cost.or(args.max_cost).is_none() {
+        bail!("nothing to do: give --max-cells, --max-portals, --min-cost or --max-cost");
     }
     if let (Some(min), Some(max)) = (args.min_cost, args.max_cost)
         && min > max
@@ -89,6 +94,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     let settings = SimplifySettings {
         min_cost: args.min_cost.unwrap_or(0.0),
         max_cost: args.max_cost,
+        outdoors: args.split_outdoors,
         max_cells: args.max_cells,
         max_portals: args.max_portals,
         metric: match args.metric {
@@ -102,26 +108,27 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
             materials: args.material_cost.iter().cloned().collect(),
         },
     };
-    let simplified = simplify(&world, &settings);
+    settings.cost.check(&world.materials)?;
+    let bounded = keep_bounds(&world, &settings);
     write(
         &args.output,
         &world,
-        &simplified.world,
-        &cost_line(&simplified),
+        &bounded.world,
+        &costs_text(bounded.costs),
     )?;
-    if let Some(max) = args.max_cost.filter(|m| simplified.max_cost > *m) {
-        writeln!(
-            io::stderr(),
-            "a cell costs {:.0}, more than {max}, and did before; only a bake can cut it",
-            simplified.max_cost
-        )?;
+    if let Some(note) = bounded.note() {
+        writeln!(io::stderr(), "{note}")?;
     }
     Ok(())
 }
 
 /// What its cells cost.
 pub(crate) fn cost_line(s: &Simplified) -> String {
-    format!("cost of a cell {:.0} to {:.0}\n", s.min_cost, s.max_cost)
+    costs_text([s.min_cost, s.max_cost])
+}
+
+fn costs_text([min, max]: [f64; 2]) -> String {
+    format!("cost of a cell {min:.0} to {max:.0}\n")
 }
 
 /// Writes a world made from another one, and says how they compare.

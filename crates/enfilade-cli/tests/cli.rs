@@ -59,10 +59,12 @@ fn inspect_prints_the_agreed_json() {
             "outdoor": false})
     );
     assert_eq!(report["cells"][2]["outdoor"], json!(true));
+    let seen = report["portals"][0]["visible_volume"].as_f64().unwrap();
+    assert!(seen > 0.0);
     assert_eq!(
         report["portals"][0],
         json!({"id": 0, "cells": [0, 1], "kind": "open", "area": 2.1, "width": 1.0, "height": 2.1,
-            "pieces": 1, "normal": [1.0, 0.0, 0.0],
+            "pieces": 1, "visible_volume": seen, "balance": 4.0, "score": 4.0 * seen, "normal": [1.0, 0.0, 0.0],
             "outline": [[4.0, 0.0, 2.0], [4.0, 2.1, 2.0], [4.0, 2.1, 3.0], [4.0, 0.0, 3.0]]})
     );
     assert_eq!(report["portals"][1]["kind"], json!("window"));

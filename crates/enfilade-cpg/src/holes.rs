@@ -48,13 +48,15 @@ pub struct Hole {
 impl CellPortalGraph {
     /// Openings to outdoors that may be holes of the model, the largest first.
     ///
-    /// Cracks are left out: they are known by their kind. O(n log n) for n portal corners.
+    /// Cracks are left out: they are known by their kind. So is what opens to an outdoors that sees no triangle, where the
+    /// air around the scene was parted from the air beyond: that lies in no wall. O(n log n) for n portal corners.
     #[must_use]
     pub fn suspected_holes(&self) -> Vec<Hole> {
         let is_outdoor = |p: &Portal| {
             p.cells
                 .iter()
-                .any(|c| self.cells.get(c.0 as usize).is_some_and(|c| c.outdoor))
+                .filter_map(|c| self.cells.get(c.0 as usize))
+                .any(|c| c.outdoor && c.n_triangles > 0)
         };
         let mut holes: Vec<Hole> = (0..)
             .zip(&self.portals)
@@ -147,6 +149,7 @@ mod tests {
     fn graph(portals: Vec<(PortalKind, [f32; 3], Vec<[f32; 3]>)>) -> CellPortalGraph {
         let cell = |outdoor| Cell {
             outdoor,
+            n_triangles: 12,
             ..Cell::default()
         };
         CellPortalGraph {
@@ -176,6 +179,15 @@ mod tests {
     }
 
     const X: [f32; 3] = [1.0, 0.0, 0.0];
+
+    #[test]
+    fn an_outdoors_that_sees_nothing_has_no_wall_for_holes() {
+        let ragged = upright(&[[0.0, 0.0], [2.0, 0.3], [1.1, 2.0]]);
+        let mut g = graph(vec![(PortalKind::Open, X, ragged)]);
+        assert_eq!(g.suspected_holes().len(), 1);
+        g.cells[0].n_triangles = 0;
+        assert_eq!(g.suspected_holes().len(), 0);
+    }
 
     #[test]
     fn doors_windows_arches_and_portholes_are_no_holes() {

@@ -1,12 +1,14 @@
 //! A bake whose portals are the separators of a tree.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding};
+use enfilade_geom::{Bvh, DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::Cut;
+use crate::bound::keep_bounds;
+use crate::complex::region::Shape;
 use crate::complex::{ComplexInput, LabelSettings, Vote, build_complex};
 use crate::pipeline::structural_triangles;
-use crate::simplify::{SimplifySettings, simplify};
+use crate::simplify::SimplifySettings;
 use crate::watershed::{
     MergeSettings, OUTDOORS, Screen, bounds_of, closure_triangles, find_stairs, slab_heights,
 };
@@ -15,7 +17,7 @@ use crate::{BakeContext, BakeError, BakeOutput, SmallestHole};
 use super::cells::{self, Cells, NO_CELL};
 use super::inside::Soup;
 use super::rooms::{self, Evidence};
-use super::{Bsp, BspInput, Guide, Heuristic, arrange, leak, separator, shape, split};
+use super::{Bsp, BspInput, Guide, Heuristic, arrange, guided, leak, separator, shape};
 
 /// Settings of a bake by binary space partition.
 #[derive(Clone, Debug, Default)]
@@ -24,7 +26,7 @@ pub struct BspConfig {
     pub heuristic: Heuristic,
     /// Planes to begin with.
     pub guide: Guide,
-    /// Bounds on the cells, and what a cell costs. Cells above the upper bound are split.
+    /// Bounds on the cells, and what a cell costs. Cells above the upper bound are cut.
     pub simplify: SimplifySettings,
     /// Whether cells become rooms by the shape of the openings between them.
     pub rooms: Rooms,
@@ -53,7 +55,7 @@ pub enum Rooms {
 /// [`crate::bake`]: the world comes out of the same cell complex.
 ///
 /// # Errors
-/// When nothing is structural, or the caller cancels.
+/// When nothing is structural, a cost is given for a material that the scene has not, or the caller cancels.
 pub fn bake_bsp(
     scene: &Scene,
     config: &BspConfig,
@@ -61,6 +63,7 @@ pub fn bake_bsp(
 ) -> Result<BakeOutput, BakeError> {
     // 1. Leaves and their portals; separators; cells.
     context.bsp_stage(0)?;
+    config.simplify.cost.check(&scene.materials)?;
     let (sources, triangles) = structural_triangles(scene);
     if triangles.is_empty() {
         return Err(BakeError::NothingStructural {
@@ -85,51 +88,27 @@ pub fn bake_bsp(
         .filter(|s| !*s.1)
         .map(|s| s.0.object)
         .collect();
-    let mut bsp = Bsp::build(
-        &input_of(scene, &walls, &objects, &leak::inside_of(scene)),
+    let inside = leak::inside_of(scene);
+    let mut bsp = guided::build(
+        &input_of(scene, &walls, &objects, &inside),
         config.heuristic,
         &config.guide,
     );
     let counts = bsp.counts();
     context.bsp_stage(1)?;
-    let by_shape = match config.rooms {
-        Rooms::Auto => scene.solids.is_empty(),
-        rooms => rooms == Rooms::Always,
-    };
-    let (parted, shapes) = if by_shape {
-        let settings = &config.merge;
-        arrange::refine(&mut bsp, settings);
-        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
-        let evidence = Evidence {
-            shapes: &shapes,
-            closures: &Bvh::build(&closure_triangles(scene, &Bvh::build(&walls))),
-            slabs: &slab_heights(&walls),
-        };
-        let parted = rooms::part(&bsp, separator::find_in_walls(&bsp), &evidence, settings);
-        (parted, shapes)
-    } else {
-        let parted = cells::part(&bsp, separator::find(&bsp));
-        (parted, shape::shapes(&bsp.tree, &bsp.tolerance))
-    };
-    let mut screens = screens_of(&bsp, &parted);
-    let mut votes = Votes::of(&bsp, &parted, &shapes);
+    let Parted {
+        cells: parted,
+        shapes,
+        is_narrow,
+    } = Parted::of(scene, &mut bsp, &walls, config);
+    let screens = screens_of(&bsp, &parted);
+    let mut votes = Votes::of(&bsp, &parted, &shapes, &is_narrow);
     if !stairs.is_empty() {
         let matter = Soup::of(&stairs, &[]);
         votes.0.retain(|v| !matter.is_inside(v.point));
     }
-    if by_shape {
-        // What leaks from them into a room is part of that room; the complex sees to it.
-        let is_narrow = rooms::narrow_cells(&bsp, &parted, &config.merge);
-        votes.0.retain(|v| {
-            let cell = v.label.checked_sub(OUTDOORS + 1);
-            !cell.is_some_and(|c| is_narrow[c as usize])
-        });
-    }
     let n_before = parted.n_cells;
     let n_separators = parted.separators.len();
-    if let Some(bound) = config.simplify.max_cost {
-        split::split_large(&bsp, &parted, bound, &mut screens, &mut votes.0);
-    }
 
     // 2. The complex makes it exact.
     context.bsp_stage(2)?;
@@ -183,16 +162,58 @@ pub fn bake_bsp(
         closed_share: 1.1,
     }
     .into_world("bsp", config.to_settings(), &statistics);
-    let world = simplify(&world, &config.simplify).world;
+    let bounded = keep_bounds(&world, &config.simplify);
     context.end_stage();
     Ok(BakeOutput {
-        world,
+        notes: bounded.note().into_iter().collect(),
+        world: bounded.world,
         voxel: 0.0,
         dims: [0; 3],
         times: context.times(),
         leaks,
-        notes: Vec::new(),
     })
+}
+
+/// The leaves by cell.
+struct Parted {
+    cells: Cells,
+    shapes: Vec<Option<Shape>>,
+    /// Whether each leaf is of what is too narrow for a room, where shape tells rooms; a guide's cells are as narrow as it
+    /// says.
+    is_narrow: Vec<bool>,
+}
+
+impl Parted {
+    fn of(scene: &Scene, bsp: &mut Bsp, walls: &[Triangle], config: &BspConfig) -> Self {
+        let by_shape = match config.rooms {
+            Rooms::Auto => scene.solids.is_empty(),
+            rooms => rooms == Rooms::Always,
+        };
+        if !by_shape {
+            return Self {
+                cells: cells::part(bsp, separator::find(bsp)),
+                shapes: shape::shapes(&bsp.tree, &bsp.tolerance),
+                is_narrow: Vec::new(),
+            };
+        }
+        let settings = &config.merge;
+        arrange::refine(bsp, settings);
+        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+        let evidence = Evidence {
+            shapes: &shapes,
+            closures: &Bvh::build(&closure_triangles(scene, &Bvh::build(walls))),
+            slabs: &slab_heights(walls),
+        };
+        let rooms = rooms::part(bsp, separator::find_in_walls(bsp), &evidence, settings);
+        let narrow = rooms::narrow_cells(bsp, &rooms, settings);
+        let outer = rooms.of_leaf[bsp.outer_leaf() as usize];
+        let of_leaf = |&c: &u32| c != outer && narrow.get(c as usize).is_some_and(|n| *n);
+        Self {
+            is_narrow: rooms.of_leaf.iter().map(of_leaf).collect(),
+            cells: guided::part(bsp, rooms),
+            shapes,
+        }
+    }
 }
 
 impl BspConfig {
@@ -267,7 +288,7 @@ fn screens_of(bsp: &Bsp, cells: &Cells) -> Vec<Screen> {
     out
 }
 
-pub(super) fn screen(winding: &Winding, regions: [u32; 2]) -> Screen {
+fn screen(winding: &Winding, regions: [u32; 2]) -> Screen {
     Screen {
         regions,
         winding: winding.clone(),
@@ -295,13 +316,12 @@ fn grown(w: &Winding, plane: &Plane, by: f64) -> Winding {
 }
 
 /// A vote of each leaf for its cell.
-pub(super) struct Votes(pub(super) Vec<Vote>);
+struct Votes(Vec<Vote>);
 
 impl Votes {
-    fn of(bsp: &Bsp, cells: &Cells, shapes: &[Option<shape::Shape>]) -> Self {
+    fn of(bsp: &Bsp, cells: &Cells, shapes: &[Option<Shape>], is_narrow: &[bool]) -> Self {
         // With triangles the air around everything is a cell; its label says so.
-        let b: &Aabb = &bsp.tree.bounds;
-        let outer = cells.of_leaf[bsp.tree.leaf_of(b.min + b.size() * 1e-4) as usize];
+        let outer = cells.of_leaf[bsp.outer_leaf() as usize];
         let label = |cell: u32| {
             if cell == outer {
                 OUTDOORS
@@ -309,9 +329,11 @@ impl Votes {
                 OUTDOORS + 1 + cell
             }
         };
-        let of_leaf = |(leaf, shape): (usize, &Option<shape::Shape>)| {
+        let of_leaf = |(leaf, shape): (usize, &Option<Shape>)| {
             let (cell, shape) = (cells.of_leaf[leaf], (*shape)?);
-            (cell != NO_CELL).then(|| Vote {
+            // What leaks from a narrow one into a room is part of that room; the complex sees to it.
+            let counts = cell != NO_CELL && !is_narrow.get(leaf).is_some_and(|n| *n);
+            counts.then(|| Vote {
                 point: shape.middle,
                 label: label(cell),
                 weight: shape.volume as f32,

@@ -19,6 +19,11 @@ pub struct Guide {
 const MAX_FAMILY: f64 = 256.0;
 
 impl Guide {
+    /// Whether there is nothing in it.
+    pub(super) fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
     /// All its planes within bounds.
     pub(super) fn planes(&self, bounds: &Aabb) -> Vec<Plane> {
         let mut out = self.planes.clone();

@@ -13,9 +13,10 @@
 //! | 2: separators, valid and invalid | `separator` |
 //! | 3: cells, crossing separators | `cells` |
 //! | separators that the arrangement would have shown (§3.0.2) | `arrange` |
+//! | cells of a guide where there are no walls | `guided` |
 //! | rooms: separators that are a pinch, in buildings | `rooms`, `lattice` |
 //! | matter, where surfaces are triangles | `inside` |
-//! | 4: cells above the bound | `split` |
+//! | 4: cells above the bound | [`crate::bound`] |
 //! | leaks, as a path | `leak` |
 //!
 //! Where it departs from the paper: with brushes, the surface of their union is made first and what
@@ -27,6 +28,7 @@ mod arrange;
 mod cells;
 mod decompose;
 mod guide;
+mod guided;
 mod inside;
 mod lattice;
 mod leak;
@@ -34,7 +36,6 @@ mod portals;
 mod rooms;
 mod separator;
 mod shape;
-mod split;
 mod surfaces;
 mod tree;
 
@@ -43,7 +44,6 @@ use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding};
 pub use decompose::{BspConfig, Rooms, bake_bsp};
 pub use guide::Guide;
 pub use leak::{LeakPath, find_leak};
-pub(crate) use shape::{Region, halves, shape_of, whole};
 
 use portals::LeafPortal;
 use tree::{Content, Tree};
@@ -109,6 +109,8 @@ pub struct Bsp {
     tolerance: Tolerance,
     /// Every surface's polygon, as the tree was built from.
     surfaces: Vec<tree::Fragment>,
+    /// Planes from this number on are a guide's alone.
+    n_own_planes: u32,
     /// Whether they are triangles, not faces of solids.
     is_of_triangles: bool,
     /// Whether each leaf counts: empty, and reached from inside if that is known.
@@ -156,6 +158,16 @@ impl Bsp {
     /// inside, and once of those. Time near-linear in surfaces that are spread out; deterministic.
     #[must_use]
     pub fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -> Self {
+        Self::build_of(input, heuristic, guide, true)
+    }
+
+    /// The same; where triangles bound no matter there is air on both sides of them.
+    fn build_of(
+        input: &BspInput<'_>,
+        heuristic: Heuristic,
+        guide: &Guide,
+        has_matter: bool,
+    ) -> Self {
         let (planes, fragments, bounds, tolerance) = surfaces::gather(input);
         let boxes: Vec<Aabb> = input.solids.iter().map(ConvexSolid::aabb).collect();
         let solids = BoxTree::new(&boxes);
@@ -182,13 +194,16 @@ impl Bsp {
                 });
             } else if !input.triangles.is_empty() {
                 let soup = inside::Soup::of(input.triangles, input.objects);
-                settle(&mut tree, &tolerance, true, &|p| soup.is_inside(p));
+                settle(&mut tree, &tolerance, true, &|p| {
+                    has_matter && soup.is_inside(p)
+                });
             }
             let mut bsp = Self {
                 portals: portals::leaf_portals(&tree, &tolerance),
                 tree,
                 tolerance,
                 surfaces: fragments,
+                n_own_planes: planes.len() as u32,
                 is_of_triangles: boxes.is_empty(),
                 is_open: Vec::new(),
                 leak: None,
@@ -308,6 +323,12 @@ impl Bsp {
             .map(|&c| c == Content::Empty)
             .collect();
         self.drop_closed_portals();
+    }
+
+    /// A leaf of the air around everything, in a corner of the box.
+    fn outer_leaf(&self) -> u32 {
+        let b = &self.tree.bounds;
+        self.tree.leaf_of(b.min + b.size() * 1e-4)
     }
 
     /// Whether each plane may be a wall's: of triangles, it holds two or more. Each triangle of a curved

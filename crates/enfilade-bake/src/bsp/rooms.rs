@@ -16,13 +16,14 @@ use enfilade_geom::{Aabb, Bvh, DVec3};
 use rayon::prelude::*;
 
 use crate::complex::poly;
+use crate::complex::region::Shape;
 use crate::watershed::MergeSettings;
 
 use super::Bsp;
 use super::cells::{self, Cells, NO_CELL};
 use super::lattice::{Lattice, NONE};
 use super::separator::{self, Separator};
-use super::shape::{self, Shape};
+use super::shape;
 
 /// A door leaf this near to a separator's plane closes it. [Units: wu]
 const CLOSURE_REACH: f64 = 0.25;
@@ -82,9 +83,6 @@ pub(super) fn part(
         .par_iter()
         .map(|s| Lattice::of(bsp, s, settings))
         .collect();
-    let outer_leaf = bsp
-        .tree
-        .leaf_of(bsp.tree.bounds.min + bsp.tree.bounds.size() * 1e-4);
     let mut merger = Merger {
         bsp,
         settings,
@@ -106,7 +104,7 @@ pub(super) fn part(
         of_leaf: &of_leaf,
         parent: (0..n_cells as u32).collect(),
         version: vec![0; n_cells],
-        outer: of_leaf[outer_leaf as usize],
+        outer: of_leaf[bsp.outer_leaf() as usize],
         neighbors: vec![BTreeSet::new(); n_cells],
         openings: BTreeMap::new(),
         storeys_apart: true,

@@ -8,6 +8,8 @@
 //! Time: near-linear in portals and surfaces that are spread out; each removal looks at the neighbors of
 //! one portal only.
 
+use std::collections::BTreeMap;
+
 use enfilade_geom::{Aabb, BoxTree, DVec3, Sets};
 use rayon::prelude::*;
 use smallvec::SmallVec;
@@ -26,18 +28,46 @@ pub(super) struct Separator {
     pub(super) area: f64,
 }
 
+/// What counts as touching. [Units: tolerance of planes]
+const EPS: f64 = 4.0;
+
 /// All valid separators, ordered by plane and first portal.
 pub(super) fn find(bsp: &Bsp) -> Vec<Separator> {
-    find_in(bsp, &|_| true)
+    find_in(bsp, EPS, &|_| true)
 }
 
 /// The valid separators in planes that may be a wall's.
 pub(super) fn find_in_walls(bsp: &Bsp) -> Vec<Separator> {
     let is_wall = bsp.wall_planes();
-    find_in(bsp, &|plane| is_wall[plane as usize])
+    find_in(bsp, EPS, &|plane| is_wall[plane as usize])
 }
 
-fn find_in(bsp: &Bsp, is_wanted: &dyn Fn(u32) -> bool) -> Vec<Separator> {
+/// The valid separators in planes that only a guide gave.
+pub(super) fn find_in_guides(bsp: &Bsp) -> Vec<Separator> {
+    // Of curved surfaces the tree makes many slivers, which are closed; portals beside one are as far apart as it was wide.
+    find_in(bsp, 2.0 * EPS, &|plane| plane >= bsp.n_own_planes)
+}
+
+/// How much of a separator's rim lies on surfaces of each plane. [Units: wu]
+pub(super) fn rim(bsp: &Bsp, s: &Separator, solids: &BoxTree) -> BTreeMap<u32, f64> {
+    let eps = 2.0 * EPS * bsp.tolerance.plane;
+    let mut lengths = BTreeMap::new();
+    for &p in &s.portals {
+        let points = &bsp.portals[p as usize].points;
+        for (i, &a) in points.iter().enumerate() {
+            let b = points[(i + 1) % points.len()];
+            solids.for_each_in_box(&Aabb::of_points(&[a, b]).expanded(eps), |surface| {
+                let f = &bsp.surfaces[surface as usize];
+                if let Some([from, to]) = on_surface(a, b, f, bsp, eps) {
+                    *lengths.entry(f.plane).or_default() += (to - from) * a.distance(b);
+                }
+            });
+        }
+    }
+    lengths
+}
+
+fn find_in(bsp: &Bsp, reach: f64, is_wanted: &dyn Fn(u32) -> bool) -> Vec<Separator> {
     let boxes: Vec<Aabb> = bsp
         .surfaces
         .iter()
@@ -53,7 +83,7 @@ fn find_in(bsp: &Bsp, is_wanted: &dyn Fn(u32) -> bool) -> Vec<Separator> {
         .collect();
     groups
         .into_par_iter()
-        .flat_map_iter(|g| of_plane(bsp, g, &solids))
+        .flat_map_iter(|g| of_plane(bsp, reach, g, &solids))
         .collect()
 }
 
@@ -69,8 +99,8 @@ struct Edge {
     slack: f64,
 }
 
-fn of_plane(bsp: &Bsp, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
-    let eps = 4.0 * bsp.tolerance.plane;
+fn of_plane(bsp: &Bsp, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
+    let eps = reach * bsp.tolerance.plane;
     let points = |k: usize| &bsp.portals[group[k] as usize].points;
     let boxes: Vec<Aabb> = (0..group.len())
         .map(|k| Aabb::of_points(points(k)).expanded(eps))
@@ -118,7 +148,7 @@ fn of_plane(bsp: &Bsp, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
             }
         }
     }
-    let mut by_root = std::collections::BTreeMap::<u32, Vec<u32>>::new();
+    let mut by_root = BTreeMap::<u32, Vec<u32>>::new();
     for k in (0..group.len()).filter(|&k| is_alive[k]) {
         by_root
             .entry(sets.find(k as u32))

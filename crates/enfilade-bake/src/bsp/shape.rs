@@ -1,25 +1,11 @@
 //! Where each leaf is: its box, its volume and a point well inside.
 
-use std::collections::BTreeMap;
+use enfilade_geom::DVec3;
 
-use enfilade_geom::{Aabb, DVec3, Plane};
-
-use crate::complex::poly::{self, Poly, Sides};
+use crate::complex::region::{Region, Shape, halves, shape_of, whole};
 
 use super::Tolerance;
 use super::tree::{Tree, leaf_index};
-
-/// A leaf's measures.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
-    pub(crate) bounds: Aabb,
-    /// Mean of its corners.
-    pub(crate) middle: DVec3,
-    pub(crate) volume: f64,
-}
-
-/// A convex region by its faces, each with the plane that looks inwards.
-pub(crate) type Region = Vec<(Plane, Poly)>;
 
 /// Measures of all leaves; none for those that rounding has left without a volume.
 pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance) -> Vec<Option<Shape>> {
@@ -31,27 +17,6 @@ pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance) -> Vec<Option<Shape>> {
         tolerance.cut,
         &mut |leaf, region| {
             out[leaf as usize] = shape_of(&region);
-        },
-    );
-    out
-}
-
-/// The leaves for which `is_wanted` says so, with their faces.
-pub(super) fn regions(
-    tree: &Tree,
-    tolerance: &Tolerance,
-    is_wanted: &dyn Fn(u32) -> bool,
-) -> BTreeMap<u32, Region> {
-    let mut out = BTreeMap::new();
-    visit(
-        tree,
-        tree.root,
-        whole(&tree.bounds, tolerance.cut),
-        tolerance.cut,
-        &mut |leaf, region| {
-            if is_wanted(leaf) {
-                out.insert(leaf, region);
-            }
         },
     );
     out
@@ -106,19 +71,6 @@ pub(super) fn widths(
         .collect()
 }
 
-/// A box as a region.
-pub(crate) fn whole(b: &Aabb, eps: f64) -> Region {
-    let mut region = Region::new();
-    for n in [DVec3::X, DVec3::Y, DVec3::Z] {
-        for plane in [Plane::through(b.min, n), Plane::through(b.max, -n)] {
-            if let Some(face) = poly::section_of_box(&plane, &b.expanded(1e-6), eps) {
-                region.push((plane, face));
-            }
-        }
-    }
-    region
-}
-
 fn visit(tree: &Tree, child: i32, region: Region, eps: f64, take: &mut dyn FnMut(u32, Region)) {
     if child < 0 {
         return take(leaf_index(child), region);
@@ -131,58 +83,4 @@ fn visit(tree: &Tree, child: i32, region: Region, eps: f64, take: &mut dyn FnMut
     {
         visit(tree, child, region, eps, take);
     }
-}
-
-/// The parts before and behind a plane.
-pub(crate) fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
-    let mut sides = [Region::new(), Region::new()];
-    if let Some(mut cap) = poly::section_of_box(plane, bounds, eps) {
-        let is_there = region
-            .iter()
-            .all(|(face, _)| match poly::clip(&cap, face, eps) {
-                Some(rest) => {
-                    cap = rest;
-                    true
-                }
-                None => false,
-            });
-        if is_there {
-            sides[0].push((*plane, cap.clone()));
-            sides[1].push((plane.flipped(), cap));
-        }
-    }
-    for (face, points) in region {
-        match poly::split(&points, plane, eps) {
-            Sides::Front => sides[0].push((face, points)),
-            Sides::Back => sides[1].push((face, points)),
-            Sides::On => {
-                let side = usize::from(face.normal.dot(plane.normal) < 0.0);
-                sides[side].push((face, points));
-            }
-            Sides::Both(f, b) => {
-                sides[0].push((face, f));
-                sides[1].push((face, b));
-            }
-        }
-    }
-    sides
-}
-
-/// Measures of a region.
-pub(crate) fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
-    let corners = || region.iter().flat_map(|(_, points)| points.iter().copied());
-    let n = corners().count();
-    if region.len() < 4 {
-        return None;
-    }
-    let middle = corners().sum::<DVec3>() / n as f64;
-    let volume: f64 = region
-        .iter()
-        .map(|(face, points)| poly::area(points) * face.signed_distance(middle) / 3.0)
-        .sum();
-    (volume > 0.0).then(|| Shape {
-        bounds: corners().fold(Aabb::EMPTY, Aabb::including),
-        middle,
-        volume,
-    })
 }

@@ -1,14 +1,14 @@
 //! One cell of a finished world, cut in two by a screen.
 //!
-//! The complex is built from the cell's own triangles, the new screen (screen 0) and the pieces of
-//! the cell's portals (all others). What of the cell hangs together other than through screens is one
-//! part; the two parts that the screen has most of its opening between are the two new cells, and
-//! whatever else it cuts off joins one of them.
+//! The complex is built from the cell's own triangles, the new screens (which come first: one in a plane, or the
+//! sides of a box) and the pieces of the cell's portals (all others). What of the cell hangs together other than
+//! through screens is one part; the two parts that the new screens have most of their opening between are the two new
+//! cells, and whatever else they cut off joins one of them.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 
-use enfilade_geom::{DVec3, Plane, Sets, Winding};
+use enfilade_geom::{DVec3, Sets, Winding};
 
 use super::facet::{Cover, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{box_faces, sides_of_border};
@@ -20,6 +20,25 @@ use super::{Complex, poly};
 pub(crate) const FRONT: u32 = 0;
 /// The cell of [`Complex::divided`] behind it.
 pub(crate) const BACK: u32 = 1;
+
+/// What cuts a cell.
+pub(crate) struct Cutter<'a> {
+    /// The screens up to this number are the cutter's.
+    pub(crate) n_screens: u32,
+    /// How far a point lies before all of them; less than 0 behind. [Units: wu]
+    pub(crate) distance: &'a dyn Fn(DVec3) -> f64,
+}
+
+impl Cutter<'_> {
+    fn is_own(&self, screen: Option<u32>) -> bool {
+        screen.is_some_and(|s| s < self.n_screens)
+    }
+
+    /// Whether a leaf's middle lies before the screens.
+    fn is_before(&self, middle: Option<DVec3>) -> bool {
+        middle.is_some_and(|p| (self.distance)(p) >= 0.0)
+    }
+}
 
 /// Why a screen does not part a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,12 +60,12 @@ struct Opening {
 }
 
 impl Complex {
-    /// Parts what `is_ours` holds of by screen 0, which lies in `plane`.
+    /// Parts what `is_ours` holds of by the cutter's screens.
     ///
     /// The partition has two cells, [`FRONT`] and [`BACK`]; all else counts as solid. Linear in leaves and openings.
     pub(crate) fn divided(
         &self,
-        plane: &Plane,
+        cutter: &Cutter<'_>,
         is_ours: impl Fn(DVec3) -> bool,
     ) -> Result<Partition, Undivided> {
         let (openings, middles) = self.openings();
@@ -61,9 +80,9 @@ impl Complex {
         // Between which parts the new screen lies, and with how much of its opening.
         let mut between: BTreeMap<[u32; 2], f64> = BTreeMap::new();
         for o in openings.iter().filter(is_inner) {
-            if o.screen == Some(0) {
+            if cutter.is_own(o.screen) {
                 let mut pair = o.leaves.map(|l| sets.find(l));
-                if !is_before(plane, middles[o.leaves[0] as usize]) {
+                if !cutter.is_before(middles[o.leaves[0] as usize]) {
                     pair.swap(0, 1);
                 }
                 *between.entry(pair).or_default() += o.area;
@@ -72,7 +91,7 @@ impl Complex {
         let main = between.iter().max_by(|a, b| a.1.total_cmp(b.1));
         let &[front, back] = main.ok_or(Undivided::Aside)?.0;
         if front == back {
-            let around = Self::way_around(plane, &openings, &ours, &middles, &mut sets, front);
+            let around = Self::way_around(cutter, &openings, &ours, &middles, &mut sets, front);
             return Err(around.map_or(Undivided::Aside, Undivided::Around));
         }
         // The rest goes to one of the two, by the widest way.
@@ -94,7 +113,7 @@ impl Complex {
             if ours[leaf] {
                 let set = sets.find(leaf as u32);
                 // What nothing opens to is a sliver at a wall: either will do.
-                let is_behind = set == k || (set != f && !is_before(plane, middles[leaf]));
+                let is_behind = set == k || (set != f && !cutter.is_before(middles[leaf]));
                 *cell = if is_behind { BACK } else { FRONT };
             }
         }
@@ -125,9 +144,9 @@ impl Complex {
         ))
     }
 
-    /// Where the shortest way within a part, from one side of screen 0 to the other, passes its plane.
+    /// Where the shortest way within a part, from one side of the cutter to the other, passes between them.
     fn way_around(
-        plane: &Plane,
+        cutter: &Cutter<'_>,
         openings: &[Opening],
         ours: &[bool],
         middles: &[Option<DVec3>],
@@ -147,9 +166,9 @@ impl Complex {
                     .leaves
                     .iter()
                     .for_each(|&l| next[l as usize].push(i as u32)),
-                Some(0) if sets.find(o.leaves[1]) == part => {
+                Some(_) if cutter.is_own(o.screen) && sets.find(o.leaves[1]) == part => {
                     for l in o.leaves {
-                        if is_before(plane, middles[l as usize]) {
+                        if cutter.is_before(middles[l as usize]) {
                             from[l as usize] = u32::MAX - 1;
                             queue.push_back(l);
                         } else {
@@ -171,7 +190,7 @@ impl Complex {
                     points.extend([o.at, middles[at as usize]?]);
                 }
                 return points.windows(2).find_map(|w| {
-                    let [a, b] = [w[0], w[1]].map(|p| plane.signed_distance(p));
+                    let [a, b] = [w[0], w[1]].map(cutter.distance);
                     (a < 0.0 && b >= 0.0).then(|| w[0].lerp(w[1], a / (a - b)))
                 });
             }
@@ -216,11 +235,6 @@ impl Complex {
         let middle = |(sum, n): (DVec3, f64)| (n > 0.0).then(|| sum / n);
         (openings, sums.into_iter().map(middle).collect())
     }
-}
-
-/// Whether a leaf's middle lies before the plane.
-fn is_before(plane: &Plane, middle: Option<DVec3>) -> bool {
-    middle.is_some_and(|p| plane.signed_distance(p) >= 0.0)
 }
 
 struct Sink<'a> {

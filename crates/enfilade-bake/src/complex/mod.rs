@@ -43,6 +43,7 @@ mod label;
 mod partition;
 mod pieces;
 pub(crate) mod poly;
+pub(crate) mod region;
 mod seen;
 mod surface;
 mod thin;

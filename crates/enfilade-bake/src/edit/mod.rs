@@ -17,7 +17,7 @@ use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::rounded_portal;
-use crate::complex::divide::{BACK, FRONT, Undivided};
+use crate::complex::divide::{BACK, Cutter, FRONT, Undivided};
 use crate::complex::{ComplexInput, Partition, build_complex};
 use crate::simplify::Batches;
 
@@ -149,6 +149,37 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         .locate(at)
         .ok_or(AddPortalError::InSolid { at })?;
 
+    let distance = |p: DVec3| plane.signed_distance(p);
+    cut_cell(world, cell, vec![screen], &distance).map_err(|why| match why {
+        Uncut::Undivided(Undivided::Aside) => AddPortalError::Aside { at, cell },
+        Uncut::Undivided(Undivided::Around(at)) => AddPortalError::DoesNotPart { cell, at },
+        Uncut::Undivided(Undivided::Endless) => AddPortalError::Endless { at, cell },
+        Uncut::TooNarrow => AddPortalError::TooNarrow { at },
+    })
+}
+
+/// Why a cell could not be cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Uncut {
+    /// The screens part nothing.
+    Undivided(Undivided),
+    /// Nothing of the portals would be left in a file.
+    TooNarrow,
+}
+
+/// Cuts a cell in two by screens; `distance` tells how far before all of them a point lies.
+pub(crate) fn cut_cell(
+    world: &World,
+    cell: CellId,
+    mut screens: Vec<Winding>,
+    distance: &dyn Fn(DVec3) -> f64,
+) -> Result<Added, Uncut> {
+    let old = &world.graph;
+    let cutter = Cutter {
+        n_screens: screens.len() as u32,
+        distance,
+    };
+
     // 1. The complex of this cell alone.
     let listed = triangles_of(world, cell);
     let triangles: Vec<Triangle> = listed.iter().map(|t| t.2).collect();
@@ -157,9 +188,7 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         .portals
         .iter()
         .flat_map(|p| &old.portals[p.0 as usize].pieces);
-    let screens: Vec<Winding> = std::iter::once(screen)
-        .chain(pieces.map(|piece| winding(piece)))
-        .collect();
+    screens.extend(pieces.map(|piece| winding(piece)));
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         screens: &screens,
@@ -171,12 +200,8 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
 
     // 2. Its two parts.
     let partition = complex
-        .divided(&plane, |p| old.locator.locate(p) == Some(cell))
-        .map_err(|why| match why {
-            Undivided::Aside => AddPortalError::Aside { at, cell },
-            Undivided::Around(at) => AddPortalError::DoesNotPart { cell, at },
-            Undivided::Endless => AddPortalError::Endless { at, cell },
-        })?;
+        .divided(&cutter, |p| old.locator.locate(p) == Some(cell))
+        .map_err(Uncut::Undivided)?;
     let parts = Parts::new(cell, old.cells.len(), &partition);
 
     // 3. Everything that names the cell.
@@ -193,7 +218,7 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         }));
     }
     if new_portals.is_empty() {
-        return Err(AddPortalError::TooNarrow { at });
+        return Err(Uncut::TooNarrow);
     }
     new_portals.sort_by(|a, b| b.area.total_cmp(&a.area));
     let first = out.graph.portals.len() as u32;

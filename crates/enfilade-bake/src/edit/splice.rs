@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_cpg::{CellId, Locator, LocatorNode};
 use enfilade_geom::{Aabb, DVec3, Plane};
 
-use crate::bsp::{Region, halves, shape_of, whole};
 use crate::complex::poly::{self, Sides};
+use crate::complex::region::{Region, halves, shape_of, whole};
 
 /// Corners this near to a plane are on it when regions are cut; planes are exact. [Units: wu]
 const CUT: f64 = 1e-9;

@@ -6,15 +6,16 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::World;
-use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use enfilade_cpg::{Portal, World};
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle, Winding};
 use rayon::prelude::*;
 
+use super::cost::{CostModel, costs};
 use super::merge::{Eyes, PairScores};
 
 /// Texels along an edge of the cube map.
 const CUBE: usize = 8;
-/// Points on each portal.
+/// Points on each portal of no more pieces.
 const POINTS: usize = 4;
 /// A ray that meets nothing goes this far, as a share of the scene's size.
 const SKY: f64 = 1.0;
@@ -52,68 +53,95 @@ fn cube_map() -> Vec<(DVec3, f64)> {
     out
 }
 
+/// What a portal is worth by the paper's metric (Lefebvre & Hornus 2003, §3.0.2). Lower is better.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PortalScore {
+    /// Volume from which it is seen. [Units: wu³]
+    pub visible_volume: f64,
+    /// How far the costs of its two cells are apart.
+    pub balance: f64,
+}
+
+impl PortalScore {
+    /// Visible volume times balance: the portal of highest score is the first to go.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        self.visible_volume * self.balance
+    }
+}
+
+/// The scores of all portals of a world.
+///
+/// Sampled by 384 rays, through the texels of a cube map, from each of several points: about four on a portal, but at
+/// least one on every piece of it, each for its share of the area. Deterministic; time is that of the rays.
+#[must_use]
+pub fn portal_scores(world: &World, cost: &CostModel) -> Vec<PortalScore> {
+    let costs = costs(world, cost);
+    let of_portal = |(p, visible_volume): (&Portal, f64)| {
+        let [a, b] = p.cells.map(|c| costs[c.0 as usize]);
+        PortalScore {
+            visible_volume,
+            balance: (a - b).abs(),
+        }
+    };
+    let portals = world.graph.portals.iter();
+    portals.zip(volumes(world)).map(of_portal).collect()
+}
+
 /// The volume from which each pair of cells' most visible portal is seen. [Units: wu³]
 pub(super) fn visible_volumes(world: &World) -> PairScores {
-    let bvh = Bvh::build(&triangles_of(world));
-    let far = SKY * bvh.bounds().size().length().max(1.0);
-    let directions = cube_map();
-    let volumes: Vec<([u32; 2], f64)> = world
-        .graph
-        .portals
-        .par_iter()
-        .map(|p| {
-            let normal = DVec3::from(p.normal.map(f64::from));
-            let mut sum = 0.0;
-            let mut n = 0;
-            for point in points_on(&p.pieces) {
-                n += 1;
-                for &(direction, solid_angle) in &directions {
-                    // Off the plane, lest what lies in it is met at once.
-                    let origin = point + normal * 1e-4_f64.copysign(direction.dot(normal));
-                    let t = bvh
-                        .closest_hit(
-                            &Ray {
-                                origin,
-                                direction,
-                                t_max: far,
-                            },
-                            |_| false,
-                        )
-                        .map_or(far, |h| h.t);
-                    sum += solid_angle * t.powi(3) / 3.0;
-                }
-            }
-            let [a, b] = p.cells.map(|c| c.0);
-            ([a.min(b), a.max(b)], sum / f64::from(n.max(1)))
-        })
-        .collect();
     let mut out = BTreeMap::new();
-    for (pair, volume) in volumes {
-        let slot = out.entry(pair).or_insert(0.0);
+    for (p, volume) in world.graph.portals.iter().zip(volumes(world)) {
+        let [a, b] = p.cells.map(|c| c.0);
+        let slot = out.entry([a.min(b), a.max(b)]).or_insert(0.0);
         *slot = f64::max(*slot, volume);
     }
     PairScores(out)
 }
 
-/// Middles of the largest pieces and points halfway from there to their corners.
-fn points_on(pieces: &[Vec<[f32; 3]>]) -> impl Iterator<Item = DVec3> + '_ {
-    pieces
-        .iter()
-        .flat_map(|piece| {
-            let corners: Vec<DVec3> = piece
-                .iter()
-                .map(|p| DVec3::from(p.map(f64::from)))
-                .collect();
-            let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
-            let step = corners.len().div_ceil(POINTS - 1).max(1);
-            let halfway: Vec<DVec3> = corners
-                .iter()
-                .step_by(step)
-                .map(|&c| (c + middle) * 0.5)
-                .collect();
-            std::iter::once(middle).chain(halfway)
-        })
-        .take(POINTS)
+/// The volume from which each portal is seen. [Units: wu³]
+fn volumes(world: &World) -> Vec<f64> {
+    let bvh = Bvh::build(&triangles_of(world));
+    let far = SKY * bvh.bounds().size().length().max(1.0);
+    let directions = cube_map();
+    let of_portal = |p: &Portal| {
+        let normal = DVec3::from(p.normal.map(f64::from));
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (point, weight) in points_on(&p.pieces) {
+            weights += weight;
+            for &(direction, solid_angle) in &directions {
+                // Off the plane, lest what lies in it is met at once.
+                let origin = point + normal * 1e-4_f64.copysign(direction.dot(normal));
+                let ray = Ray {
+                    origin,
+                    direction,
+                    t_max: far,
+                };
+                let t = bvh.closest_hit(&ray, |_| false).map_or(far, |h| h.t);
+                sum += weight * solid_angle * t.powi(3) / 3.0;
+            }
+        }
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    };
+    world.graph.portals.par_iter().map(of_portal).collect()
+}
+
+/// Points on every piece of a portal, [`POINTS`] in all or one a piece, with the area that each stands for.
+fn points_on(pieces: &[Vec<[f32; 3]>]) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+    let most = POINTS.div_ceil(pieces.len().max(1));
+    pieces.iter().flat_map(move |piece| {
+        let corners: Vec<DVec3> = piece
+            .iter()
+            .map(|p| DVec3::from(p.map(f64::from)))
+            .collect();
+        let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+        let step = corners.len().div_ceil((most - 1).max(1)).max(1);
+        let halfway = corners.iter().step_by(step).take(most - 1);
+        let mut points = vec![middle];
+        points.extend(halfway.map(|&c| (c + middle) * 0.5));
+        let weight = Winding::new(corners).area() / points.len() as f64;
+        points.into_iter().map(move |p| (p, weight))
+    })
 }
 
 /// Eyes of which views are sampled.
@@ -196,4 +224,30 @@ pub(super) fn views(world: &World, n_eyes: usize, first: u32) -> Eyes {
         }
     }
     Eyes(bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_piece_of_a_portal_is_sampled_and_stands_for_its_area() {
+        for n in 1..12_usize {
+            // A row of rectangles, each twice as wide as the one before.
+            let from = |i: usize| (1 << i) as f32;
+            let piece = |i: usize| {
+                let (a, b) = (from(i), from(i + 1));
+                vec![[a, 0.0, 0.0], [b, 0.0, 0.0], [b, 3.0, 0.0], [a, 3.0, 0.0]]
+            };
+            let pieces: Vec<_> = (0..n).map(piece).collect();
+            let points: Vec<(DVec3, f64)> = points_on(&pieces).collect();
+            assert!(points.len() <= n.max(2 * POINTS), "{}", points.len());
+            for i in 0..n {
+                let [a, b] = [from(i), from(i + 1)].map(f64::from);
+                let inside = points.iter().filter(|p| p.0.x > a && p.0.x < b);
+                let sum: f64 = inside.map(|p| p.1).sum();
+                assert!((sum - 3.0 * (b - a)).abs() < 1e-9, "{n} {i}: {sum}");
+            }
+        }
+    }
 }

@@ -9,6 +9,7 @@
 //! **Every promise is kept:** a portal is left out only where both its sides are the same cell.
 
 mod apply;
+mod cost;
 mod merge;
 mod metric;
 mod views;
@@ -16,10 +17,13 @@ mod views;
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::DVec3;
 
 pub(crate) use apply::Batches;
-use merge::{Bounds, CostGraph, Eyes};
+use cost::cost_graph;
+pub use cost::{CostModel, UnknownMaterial, costs};
+pub(crate) use cost::{Surface, cost_of_cell, surfaces_of};
+use merge::{Bounds, Eyes};
+pub use metric::{PortalScore, portal_scores};
 
 /// How portals are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,38 +35,16 @@ pub enum Metric {
     VisibleVolume,
 }
 
-/// What drawing a cell costs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CostModel {
-    /// Of a triangle. [Limit: at least 0]
-    pub triangle: f64,
-    /// Of its area. [Units: 1/wu²] [Limit: at least 0]
-    pub area: f64,
-    /// By what a material's name multiplies both; 1 for those not named. [Limit: at least 0]
-    pub materials: BTreeMap<String, f64>,
-    /// By what all that is of a detail object is multiplied; 0 where only structure counts. [Limit: at least 0]
-    pub detail: f64,
-}
-
-impl Default for CostModel {
-    fn default() -> Self {
-        Self {
-            triangle: 1.0,
-            area: 0.0,
-            materials: BTreeMap::new(),
-            detail: 1.0,
-        }
-    }
-}
-
 /// Settings of the simplifier.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimplifySettings {
     /// Cheaper cells are merged with neighbors, where that keeps the upper bound. What reaches through
     /// several cells counts in each in part: no portal between them hides it.
     pub min_cost: f64,
-    /// No merge makes a cell that costs more.
+    /// No merge makes a cell that costs more; [`keep_bounds`](crate::bound::keep_bounds) cuts those that do.
     pub max_cost: Option<f64>,
+    /// Whether the outdoors is cut, too, where it costs more.
+    pub outdoors: bool,
     /// Cells are merged until there are no more than this, where that keeps the upper bound.
     pub max_cells: Option<usize>,
     /// Cells are merged until there are no more portals than this, where that keeps the upper bound.
@@ -74,8 +56,9 @@ pub struct SimplifySettings {
 }
 
 impl SimplifySettings {
-    /// Every setting by name, as text.
-    pub(crate) fn to_settings(&self) -> BTreeMap<String, String> {
+    /// Every setting by name, as text, for the provenance of the file.
+    #[must_use]
+    pub fn to_settings(&self) -> BTreeMap<String, String> {
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
         let mut out: BTreeMap<String, String> = [
             ("simplify.min_cost", self.min_cost.to_string()),
@@ -95,6 +78,9 @@ impl SimplifySettings {
         ]
         .map(|(k, v)| (k.to_owned(), v))
         .into();
+        if self.outdoors {
+            out.insert("simplify.outdoors".to_owned(), "true".to_owned());
+        }
         for (name, weight) in &self.cost.materials {
             out.insert(format!("cost.material.{name}"), weight.to_string());
         }
@@ -170,7 +156,8 @@ pub fn delete_portal(world: &World, portal: PortalId) -> Option<Simplified> {
 fn finish(world: &World, into: &[u32], cost: &CostModel) -> Simplified {
     let (world, cell_of) = apply::merged(world, into);
     let graph = cost_graph(&world, cost);
-    let costs = || (0..world.graph.cells.len() as u32).map(|c| graph.cost(c));
+    // The sum of nothing is -0; adding 0 makes it 0.
+    let costs = || (0..world.graph.cells.len() as u32).map(|c| graph.cost(c) + 0.0);
     Simplified {
         cell_of,
         max_cost: costs().fold(0.0, f64::max),
@@ -304,60 +291,4 @@ fn cost_of_views(
         })
         .sum();
     total / n_views.max(1) as f64
-}
-
-/// Cells with what drawing them costs: a batch is an item, so is a detail object.
-fn cost_graph(world: &World, cost: &CostModel) -> CostGraph {
-    let n = world.graph.cells.len();
-    let mut graph = CostGraph {
-        items: vec![Vec::new(); n],
-        pairs: world
-            .graph
-            .portals
-            .iter()
-            .map(|p| p.cells.map(|c| c.0))
-            .collect(),
-        aloof: world.graph.cells.iter().map(|c| c.outdoor).collect(),
-        ..CostGraph::default()
-    };
-    let factor = |material: Option<u32>| {
-        let name = material
-            .and_then(|m| world.materials.get(m as usize))
-            .map_or("", |m| &m.name);
-        cost.materials.get(name).copied().unwrap_or(1.0)
-    };
-    let of_primitive = |p: &enfilade_geom::scene::Primitive, scale: f64| {
-        let area = if cost.area == 0.0 {
-            0.0
-        } else {
-            let at = |i: u32| DVec3::from(p.positions[i as usize].map(f64::from));
-            let double: f64 = p
-                .indices
-                .chunks_exact(3)
-                .map(|t| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).length())
-                .sum();
-            0.5 * double * scale
-        };
-        factor(p.material) * (cost.triangle * (p.indices.len() / 3) as f64 + cost.area * area)
-    };
-    let mut add = |cells: &[CellId], weight: f64| {
-        let item = graph.weights.len() as u32;
-        graph.weights.push(weight);
-        cells
-            .iter()
-            .for_each(|c| graph.items[c.0 as usize].push(item));
-    };
-    for b in &world.batches {
-        add(&b.cells, of_primitive(&b.primitive, 1.0));
-    }
-    for d in &world.details {
-        let t = d.transform;
-        let column = |k: usize| DVec3::new(t[k].into(), t[k + 1].into(), t[k + 2].into());
-        let volume = column(0).dot(column(4).cross(column(8))).abs();
-        let mesh = &world.detail_meshes[d.mesh as usize];
-        let scale = volume.powf(2.0 / 3.0);
-        let parts = mesh.primitives.iter().map(|p| of_primitive(p, scale));
-        add(&d.cells, cost.detail * parts.sum::<f64>());
-    }
-    graph
 }

@@ -63,13 +63,16 @@ pub(crate) struct BakeOptions {
     /// the largest air with walls around, or from a point of the world that should be in a room.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, num_args = 0..=1, require_equals = true)]
     pub(super) leak_path: Option<Option<DVec3>>,
-    /// With `--method bsp`: cells of fewer triangles are merged with neighbors [default: 50 in
-    /// levels of brushes, 0 elsewhere].
-    #[arg(long, value_name = "N")]
+    /// Cells that cost less, in triangles if no other costs are set, are merged with neighbors [default: 50 in levels of
+    /// brushes, 0 elsewhere].
+    #[arg(long, value_name = "COST")]
     min_cost: Option<u32>,
-    /// With `--method bsp`: cells of more triangles are cut, and none is merged to more.
-    #[arg(long, value_name = "N")]
+    /// Cells that cost more are cut, and none is merged to more; what cannot be met is told.
+    #[arg(long, value_name = "COST")]
     max_cost: Option<u32>,
+    /// With `--max-cost`: cut the outdoors, too.
+    #[arg(long)]
+    split_outdoors: bool,
     /// Edge of a voxel in meters; chosen from the narrowest opening and the scene's size if not given.
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     voxel: Option<f64>,
@@ -284,6 +287,7 @@ struct BspTable {
     boxes: Vec<[f64; 6]>,
     min_cost: Option<Amount>,
     max_cost: Option<Amount>,
+    split_outdoors: Option<bool>,
     max_cells: Option<usize>,
     max_portals: Option<usize>,
     triangle_cost: Option<Amount>,
@@ -339,16 +343,18 @@ fn resolve_bsp(
         let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
         Ok(Plane::through(DVec3::new(x, y, z), normal))
     };
+    let max_cost = options
+        .max_cost
+        .map(f64::from)
+        .or(table.max_cost.map(|v| v.0));
     let simplify = SimplifySettings {
         min_cost: options
             .min_cost
             .map(f64::from)
             .or(table.min_cost.map(|v| v.0))
-            .unwrap_or(MERGE_BELOW),
-        max_cost: options
-            .max_cost
-            .map(f64::from)
-            .or(table.max_cost.map(|v| v.0)),
+            .unwrap_or_else(|| max_cost.unwrap_or(MERGE_BELOW).min(MERGE_BELOW)),
+        max_cost,
+        outdoors: options.split_outdoors || table.split_outdoors == Some(true),
         max_cells: table.max_cells,
         max_portals: table.max_portals,
         cost: CostModel {
@@ -414,7 +420,19 @@ pub(crate) struct Resolved {
     pub(crate) watershed: BakeConfig,
     pub(crate) bsp: BspConfig,
     /// Nothing was said of what cells are merged below: that is for levels of brushes alone.
-    pub(super) merges_brushes_only: bool,
+    merges_brushes_only: bool,
+}
+
+impl Resolved {
+    /// Bounds on what cells cost where they are rooms. A room of a building has few triangles; the shape of its openings says
+    /// that it is one.
+    pub(crate) fn costs_of_rooms(&self) -> SimplifySettings {
+        let mut costs = self.bsp.simplify.clone();
+        if self.merges_brushes_only {
+            costs.min_cost = 0.0;
+        }
+        costs
+    }
 }
 
 /// Command line and settings file, resolved.
@@ -564,7 +582,7 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 36);
+        assert_eq!(n, 37);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: ConfigFile = toml::from_str(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));

@@ -1,0 +1,107 @@
+//! Cells that a guide makes where there are no walls: vessels, caves, tunnels (Lefebvre & Hornus 2003, §3.0.2).
+//!
+//! Where surfaces are curved, no plane of theirs closes a path, and the planes that the user gives are all there are. The
+//! shape of an opening tells nothing there either: a grid cuts a tube anywhere. So a separator in a guide's plane is kept
+//! where its rim is round; where walls stand, rooms are told by their shape (`rooms`), and a guide is but a beginning.
+//!
+//! Time: separators of guides times portals.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::{Aabb, BoxTree, Sets};
+
+use super::cells::{self, Cells, NO_CELL};
+use super::separator::{self, Separator};
+use super::{Bsp, BspInput, Guide, Heuristic};
+
+/// Share of a rim that lies in the two planes with most of it, from which on they are walls: that of a hexagon. A
+/// rectangle has half and more, an octagon a quarter.
+const FLAT: f64 = 1.0 / 3.0;
+
+/// The tree of a scene. Where a guide is given and matter leaves no air but the outdoors, the scene is nothing but a shell,
+/// which somebody wants the inside of, whichever way it faces: then there is no matter.
+pub(super) fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -> Bsp {
+    let build = |has_matter| Bsp::build_of(input, heuristic, guide, has_matter);
+    let bsp = build(true);
+    let is_shell = || input.solids.is_empty() && cells::components(&bsp, &[]).1 <= 1;
+    if !guide.is_empty() && is_shell() {
+        return build(false);
+    }
+    bsp
+}
+
+/// Parts rooms further by the separators in planes of guides with a round rim.
+pub(super) fn part(bsp: &Bsp, rooms: Cells) -> Cells {
+    let found = separator::find_in_guides(bsp);
+    if found.is_empty() {
+        return rooms;
+    }
+    let boxes: Vec<Aabb> = bsp
+        .surfaces
+        .iter()
+        .map(|f| Aabb::of_points(&f.points))
+        .collect();
+    let solids = BoxTree::new(&boxes);
+    let is_round = |s: &Separator| {
+        let mut sides: Vec<f64> = separator::rim(bsp, s, &solids).into_values().collect();
+        sides.sort_by(|a, b| b.total_cmp(a));
+        let longest: f64 = sides.iter().take(2).sum();
+        longest < FLAT * sides.iter().sum::<f64>()
+    };
+    let guides = uncrossed(bsp, found.into_iter().filter(is_round).collect());
+    let mut is_cut = vec![false; bsp.portals.len()];
+    for &p in guides.iter().flat_map(|s| &s.portals) {
+        is_cut[p as usize] = true;
+    }
+    let mut sets = Sets::new(bsp.is_open.len());
+    for (p, _) in bsp.portals.iter().zip(&is_cut).filter(|(_, cut)| !**cut) {
+        let [a, b] = p.leaves;
+        if rooms.of_leaf[a as usize] == rooms.of_leaf[b as usize] {
+            sets.join(a, b);
+        }
+    }
+    let mut number = BTreeMap::new();
+    let of_leaf: Vec<u32> = (0..bsp.is_open.len() as u32)
+        .map(|leaf| {
+            if rooms.of_leaf[leaf as usize] == NO_CELL {
+                return NO_CELL;
+            }
+            let next = number.len() as u32;
+            *number.entry(sets.find(leaf)).or_insert(next)
+        })
+        .collect();
+    let mut separators = rooms.separators;
+    separators.extend(guides);
+    Cells {
+        of_leaf,
+        n_cells: number.len(),
+        separators,
+        n_crossing: rooms.n_crossing,
+        n_useless: rooms.n_useless,
+    }
+}
+
+/// Of separators those that cross none of the others that are kept, the smallest first: they go across a tube and not
+/// along it. Those with one cell on both sides go, too.
+fn uncrossed(bsp: &Bsp, mut found: Vec<Separator>) -> Vec<Separator> {
+    found.sort_by(|a, b| a.area.total_cmp(&b.area));
+    let mut kept: Vec<Separator> = Vec::new();
+    for s in found {
+        kept.push(s);
+        let (of_leaf, _) = cells::components(bsp, &kept);
+        let crosses = |s: &Separator| {
+            cells::sides_of(bsp, s, &of_leaf)
+                .iter()
+                .any(|c| c.len() > 1)
+        };
+        if kept.iter().any(crosses) {
+            kept.pop();
+        }
+    }
+    let (of_leaf, _) = cells::components(bsp, &kept);
+    kept.retain(|s| {
+        let [front, back] = cells::sides_of(bsp, s, &of_leaf);
+        front != back
+    });
+    kept
+}
