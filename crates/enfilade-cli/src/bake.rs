@@ -4,6 +4,7 @@ mod curved;
 pub(crate) mod delaunay;
 mod doorless;
 pub(crate) mod settings;
+mod values;
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -80,6 +81,11 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         } else {
             writeln!(io::stderr(), "there are none: the watershed's is kept")?;
         }
+    }
+    if let Some(repair) = settings.import.repair {
+        let told = &mut baked.world.graph.provenance.settings;
+        told.insert("repair.weld".into(), repair.weld.to_string());
+        told.insert("repair.hole".into(), repair.hole.to_string());
     }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
@@ -268,8 +274,17 @@ fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow:
         }
     }
     let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
+    let title = if let Some(repair) = &report.repair {
+        writeln!(
+            err,
+            "repaired (leave out --repair to have the model as it was):\n{repair}"
+        )?;
+        "what is left of the model's faults"
+    } else {
+        "the model as found (nothing was changed)"
+    };
     if verbose || cleaning.findings().iter().any(|(_, f)| f.n > 0) {
-        writeln!(err, "the model as found (nothing was changed):\n{cleaning}")?;
+        writeln!(err, "{title}:\n{cleaning}")?;
     }
     Ok(())
 }
