@@ -9,6 +9,7 @@
 //! **Every promise is kept:** a portal is left out only where both its sides are the same cell.
 
 mod apply;
+mod graph;
 mod merge;
 mod metric;
 mod views;
@@ -19,6 +20,7 @@ use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 
 pub(crate) use apply::Batches;
+pub use graph::{SimplifiedGraph, simplify_graph};
 use merge::{Bounds, CostGraph, Eyes};
 
 /// How portals are compared.
