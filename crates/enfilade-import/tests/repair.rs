@@ -478,7 +478,7 @@ fn messy() -> impl Strategy<Value = (Fault, Disturbance)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
     fn repairing_twice_changes_nothing((fault, by) in messy(), hole in prop_oneof![Just(0.1), Just(2.0)]) {
