@@ -2,9 +2,10 @@
 
 use enfilade_bake::simplify::{
     CostModel, Metric, SimplifySettings, delete_portal, expected_cost, expected_cost_after,
-    least_expected_cost, simplify,
+    least_expected_cost, simplify, simplify_graph,
 };
-use enfilade_cpg::{PortalId, World};
+use enfilade_cpg::{PortalId, SightGraph, SightPortal, World};
+use enfilade_geom::DVec3;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 use enfilade_verify::{VerifyOptions, verify_world};
 
@@ -187,5 +188,59 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
         sum / f64::from(n_worlds) < 1.01,
         "{} of {n_worlds}",
         sum / f64::from(n_worlds)
+    );
+}
+
+#[test]
+fn graphs_without_surfaces_keep_their_bounds_and_merge_across_what_is_widest() {
+    // A row of cells whose openings get wider to the end, and one cell that nothing opens to.
+    let square = |x: f64, size: f64| {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        corners
+            .map(|[y, z]| DVec3::new(x, y * size, z * size))
+            .to_vec()
+    };
+    let graph = SightGraph {
+        n_cells: 7,
+        portals: (0..5)
+            .map(|i| SightPortal {
+                cells: [i, i + 1],
+                winding: square(f64::from(i), f64::from(i + 1)),
+                pieces: Vec::new(),
+            })
+            .collect(),
+    };
+    let costs = [1.0; 7];
+    let with = |settings: SimplifySettings| simplify_graph(&graph, &costs, &settings);
+    let nothing = with(SimplifySettings::default());
+    assert_eq!(nothing.cell_of, (0..7).collect::<Vec<_>>());
+    assert_eq!((nothing.n_cells, nothing.n_portals), (7, 5));
+    let few = with(SimplifySettings {
+        max_cells: Some(6),
+        ..SimplifySettings::default()
+    });
+    // The first of the cheapest, which has one neighbor.
+    assert_eq!(few.cell_of, [0, 0, 1, 2, 3, 4, 5]);
+    let pairs = with(SimplifySettings {
+        min_cost: 2.0,
+        max_cost: Some(2.0),
+        ..SimplifySettings::default()
+    });
+    assert_eq!(pairs.cell_of, [0, 0, 1, 1, 2, 2, 3]);
+    assert_eq!(
+        (pairs.min_cost, pairs.max_cost, pairs.n_portals),
+        (1.0, 2.0, 2)
+    );
+    // The cell in the middle of the row goes where the opening is wider.
+    let mut dear = costs;
+    dear[..2].fill(9.0);
+    dear[3..].fill(9.0);
+    let settings = SimplifySettings {
+        min_cost: 2.0,
+        ..SimplifySettings::default()
+    };
+    assert_eq!(
+        simplify_graph(&graph, &dear, &settings).cell_of,
+        [0, 1, 2, 2, 3, 4, 5]
     );
 }

@@ -6,6 +6,7 @@ pub(crate) mod delaunay;
 mod doorless;
 mod leak_path;
 pub(crate) mod settings;
+mod values;
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -102,6 +103,11 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     }
     if method != Builder::Bsp {
         keep_costs(&mut baked, &settings.costs_of_rooms());
+    }
+    if let Some(repair) = settings.import.repair {
+        let told = &mut baked.world.graph.provenance.settings;
+        told.insert("repair.weld".into(), repair.weld.to_string());
+        told.insert("repair.hole".into(), repair.hole.to_string());
     }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_atomically(&args.output, &bytes)?;
@@ -309,8 +315,17 @@ fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow:
         }
     }
     let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
+    let title = if let Some(repair) = &report.repair {
+        writeln!(
+            err,
+            "repaired (leave out --repair to have the model as it was):\n{repair}"
+        )?;
+        "what is left of the model's faults"
+    } else {
+        "the model as found (nothing was changed)"
+    };
     if verbose || cleaning.findings().iter().any(|(_, f)| f.n > 0) {
-        writeln!(err, "the model as found (nothing was changed):\n{cleaning}")?;
+        writeln!(err, "{title}:\n{cleaning}")?;
     }
     Ok(())
 }

@@ -49,11 +49,11 @@ pub(crate) fn bench_bsp(
     min_polygons: Option<f64>,
 ) -> anyhow::Result<()> {
     table.push(
-        "| scene | heuristic | polygons in | BSP s | polygons out | splits | leaves | portals | grouping s | \
+        "| scene | heuristic | faces | polygons in | BSP s | polygons out | splits | leaves | portals | grouping s | \
          valid | crossing | separators | cells before | cells | fewer | final portals | fewer |"
             .into(),
     );
-    table.push("| --- | --- |".to_owned() + &" ---: |".repeat(15));
+    table.push("| --- | --- |".to_owned() + &" ---: |".repeat(16));
     let options = ImportOptions::default();
     for path in paths {
         let imported = import(std::slice::from_ref(path), &[], &options)?;
@@ -132,7 +132,8 @@ fn measure(
             "- | - | - | -".to_owned()
         };
         table.push(format!(
-            "| {name} | {heuristic_name} | {} | {:.2} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {last} |",
+            "| {name} | {heuristic_name} | {} | {} | {:.2} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {last} |",
+            c.n_faces,
             c.n_polygons,
             built - start,
             c.n_pieces,

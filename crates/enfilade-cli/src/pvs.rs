@@ -169,7 +169,7 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
 }
 
 /// The portals of a file that light can pass: those with fewer than three corners have no area.
-fn sight_graph(file: &PrtFile) -> SightGraph {
+pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
     SightGraph {
         n_cells: file.n_clusters,
         portals: file

@@ -1,25 +1,27 @@
 //! `enfilade simplify`: a graph becomes a simpler one, of cells within bounds.
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::bake::bound::keep_bounds;
-use enfilade::bake::simplify::{CostModel, Metric, Simplified, SimplifySettings};
+use enfilade::bake::simplify::{CostModel, Metric, Simplified, SimplifySettings, simplify_graph};
 use enfilade::cpg::World;
-use enfilade::cpg::wire::encode_glb;
+use enfilade::cpg::wire::{decode_glb, encode_glb};
+use enfilade::import::{PrtFile, read_prt, write_prt};
 
 use crate::output::{check_target, write_atomically};
-use crate::world::read_world;
+use crate::pvs::sight_graph;
 
-/// Merges and cuts cells of a world until their costs are within bounds.
+/// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
 #[derive(clap::Args)]
 pub(crate) struct Simplify {
-    /// World, whatever built it.
-    #[arg(value_name = "IN.glb")]
+    /// World, whatever built it, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3).
+    #[arg(value_name = "IN")]
     input: PathBuf,
-    /// World to write.
-    #[arg(short, long, value_name = "OUT.glb")]
+    /// World or portal file to write, as the input is; PRT1 becomes PRT2, whose leaves are the clusters that were.
+    #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Merge until there are no more cells than this, as far as the cost bound allows.
     #[arg(long, value_name = "N")]
@@ -33,13 +35,14 @@ pub(crate) struct Simplify {
     /// Cells that cost more than this are cut, and none is merged to more; what cannot be met is told.
     #[arg(long, value_name = "COST", value_parser = parse_cost)]
     max_cost: Option<f64>,
-    /// With `--max-cost`: cut the outdoors, too.
+    /// With `--max-cost`, for worlds: cut the outdoors, too.
     #[arg(long)]
     split_outdoors: bool,
-    /// How portals are compared.
-    #[arg(long, value_enum, default_value_t = MetricName::ExpectedTriangles)]
-    metric: MetricName,
-    /// What a triangle costs.
+    /// How portals are compared [default: expected-triangles]; those of a portal file, which has no surfaces, by
+    /// their area.
+    #[arg(long, value_enum)]
+    metric: Option<MetricName>,
+    /// What a triangle costs; in a portal file, a triangle of a solid face or, where it has none, a leaf.
     #[arg(long, value_name = "COST", value_parser = parse_cost, default_value_t = 1.0)]
     triangle_cost: f64,
     /// What a square meter costs.
@@ -90,7 +93,8 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         bail!("--min-cost {min} is above --max-cost {max}; no cell can be within both");
     }
     check_target(&args.output)?;
-    let world = read_world(&args.input)?;
+    let bytes =
+        fs::read(&args.input).with_context(|| format!("cannot read {}", args.input.display()))?;
     let settings = SimplifySettings {
         min_cost: args.min_cost.unwrap_or(0.0),
         max_cost: args.max_cost,
@@ -98,8 +102,8 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         max_cells: args.max_cells,
         max_portals: args.max_portals,
         metric: match args.metric {
-            MetricName::ExpectedTriangles => Metric::ExpectedTriangles,
-            MetricName::VisibleVolume => Metric::VisibleVolume,
+            None | Some(MetricName::ExpectedTriangles) => Metric::ExpectedTriangles,
+            Some(MetricName::VisibleVolume) => Metric::VisibleVolume,
         },
         cost: CostModel {
             triangle: args.triangle_cost,
@@ -108,6 +112,12 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
             materials: args.material_cost.iter().cloned().collect(),
         },
     };
+    if !bytes.starts_with(b"glTF")
+        && let Ok(text) = std::str::from_utf8(&bytes)
+    {
+        return simplify_portal_file(args, text, &settings);
+    }
+    let world = decode_glb(&bytes).with_context(|| args.input.display().to_string())?;
     settings.cost.check(&world.materials)?;
     let bounded = keep_bounds(&world, &settings);
     write(
@@ -120,6 +130,67 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         writeln!(io::stderr(), "{note}")?;
     }
     Ok(())
+}
+
+fn warn_of_costs(args: &Simplify, max_cost: f64) -> anyhow::Result<()> {
+    if let Some(max) = args.max_cost.filter(|m| max_cost > *m) {
+        writeln!(
+            io::stderr(),
+            "a cell costs {max_cost:.0}, more than {max}, and did before; only a bake can cut it"
+        )?;
+    }
+    Ok(())
+}
+
+/// Merges the clusters of a portal file.
+fn simplify_portal_file(
+    args: &Simplify,
+    text: &str,
+    settings: &SimplifySettings,
+) -> anyhow::Result<()> {
+    if args.metric.is_some()
+        || args.split_outdoors
+        || args.area_cost > 0.0
+        || !args.material_cost.is_empty()
+    {
+        bail!(
+            "--metric, --split-outdoors, --area-cost and --material-cost ask for surfaces, which a portal file does not have"
+        );
+    }
+    let file = read_prt(text).with_context(|| args.input.display().to_string())?;
+    let graph = sight_graph(&file);
+    graph
+        .validate()
+        .with_context(|| args.input.display().to_string())?;
+    let simple = simplify_graph(&graph, &cluster_costs(&file, &settings.cost), settings);
+    let merged = file.merged(&simple.cell_of, simple.n_cells);
+    write_atomically(&args.output, write_prt(&merged).as_bytes())?;
+    let mut out = io::stdout().lock();
+    writeln!(
+        out,
+        "clusters {:>7} → {}",
+        file.n_clusters, merged.n_clusters
+    )?;
+    let (before, after) = (file.portals.len(), merged.portals.len());
+    writeln!(out, "portals  {before:>7} → {after}")?;
+    let (least, most) = (simple.min_cost, simple.max_cost);
+    writeln!(out, "cost of a cluster {least:.0} to {most:.0}")?;
+    writeln!(out, "wrote {}", args.output.display())?;
+    warn_of_costs(args, simple.max_cost)
+}
+
+/// What the clusters of a portal file cost: by their solid faces, which Quake 3's files have, else by their leaves.
+fn cluster_costs(file: &PrtFile, cost: &CostModel) -> Vec<f64> {
+    let mut costs = vec![0.0; file.n_clusters as usize];
+    for face in &file.faces {
+        costs[face.cluster as usize] += cost.triangle * face.points.len().saturating_sub(2) as f64;
+    }
+    if file.faces.is_empty() {
+        for &cluster in &file.leaf_cluster {
+            costs[cluster as usize] += cost.triangle;
+        }
+    }
+    costs
 }
 
 /// What its cells cost.

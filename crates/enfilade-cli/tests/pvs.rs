@@ -185,3 +185,38 @@ fn far_planes_and_walls_leave_evidence_that_is_accepted() {
         assert!(done.status.success(), "{far:?} {done:?}");
     }
 }
+
+#[test]
+fn a_portal_file_is_simplified_and_answers_as_before() {
+    let (prt, simple, pvs) = (
+        place("to-simplify.prt"),
+        place("simple.prt"),
+        place("simple.pvs"),
+    );
+    // The opening between the first two rooms is the widest.
+    let wide = PRT.replace("(1 1 1 ) (1 0 1 )", "(1 1 4 ) (1 0 4 )");
+    fs::write(&prt, wide).unwrap();
+    let [command, o, n, three] = ["simplify", "-o", "--max-cells", "3"].map(Path::new);
+    let done = enfilade(&[command, &prt, o, &simple, n, three]);
+    assert!(done.status.success(), "{done:?}");
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(said.contains("clusters       4 → 3"), "{said}");
+    assert!(said.contains("portals        3 → 2"), "{said}");
+    let text = fs::read_to_string(&simple).unwrap();
+    // Leaves are the clusters that were.
+    assert!(text.starts_with("PRT2\n4\n3\n2\n"), "{text}");
+    assert!(text.ends_with("\n0 1 -1\n2 -1\n3 -1\n"), "{text}");
+    let done = enfilade(&[Path::new("pvs"), &simple, o, &pvs]);
+    assert!(done.status.success(), "{done:?}");
+    let text = fs::read_to_string(&pvs).unwrap();
+    assert!(text.contains("\n0: 0-2\n1: 0-2\n2: 0-2\n"), "{text}");
+    // What needs surfaces is refused.
+    let [metric, volume] = ["--metric", "visible-volume"].map(Path::new);
+    let done = enfilade(&[command, &prt, o, &simple, n, three, metric, volume]);
+    assert_eq!(done.status.code(), Some(1));
+    // No cell of more than two leaves, however few are asked for.
+    let [max, two, one] = ["--max-cost", "2", "1"].map(Path::new);
+    let done = enfilade(&[command, &prt, o, &simple, n, one, max, two]);
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(said.contains("cost of a cluster 2 to 2"), "{said}");
+}

@@ -4,10 +4,11 @@
 //! only search in space is bounded by a budget, so that a million triangles take seconds.
 
 use crate::report::Finding;
-use crate::tjunction;
+use crate::shells::Shells;
 use crate::{ImportError, ImportReport};
+use crate::{crossing, tjunction};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene, TriangleSource};
-use enfilade_geom::{DVec3, triangle_area_normal};
+use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -21,6 +22,8 @@ pub struct CleaningOptions {
     pub t_junction: f64,
     /// Look at detail objects, too.
     pub has_detail: bool,
+    /// Pairs of triangles looked at for crossing ones, at most; 0 looks at none.
+    pub crossing_pairs: u64,
 }
 
 impl Default for CleaningOptions {
@@ -29,6 +32,7 @@ impl Default for CleaningOptions {
             weld: 1e-5,
             t_junction: 1e-4,
             has_detail: false,
+            crossing_pairs: 20_000_000,
         }
     }
 }
@@ -57,16 +61,40 @@ pub struct CleaningReport {
     /// Closed shells whose front faces look inwards: turned inside out, or rooms modeled from
     /// within.
     pub inverted_shells: Finding,
+    /// Pairs of triangles of one object that share no corner and of which one runs through the other.
+    pub crossing_triangles: Finding,
+    /// Whether the search for them went through to its end.
+    pub is_crossing_complete: bool,
+    /// What the shells of the objects are.
+    pub shells: ShellCounts,
+    /// From the import: polygons with a corner that turns inwards.
+    pub concave_polygons: Finding,
+    /// From the import: polygons whose outline crosses itself.
+    pub crossing_polygons: Finding,
     /// From the import: polygons with a corner more than 1 mm off their plane.
     pub non_planar_polygons: Finding,
     /// From the import: vertices that are no finite numbers, dropped with their triangles.
     pub nonfinite_vertices: Finding,
 }
 
+/// Triangles of an object that hang together over edges with exactly two of them make a shell; how many are what
+/// (after Gjørup 1999, §2.4.1).
+///
+/// Where triangles are turned against each other, most of them decide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShellCounts {
+    /// Closed, front faces outwards: what is inside is matter.
+    pub solids: u64,
+    /// Closed, front faces inwards: what is inside is a room, or the shell is inside out.
+    pub rooms: u64,
+    /// With a rim, with an edge that more than two triangles use, or with one side only.
+    pub open: u64,
+}
+
 impl CleaningReport {
     /// The findings with what to call them, in the order shown.
     #[must_use]
-    pub fn findings(&self) -> [(&'static str, &Finding); 10] {
+    pub fn findings(&self) -> [(&'static str, &Finding); 13] {
         [
             ("duplicate vertices", &self.duplicate_vertices),
             ("duplicate triangles", &self.duplicate_triangles),
@@ -76,6 +104,9 @@ impl CleaningReport {
             ("non-manifold edges", &self.non_manifold_edges),
             ("flipped triangles", &self.flipped_triangles),
             ("inverted shells", &self.inverted_shells),
+            ("crossing triangles", &self.crossing_triangles),
+            ("concave polygons", &self.concave_polygons),
+            ("crossing polygons", &self.crossing_polygons),
             ("non-planar polygons", &self.non_planar_polygons),
             ("non-finite vertices", &self.nonfinite_vertices),
         ]
@@ -98,6 +129,17 @@ impl fmt::Display for CleaningReport {
         }
         if !self.is_complete {
             writeln!(f, "T-junctions: at least; the search was stopped")?;
+        }
+        if !self.is_crossing_complete {
+            writeln!(f, "crossing triangles: at least; the search was stopped")?;
+        }
+        let ShellCounts {
+            solids,
+            rooms,
+            open,
+        } = self.shells;
+        for (name, n) in [("solids", solids), ("rooms", rooms), ("open", open)] {
+            writeln!(f, "{:<22} {n:>9}", format!("shells: {name}"))?;
         }
         write!(f, "{:<22} {:>9}", "of triangles", self.n_triangles)
     }
@@ -132,6 +174,8 @@ pub fn cleaning_report(
     let mut report = CleaningReport::default();
     if let Some(import) = import {
         report.non_planar_polygons = import.non_planar_polygons.clone();
+        report.concave_polygons = import.concave_polygons.clone();
+        report.crossing_polygons = import.crossing_polygons.clone();
         report.nonfinite_vertices = import.nonfinite_vertices.clone();
     }
     let chosen: Vec<usize> = (0..scene.objects.len())
@@ -142,6 +186,7 @@ pub fn cleaning_report(
     report.n_triangles = soup.triangles.len() as u64;
     find_odd_triangles(&mut report, scene, &soup, options.weld);
     find_odd_edges(&mut report, scene, &soup, options);
+    find_crossing(&mut report, scene, &soup, options);
     Ok(report)
 }
 
@@ -395,64 +440,33 @@ fn find_odd_edges(
     }
 }
 
-/// Triangles that hang together over edges with exactly two of them, by union-find; each knows
-/// whether it is turned against its parent.
-struct Shells {
-    parent: Vec<u32>,
-    is_turned: Vec<bool>,
-    is_unclosed: Vec<bool>,
-}
-
-impl Shells {
-    fn new(n: usize) -> Self {
-        Self {
-            parent: (0..n as u32).collect(),
-            is_turned: vec![false; n],
-            is_unclosed: vec![false; n],
-        }
-    }
-
-    /// Root of `t`, and whether `t` is turned against it.
-    fn root(&mut self, t: u32) -> (u32, bool) {
-        let mut at = t;
-        let mut turned = false;
-        while self.parent[at as usize] != at {
-            let up = self.parent[at as usize];
-            let above = self.parent[up as usize];
-            // Path halving: link to the grandparent, with the turns of both steps.
-            let turn = self.is_turned[at as usize] ^ (up != above && self.is_turned[up as usize]);
-            self.parent[at as usize] = above;
-            self.is_turned[at as usize] = turn;
-            turned ^= turn;
-            at = above;
-        }
-        (at, turned)
-    }
-
-    /// Joins two triangles that walk their edge the same way (then one is turned) or not.
-    fn join(&mut self, a: u32, b: u32, is_turned: bool) {
-        let ((ra, ta), (rb, tb)) = (self.root(a), self.root(b));
-        if ra != rb {
-            let (low, high) = (ra.min(rb), ra.max(rb));
-            self.parent[high as usize] = low;
-            self.is_turned[high as usize] = ta ^ tb ^ is_turned;
-        } else if ta ^ tb != is_turned {
-            // A surface with one side only, such as a Moebius strip.
-            self.is_unclosed[a as usize] = true;
-        }
-    }
-
-    fn mark_unclosed(&mut self, t: u32) {
-        self.is_unclosed[t as usize] = true;
-    }
-}
-
 #[derive(Clone, Copy, Default)]
 struct ShellSum {
     n: [u64; 2],
     is_unclosed: bool,
     /// Six times the volume, front faces outwards, were all turned as the root is.
     volume: f64,
+}
+
+/// Counts crossing pairs of triangles of one object.
+fn find_crossing(
+    report: &mut CleaningReport,
+    scene: &Scene,
+    soup: &Soup,
+    options: &CleaningOptions,
+) {
+    let corners: Vec<Triangle> = (0..soup.triangles.len()).map(|t| soup.corners(t)).collect();
+    let is_pair = |a: usize, b: usize| {
+        let (t, u) = (soup.triangles[a], soup.triangles[b]);
+        soup.sources[a].object == soup.sources[b].object && !t.iter().any(|p| u.contains(p))
+    };
+    report.is_crossing_complete = crossing::for_each(
+        &corners,
+        options.weld,
+        options.crossing_pairs,
+        is_pair,
+        |t, at| report.crossing_triangles.add(at, || soup.name(scene, t)),
+    );
 }
 
 fn find_odd_shells(report: &mut CleaningReport, scene: &Scene, soup: &Soup, shells: &mut Shells) {
@@ -470,7 +484,7 @@ fn find_odd_shells(report: &mut CleaningReport, scene: &Scene, soup: &Soup, shel
         let [a, b, c] = soup.corners(t).map(|p| p - origin);
         let sum = &mut sums[root as usize];
         sum.n[usize::from(is_turned)] += 1;
-        sum.is_unclosed |= shells.is_unclosed[t];
+        sum.is_unclosed |= shells.is_unclosed[t] || shells.is_one_sided[t];
         sum.volume += a.dot(b.cross(c)) * if is_turned { -1.0 } else { 1.0 };
     }
     for (t, &(root, is_turned)) in roots.iter().enumerate() {
@@ -489,10 +503,19 @@ fn find_odd_shells(report: &mut CleaningReport, scene: &Scene, soup: &Soup, shel
         } else {
             sum.volume
         };
-        if root as usize == t && !sum.is_unclosed && volume < 0.0 {
+        if root as usize != t {
+            continue;
+        }
+        let shells = &mut report.shells;
+        if sum.is_unclosed {
+            shells.open += 1;
+        } else if volume < 0.0 {
+            shells.rooms += 1;
             report
                 .inverted_shells
                 .add(soup.center(t), || soup.name(scene, t));
+        } else {
+            shells.solids += 1;
         }
     }
 }

@@ -24,6 +24,7 @@
 mod auto_roles;
 mod builder;
 mod clean;
+mod crossing;
 mod error;
 mod export;
 mod files;
@@ -36,18 +37,21 @@ mod ply;
 mod polygon;
 mod prt;
 mod pvs_text;
+mod repair;
 mod report;
 mod roles;
+mod shells;
 mod soup;
 mod stl;
 mod tjunction;
 
-pub use clean::{CleaningOptions, CleaningReport, cleaning_report};
+pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
 pub use error::ImportError;
 pub use export::export_glb;
 pub use options::{ImportOptions, Limits, Up};
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
+pub use repair::{RepairOptions, RepairReport, repair};
 pub use report::{Example, FileReport, Finding, ImportReport, Note};
 pub use roles::RoleRules;
 
@@ -185,7 +189,7 @@ fn decode(
 }
 
 fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, ImportError> {
-    let (mut scene, report) = builder.finish();
+    let (mut scene, mut report) = builder.finish();
     if scene.objects.is_empty() {
         let advice = match report.notes.first() {
             Some(note) => format!("the first thing noticed: {note}"),
@@ -199,6 +203,9 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     check_extent(&scene, &report, options)?;
     if options.roles.is_automatic && !options.roles.is_manual {
         auto_roles::judge(&mut scene);
+    }
+    if let Some(wanted) = &options.repair {
+        report.repair = Some(repair(&mut scene, wanted)?);
     }
     Ok(Imported { scene, report })
 }

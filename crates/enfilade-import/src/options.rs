@@ -1,7 +1,7 @@
 //! What the caller can choose.
 
-use crate::ImportError;
 use crate::roles::RoleRules;
+use crate::{ImportError, RepairOptions};
 use enfilade_geom::{DMat4, DVec3};
 
 /// The input's up axis.
@@ -29,6 +29,8 @@ pub struct ImportOptions {
     pub limits: Limits,
     /// What is structural and what is detail.
     pub roles: RoleRules,
+    /// What to put right in structural triangles; nothing if not given.
+    pub repair: Option<RepairOptions>,
 }
 
 /// What to refuse, so that hostile input ends in an error in bounded memory and time.

@@ -15,6 +15,9 @@ pub(crate) const MAX_CORNERS: usize = 4096;
 /// Corners may be this far from their polygon's plane. [Units: wu]
 const PLANAR: f64 = 1e-3;
 
+/// A corner this far inside the line through its neighbors makes a polygon concave. [Units: wu]
+const NOTCH: f64 = 1e-5;
+
 const CROSSES: &str = "a polygon that crosses or touches itself; look at the result";
 
 /// Splits polygons; keeps its buffers.
@@ -83,6 +86,14 @@ impl Splitter {
                 .iter()
                 .map(|&c| [(c - center).dot(u), (c - center).dot(v)]),
         );
+        let position = || builder.base.transform_point3(center);
+        if !self.is_convex(NOTCH / unit) {
+            if self.crosses_itself() {
+                builder.report.crossing_polygons.add(position(), &place);
+            } else if self.is_notched(NOTCH / unit) {
+                builder.report.concave_polygons.add(position(), &place);
+            }
+        }
         // `u, v, normal` is right-handed, so the outline runs counter-clockwise.
         if n == 4 {
             if !self.split_quad() {
@@ -130,6 +141,50 @@ impl Splitter {
         };
         self.triangles.extend(cut.map(|i| i as u32));
         first.max(second) > 0.0
+    }
+
+    /// Whether a corner lies more than `depth` inside the line through its neighbors.
+    fn is_notched(&self, depth: f64) -> bool {
+        let n = self.flat.len();
+        (0..n).any(|i| {
+            let (before, after) = ((i + n - 1) % n, (i + 1) % n);
+            let [a, b] = [before, after].map(|k| self.flat[k]);
+            let width = (b[0] - a[0]).hypot(b[1] - a[1]);
+            self.area([before, i, after]) < -depth * width
+        })
+    }
+
+    /// Whether no corner turns inwards and the outline goes round once: then it cannot cross itself.
+    fn is_convex(&self, depth: f64) -> bool {
+        let n = self.flat.len();
+        let turns = (0..n).map(|i| {
+            let [a, b, c] = [i, (i + 1) % n, (i + 2) % n].map(|k| self.flat[k]);
+            let (p, q) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
+            (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1])
+        });
+        // Once round is a full turn, twice two.
+        !self.is_notched(depth) && turns.sum::<f64>() < 1.5 * std::f64::consts::TAU
+    }
+
+    /// Whether two edges without a common corner cross. Time: `n log n`, and the pairs of edges that lie side by side in
+    /// the first direction.
+    fn crosses_itself(&self) -> bool {
+        let n = self.flat.len();
+        let ends = |i: usize| [self.flat[i], self.flat[(i + 1) % n]];
+        let low = |i: usize| ends(i)[0][0].min(ends(i)[1][0]);
+        let high = |i: usize| ends(i)[0][0].max(ends(i)[1][0]);
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&i, &j| low(i).total_cmp(&low(j)));
+        order.iter().enumerate().any(|(k, &i)| {
+            let beside = order[k + 1..].iter().take_while(|&&j| low(j) < high(i));
+            beside.into_iter().any(|&j| {
+                let is_next = (i + 1) % n == j || (j + 1) % n == i;
+                let (i1, j1) = ((i + 1) % n, (j + 1) % n);
+                !is_next
+                    && self.area([i, i1, j]) * self.area([i, i1, j1]) < 0.0
+                    && self.area([j, j1, i]) * self.area([j, j1, i1]) < 0.0
+            })
+        })
     }
 
     fn fan(&mut self, n: usize) {
@@ -230,6 +285,33 @@ mod tests {
             let bent = bent.map(|(x, y, z)| DVec3::new(x.into(), y.into(), z.into()));
             assert_eq!(split(&bent).0.len(), 6, "{height}");
         }
+    }
+
+    #[test]
+    fn concave_and_crossing_outlines_are_counted() {
+        let count = |outline: &[[f64; 2]]| {
+            let options = ImportOptions::default();
+            let mut builder = Builder::new(&options).unwrap();
+            let corners = on_plane(outline);
+            let mut splitter = Splitter::new();
+            let split = splitter.split(&corners, 1.0, &mut builder, || "here".into());
+            assert!(!split.unwrap().is_empty());
+            let report = &builder.report;
+            (report.concave_polygons.n, report.crossing_polygons.n)
+        };
+        let square = [[0., 0.], [1., 0.], [1., 1.], [0., 1.]];
+        assert_eq!(count(&square), (0, 0));
+        assert_eq!(count(&[[0., 0.], [1., 0.5], [2., 0.], [1., 3.]]), (1, 0));
+        assert_eq!(count(&[[0., 0.], [2., 2.], [2., 0.], [0., 3.]]), (0, 1));
+        // A corner in the middle of an edge, but for rounding.
+        let straight = [[0., 0.], [0.5, 1e-7], [1., 0.], [1., 1.], [0., 1.]];
+        assert_eq!(count(&straight), (0, 0));
+        // A star of five points, drawn without lifting the pen: every corner turns the same way.
+        let star: Vec<[f64; 2]> = (0..5)
+            .map(|i| f64::from(i) * 0.4 * std::f64::consts::TAU)
+            .map(|a| [a.cos(), a.sin()])
+            .collect();
+        assert_eq!(count(&star), (0, 1));
     }
 
     #[test]

@@ -25,8 +25,14 @@ pub struct ImportReport {
     pub n_nonfinite_triangles: u64,
     /// Polygons with more than three corners, one of them more than 1 mm off their plane.
     pub non_planar_polygons: Finding,
+    /// Polygons with a corner that turns inwards by more than 0.01 mm, outlines that cross themselves aside.
+    pub concave_polygons: Finding,
+    /// Polygons whose outline crosses itself, seen along their normal.
+    pub crossing_polygons: Finding,
     /// Polygons split into triangles.
     pub n_polygons: u64,
+    /// What was put right, if that was asked for.
+    pub repair: Option<crate::RepairReport>,
 }
 
 /// One input file.

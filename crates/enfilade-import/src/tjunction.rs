@@ -26,6 +26,26 @@ pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found 
         examples: Vec::new(),
         is_complete: true,
     };
+    let mut counted: HashSet<u32> = HashSet::new();
+    found.is_complete = for_each(points, open, distance, |_, i, _| {
+        if counted.insert(i) {
+            found.n += 1;
+            if found.examples.len() < MAX_EXAMPLES {
+                found.examples.push(i);
+            }
+        }
+    });
+    found
+}
+
+/// Visits each pair of an edge and a point within `distance` of its inside: the edge's place in `open`, the point and
+/// how far along the edge it lies. `false` if the search was stopped before its end.
+pub(crate) fn for_each(
+    points: &[DVec3],
+    open: &[[u32; 2]],
+    distance: f64,
+    mut visit: impl FnMut(usize, u32, f64),
+) -> bool {
     let mut ends: Vec<u32> = open.iter().flatten().copied().collect();
     ends.sort_unstable();
     ends.dedup();
@@ -35,7 +55,7 @@ pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found 
     };
     let longest = lengths().fold(0.0, f64::max);
     if ends.is_empty() || longest <= 0.0 {
-        return found;
+        return true;
     }
     // As wide as a typical edge, so that an edge meets few cells; wider where one very long edge
     // would meet too many.
@@ -47,8 +67,7 @@ pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found 
         grid.entry(cell(points[i as usize])).or_default().push(i);
     }
     let mut budget = BUDGET;
-    let mut counted: HashSet<u32> = HashSet::new();
-    for &[a, b] in open {
+    for (edge, &[a, b]) in open.iter().enumerate() {
         let (from, to) = (points[a as usize], points[b as usize]);
         let along = to - from;
         let length = along.length();
@@ -64,21 +83,16 @@ pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found 
                 let t = to_point.dot(direction);
                 let is_inside = t > distance && t < length - distance;
                 let off = (to_point - direction * t).length_squared();
-                if i != a && i != b && is_inside && off <= distance * distance && counted.insert(i)
-                {
-                    found.n += 1;
-                    if found.examples.len() < MAX_EXAMPLES {
-                        found.examples.push(i);
-                    }
+                if i != a && i != b && is_inside && off <= distance * distance {
+                    visit(edge, i, t);
                 }
             }
         });
         if budget == 0 {
-            found.is_complete = false;
-            break;
+            return false;
         }
     }
-    found
+    true
 }
 
 /// Visits every grid cell within `distance` of the segment, each once, and a few around.

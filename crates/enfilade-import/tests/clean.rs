@@ -5,7 +5,7 @@ mod common;
 use common::{box_primitive, scene_of, v};
 use enfilade_geom::scene::{Primitive, Role, Scene};
 use enfilade_geom::{DMat4, DVec3};
-use enfilade_import::{CleaningOptions, CleaningReport, cleaning_report, decode_obj};
+use enfilade_import::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report, decode_obj};
 use proptest::prelude::*;
 
 fn clean(scene: &Scene) -> CleaningReport {
@@ -174,6 +174,7 @@ fn options_out_of_range_are_refused() {
             weld,
             t_junction,
             has_detail: false,
+            ..CleaningOptions::default()
         };
         assert!(
             cleaning_report(&scene, None, &options).is_err(),
@@ -274,4 +275,63 @@ proptest! {
         prop_assert_eq!(n_open(0.9e-5), 4);
         prop_assert_eq!(n_open(1.1e-5), 6);
     }
+}
+
+#[test]
+fn shells_are_solids_rooms_or_open() {
+    let shells = |primitive: Primitive| {
+        let ShellCounts {
+            solids,
+            rooms,
+            open,
+        } = of(primitive).shells;
+        [solids, rooms, open]
+    };
+    assert_eq!(shells(cube()), [1, 0, 0]);
+    let mut room = cube();
+    room.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
+    assert_eq!(shells(room), [0, 1, 0]);
+    let mut open = cube();
+    open.indices.truncate(30);
+    assert_eq!(shells(open), [0, 0, 1]);
+    // One triangle turned: most of them decide.
+    let mut flipped = cube();
+    flipped.indices.swap(0, 1);
+    assert_eq!(shells(flipped), [1, 0, 0]);
+}
+
+#[test]
+fn triangles_that_run_through_each_other_are_counted_within_an_object() {
+    // Two boxes of one object, one through the other's corner; as two objects they may.
+    let mut both = cube();
+    let other = cube();
+    let moved = other.positions.iter();
+    both.positions
+        .extend(moved.map(|p| [p[0] + 0.2, p[1] + 0.3, p[2] + 0.45]));
+    both.indices.extend(other.indices.iter().map(|i| i + 8));
+    let report = of(both.clone());
+    assert!(report.crossing_triangles.n > 0 && report.is_crossing_complete);
+    let beside = DMat4::from_translation(v(0.2, 0.3, 0.45));
+    let apart = clean(&scene_of(cube(), &[DMat4::IDENTITY, beside]));
+    assert_eq!(apart.crossing_triangles.n, 0);
+    let options = CleaningOptions {
+        crossing_pairs: 1,
+        ..CleaningOptions::default()
+    };
+    let scene = scene_of(both, &[DMat4::IDENTITY]);
+    let stopped = cleaning_report(&scene, None, &options).unwrap();
+    assert!(!stopped.is_crossing_complete);
+    assert!(stopped.to_string().contains("crossing triangles: at least"));
+}
+
+#[test]
+fn concave_and_crossing_polygons_are_counted_from_the_file() {
+    let text = b"v 0 0 0\nv 1 .5 0\nv 2 0 0\nv 1 3 0\nv 0 0 1\nv 2 2 1\nv 2 0 1\nv 0 3 1\nf 1 2 3 4\nf 5 6 7 8\n";
+    let imported = decode_obj(text, &Default::default()).unwrap();
+    let options = CleaningOptions::default();
+    let report = cleaning_report(&imported.scene, Some(&imported.report), &options).unwrap();
+    assert_eq!(
+        (report.concave_polygons.n, report.crossing_polygons.n),
+        (1, 1)
+    );
 }

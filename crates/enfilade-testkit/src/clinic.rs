@@ -1,8 +1,10 @@
-//! A hospital wing made of brushes, of any size: storeys of wards along corridors.
+//! A clinic made of brushes, of any size: storeys of wards along corridors, in three wings around a hall.
 //!
 //! Stands for the clinic of Lefebvre & Hornus 2003, table 1, which is not public: rooms with doorways on
 //! both sides of corridors, furnished with what they name (tables, beds, wash basins) as brushes of the
-//! structure, so that the tree has to cut them.
+//! structure, so that the tree has to cut them. Wings stand at 120 degrees to each other, none along an axis, and
+//! furniture stands as people leave it, at any angle, so that planes of one piece run through others: what
+//! makes a tree cut polygons.
 
 use enfilade_geom::scene::{Entity, Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Plane};
@@ -16,103 +18,197 @@ const CORRIDOR: f64 = 2.5;
 const HEIGHT: f64 = 3.0;
 const WALL: f64 = 0.25;
 /// Wards on one side of a corridor.
-const PER_SIDE: usize = 10;
+const PER_SIDE: usize = 6;
+/// Wings around the hall, whose walls stand this far from its middle. [Units: wu]
+const WINGS: usize = 3;
+const HALL: f64 = 4.25;
+/// The first wing's angle to the x axis, in radians: none of the three lies along an axis.
+const TURN: f64 = 0.2;
+/// Boards of a shelf.
+const BOARDS: usize = 2;
+/// Faces of brushes seen from inside of a storey, counted.
+const PER_STOREY: f64 = 3750.0;
 
-/// A clinic of about `n_polygons` polygons seen from inside; closed. Storeys are joined by a stairwell.
+/// A place and a turn around the vertical axis.
+#[derive(Clone, Copy)]
+struct Frame {
+    origin: DVec3,
+    /// In radians.
+    angle: f64,
+}
+
+impl Frame {
+    fn turned(&self, v: DVec3) -> DVec3 {
+        let (s, c) = self.angle.sin_cos();
+        DVec3::new(v.x * c - v.z * s, v.y, v.x * s + v.z * c)
+    }
+
+    fn at(&self, p: DVec3) -> DVec3 {
+        self.origin + self.turned(p)
+    }
+
+    /// A frame that stands in this one.
+    fn within(&self, origin: DVec3, angle: f64) -> Self {
+        Self {
+            origin: self.at(origin),
+            angle: self.angle + angle,
+        }
+    }
+
+    /// What lies behind all planes, each a point and a normal of this frame.
+    fn solid(&self, planes: &[(DVec3, DVec3)]) -> ConvexSolid {
+        let planes: Vec<Plane> = planes
+            .iter()
+            .map(|&(p, n)| Plane::through(self.at(p), self.turned(n)))
+            .collect();
+        ConvexSolid::from_planes(&planes, 1e5, 1e-6).expect("it bounds something")
+    }
+
+    fn boxed(&self, min: [f64; 3], max: [f64; 3]) -> ConvexSolid {
+        let (min, max) = (DVec3::from(min), DVec3::from(max));
+        let planes: Vec<_> = [DVec3::X, DVec3::Y, DVec3::Z]
+            .into_iter()
+            .flat_map(|n| [(max, n), (min, -n)])
+            .collect();
+        self.solid(&planes)
+    }
+
+    /// An upright prism of `n` sides around the frame's axis, which are `apothem` away.
+    fn prism(&self, n: usize, apothem: f64, [low, high]: [f64; 2]) -> ConvexSolid {
+        let mut planes = vec![(DVec3::Y * high, DVec3::Y), (DVec3::Y * low, -DVec3::Y)];
+        planes.extend((0..n).map(|k| {
+            let (s, c) = (k as f64 / n as f64 * std::f64::consts::TAU).sin_cos();
+            let normal = DVec3::new(c, 0.0, s);
+            (normal * apothem, normal)
+        }));
+        self.solid(&planes)
+    }
+}
+
+/// A clinic of which about `n_polygons` faces of brushes are seen from inside; closed. The hall is open through all storeys.
 ///
 /// # Panics
-/// Never: all brushes are boxes.
+/// Never: all brushes bound something.
 #[must_use]
 pub fn clinic(n_polygons: usize, seed: u64) -> Scene {
     let mut rng = Rng::new(seed);
     let mut solids = Vec::new();
-    // Counted: a storey of twenty wards has about this many.
-    let n_storeys = ((n_polygons as f64 / 2020.0).round() as usize).max(1);
-    let length = PER_SIDE as f64 * (WARD[0] + WALL) + WALL;
-    let depth = 2.0 * WARD[1] + CORRIDOR + 4.0 * WALL;
+    let n_storeys = ((n_polygons as f64 / PER_STOREY).round() as usize).max(1);
+    let ground = Frame {
+        origin: DVec3::ZERO,
+        angle: TURN,
+    };
+    let top = n_storeys as f64 * (HEIGHT + WALL);
+    // Wider than the hall, whose walls stand on the one and carry the other.
+    solids.push(ground.prism(WINGS, HALL + 0.1, [-WALL, 0.0]));
+    solids.push(ground.prism(WINGS, HALL + 0.1, [top - WALL, top]));
+    solids.push(ground.prism(8, 0.4, [0.0, top - WALL]));
     for storey in 0..n_storeys {
-        let y = storey as f64 * (HEIGHT + WALL);
-        let mut add = |min: [f64; 3], max: [f64; 3]| solids.push(boxed(min, max, y));
-        // The floor, open above the stairwell of the storey below, which lies beside the corridor's end.
-        let hole = [length - WALL, length - WALL + 3.0];
-        add([-WALL, -WALL, -WALL], [length, 0.0, depth]);
-        if storey == 0 {
-            add([length, -WALL, -WALL], [hole[1] + WALL, 0.0, depth]);
-        }
-        if storey + 1 == n_storeys {
-            add(
-                [-WALL, HEIGHT, -WALL],
-                [hole[1] + WALL, HEIGHT + WALL, depth],
-            );
-        }
-        // The stairwell's three outer walls and the end of the building.
-        let z = [WARD[1] + WALL, WARD[1] + WALL + CORRIDOR];
-        let top = HEIGHT + WALL;
-        add(
-            [hole[1], -WALL, z[0] - WALL],
-            [hole[1] + WALL, top, z[1] + WALL],
-        );
-        add([length, -WALL, z[0] - WALL], [hole[1], top, z[0]]);
-        add([length, -WALL, z[1]], [hole[1], top, z[1] + WALL]);
-        add([length - WALL, 0.0, -WALL], [length, top, z[0]]);
-        add([length - WALL, 0.0, z[1]], [length, top, depth]);
-        add([-WALL, 0.0, -WALL], [0.0, top, depth]);
-        for side in 0..2 {
-            // The outer wall, and the corridor's with doorways.
-            let (inner, outer) = if side == 0 {
-                ([z[0] - WALL, z[0]], [-WALL, 0.0])
-            } else {
-                ([z[1], z[1] + WALL], [depth - WALL, depth])
-            };
-            add([0.0, 0.0, outer[0]], [length - WALL, top, outer[1]]);
-            let ward = if side == 0 {
-                [0.0, inner[0]]
-            } else {
-                [inner[1], outer[0]]
-            };
-            for k in 0..PER_SIDE {
-                let x = k as f64 * (WARD[0] + WALL);
-                let door = x + 0.5 + 2.0 * rng.unit();
-                add([x, 0.0, inner[0]], [door, top, inner[1]]);
-                add([door + 1.0, 0.0, inner[0]], [x + WARD[0], top, inner[1]]);
-                add([door, 2.1, inner[0]], [door + 1.0, top, inner[1]]);
-                add(
-                    [x + WARD[0], 0.0, ward[0].min(inner[0])],
-                    [x + WARD[0] + WALL, top, ward[1].max(inner[1])],
-                );
-                furnish(&mut rng, [x, ward[0]], &mut add);
-            }
+        for k in 0..WINGS {
+            let wing = wing_frame(storey, k);
+            wing_of(&mut rng, &wing, storey + 1 == n_storeys, &mut solids);
         }
     }
     scene_of(solids, n_storeys)
 }
 
-/// Beds, a table on legs, a wash basin on a foot.
-fn furnish(rng: &mut Rng, [x, z]: [f64; 2], add: &mut impl FnMut([f64; 3], [f64; 3])) {
-    let dx = 0.4 * rng.unit();
-    for bed in 0..2 {
-        let z = z + 0.6 + 2.2 * bed as f64 + 0.3 * rng.unit();
-        add([x, 0.0, z], [x + 2.0, 0.5, z + 0.9]);
-        add([x, 0.5, z], [x + 0.1, 1.0, z + 0.9]);
-    }
-    let (tx, tz) = (x + 2.5 + dx, z + 1.0 + rng.unit());
-    add([tx, 0.7, tz], [tx + 0.8, 0.75, tz + 1.2]);
-    for (lx, lz) in [(0.0, 0.0), (0.7, 0.0), (0.0, 1.1), (0.7, 1.1)] {
-        add([tx + lx, 0.0, tz + lz], [tx + lx + 0.1, 0.7, tz + lz + 0.1]);
-    }
-    let bx = x + 3.0 + dx;
-    add([bx, 0.8, z + 4.4], [bx + 0.5, 0.95, z + 4.8]);
-    add([bx + 0.2, 0.0, z + 4.5], [bx + 0.3, 0.8, z + 4.6]);
+/// Where a wing begins: at the hall's wall, its floor, the outer wall of its first side of wards.
+fn wing_frame(storey: usize, k: usize) -> Frame {
+    let turn = TURN + k as f64 / WINGS as f64 * std::f64::consts::TAU;
+    let hall = Frame {
+        origin: DVec3::Y * (storey as f64 * (HEIGHT + WALL)),
+        angle: turn,
+    };
+    let middle = WARD[1] + WALL + 0.5 * CORRIDOR;
+    hall.within(DVec3::new(HALL, 0.0, -middle), 0.0)
 }
 
-fn boxed(min: [f64; 3], max: [f64; 3], y: f64) -> ConvexSolid {
-    let up = DVec3::new(0.0, y, 0.0);
-    let (min, max) = (DVec3::from(min) + up, DVec3::from(max) + up);
-    let planes: Vec<Plane> = [DVec3::X, DVec3::Y, DVec3::Z]
-        .into_iter()
-        .flat_map(|n| [Plane::through(max, n), Plane::through(min, -n)])
-        .collect();
-    ConvexSolid::from_planes(&planes, 1e5, 1e-6).expect("a box bounds something")
+/// A storey of one wing: wards on both sides of a corridor that is open to the hall.
+fn wing_of(rng: &mut Rng, wing: &Frame, is_top: bool, solids: &mut Vec<ConvexSolid>) {
+    let length = PER_SIDE as f64 * (WARD[0] + WALL) + WALL;
+    let depth = 2.0 * WARD[1] + CORRIDOR + 4.0 * WALL;
+    let top = HEIGHT + WALL;
+    let z = [WARD[1] + WALL, WARD[1] + WALL + CORRIDOR];
+    let mut add = |min, max| solids.push(wing.boxed(min, max));
+    add([-WALL, -WALL, -WALL], [length, 0.0, depth]);
+    if is_top {
+        add([-WALL, HEIGHT, -WALL], [length, top, depth]);
+    }
+    // The hall's wall, a little longer than the hall's side, and the end of the wing.
+    let over = 1.1;
+    add([-WALL, -WALL, -over], [0.0, top, z[0]]);
+    add([-WALL, -WALL, z[1]], [0.0, top, z[0] + z[1] + over]);
+    add([length - WALL, 0.0, -WALL], [length, top, depth]);
+    for side in 0..2 {
+        // The outer wall, and the corridor's with doorways.
+        let (inner, outer) = if side == 0 {
+            ([z[0] - WALL, z[0]], [-WALL, 0.0])
+        } else {
+            ([z[1], z[1] + WALL], [depth - WALL, depth])
+        };
+        let mut add = |min, max| solids.push(wing.boxed(min, max));
+        add([0.0, 0.0, outer[0]], [length - WALL, top, outer[1]]);
+        let ward = if side == 0 {
+            [0.0, inner[0]]
+        } else {
+            [inner[1], outer[0]]
+        };
+        for k in 0..PER_SIDE {
+            let x = k as f64 * (WARD[0] + WALL);
+            let door = x + 0.5 + 2.0 * rng.unit();
+            let mut add = |min, max| solids.push(wing.boxed(min, max));
+            add([x, 0.0, inner[0]], [door, top, inner[1]]);
+            add([door + 1.0, 0.0, inner[0]], [x + WARD[0], top, inner[1]]);
+            add([door, 2.1, inner[0]], [door + 1.0, top, inner[1]]);
+            add(
+                [x + WARD[0], 0.0, ward[0].min(inner[0])],
+                [x + WARD[0] + WALL, top, ward[1].max(inner[1])],
+            );
+            furnish(rng, &wing.within(DVec3::new(x, 0.0, ward[0]), 0.0), solids);
+        }
+    }
+}
+
+/// Beds with slanted heads, a table on legs, a round stool, a wash basin on a foot, each at an angle of its own.
+fn furnish(rng: &mut Rng, ward: &Frame, solids: &mut Vec<ConvexSolid>) {
+    for bed in 0..2 {
+        let z = 0.7 + 2.1 * f64::from(bed) + 0.3 * rng.unit();
+        let turn = 0.3 * (rng.unit() - 0.5);
+        let bed = ward.within(DVec3::new(0.3, 0.0, z), turn);
+        solids.push(bed.boxed([0.0, 0.0, 0.0], [1.8, 0.5, 0.9]));
+        // The head leans back: two planes are slanted.
+        let lean = DVec3::new(1.0, 0.2, 0.0).normalize();
+        let (low, high) = (DVec3::new(0.15, 0.5, 0.0), DVec3::new(0.0, 1.0, 0.9));
+        solids.push(bed.solid(&[
+            (low, lean),
+            (low - DVec3::X * 0.1, -lean),
+            (high, DVec3::Y),
+            (low, -DVec3::Y),
+            (high, DVec3::Z),
+            (low, -DVec3::Z),
+        ]));
+    }
+    let turn = std::f64::consts::TAU * rng.unit();
+    let table = ward.within(DVec3::new(2.95, 0.0, 1.5 + 0.4 * rng.unit()), turn);
+    solids.push(table.boxed([-0.4, 0.7, -0.6], [0.4, 0.75, 0.6]));
+    for (x, z) in [(-0.35, -0.55), (0.25, -0.55), (-0.35, 0.45), (0.25, 0.45)] {
+        solids.push(table.boxed([x, 0.0, z], [x + 0.1, 0.7, z + 0.1]));
+    }
+    let stool = ward.within(DVec3::new(2.6 + 0.8 * rng.unit(), 0.0, 3.0), turn);
+    solids.push(stool.prism(6, 0.2, [0.0, 0.45]));
+    // Four posts through the boards of a shelf that nobody pushed back to the wall.
+    let place = DVec3::new(1.0 + rng.unit(), 0.0, 4.3);
+    let shelf = ward.within(place, 0.4 * (rng.unit() - 0.5));
+    for board in 0..BOARDS {
+        let y = 0.1 + 0.5 * board as f64;
+        solids.push(shelf.boxed([-0.5, y, -0.2], [0.5, y + 0.03, 0.2]));
+    }
+    for (x, z) in [(-0.45, -0.15), (0.4, -0.15), (-0.45, 0.1), (0.4, 0.1)] {
+        solids.push(shelf.boxed([x, 0.0, z], [x + 0.05, 1.8, z + 0.05]));
+    }
+    let basin = ward.within(DVec3::new(3.3, 0.0, 4.3), 0.5 * rng.unit());
+    solids.push(basin.boxed([-0.25, 0.8, -0.2], [0.25, 0.95, 0.2]));
+    solids.push(basin.boxed([-0.05, 0.0, -0.05], [0.05, 0.8, 0.05]));
 }
 
 fn scene_of(solids: Vec<ConvexSolid>, n_storeys: usize) -> Scene {
@@ -141,11 +237,7 @@ fn scene_of(solids: Vec<ConvexSolid>, n_storeys: usize) -> Scene {
         entities: (0..n_storeys)
             .map(|s| Entity {
                 class: "light".into(),
-                position: Some(DVec3::new(
-                    1.0,
-                    1.5 + s as f64 * (HEIGHT + WALL),
-                    WARD[1] + 1.0,
-                )),
+                position: Some(wing_frame(s, 0).at(DVec3::new(1.0, 1.5, WARD[1] + 1.0))),
                 ..Entity::default()
             })
             .collect(),

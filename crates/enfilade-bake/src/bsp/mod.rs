@@ -111,6 +111,8 @@ pub struct Bsp {
     surfaces: Vec<tree::Fragment>,
     /// Planes from this number on are a guide's alone.
     n_own_planes: u32,
+    /// Faces of solids, or triangles, that those are of.
+    n_faces: usize,
     /// Whether they are triangles, not faces of solids.
     is_of_triangles: bool,
     /// Whether each leaf counts: empty, and reached from inside if that is known.
@@ -122,7 +124,9 @@ pub struct Bsp {
 /// Numbers of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BspCounts {
-    /// Polygons that the tree was built from.
+    /// Faces of solids, or triangles, that something is seen of: what was modeled.
+    pub n_faces: usize,
+    /// Polygons that the tree was built from: what is left of faces once all solids are one.
     pub n_polygons: usize,
     /// Triangles that those make: of each polygon, two fewer than it has corners.
     pub n_triangles: usize,
@@ -151,6 +155,11 @@ pub struct Grouping {
     pub n_cells: usize,
 }
 
+/// How many different numbers there are; equal ones stand side by side.
+fn n_distinct(numbers: &[u32]) -> usize {
+    numbers.chunk_by(|a, b| a == b).count()
+}
+
 impl Bsp {
     /// Builds the tree and its portals.
     ///
@@ -168,7 +177,13 @@ impl Bsp {
         guide: &Guide,
         has_matter: bool,
     ) -> Self {
-        let (planes, fragments, bounds, tolerance) = surfaces::gather(input);
+        let surfaces::Gathered {
+            planes,
+            fragments,
+            faces,
+            bounds,
+            tolerance,
+        } = surfaces::gather(input);
         let boxes: Vec<Aabb> = input.solids.iter().map(ConvexSolid::aabb).collect();
         let solids = BoxTree::new(&boxes);
         let make = |fragments: Vec<tree::Fragment>,
@@ -204,6 +219,7 @@ impl Bsp {
                 tolerance,
                 surfaces: fragments,
                 n_own_planes: planes.len() as u32,
+                n_faces: n_distinct(&faces),
                 is_of_triangles: boxes.is_empty(),
                 is_open: Vec::new(),
                 leak: None,
@@ -222,19 +238,21 @@ impl Bsp {
             leaky.leak = reached.path;
             return leaky;
         }
-        let seen: Vec<tree::Fragment> = first
+        let (seen, faces_seen): (Vec<tree::Fragment>, Vec<u32>) = first
             .surfaces
             .iter()
-            .filter(|f| {
+            .zip(&faces)
+            .filter(|(f, _)| {
                 let mut is_seen = false;
                 first.tree.leaves_before(f, tolerance.plane, &mut |leaf| {
                     is_seen |= reached.is_reached[leaf as usize];
                 });
                 is_seen
             })
-            .cloned()
-            .collect();
+            .map(|(f, face)| (f.clone(), *face))
+            .unzip();
         let mut bsp = make(seen, heuristic, guide, false);
+        bsp.n_faces = n_distinct(&faces_seen);
         let reached = leak::reach(&bsp, input.inside);
         // What the points do not reach now is a sliver of the void that rounding left.
         for (open, &reached) in bsp.is_open.iter_mut().zip(&reached.is_reached) {
@@ -248,6 +266,7 @@ impl Bsp {
     #[must_use]
     pub fn counts(&self) -> BspCounts {
         BspCounts {
+            n_faces: self.n_faces,
             n_polygons: self.surfaces.len(),
             n_triangles: self.surfaces.iter().map(|s| s.points.len() - 2).sum(),
             n_pieces: self.surfaces.len() + self.tree.n_splits,

@@ -11,8 +11,18 @@ use crate::pipeline::in_own_order;
 use super::tree::Fragment;
 use super::{BspInput, Tolerance};
 
+/// What a tree is built from.
+pub(super) struct Gathered {
+    pub(super) planes: Vec<Plane>,
+    pub(super) fragments: Vec<Fragment>,
+    /// The face of a solid, or the triangle, that each fragment is of.
+    pub(super) faces: Vec<u32>,
+    pub(super) bounds: Aabb,
+    pub(super) tolerance: Tolerance,
+}
+
 /// Planes, polygons, the box around them and what counts as touching.
-pub(super) fn gather(input: &BspInput<'_>) -> (Vec<Plane>, Vec<Fragment>, Aabb, Tolerance) {
+pub(super) fn gather(input: &BspInput<'_>) -> Gathered {
     let points = input.triangles.iter().flatten().copied().chain(
         input
             .solids
@@ -30,21 +40,33 @@ pub(super) fn gather(input: &BspInput<'_>) -> (Vec<Plane>, Vec<Fragment>, Aabb, 
     let bounds = bounds.expanded(0.5 + 0.01 * bounds.size().max_element());
     let mut planes = PlaneList::new(&tolerance, &bounds);
     let mut fragments = Vec::new();
+    let mut faces = Vec::new();
+    let mut face = 0;
     if input.solids.is_empty() {
         for t in &in_own_order(input.triangles) {
             planes.add_triangle(t, &mut fragments);
+            faces.resize(fragments.len(), face);
+            face += 1;
         }
     } else {
         let solids: Vec<&ConvexSolid> = input.solids.iter().collect();
-        for (solid, faces) in solids.iter().zip(exposed_faces(&solids, tolerance.plane)) {
-            for (plane, parts) in solid.planes.iter().zip(faces) {
+        for (solid, exposed) in solids.iter().zip(exposed_faces(&solids, tolerance.plane)) {
+            for (plane, parts) in solid.planes.iter().zip(exposed) {
                 for part in parts {
                     planes.add(plane, part.points.into(), &mut fragments);
                 }
+                faces.resize(fragments.len(), face);
+                face += 1;
             }
         }
     }
-    (planes.planes, fragments, bounds, tolerance)
+    Gathered {
+        planes: planes.planes,
+        fragments,
+        faces,
+        bounds,
+        tolerance,
+    }
 }
 
 /// Distinct planes, found by rounded normal and offset.

@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use enfilade_geom::scene::{Entity, Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{DMat4, Plane};
-use enfilade_testkit::Rng;
+use enfilade_testkit::{Rng, clinic};
 
 use super::*;
 use crate::complex::poly;
@@ -256,6 +256,31 @@ fn the_pieces_of_a_tree_have_the_area_of_what_went_in() {
     let (before, after) = (area(&bsp.surfaces), area(&bsp.tree.on_plane));
     assert!((before - after).abs() < 1e-6 * before, "{before} {after}");
     assert!(bsp.counts().n_splits > 0);
+}
+
+#[test]
+fn the_clinic_is_cut_as_much_as_that_of_the_paper() {
+    // Lefebvre & Hornus 2003, table 1: 11,597 polygons in, 27,241 out.
+    let scene = clinic(11_597, 1);
+    let lights: Vec<DVec3> = scene.entities.iter().filter_map(|e| e.position).collect();
+    let bsp = bsp_of(
+        &scene.solids,
+        &lights,
+        Heuristic::Default,
+        &Guide::default(),
+    );
+    assert!(bsp.leak().is_none());
+    let c = bsp.counts();
+    let (size, growth) = (
+        c.n_faces as f64 / 11_597.0,
+        c.n_pieces as f64 / c.n_faces as f64,
+    );
+    assert!((0.95..1.05).contains(&size), "{} faces", c.n_faces);
+    assert!(
+        (2.2..2.5).contains(&growth),
+        "{growth} times as many pieces"
+    );
+    assert!(c.n_faces < c.n_polygons && c.n_splits > 0);
 }
 
 /// The solids as a scene, as the importer of maps makes it.

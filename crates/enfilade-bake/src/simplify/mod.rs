@@ -10,6 +10,7 @@
 
 mod apply;
 mod cost;
+mod graph;
 mod merge;
 mod metric;
 mod views;
@@ -22,6 +23,7 @@ pub(crate) use apply::Batches;
 use cost::cost_graph;
 pub use cost::{CostModel, UnknownMaterial, costs};
 pub(crate) use cost::{Surface, cost_of_cell, surfaces_of};
+pub use graph::{SimplifiedGraph, simplify_graph};
 use merge::{Bounds, Eyes};
 pub use metric::{PortalScore, portal_scores};
 

@@ -2,8 +2,6 @@
 //!
 //! Every value is checked where it is read, so that a wrong one is shown at its place.
 
-use std::fmt;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -11,8 +9,12 @@ use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
 use enfilade::bake::{BakeConfig, SmallestHole};
 use enfilade::geom::{Aabb, DVec3, Plane};
-use enfilade::import::{ImportOptions, RoleRules, Up};
-use serde::de::{Deserialize, Deserializer, Error};
+use enfilade::import::{ImportOptions, RepairOptions, RoleRules, Up};
+
+use super::values::{
+    Amount, Budget, Hole, Length, Unit, Weld, parse_hole, parse_length, parse_point, parse_unit,
+    parse_weld,
+};
 
 /// How scenes are read: the same for what is baked and what it is compared with.
 #[derive(clap::Args)]
@@ -36,6 +38,15 @@ pub(crate) struct SceneOptions {
     /// Point of the scene, in meters and with y up, that becomes the origin.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
+    /// Repair structural triangles: weld corners along open edges within METERS (0.001 if not given), split
+    /// T-junctions, turn shells alike, drop what is there twice, fill small holes; each change is counted.
+    #[arg(long, value_name = "METERS", num_args = 0..=1, require_equals = true,
+        default_missing_value = "0.001", value_parser = parse_weld)]
+    repair: Option<f64>,
+    /// With `--repair`, and in itself asking for it: fill holes whose box has a diagonal of up to METERS; 0 fills none
+    /// [default: 0.1].
+    #[arg(long, value_name = "METERS", value_parser = parse_hole, allow_hyphen_values = true)]
+    repair_holes: Option<f64>,
     /// Settings file in TOML; what is given on the command line wins.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
@@ -116,139 +127,6 @@ pub(super) enum Method {
     Delaunay,
 }
 
-/// The longest voxel and the widest "narrowest opening": past it no room is left to find.
-const LONGEST: f64 = 10.0;
-
-fn check_length(value: f64) -> Result<f64, String> {
-    if value > 0.0 && value <= LONGEST {
-        Ok(value)
-    } else {
-        Err(format!(
-            "{value} is not a length in meters above 0 and up to {LONGEST}"
-        ))
-    }
-}
-
-fn parse_length(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .map_err(|_| format!("'{text}' is not a number of meters"))?;
-    check_length(number)
-}
-
-fn parse_hole(text: &str) -> Result<f64, String> {
-    let number: f64 = text
-        .parse()
-        .map_err(|_| format!("'{text}' is not a number of meters"))?;
-    if number == 0.0 {
-        Ok(0.0)
-    } else {
-        check_length(number)
-    }
-}
-
-fn parse_unit(text: &str) -> Result<f64, String> {
-    Ok(match text {
-        "m" => 1.0,
-        "cm" => 0.01,
-        "mm" => 0.001,
-        "in" => 0.0254,
-        "ft" => 0.3048,
-        _ => text
-            .parse()
-            .ok()
-            .filter(|u| UNITS.contains(u))
-            .ok_or("give m, cm, mm, in, ft, or the meters of one unit, such as 0.001")?,
-    })
-}
-
-/// What the importer takes as a unit.
-const UNITS: RangeInclusive<f64> = 1e-9..=1e9;
-
-fn parse_point(text: &str) -> Result<DVec3, String> {
-    let numbers: Option<Vec<f64>> = text
-        .split(',')
-        .map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite()))
-        .collect();
-    match numbers.as_deref() {
-        Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
-        _ => Err("give three numbers with commas between, such as 5000,0,-1200".into()),
-    }
-}
-
-/// A length of the settings file. [Units: wu]
-struct Length(f64);
-
-impl<'de> Deserialize<'de> for Length {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value = Deserialize::deserialize(deserializer)?;
-        check_length(value).map(Self).map_err(D::Error::custom)
-    }
-}
-
-/// A number of the settings file that is at least 0.
-struct Amount(f64);
-
-impl<'de> Deserialize<'de> for Amount {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value: f64 = Deserialize::deserialize(deserializer)?;
-        if value >= 0.0 && value.is_finite() {
-            Ok(Self(value))
-        } else {
-            Err(D::Error::custom(format!(
-                "{value} is not a number of at least 0"
-            )))
-        }
-    }
-}
-
-/// A number of voxels of the settings file.
-struct Budget(usize);
-
-impl<'de> Deserialize<'de> for Budget {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value = Deserialize::deserialize(deserializer)?;
-        if value >= LEAST_VOXELS {
-            Ok(Self(value))
-        } else {
-            Err(D::Error::custom(format!(
-                "{value} voxels are too few: at least {LEAST_VOXELS}"
-            )))
-        }
-    }
-}
-
-/// What the bake takes as a budget.
-const LEAST_VOXELS: usize = 1000;
-
-/// A unit of the settings file: a name or a number.
-struct Unit(f64);
-
-impl<'de> Deserialize<'de> for Unit {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NameOrNumber;
-        impl serde::de::Visitor<'_> for NameOrNumber {
-            type Value = Unit;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(
-                    f,
-                    "\"m\", \"cm\", \"mm\", \"in\", \"ft\" or a number of meters"
-                )
-            }
-            fn visit_str<E: Error>(self, text: &str) -> Result<Unit, E> {
-                parse_unit(text).map(Unit).map_err(E::custom)
-            }
-            fn visit_f64<E: Error>(self, value: f64) -> Result<Unit, E> {
-                self.visit_str(&value.to_string())
-            }
-            fn visit_i64<E: Error>(self, value: i64) -> Result<Unit, E> {
-                self.visit_str(&value.to_string())
-            }
-        }
-        deserializer.deserialize_any(NameOrNumber)
-    }
-}
-
 /// The settings file: the fields of the bake's configuration and of the import, all optional.
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -262,6 +140,8 @@ struct ConfigFile {
     up: Option<UpAxis>,
     origin: Option<[f64; 3]>,
     auto_roles: Option<bool>,
+    repair: Option<Weld>,
+    repair_holes: Option<Hole>,
     #[serde(default)]
     detail_names: Vec<String>,
     #[serde(default)]
@@ -490,6 +370,19 @@ impl SceneOptions {
         Ok(self.resolve_with(&self.file()?))
     }
 
+    /// What is put right: nothing unless the command line or the settings file says so.
+    fn repair_with(&self, file: &ConfigFile) -> Option<RepairOptions> {
+        let weld = self.repair.or(file.repair.as_ref().map(|v| v.0));
+        let hole = self
+            .repair_holes
+            .or(file.repair_holes.as_ref().map(|v| v.0));
+        let default = RepairOptions::default();
+        (weld.is_some() || hole.is_some()).then(|| RepairOptions {
+            weld: weld.unwrap_or(default.weld),
+            hole: hole.unwrap_or(default.hole),
+        })
+    }
+
     fn resolve_with(&self, file: &ConfigFile) -> ImportOptions {
         ImportOptions {
             unit: self.unit.or(file.unit.as_ref().map(|u| u.0)),
@@ -511,6 +404,7 @@ impl SceneOptions {
                     .unwrap_or(true),
                 ..RoleRules::default()
             },
+            repair: self.repair_with(file),
             ..ImportOptions::default()
         }
     }
@@ -519,23 +413,6 @@ impl SceneOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn units_have_names() {
-        assert_eq!(parse_unit("mm"), Ok(0.001));
-        assert_eq!(parse_unit("0.5"), Ok(0.5));
-        for bad in ["feet", "", "0", "-1", "NaN", "inf", "1e99"] {
-            assert!(parse_unit(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn points_are_three_finite_numbers() {
-        assert_eq!(parse_point("1,-2, 3e2"), Ok(DVec3::new(1.0, -2.0, 300.0)));
-        for bad in ["", "1,2", "1,2,3,4", "1 2 3", "1,2,NaN", "1,2,inf"] {
-            assert!(parse_point(bad).is_err(), "{bad}");
-        }
-    }
 
     #[test]
     fn the_settings_file_says_which_line_is_wrong() {
@@ -555,6 +432,8 @@ mod tests {
         of_line("min_opening = nan", 1, "above 0");
         of_line("max_voxels = 999", 1, "at least 1000");
         of_line("noise = -0.5", 1, "at least 0");
+        of_line("repair = 0.0", 1, "0.1");
+        of_line("repair_holes = 11", 1, "up to 10");
         of_line("[merge]\nthreshold = inf", 2, "at least 0");
         of_line("[merge]\n\nthreshhold = 0.7", 3, "threshhold");
         of_line("unit = \"feet\"", 1, "ft");

@@ -1,0 +1,205 @@
+//! Numbers of the command line and the settings file, each checked where it is read.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use enfilade::geom::DVec3;
+use serde::de::{Deserialize, Deserializer, Error};
+
+/// The longest voxel and the widest "narrowest opening": past it no room is left to find.
+const LONGEST: f64 = 10.0;
+
+pub(super) fn check_length(value: f64) -> Result<f64, String> {
+    if value > 0.0 && value <= LONGEST {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is not a length in meters above 0 and up to {LONGEST}"
+        ))
+    }
+}
+
+pub(super) fn parse_length(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number of meters"))?;
+    check_length(number)
+}
+
+pub(super) fn parse_hole(text: &str) -> Result<f64, String> {
+    let number: f64 = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number of meters"))?;
+    if number == 0.0 {
+        Ok(0.0)
+    } else {
+        check_length(number)
+    }
+}
+
+pub(super) fn check_weld(value: f64) -> Result<f64, String> {
+    if WELDS.contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is not a length in meters from 0.000001 to 0.1"
+        ))
+    }
+}
+
+pub(super) fn parse_weld(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number of meters"))?;
+    check_weld(number)
+}
+
+pub(super) fn parse_unit(text: &str) -> Result<f64, String> {
+    Ok(match text {
+        "m" => 1.0,
+        "cm" => 0.01,
+        "mm" => 0.001,
+        "in" => 0.0254,
+        "ft" => 0.3048,
+        _ => text
+            .parse()
+            .ok()
+            .filter(|u| UNITS.contains(u))
+            .ok_or("give m, cm, mm, in, ft, or the meters of one unit, such as 0.001")?,
+    })
+}
+
+/// What a repair takes as its distance. [Units: wu]
+const WELDS: RangeInclusive<f64> = 1e-6..=0.1;
+
+/// What the importer takes as a unit.
+const UNITS: RangeInclusive<f64> = 1e-9..=1e9;
+
+pub(super) fn parse_point(text: &str) -> Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite()))
+        .collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
+        _ => Err("give three numbers with commas between, such as 5000,0,-1200".into()),
+    }
+}
+
+/// A length of the settings file. [Units: wu]
+pub(super) struct Length(pub(super) f64);
+
+impl<'de> Deserialize<'de> for Length {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Deserialize::deserialize(deserializer)?;
+        check_length(value).map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// A repair's distance in the settings file. [Units: wu]
+pub(super) struct Weld(pub(super) f64);
+
+impl<'de> Deserialize<'de> for Weld {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Deserialize::deserialize(deserializer)?;
+        check_weld(value).map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// A repair's largest hole in the settings file. [Units: wu]
+pub(super) struct Hole(pub(super) f64);
+
+impl<'de> Deserialize<'de> for Hole {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value: f64 = Deserialize::deserialize(deserializer)?;
+        if value == 0.0 {
+            return Ok(Self(value));
+        }
+        check_length(value).map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// A number of the settings file that is at least 0.
+pub(super) struct Amount(pub(super) f64);
+
+impl<'de> Deserialize<'de> for Amount {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value: f64 = Deserialize::deserialize(deserializer)?;
+        if value >= 0.0 && value.is_finite() {
+            Ok(Self(value))
+        } else {
+            Err(D::Error::custom(format!(
+                "{value} is not a number of at least 0"
+            )))
+        }
+    }
+}
+
+/// A number of voxels of the settings file.
+pub(super) struct Budget(pub(super) usize);
+
+impl<'de> Deserialize<'de> for Budget {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Deserialize::deserialize(deserializer)?;
+        if value >= LEAST_VOXELS {
+            Ok(Self(value))
+        } else {
+            Err(D::Error::custom(format!(
+                "{value} voxels are too few: at least {LEAST_VOXELS}"
+            )))
+        }
+    }
+}
+
+/// What the bake takes as a budget.
+const LEAST_VOXELS: usize = 1000;
+
+/// A unit of the settings file: a name or a number.
+pub(super) struct Unit(pub(super) f64);
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NameOrNumber;
+        impl serde::de::Visitor<'_> for NameOrNumber {
+            type Value = Unit;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(
+                    f,
+                    "\"m\", \"cm\", \"mm\", \"in\", \"ft\" or a number of meters"
+                )
+            }
+            fn visit_str<E: Error>(self, text: &str) -> Result<Unit, E> {
+                parse_unit(text).map(Unit).map_err(E::custom)
+            }
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Unit, E> {
+                self.visit_str(&value.to_string())
+            }
+            fn visit_i64<E: Error>(self, value: i64) -> Result<Unit, E> {
+                self.visit_str(&value.to_string())
+            }
+        }
+        deserializer.deserialize_any(NameOrNumber)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_have_names() {
+        assert_eq!(parse_unit("mm"), Ok(0.001));
+        assert_eq!(parse_unit("0.5"), Ok(0.5));
+        for bad in ["feet", "", "0", "-1", "NaN", "inf", "1e99"] {
+            assert!(parse_unit(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn points_are_three_finite_numbers() {
+        assert_eq!(parse_point("1,-2, 3e2"), Ok(DVec3::new(1.0, -2.0, 300.0)));
+        for bad in ["", "1,2", "1,2,3,4", "1 2 3", "1,2,NaN", "1,2,inf"] {
+            assert!(parse_point(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! `bake --repair` as a user runs it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn enfilade(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn place(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+/// A room of 4 x 3 x 5 m, seen from within, one corner of one triangle half a millimeter off.
+const ROOM: &str = "o Room\nv 0 0 0\nv 4 0 0\nv 0 3 0\nv 4 3 0\nv 0 0 5\nv 4 0 5\nv 0 3 5\nv 4 3 5\n\
+    v 4 3 5.0005\nf 1 3 7\nf 1 7 5\nf 2 6 8\nf 2 8 4\nf 1 5 6\nf 1 6 2\nf 3 4 8\nf 3 8 7\nf 1 2 4\n\
+    f 1 4 3\nf 5 7 9\nf 5 8 6\n";
+
+#[test]
+fn a_bake_repairs_on_request_and_says_what_it_changed() {
+    let (obj, plain, better) = (place("torn.obj"), place("torn.glb"), place("whole.glb"));
+    fs::write(&obj, ROOM).unwrap();
+    let text = |p: &Path| p.to_str().unwrap().to_owned();
+    let (obj, plain, better) = (text(&obj), text(&plain), text(&better));
+    let done = enfilade(&["bake", &obj, "-o", &plain]);
+    assert!(done.status.success(), "{done:?}");
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(said.contains("nothing was changed"), "{said}");
+    let done = enfilade(&["bake", "--repair", &obj, "-o", &better]);
+    assert!(done.status.success(), "{done:?}");
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let line = format!("{:<30} {:>9}", "corners welded", 1);
+    assert!(said.contains(&line), "{said}");
+    // The world has the triangles that were repaired, and says so.
+    let done = enfilade(&[
+        "verify", &better, "--source", &obj, "--repair", "--rays", "20000",
+    ]);
+    assert!(done.status.success(), "{done:?}");
+    let settings = fs::read(&better).unwrap();
+    let has = |bytes: &[u8], key: &str| bytes.windows(key.len()).any(|w| w == key.as_bytes());
+    assert!(has(&settings, "repair.weld"));
+    assert!(!has(&fs::read(&plain).unwrap(), "repair.weld"));
+    // Less than the gap closes nothing; what is no distance is refused.
+    let done = enfilade(&["bake", "--repair=0.0001", &obj, "-o", &better]);
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(
+        said.contains(&format!("{:<30} {:>9}", "corners welded", 0)),
+        "{said}"
+    );
+    let done = enfilade(&["bake", "--repair=5", &obj, "-o", &better]);
+    assert_eq!(done.status.code(), Some(2));
+}

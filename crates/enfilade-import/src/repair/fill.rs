@@ -1,0 +1,351 @@
+//! Holes: closed loops of open edges get triangles.
+//!
+//! The triangulation of least area of a loop in space, by dynamic programming (Barequet & Sharir 1995, §4;
+//! the first step of Liepa 2003). Triangles without area and edges that the surface has already are left out, so that
+//! what is filled is a 2-manifold; and a loop is the outer rim of a sheet, no hole, where its triangles would lie folded on it.
+
+use std::collections::{HashMap, HashSet};
+
+use enfilade_geom::{Aabb, DVec3, Sets, triangle_area_normal};
+
+use super::surface::{Face, Surface, Use, open_of, unit};
+use super::weld::ONE_POINT;
+
+/// Longest loop filled; the time grows with the cube of it.
+const MAX_CORNERS: usize = 128;
+
+/// Triangles at an edge are folded on each other below 45 degrees: cosine of that.
+const FOLDED: f64 = 0.7;
+
+/// What was filled.
+#[derive(Default)]
+pub(super) struct Filled {
+    pub(super) n_holes: u64,
+    pub(super) n_triangles: u64,
+    /// Loops that stay open.
+    pub(super) n_left: u64,
+}
+
+/// One loop of open edges: corners, and the use of the edge from each to the next.
+struct Loop {
+    points: Vec<u32>,
+    edges: Vec<Use>,
+}
+
+/// Fills each loop of open edges whose box has a diagonal of `size` at most. [Units: wu]
+///
+/// Time: `n log n` for all triangles, and the cube of a loop's corners, of which it may have 128.
+pub(super) fn fill_holes(surface: &mut Surface, size: f64) -> Filled {
+    let uses = surface.uses();
+    let loops = loops(&uses, &open_of(&uses));
+    let mut filled = Filled::default();
+    if loops.is_empty() {
+        return filled;
+    }
+    let mut edges: HashSet<[u32; 2]> = uses.iter().map(|u| u.ends).collect();
+    let mut known: HashSet<[u32; 3]> = (0..surface.faces.len())
+        .map(|f| sorted(surface.ends(f)))
+        .collect();
+    for mut rim in loops {
+        let at = |p: &u32| surface.points[*p as usize];
+        let bounds = rim
+            .points
+            .iter()
+            .fold(Aabb::EMPTY, |b, p| b.including(at(p)));
+        let is_small = bounds.size().length() <= size && rim.points.len() <= MAX_CORNERS;
+        turn_against_faces(surface, &mut rim);
+        let triangles = is_small
+            .then(|| triangulated(surface, &rim.points, &edges))
+            .flatten()
+            .filter(|t| !is_folded(surface, &rim, t))
+            .filter(|t| {
+                t.iter()
+                    .all(|t| !known.contains(&sorted(t.map(|i| rim.points[i]))))
+            });
+        let Some(triangles) = triangles else {
+            filled.n_left += 1;
+            continue;
+        };
+        for t in &triangles {
+            let ends = t.map(|i| rim.points[i]);
+            known.insert(sorted(ends));
+            edges.extend([0, 1, 2].map(|k| {
+                let (a, b) = (ends[k], ends[(k + 1) % 3]);
+                [a.min(b), a.max(b)]
+            }));
+        }
+        filled.n_holes += 1;
+        filled.n_triangles += triangles.len() as u64;
+        add(surface, &rim, &triangles);
+    }
+    filled
+}
+
+fn sorted(mut corners: [u32; 3]) -> [u32; 3] {
+    corners.sort_unstable();
+    corners
+}
+
+/// Whether a triangle at the other side walks this edge from its lesser end to its greater.
+fn is_forward(edge: &Use) -> bool {
+    edge.is_reverse
+}
+
+/// Which fan of triangles around a point a triangle is in, where several meet in the point alone.
+struct Fans {
+    /// Numbers of the pairs of point and face.
+    numbers: HashMap<(u32, u32), u32>,
+    sets: Sets,
+}
+
+impl Fans {
+    /// Fans around points that more than two open edges meet in.
+    fn new(uses: &[Use], at: &HashMap<u32, Vec<usize>>) -> Self {
+        let mut numbers = HashMap::new();
+        let is_shared = |p: &u32| at.get(p).is_some_and(|edges| edges.len() > 2);
+        for u in uses {
+            for p in u.ends.into_iter().filter(is_shared) {
+                let n = numbers.len() as u32;
+                numbers.entry((p, u.face)).or_insert(n);
+            }
+        }
+        let mut sets = Sets::new(numbers.len());
+        for edge in uses.chunk_by(|a, b| a.ends == b.ends) {
+            if let [one, other] = edge {
+                for p in one.ends.into_iter().filter(is_shared) {
+                    sets.join(numbers[&(p, one.face)], numbers[&(p, other.face)]);
+                }
+            }
+        }
+        Self { numbers, sets }
+    }
+
+    fn of(&mut self, point: u32, face: u32) -> Option<u32> {
+        let number = self.numbers.get(&(point, face))?;
+        Some(self.sets.find(*number))
+    }
+}
+
+/// Parts open edges into simple loops: a walk along unused edges gives one up whenever it meets itself.
+///
+/// An even number of open edges meets in each point, so that every walk ends where it began. Where there is a
+/// choice, the next edge is one that its triangle walks as the last one, and across the gap from there: not the other
+/// rim of the same fan of triangles. Linear.
+fn loops(uses: &[Use], open: &[Use]) -> Vec<Loop> {
+    let mut at: HashMap<u32, Vec<usize>> = HashMap::new();
+    for (i, edge) in open.iter().enumerate() {
+        edge.ends
+            .iter()
+            .for_each(|&p| at.entry(p).or_default().push(i));
+    }
+    let mut fans = Fans::new(uses, &at);
+    let mut is_used = vec![false; open.len()];
+    let mut out = Vec::new();
+    for start in 0..open.len() {
+        if is_used[start] {
+            continue;
+        }
+        let first = open[start].ends[usize::from(!is_forward(&open[start]))];
+        let mut points = vec![first];
+        let mut edges: Vec<Use> = Vec::new();
+        let mut place = HashMap::from([(first, 0)]);
+        while let Some(&from) = points.last() {
+            let leaves = |i: &usize| (open[*i].ends[0] == from) == is_forward(&open[*i]);
+            let last = edges.last().and_then(|e| fans.of(from, e.face));
+            let next = at[&from].iter().copied().filter(|&i| !is_used[i]);
+            let Some(i) = next.min_by_key(|i| {
+                let is_same_fan = last.is_some() && last == fans.of(from, open[*i].face);
+                (is_same_fan, !leaves(i), *i)
+            }) else {
+                break;
+            };
+            is_used[i] = true;
+            let [a, b] = open[i].ends;
+            let to = if a == from { b } else { a };
+            edges.push(open[i]);
+            if let Some(&k) = place.get(&to) {
+                let of_loop = points.split_off(k);
+                of_loop.iter().skip(1).for_each(|p| {
+                    place.remove(p);
+                });
+                points.push(to);
+                out.push(Loop {
+                    points: of_loop,
+                    edges: edges.split_off(k),
+                });
+            } else {
+                place.insert(to, points.len());
+                points.push(to);
+            }
+        }
+    }
+    out
+}
+
+/// Turns a loop so that its triangles walk most of its length against those around it.
+fn turn_against_faces(surface: &Surface, rim: &mut Loop) {
+    let against: f64 = (rim.points.iter().zip(&rim.edges))
+        .map(|(&p, e)| {
+            let [a, b] = e.ends.map(|i| surface.points[i as usize]);
+            let is_along = (e.ends[0] == p) == is_forward(e);
+            a.distance(b) * if is_along { 1.0 } else { -1.0 }
+        })
+        .sum();
+    if against < 0.0 {
+        rim.points.reverse();
+        // Edge `i` leads from corner `i` to the next one, before and after.
+        rim.edges.reverse();
+        rim.edges.rotate_left(1);
+    }
+}
+
+/// Triangles of least area over a loop, as triples of its corners' places; `None` if there are none without
+/// a triangle lower than [`ONE_POINT`] or an inner edge that is there already. Time: the cube of the corners.
+fn triangulated(
+    surface: &Surface,
+    points: &[u32],
+    edges: &HashSet<[u32; 2]>,
+) -> Option<Vec<[usize; 3]>> {
+    let n = points.len();
+    let at: Vec<DVec3> = points.iter().map(|&p| surface.points[p as usize]).collect();
+    let area = |t: [usize; 3]| {
+        let corners = t.map(|i| at[i]);
+        let [a, b, c] = corners;
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let double = triangle_area_normal(&corners).length();
+        if double <= ONE_POINT * longest {
+            f64::INFINITY
+        } else {
+            double
+        }
+    };
+    let is_free = |i: usize, j: usize| {
+        let (a, b) = (points[i], points[j]);
+        let is_rim = j - i == 1 || j - i == n - 1;
+        is_rim || !edges.contains(&[a.min(b), a.max(b)])
+    };
+    // Of the part of the loop from corner `i` to `j`: the least area, and the corner that makes a triangle with both.
+    let mut least = vec![0.0; n * n];
+    let mut middle = vec![0; n * n];
+    for length in 2..n {
+        for i in 0..n - length {
+            let j = i + length;
+            let mut best = (f64::INFINITY, 0);
+            if is_free(i, j) {
+                for k in i + 1..j {
+                    let sum = least[i * n + k] + least[k * n + j];
+                    if sum < best.0 {
+                        let sum = sum + area([i, k, j]);
+                        if sum < best.0 {
+                            best = (sum, k);
+                        }
+                    }
+                }
+            }
+            least[i * n + j] = best.0;
+            middle[i * n + j] = best.1;
+        }
+    }
+    if !least[n - 1].is_finite() {
+        return None;
+    }
+    let mut out = Vec::with_capacity(n - 2);
+    let mut open = vec![(0, n - 1)];
+    while let Some((i, j)) = open.pop() {
+        if j - i > 1 {
+            let k = middle[i * n + j];
+            out.push([i, k, j]);
+            open.extend([(i, k), (k, j)]);
+        }
+    }
+    Some(out)
+}
+
+/// Whether most of the loop's length has its new triangle folded on the old one.
+fn is_folded(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> bool {
+    let n = rim.points.len();
+    let at = |p: u32| surface.points[p as usize];
+    let (mut folded, mut all) = (0.0, 0.0);
+    for t in triangles {
+        for k in 0..3 {
+            let (i, j, apex) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+            if (i + 1) % n != j {
+                continue;
+            }
+            let edge = &rim.edges[i];
+            let ends = edge.ends;
+            let old = surface.ends(edge.face as usize);
+            let Some(other) = old.iter().find(|p| !ends.contains(p)) else {
+                continue;
+            };
+            let from = at(ends[0]);
+            let along = (at(ends[1]) - from).normalize_or_zero();
+            let away = |p: DVec3| {
+                let v = p - from;
+                (v - along * v.dot(along)).normalize_or_zero()
+            };
+            let length = at(ends[1]).distance(from);
+            all += length;
+            if away(at(rim.points[apex])).dot(away(at(*other))) > FOLDED {
+                folded += length;
+            }
+        }
+    }
+    2.0 * folded > all
+}
+
+/// Adds the triangles to the part that has most of the rim; corners take what its vertices have there, or nearest along
+/// the rim, and normals of their own.
+fn add(surface: &mut Surface, rim: &Loop, triangles: &[[usize; 3]]) {
+    let mut lengths: Vec<(u32, f64)> = Vec::new();
+    for edge in &rim.edges {
+        let part = surface.faces[edge.face as usize].part;
+        let [a, b] = edge.ends.map(|p| surface.points[p as usize]);
+        match lengths.iter_mut().find(|(p, _)| *p == part) {
+            Some((_, length)) => *length += a.distance(b),
+            None => lengths.push((part, a.distance(b))),
+        }
+    }
+    lengths.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let part = lengths[0].0;
+    let n = rim.points.len();
+    let mut vertices: Vec<Option<u32>> = vec![None; n];
+    for edge in &rim.edges {
+        let face = surface.faces[edge.face as usize];
+        if face.part != part {
+            continue;
+        }
+        let ends = surface.ends(edge.face as usize);
+        for (point, vertex) in ends.into_iter().zip(face.corners) {
+            if let Some(i) = rim.points.iter().position(|&p| p == point) {
+                vertices[i].get_or_insert(vertex);
+            }
+        }
+    }
+    let nearest =
+        |i: usize| (0..n).find_map(|d| vertices[(i + d) % n].or(vertices[(i + n - d) % n]));
+    for t in triangles {
+        let corners = t.map(|i| surface.points[rim.points[i] as usize]);
+        let normal = triangle_area_normal(&corners).normalize_or_zero();
+        let corners = t.map(|i| {
+            // Some edge of the rim is the part's, so that there is a vertex.
+            let from = nearest(i).unwrap_or_default();
+            let v = surface.mix(part, [from, from], 0.0, rim.points[i]);
+            let attributes = &mut surface.parts[part as usize].vertices;
+            if let Some(of_vertex) = attributes.normals.last_mut() {
+                *of_vertex = unit(normal);
+            }
+            if let Some(t) = attributes.tangents.last_mut() {
+                let old = DVec3::new(t[0].into(), t[1].into(), t[2].into());
+                let flat = old - normal * old.dot(normal);
+                let flat = flat.try_normalize();
+                let [x, y, z] = unit(flat.unwrap_or_else(|| normal.any_orthonormal_vector()));
+                *t = [x, y, z, t[3]];
+            }
+            v
+        });
+        surface.faces.push(Face { part, corners });
+    }
+    let object = surface.parts[part as usize].object;
+    surface.is_changed[object as usize] = true;
+}

@@ -1,0 +1,196 @@
+//! Repairs: what the cleaning report counts, put right on request.
+//!
+//! The structural triangles are taken as one surface over shared points (`surface.rs`), and go through these steps
+//! again and again until none finds anything to do: corners that nearly meet are welded (`weld.rs`), triangles without area or
+//! there twice go (`drop.rs`), T-junctions are cut (`split.rs`), shells are turned (`orient.rs`), holes are
+//! filled (`fill.rs`). So a second repair changes nothing.
+//!
+//! The order is that of Guéziec, Taubin, Lazarus & Horn, "Cutting and Stitching: Converting Sets of Polygons to Manifold
+//! Surfaces" (2001): join what nearly meets, then look at what is left open.
+
+mod drop;
+mod fill;
+mod orient;
+mod split;
+mod surface;
+mod weld;
+
+use std::fmt;
+
+use enfilade_geom::scene::Scene;
+
+use crate::ImportError;
+use surface::Surface;
+
+/// What is put right, and how far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RepairOptions {
+    /// Ends of open edges at most this far apart become one; ends this near to the inside of an open edge cut
+    /// it. [Units: wu] [Limit: 1e-6 to 0.1]
+    ///
+    /// The default, 1 mm, is a tenth of the smallest hole that a bake takes for meant, so that no opening goes.
+    pub weld: f64,
+    /// Loops of open edges are filled up to this diagonal of their box; 0 fills none. [Units: wu] [Limit: 0 to 10]
+    ///
+    /// The default, 0.1 m, is a sixth of the narrowest opening that a bake looks for.
+    pub hole: f64,
+}
+
+impl Default for RepairOptions {
+    fn default() -> Self {
+        Self {
+            weld: 1e-3,
+            hole: 0.1,
+        }
+    }
+}
+
+/// What a repair changed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RepairReport {
+    /// Distinct corners that became one with another.
+    pub welded_corners: u64,
+    /// Triangles removed because two corners are one point, or because they are lower than 0.01 mm.
+    pub degenerate_triangles: u64,
+    /// Triangles removed because they are there twice.
+    pub duplicate_triangles: u64,
+    /// Cuts of triangles at T-junctions.
+    pub t_junctions: u64,
+    /// Triangles turned round.
+    pub turned_triangles: u64,
+    /// Closed shells of which triangles were turned so that all face outwards.
+    pub shells_outwards: u64,
+    /// Holes filled.
+    pub filled_holes: u64,
+    /// Triangles that fill them.
+    pub filling_triangles: u64,
+    /// Objects whose triangles are not as they were; they have meshes of their own now.
+    pub changed_objects: u64,
+    /// Not changed: closed shells that face inwards, taken for rooms modeled from within.
+    pub shells_rooms: u64,
+    /// Not changed: shells with one side only.
+    pub shells_one_sided: u64,
+    /// Not changed: loops of open edges too large to fill, rims of sheets, or without triangles that fit.
+    pub open_rims: u64,
+    /// Whether the last pass found nothing more to do.
+    pub is_settled: bool,
+    /// The structure is made of brushes, which are exact: nothing was looked at.
+    pub is_of_brushes: bool,
+}
+
+impl RepairReport {
+    /// The counts with what to call them, in the order shown: what was changed, then what was not.
+    #[must_use]
+    pub fn counts(&self) -> [(&'static str, u64); 12] {
+        [
+            ("corners welded", self.welded_corners),
+            ("degenerate triangles removed", self.degenerate_triangles),
+            ("duplicate triangles removed", self.duplicate_triangles),
+            ("T-junctions split", self.t_junctions),
+            ("triangles turned", self.turned_triangles),
+            ("closed shells turned outwards", self.shells_outwards),
+            ("holes filled", self.filled_holes),
+            ("triangles filling them", self.filling_triangles),
+            ("objects changed", self.changed_objects),
+            ("shells kept as rooms", self.shells_rooms),
+            ("shells with one side, kept", self.shells_one_sided),
+            ("open rims left", self.open_rims),
+        ]
+    }
+
+    fn n_changes(&self) -> u64 {
+        self.counts()[..8].iter().map(|c| c.1).sum()
+    }
+}
+
+impl fmt::Display for RepairReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_of_brushes {
+            return write!(f, "brushes are exact: nothing to repair");
+        }
+        for (i, (name, n)) in self.counts().into_iter().enumerate() {
+            write!(f, "{}{name:<30} {n:>9}", if i == 0 { "" } else { "\n" })?;
+        }
+        if !self.is_settled {
+            write!(
+                f,
+                "\nstopped after {MAX_PASSES} passes: repair the result again"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Passes after which a repair stops; two or three are usual.
+const MAX_PASSES: usize = 16;
+
+/// Repairs the structural triangles of a scene; detail stays as it is.
+///
+/// Positions are those of corners that were there before; normals, tangents, texture coordinates and colors are
+/// kept, mixed along edges that are cut, and taken from the rim for holes. Objects that change get a mesh of their own, in
+/// world space, those that lose all their triangles go; the others keep their bits. Repairing again changes nothing, if
+/// [`RepairReport::is_settled`].
+///
+/// Time: `n log n` for `n` triangles in each pass, and the cube of the corners of a hole; memory: about 300 bytes a
+/// triangle.
+///
+/// # Errors
+///
+/// When an option is out of range.
+///
+/// # Panics
+///
+/// When the scene breaks its own promises (an index out of range).
+pub fn repair(scene: &mut Scene, options: &RepairOptions) -> Result<RepairReport, ImportError> {
+    for (option, x, low, high) in [
+        ("repair", options.weld, 1e-6, 0.1),
+        ("repair_holes", options.hole, 0.0, 10.0),
+    ] {
+        if !(low..=high).contains(&x) {
+            let problem = format!("{x} m is not between {low} and {high}");
+            return Err(ImportError::BadOption { option, problem });
+        }
+    }
+    let mut report = RepairReport::default();
+    if !scene.solids.is_empty() {
+        report.is_of_brushes = true;
+        report.is_settled = true;
+        return Ok(report);
+    }
+    let mut surface = Surface::of_scene(scene);
+    for _ in 0..MAX_PASSES {
+        let before = report.n_changes();
+        pass(&mut surface, options, &mut report);
+        report.is_settled = report.n_changes() == before;
+        if report.is_settled {
+            break;
+        }
+    }
+    report.changed_objects = surface.is_changed.iter().filter(|c| **c).count() as u64;
+    surface.into_scene(scene);
+    Ok(report)
+}
+
+fn pass(surface: &mut Surface, options: &RepairOptions, report: &mut RepairReport) {
+    let tidy = |surface: &mut Surface, report: &mut RepairReport| {
+        report.degenerate_triangles += drop::drop_collapsed(surface);
+        report.duplicate_triangles += drop::drop_duplicates(surface);
+        report.degenerate_triangles += drop::drop_caps(surface);
+    };
+    // As they would be read again: the next repair sees what this pass sees.
+    surface.faces.sort_by_key(|f| f.part);
+    report.welded_corners += weld::weld_all(surface, options.weld);
+    tidy(surface, report);
+    report.welded_corners += weld::weld_rims(surface, options.weld);
+    tidy(surface, report);
+    report.t_junctions += split::split_t_junctions(surface, options.weld);
+    let turned = orient::orient(surface);
+    report.turned_triangles += turned.n_triangles;
+    report.shells_outwards += turned.n_outwards;
+    report.shells_rooms = turned.n_rooms;
+    report.shells_one_sided = turned.n_one_sided;
+    let filled = fill::fill_holes(surface, options.hole);
+    report.filled_holes += filled.n_holes;
+    report.filling_triangles += filled.n_triangles;
+    report.open_rims = filled.n_left;
+}
