@@ -3,6 +3,7 @@
 //! Structural triangles go to batches by the set of cells that see them and by material, so that
 //! each is stored, and drawn, once. Detail objects keep their identity and list the cells they touch.
 
+mod bays;
 mod seals;
 
 use std::collections::{BTreeMap, HashMap};
@@ -32,6 +33,14 @@ pub(crate) struct Cut<'a> {
     pub(crate) closed_share: f64,
 }
 
+/// An opening and what it is taken for.
+struct Judged {
+    portal: PartitionPortal,
+    kind: PortalKind,
+    /// It begins at a floor.
+    is_on_floor: bool,
+}
+
 pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
     let Cut {
         scene, partition, ..
@@ -55,13 +64,17 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
             }
         })
         .collect();
-    let portals: Vec<Portal> = partition
-        .portals
-        .par_iter()
-        .map(|p| portal(cut, p))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .flatten()
+    let judged = partition.portals.par_iter().map(|p| {
+        let (kind, is_on_floor) = kind_of(cut, p);
+        Judged {
+            portal: p.clone(),
+            kind,
+            is_on_floor,
+        }
+    });
+    let portals: Vec<Portal> = bays::join_bays(judged.collect())
+        .iter()
+        .filter_map(|j| portal(cut, j))
         .collect();
     for (i, p) in portals.iter().enumerate() {
         for c in p.cells {
@@ -93,10 +106,11 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
 const HAIR: f64 = 1e-5;
 
 /// The portal in its final form; `None` when nothing of it is wider than a rounding.
-fn portal(cut: &Cut<'_>, p: &PartitionPortal) -> Option<Portal> {
+fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
+    let p = &judged.portal;
     Some(Portal {
         cells: p.cells.map(CellId),
-        kind: kind_of(cut, p),
+        kind: judged.kind,
         ..rounded_portal(&p.plane, &p.outline, &p.pieces, cut.outward)?
     })
 }
@@ -233,45 +247,47 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
 /// Parapets higher than this make a window of an opening. [Units: wu]
 const PARAPET: f64 = 0.4;
 
-fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> PortalKind {
+/// Lower ones that are closed are no doors. [Units: wu]
+const LEAST_DOOR: f64 = 1.5;
+
+/// What an opening is taken for, and whether it begins at a floor.
+fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
-        return PortalKind::Crack;
+        return (PortalKind::Crack, false);
     }
-    let n = p.plane.normal;
     let closed = p.screen.map_or(0.0, |s| cut.screens[s as usize].closed);
     let is_closed = closed >= cut.closed_share;
-    if n.y.abs() < 0.5 {
-        let bottom = p
-            .outline
-            .points
-            .iter()
-            .map(|q| q.y)
-            .fold(f64::MAX, f64::min);
-        let center = p.outline.centroid();
-        // Height of the sill over the ground half a meter away, on either side.
-        let drop = |side: f64| {
-            let foot = DVec3::new(center.x, bottom + 0.05, center.z)
-                + DVec3::new(n.x, 0.0, n.z).normalize_or_zero() * (0.5 * side);
-            let ray = Ray {
-                origin: foot,
-                direction: -DVec3::Y,
-                t_max: 100.0,
-            };
-            cut.bvh
-                .closest_hit(&ray, |_| false)
-                .map_or(f64::INFINITY, |h| h.t - 0.05)
+    let is_upright = p.plane.normal.y.abs() < 0.5;
+    let up = p.outline.points.iter().map(|q| q.y);
+    let bottom = up.clone().fold(f64::MAX, f64::min);
+    let height = up.fold(f64::MIN, f64::max) - bottom;
+    let has_sill = is_upright && sill(cut, p, bottom) > PARAPET;
+    let kind = match (is_closed, is_upright) {
+        (_, true) if has_sill => PortalKind::Window,
+        (true, true) if height >= LEAST_DOOR => PortalKind::Door,
+        (true, _) => PortalKind::Window,
+        (false, _) => PortalKind::Open,
+    };
+    (kind, is_upright && !has_sill)
+}
+
+/// Height of an upright opening's lower edge over the ground half a meter away, on the higher side. [Units: wu]
+fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
+    let n = p.plane.normal;
+    let center = p.outline.centroid();
+    let drop = |side: f64| {
+        let foot = DVec3::new(center.x, bottom + 0.05, center.z)
+            + DVec3::new(n.x, 0.0, n.z).normalize_or_zero() * (0.5 * side);
+        let ray = Ray {
+            origin: foot,
+            direction: -DVec3::Y,
+            t_max: 100.0,
         };
-        if drop(1.0).min(drop(-1.0)) > PARAPET {
-            return PortalKind::Window;
-        }
-    } else if is_closed {
-        return PortalKind::Window;
-    }
-    if is_closed {
-        PortalKind::Door
-    } else {
-        PortalKind::Open
-    }
+        cut.bvh
+            .closest_hit(&ray, |_| false)
+            .map_or(f64::INFINITY, |h| h.t - 0.05)
+    };
+    drop(1.0).min(drop(-1.0))
 }
 
 /// Which attributes a batch's primitive carries: normals, tangents, sets of texture coordinates,

@@ -19,8 +19,8 @@ use crate::voxel::{
 };
 use crate::watershed::{
     Flooded, Frame, Lids, Regions, Screen, bounds_of, connected_patches, cut_at_slabs, find_lids,
-    find_matter, find_stairs, fit_screen, flood_closures, merge_basins, opening_of, plates,
-    rim_caps, shallow_voids, slab_heights, split_limbs, without_open_leaves,
+    find_matter, find_stairs, fit_screen, flood_closures, is_in, merge_basins, opening_of, plates,
+    rim_caps, shallow_voids, slab_heights, split_limbs, without_corners, without_open_leaves,
 };
 use crate::{BakeConfig, BakeContext, BakeError};
 
@@ -156,7 +156,15 @@ pub fn bake(
 
     // 5. Where rooms meet: a screen in each real opening.
     context.stage(4)?;
-    let mut screens = fit_screens(&grid, &labels, &regions, &closures, &lids, &walls);
+    let mut screens = fit_screens(
+        &grid,
+        &labels,
+        &regions,
+        &closures,
+        &lids,
+        &walls,
+        config.merge.closed_share,
+    );
     drop((closures, lids));
     let ballots = Ballots::cast(
         &grid,
@@ -359,16 +367,29 @@ fn fit_screens(
     closures: &BitVolume,
     lids: &Lids,
     triangles: &[Triangle],
+    closed_share: f64,
 ) -> Vec<Screen> {
     let bvh = Bvh::build(triangles);
+    let is_shut = |faces: &[u64]| {
+        let n = faces.iter().filter(|&&f| is_in(grid, closures, f)).count();
+        n as f64 >= closed_share * faces.len() as f64
+    };
     let openings: Vec<([u32; 2], Vec<u64>)> = regions
         .contacts
         .iter()
         .flat_map(|(&(a, b), faces)| {
             connected_patches(grid, faces)
                 .into_iter()
+                .flat_map(|patch| {
+                    if is_shut(&patch) {
+                        without_corners(grid, patch)
+                    } else {
+                        vec![patch]
+                    }
+                })
                 .filter(|patch| patch.len() >= MIN_FACES)
-                .map(move |patch| ([a, b], patch))
+                .map(|patch| ([a, b], patch))
+                .collect::<Vec<_>>()
         })
         .collect();
     openings

@@ -17,7 +17,7 @@ use enfilade_geom::{Aabb, DVec3, Plane, Triangle, Winding, triangle_area_normal}
 
 use crate::voxel::Grid;
 
-use super::regions::{Opening, face_center};
+use super::fronts::{Opening, face_center};
 
 /// A candidate portal: a convex polygon across an opening, a bit larger than the opening.
 #[derive(Clone, Debug)]

@@ -22,7 +22,8 @@ use enfilade_geom::Sets;
 
 use crate::voxel::{BitVolume, Grid, Labels, distance};
 
-use super::regions::{Flooded, MergeSettings, OUTDOORS, Regions, contact_faces, group_faces};
+use super::fronts::group_faces;
+use super::regions::{Flooded, MergeSettings, OUTDOORS, Regions, contact_faces};
 use super::sections::section_ratio;
 
 /// A limb opens to what is at least this many times as thick: its section is at most half of that.

@@ -8,6 +8,7 @@
 mod closures;
 mod fit;
 mod frame;
+mod fronts;
 mod hollow;
 mod lids;
 mod limbs;
@@ -21,13 +22,13 @@ mod voids;
 pub use closures::{bounds_of, closure_triangles, flood_closures, plates, without_open_leaves};
 pub use fit::{Screen, fit_screen, fit_screen_at};
 pub use frame::Frame;
+pub use fronts::{
+    Opening, connected_patches, face_center, group_faces, is_in, opening_of, without_corners,
+};
 pub use hollow::{Matter, find_matter};
 pub use lids::{Lids, find_lids};
 pub use limbs::split_limbs;
-pub use regions::{
-    Flooded, MergeSettings, OUTDOORS, Opening, Regions, connected_patches, face_center,
-    group_faces, merge_basins, opening_of,
-};
+pub use regions::{Flooded, MergeSettings, OUTDOORS, Regions, merge_basins};
 pub use rims::rim_caps;
 pub(crate) use sections::{connected_count, rim_share};
 pub use slabs::{cut_at_slabs, slab_heights};

@@ -3,7 +3,8 @@
 
 use enfilade_geom::DVec3;
 
-use super::regions::{Flooded, MergeSettings, OUTDOORS, Opening, face_center};
+use super::fronts::{Opening, face_center};
+use super::regions::{Flooded, MergeSettings, OUTDOORS};
 
 /// Share of a front that leaves must hold for it to stand between them.
 const LEAVES: f64 = 0.2;

@@ -1,0 +1,114 @@
+//! Panes above each other from the floor up are one window: transoms divide the bays of a glazed wall, mullions part them.
+//! Windows above a sill stay as they are.
+//!
+//! Time `O(p log p)` in windows, as long as few lie in one column of one plane.
+
+use std::collections::BTreeMap;
+
+use enfilade_cpg::PortalKind;
+use enfilade_geom::{DVec3, Sets, Winding};
+
+use super::Judged;
+use crate::complex::PartitionPortal;
+
+/// Transoms are no higher, and the sides of panes in one bay are no farther apart. [Units: wu]
+const BAR: f64 = 0.15;
+/// Windows whose planes are no farther apart lie in one. [Units: wu]
+const ONE_PLANE: f64 = 1e-6;
+
+/// Where a window lies in its facade. [Units: wu]
+struct Extent {
+    /// From side to side, horizontally along the plane.
+    across: [f64; 2],
+    up: [f64; 2],
+}
+
+impl Extent {
+    fn of(p: &PartitionPortal) -> Self {
+        let along = along(p);
+        let range = |d: DVec3| {
+            let at = p.outline.points.iter().map(|q| d.dot(*q));
+            at.fold([f64::MAX, f64::MIN], |[lo, hi], t| [lo.min(t), hi.max(t)])
+        };
+        Self {
+            across: range(along),
+            up: range(DVec3::Y),
+        }
+    }
+
+    /// Whether another stands on it, with nothing but a transom between.
+    fn carries(&self, above: &Self) -> bool {
+        let is_flush = |k: usize| (self.across[k] - above.across[k]).abs() <= BAR;
+        let gap = above.up[0] - self.up[1];
+        is_flush(0) && is_flush(1) && (-ONE_PLANE..=BAR).contains(&gap)
+    }
+}
+
+fn along(p: &PartitionPortal) -> DVec3 {
+    DVec3::Y.cross(p.plane.normal).normalize_or_zero()
+}
+
+/// Joins windows between the same two cells that stand above each other in one upright plane, the lowest on a floor. Each bay
+/// has one portal with the pieces of all, in place of its first; the rest stay in order.
+pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
+    let mut sets = Sets::new(portals.len());
+    let mut facades: BTreeMap<[u32; 2], Vec<(usize, Extent)>> = BTreeMap::new();
+    for (i, judged) in portals.iter().enumerate() {
+        let p = &judged.portal;
+        if judged.kind == PortalKind::Window && p.plane.normal.y.abs() < 0.5 {
+            facades.entry(p.cells).or_default().push((i, Extent::of(p)));
+        }
+    }
+    for windows in facades.values_mut() {
+        windows.sort_by(|a, b| a.1.across[0].total_cmp(&b.1.across[0]).then(a.0.cmp(&b.0)));
+        for (k, (i, a)) in windows.iter().enumerate() {
+            let is_near = |w: &&(usize, Extent)| w.1.across[0] - a.across[0] <= BAR;
+            for (j, b) in windows[k + 1..].iter().take_while(is_near) {
+                let [p, q] = [&portals[*i].portal, &portals[*j].portal];
+                let is_one_plane = q
+                    .outline
+                    .points
+                    .iter()
+                    .all(|&x| p.plane.signed_distance(x).abs() <= ONE_PLANE);
+                if is_one_plane
+                    && p.plane.normal.dot(q.plane.normal) > 0.0
+                    && (a.carries(b) || b.carries(a))
+                {
+                    sets.join(*i as u32, *j as u32);
+                }
+            }
+        }
+    }
+    let roots: Vec<u32> = (0..portals.len() as u32).map(|i| sets.find(i)).collect();
+    let mut on_floor: Vec<bool> = vec![false; portals.len()];
+    for (judged, &root) in portals.iter().zip(&roots) {
+        on_floor[root as usize] |= judged.is_on_floor;
+    }
+    let mut out: Vec<Judged> = Vec::with_capacity(portals.len());
+    let mut place: BTreeMap<u32, usize> = BTreeMap::new();
+    for (judged, root) in portals.into_iter().zip(roots) {
+        match place.get(&root) {
+            Some(&at) if on_floor[root as usize] => out[at].take_in(judged.portal),
+            _ => {
+                place.insert(root, out.len());
+                out.push(judged);
+            }
+        }
+    }
+    out
+}
+
+impl Judged {
+    /// Makes one portal of two in one plane.
+    fn take_in(&mut self, other: PartitionPortal) {
+        let whole = &mut self.portal;
+        whole.pieces.extend(other.pieces);
+        whole.area += other.area;
+        whole.width = whole.width.max(other.width);
+        // Largest first, as in every portal.
+        whole.pieces.sort_by(|a, b| b.area().total_cmp(&a.area()));
+        let corners = whole.pieces.iter().flat_map(|w| w.points.iter().copied());
+        let corners: Vec<DVec3> = corners.collect();
+        whole.outline = Winding::hull_in_plane(&whole.plane, &corners);
+    }
+}

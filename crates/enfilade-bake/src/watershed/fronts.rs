@@ -1,0 +1,267 @@
+//! Fronts: the faces where two cells of a flooded volume meet, told into openings.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::{DVec3, Plane, Sets};
+
+use crate::voxel::{BitVolume, Grid};
+
+/// The faces through which two cells touch: voxel index × 4 + axis, the face being the one between
+/// the voxel and its next neighbor along the axis.
+pub(super) type Faces = Vec<u64>;
+
+/// A connected or coplanar group of faces between two cells.
+#[derive(Clone, Debug)]
+pub struct Opening {
+    /// Mean plane; the normal points from the lesser to the greater label.
+    pub plane: Plane,
+    /// Mean of the face centers. [Units: wu]
+    pub center: DVec3,
+    /// Length of the vector area, or the silhouette where the faces wrap around. [Units: wu²]
+    pub area: f64,
+    /// Share of the faces that lie in a closure.
+    pub closed: f64,
+    /// The faces.
+    pub faces: Faces,
+}
+
+/// Center of a face. [Units: wu]
+#[must_use]
+pub fn face_center(grid: &Grid, face: u64) -> DVec3 {
+    let axis = (face % 4) as usize;
+    let [i, j, k] = grid.coords((face / 4) as usize);
+    let mut p = grid.center(i, j, k);
+    p[axis] += grid.voxel * 0.5;
+    p
+}
+
+/// Whether one of a face's two voxels is in a set.
+#[must_use]
+pub fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
+    let [nx, ny, _] = grid.dims;
+    let (index, axis) = ((face / 4) as usize, (face % 4) as usize);
+    voxels.get_index(index) || voxels.get_index(index + [1, nx, nx * ny][axis])
+}
+
+/// Splits the faces between two cells into openings, largest first.
+///
+/// Faces that touch (or nearly: within two voxels) belong together; groups that share a plane are
+/// one opening too, because a column in the middle of a wide opening does not make two doors of it.
+/// `is_lesser` tells whether a voxel index lies in the cell with the lesser label.
+#[must_use]
+pub fn group_faces(
+    grid: &Grid,
+    faces: &[u64],
+    is_lesser: &dyn Fn(usize) -> bool,
+    closures: Option<&BitVolume>,
+) -> Vec<Opening> {
+    let mut patches = connected_patches(grid, faces)
+        .into_iter()
+        .map(|faces| opening_of(grid, faces, is_lesser, closures))
+        .collect::<Vec<_>>();
+    patches.sort_by(|p, q| q.area.total_cmp(&p.area).then(p.faces[0].cmp(&q.faces[0])));
+    let mut groups: Vec<Vec<Opening>> = Vec::new();
+    for patch in patches {
+        let home = groups.iter_mut().find(|g| {
+            let lead = &g[0];
+            lead.plane.normal.dot(patch.plane.normal) > 0.9
+                && lead.plane.signed_distance(patch.center).abs() < 0.5
+        });
+        match home {
+            Some(group) => group.push(patch),
+            None => groups.push(vec![patch]),
+        }
+    }
+    let mut openings: Vec<Opening> = groups
+        .into_iter()
+        .map(|mut g| {
+            if g.len() == 1 {
+                return g.swap_remove(0);
+            }
+            let faces = g.into_iter().flat_map(|o| o.faces).collect();
+            opening_of(grid, faces, is_lesser, closures)
+        })
+        .collect();
+    openings.sort_by(|p, q| q.area.total_cmp(&p.area).then(p.faces[0].cmp(&q.faces[0])));
+    openings
+}
+
+/// Faces grouped by nearness: two faces are linked when their voxels are at most one step apart
+/// along each axis. Each group ascending, groups by their first face.
+#[must_use]
+pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
+    let [nx, ny, _] = grid.dims;
+    let mut sorted = faces.to_vec();
+    sorted.sort_unstable();
+    // Voxels that carry a face, each once; groups are found over voxels.
+    let mut voxels: Vec<u64> = sorted.iter().map(|f| f / 4).collect();
+    voxels.dedup();
+    let mut sets = Sets::new(voxels.len());
+    let (nx64, layer) = (nx as i64, (nx * ny) as i64);
+    for (at, &voxel) in voxels.iter().enumerate() {
+        // Half of the 26 neighbors: the other half looks back at us.
+        for dz in 0..=1_i64 {
+            for dy in -1..=1_i64 {
+                for dx in -1..=1_i64 {
+                    let step = dz * layer + dy * nx64 + dx;
+                    if step <= 0 {
+                        continue;
+                    }
+                    let Some(other) = voxel.checked_add_signed(step) else {
+                        continue;
+                    };
+                    if let Ok(found) = voxels.binary_search(&other) {
+                        sets.join(at as u32, found as u32);
+                    }
+                }
+            }
+        }
+    }
+    let mut patches: BTreeMap<u32, Faces> = BTreeMap::new();
+    let mut at = 0;
+    for &face in &sorted {
+        while voxels[at] != face / 4 {
+            at += 1;
+        }
+        patches.entry(sets.find(at as u32)).or_default().push(face);
+    }
+    patches.into_values().collect()
+}
+
+/// What a set of faces says about the opening they fill.
+#[must_use]
+pub fn opening_of(
+    grid: &Grid,
+    faces: Faces,
+    is_lesser: &dyn Fn(usize) -> bool,
+    closures: Option<&BitVolume>,
+) -> Opening {
+    let [nx, ny, _] = grid.dims;
+    let unit = grid.voxel * grid.voxel;
+    let (mut vector, mut center, mut closed) = (DVec3::ZERO, DVec3::ZERO, 0_usize);
+    let mut per_axis = [0_usize; 3];
+    for &face in &faces {
+        let (index, axis) = ((face / 4) as usize, (face % 4) as usize);
+        vector[axis] += if is_lesser(index) { 1.0 } else { -1.0 };
+        per_axis[axis] += 1;
+        center += face_center(grid, face);
+        closed += usize::from(closures.is_some_and(|bits| is_in(grid, bits, face)));
+    }
+    center /= faces.len() as f64;
+    // A flat front seen along the worst diagonal has √3 times its area in voxel faces; when the
+    // vector area falls short of that by far, the front wraps around something and its silhouette
+    // along the axis of most faces says more.
+    let total = faces.len() as f64;
+    let wraps = vector.length() < 0.4 * total;
+    let (normal, area) = if wraps {
+        let axis = (0..3).max_by_key(|&k| (per_axis[k], 2 - k)).unwrap_or(0);
+        let mut columns: Vec<usize> = faces
+            .iter()
+            .filter(|&&f| (f % 4) as usize == axis)
+            .map(|&f| {
+                let i = (f / 4) as usize;
+                let at = [i % nx, i / nx % ny, i / (nx * ny)];
+                match axis {
+                    0 => at[1] + at[2] * ny,
+                    1 => at[0] + at[2] * nx,
+                    _ => at[0] + at[1] * nx,
+                }
+            })
+            .collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let mut n = DVec3::ZERO;
+        n[axis] = 1.0;
+        (
+            vector
+                .try_normalize()
+                .filter(|v| v.dot(n).abs() > 0.5)
+                .unwrap_or(n),
+            columns.len() as f64,
+        )
+    } else {
+        (vector.normalize(), vector.length())
+    };
+    Opening {
+        plane: Plane::through(center, normal),
+        center,
+        area: area * unit,
+        closed: closed as f64 / total,
+        faces,
+    }
+}
+
+/// Share of a front's faces that must lie flat on each side of a corner.
+const CORNER_SHARE: f64 = 0.2;
+
+/// A front that runs around a corner as the two or three that it is, each across one axis of the grid; any other as it is.
+/// Panes on both sides of a corner post meet so.
+///
+/// A front askew to the grid is made of steps, and flat across no axis. `O(n log n)` in faces.
+#[must_use]
+pub fn without_corners(grid: &Grid, faces: Faces) -> Vec<Faces> {
+    let mut per_axis: [Faces; 3] = Default::default();
+    for &f in &faces {
+        per_axis[(f % 4) as usize].push(f);
+    }
+    let is_flat = |axis: usize| {
+        let at = |f: &u64| grid.coords((f / 4) as usize)[axis];
+        connected_patches(grid, &per_axis[axis])
+            .iter()
+            .any(|patch| {
+                let (low, high) = (patch.iter().map(at).min(), patch.iter().map(at).max());
+                let is_level = low.zip(high).is_some_and(|(low, high)| high - low <= 1);
+                is_level && patch.len() as f64 >= CORNER_SHARE * faces.len() as f64
+            })
+    };
+    let flat: [bool; 3] = std::array::from_fn(is_flat);
+    if flat.iter().filter(|&&f| f).count() < 2 {
+        return vec![faces];
+    }
+    // What little there is across another axis is the steps of these.
+    let parts = per_axis.iter().zip(flat).filter(|p| p.1);
+    parts.flat_map(|p| connected_patches(grid, p.0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use enfilade_geom::Aabb;
+
+    use super::*;
+
+    /// The faces across `axis` of voxels.
+    fn faces(grid: &Grid, axis: u64, voxels: impl Iterator<Item = [usize; 3]>) -> Faces {
+        voxels
+            .map(|[x, y, z]| grid.index(x, y, z) as u64 * 4 + axis)
+            .collect()
+    }
+
+    #[test]
+    fn a_front_around_a_corner_is_two_and_one_askew_is_one() {
+        let grid = Grid::covering(&Aabb::new(DVec3::ZERO, DVec3::splat(2.0)), 0.1, 1);
+        let panes = |axis, at: fn(usize) -> [usize; 3]| {
+            let column = (5..15).map(at);
+            faces(
+                &grid,
+                axis,
+                column.flat_map(|[x, _, z]| (3..12).map(move |y| [x, y, z])),
+            )
+        };
+        // Two panes that meet at a corner.
+        let mut corner = panes(0, |i| [15, 0, i]);
+        corner.extend(panes(2, |i| [i, 0, 15]));
+        let parts = without_corners(&grid, corner);
+        assert_eq!(parts.iter().map(Vec::len).collect::<Vec<_>>(), [90, 90]);
+        // One pane at half a right angle: steps along both axes.
+        let mut askew = panes(0, |i| [i, 0, i]);
+        askew.extend(panes(2, |i| [i, 0, i]));
+        let n = askew.len();
+        assert_eq!(
+            without_corners(&grid, askew)
+                .iter()
+                .map(Vec::len)
+                .collect::<Vec<_>>(),
+            [n]
+        );
+    }
+}
