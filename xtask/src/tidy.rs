@@ -25,7 +25,7 @@ const PRINT: &[&str] = &["println!", "eprintln!", "print!(", "eprint!("];
 /// Readers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 12] = [
+const FENCES: [Fence; 13] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -46,6 +46,12 @@ const FENCES: [Fence; 12] = [
     },
     Fence {
         name: "enfilade-bake",
+        siblings: &["enfilade-geom", "enfilade-cpg"],
+        not: FORMATS,
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
+        name: "enfilade-vis",
         siblings: &["enfilade-geom", "enfilade-cpg"],
         not: FORMATS,
         words: &["std::fs", "std::thread"],
@@ -82,6 +88,7 @@ const FENCES: [Fence; 12] = [
             "enfilade-import",
             "enfilade-bake",
             "enfilade-runtime",
+            "enfilade-vis",
         ],
         not: &["anyhow", "clap"],
         words: &["std::fs", "std::thread", "fn "],

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
+use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
 use enfilade::cpg::wire::decode_glb;
 use enfilade::cpg::{CellSet, SightGraph, SightPortal, World};
 use enfilade::geom::{DVec3, Triangle};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{VisConfig, VisContext, see_all};
+use enfilade::vis::{VisConfig, VisContext, see_all};
 use enfilade::cpg::{CellSet, SightGraph, World};
 use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};

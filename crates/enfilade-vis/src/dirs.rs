@@ -7,54 +7,54 @@ use enfilade_cpg::SightGraph;
 use enfilade_geom::DVec3;
 use rayon::prelude::*;
 
-use super::bits::{self, BitTable};
+use crate::bits::{self, BitTable};
 
 /// A portal crossed one way.
 #[derive(Clone, Debug)]
-pub(super) struct Dir {
-    pub(super) from: u32,
-    pub(super) to: u32,
+pub(crate) struct Dir {
+    pub(crate) from: u32,
+    pub(crate) to: u32,
     /// Direction in [`SightGraph`]'s numbers.
-    pub(super) id: u32,
+    pub(crate) id: u32,
     /// Unit normal, from `from` to `to`; zero where the winding has no area.
-    pub(super) normal: DVec3,
+    pub(crate) normal: DVec3,
     /// Least and greatest of `normal · p` over the winding, which is planar only up to rounding.
-    pub(super) low: f64,
-    pub(super) high: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
     /// Unit normal that the corners run counter-clockwise about: `normal` or its opposite.
-    pub(super) turn: DVec3,
-    pub(super) center: DVec3,
-    pub(super) radius: f64,
+    pub(crate) turn: DVec3,
+    pub(crate) center: DVec3,
+    pub(crate) radius: f64,
     /// Corners in [`Dirs::points`], shared with the opposite direction.
-    pub(super) corners: Range<u32>,
+    pub(crate) corners: Range<u32>,
     /// The convex parts that are truly open, in [`Dirs::pieces`].
-    pub(super) pieces: Range<u32>,
+    pub(crate) pieces: Range<u32>,
 }
 
 /// All directions.
 #[derive(Debug)]
-pub(super) struct Dirs {
-    pub(super) n_cells: usize,
-    pub(super) all: Vec<Dir>,
+pub(crate) struct Dirs {
+    pub(crate) n_cells: usize,
+    pub(crate) all: Vec<Dir>,
     /// The same portal the other way.
-    pub(super) reverse: Vec<u32>,
+    pub(crate) reverse: Vec<u32>,
     /// By direction, the number of its portal.
     portals: Vec<u32>,
     /// By direction, what is looked at most, side by side: the ball around it (middle, radius), its plane (normal, height
     /// half way between `low` and `high`), and the first exit of the cell it leads into and the one after the last.
-    pub(super) balls: Vec<[f64; 4]>,
-    pub(super) planes: Vec<[f64; 4]>,
+    pub(crate) balls: Vec<[f64; 4]>,
+    pub(crate) planes: Vec<[f64; 4]>,
     ahead: Vec<[u32; 2]>,
     /// Directions out of cell `c` are `out_of[c]..out_of[c + 1]`.
     out_of: Vec<u32>,
     /// Corners of each piece, in `points`.
-    pub(super) pieces: Vec<Range<u32>>,
+    pub(crate) pieces: Vec<Range<u32>>,
     /// Corners of all windings and pieces.
-    pub(super) points: Vec<DVec3>,
+    pub(crate) points: Vec<DVec3>,
     /// By corner of `points`: the inward normal of the edge that starts there, and its offset.
-    pub(super) edges: Vec<(DVec3, f64)>,
+    pub(crate) edges: Vec<(DVec3, f64)>,
     /// Largest absolute coordinate, at least 1e-300. Errors are relative to it.
-    pub(super) scale: f64,
+    pub(crate) scale: f64,
 }
 
 /// Openings of one normal for which heights of all others are not worth taking once.
@@ -62,7 +62,7 @@ const FEW: usize = 4;
 
 impl Dirs {
     /// Takes time and memory linear in the corners, but for a sort of the portals.
-    pub(super) fn new(graph: &SightGraph) -> Self {
+    pub(crate) fn new(graph: &SightGraph) -> Self {
         let mut points = Vec::new();
         let mut edges = Vec::new();
         let mut pieces = Vec::new();
@@ -154,45 +154,45 @@ impl Dirs {
     }
 
     #[inline]
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.all.len()
     }
 
     /// The directions out of a cell.
     #[inline]
-    pub(super) fn exits(&self, cell: u32) -> Range<usize> {
+    pub(crate) fn exits(&self, cell: u32) -> Range<usize> {
         self.out_of[cell as usize] as usize..self.out_of[cell as usize + 1] as usize
     }
 
     /// The directions into a cell.
     #[inline]
-    pub(super) fn entries(&self, cell: u32) -> &[u32] {
+    pub(crate) fn entries(&self, cell: u32) -> &[u32] {
         &self.reverse[self.exits(cell)]
     }
 
     /// The directions out of the cell that a direction leads into.
     #[inline]
-    pub(super) fn after(&self, dir: usize) -> Range<usize> {
+    pub(crate) fn after(&self, dir: usize) -> Range<usize> {
         let [start, end] = self.ahead[dir];
         start as usize..end as usize
     }
 
     /// Of 64 directions from `start` on, those that are in `row` and in a range that starts there, as bits.
     #[inline]
-    pub(super) fn window(row: &[u64], range: &Range<usize>, start: usize) -> u64 {
+    pub(crate) fn window(row: &[u64], range: &Range<usize>, start: usize) -> u64 {
         let n = range.end - start;
         let in_range = if n >= 64 { u64::MAX } else { (1 << n) - 1 };
         bits::window(row, start) & in_range
     }
 
     #[inline]
-    pub(super) fn winding(&self, dir: usize) -> &[DVec3] {
+    pub(crate) fn winding(&self, dir: usize) -> &[DVec3] {
         let corners = &self.all[dir].corners;
         &self.points[corners.start as usize..corners.end as usize]
     }
 
     /// The set of directions that lead into the cells of a set.
-    pub(super) fn entries_of(&self, cells: &[u64], out: &mut [u64]) {
+    pub(crate) fn entries_of(&self, cells: &[u64], out: &mut [u64]) {
         out.fill(0);
         for cell in bits::ones(cells) {
             for &d in self.entries(cell as u32) {
@@ -204,7 +204,7 @@ impl Dirs {
     /// The directions that a line might cross after each direction, by sides of planes and the far plane alone.
     ///
     /// Time: the square of the portals, a few nanoseconds each, plus what is reached times the exits of a cell.
-    pub(super) fn might_see(&self, clearance: f64, far: Option<f64>) -> BitTable {
+    pub(crate) fn might_see(&self, clearance: f64, far: Option<f64>) -> BitTable {
         let past = self.past(clearance);
         // By portal, the directions whose openings it reaches in front of from behind.
         let behind = past.transposed(&self.reverse);
@@ -363,7 +363,7 @@ impl Dirs {
     }
 
     /// Clears what is not seen both ways.
-    pub(super) fn make_symmetric(&self, might: &mut BitTable) {
+    pub(crate) fn make_symmetric(&self, might: &mut BitTable) {
         let seen_by = might.transposed(&self.reverse);
         let n_words = might.n_words().max(1);
         let rows = might.words_mut().par_chunks_mut(n_words).enumerate();
@@ -380,10 +380,10 @@ impl Dirs {
 ///
 /// A copy of some bits of the table of what might be seen, whose rows lie far apart.
 #[derive(Debug)]
-pub(super) struct Next(Vec<u64>);
+pub(crate) struct Next(Vec<u64>);
 
 impl Next {
-    pub(super) fn new(dirs: &Dirs, might: &BitTable) -> Self {
+    pub(crate) fn new(dirs: &Dirs, might: &BitTable) -> Self {
         let masks = (0..dirs.len()).map(|d| {
             let exits = dirs.after(d);
             Dirs::window(might.row(d), &exits, exits.start)
@@ -393,7 +393,7 @@ impl Next {
 
     /// Of 64 exits behind `d` from `start` on, those that a line through `d` might take, as bits.
     #[inline]
-    pub(super) fn window(
+    pub(crate) fn window(
         &self,
         (might, d): (&BitTable, usize),
         exits: &Range<usize>,
@@ -407,7 +407,7 @@ impl Next {
 
     /// Takes up, in `might` too, that no line passes `source` and then one of `hidden`, nor one of them and then `source`
     /// the other way.
-    pub(super) fn hide(
+    pub(crate) fn hide(
         &mut self,
         dirs: &Dirs,
         might: &mut BitTable,
@@ -443,7 +443,7 @@ struct Flood {
 
 /// Sine of the angle between two planes with unit normals.
 #[inline]
-pub(super) fn sine(a: DVec3, b: DVec3) -> f64 {
+pub(crate) fn sine(a: DVec3, b: DVec3) -> f64 {
     let cosine = a.dot(b);
     (1.0 - cosine * cosine).max(0.0).sqrt()
 }
@@ -468,8 +468,8 @@ fn unit_normal(winding: &[DVec3]) -> DVec3 {
 mod tests {
     use enfilade_cpg::SightPortal;
 
-    use super::super::rays::Rng;
     use super::*;
+    use crate::rng::Rng;
 
     /// A chain of cells joined by random triangles, or as many cells around one; some triangles lie on one plane, some
     /// a hair from another's.

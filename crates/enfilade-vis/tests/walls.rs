@@ -5,11 +5,11 @@ mod common;
 use std::io::Read;
 
 use common::pack;
-use enfilade_bake::vis::{VisConfig, VisContext, VisOutput, see_all};
 use enfilade_cpg::{CellId, CellSet, SightGraph, SightPortal};
 use enfilade_geom::{DVec3, Triangle};
 use enfilade_testkit::Rng;
 use enfilade_verify::{EvidenceError, EvidenceReport, verify_evidence};
+use enfilade_vis::{VisConfig, VisContext, VisOutput, see_all};
 use proptest::prelude::*;
 
 /// Rooms of one unit in a row along x, a window from each to the next, and screens that stand in them.

@@ -4,13 +4,13 @@ use rayon::prelude::*;
 
 /// A square table of bits, a row after the other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct BitTable {
+pub(crate) struct BitTable {
     n_words: usize,
     words: Vec<u64>,
 }
 
 impl BitTable {
-    pub(super) fn new(n_rows: usize, n_columns: usize) -> Self {
+    pub(crate) fn new(n_rows: usize, n_columns: usize) -> Self {
         let n_words = n_columns.div_ceil(64);
         Self {
             n_words,
@@ -19,37 +19,37 @@ impl BitTable {
     }
 
     #[inline]
-    pub(super) fn n_words(&self) -> usize {
+    pub(crate) fn n_words(&self) -> usize {
         self.n_words
     }
 
     #[inline]
-    pub(super) fn row(&self, row: usize) -> &[u64] {
+    pub(crate) fn row(&self, row: usize) -> &[u64] {
         &self.words[row * self.n_words..][..self.n_words]
     }
 
     #[inline]
-    pub(super) fn row_mut(&mut self, row: usize) -> &mut [u64] {
+    pub(crate) fn row_mut(&mut self, row: usize) -> &mut [u64] {
         &mut self.words[row * self.n_words..][..self.n_words]
     }
 
     #[inline]
-    pub(super) fn get(&self, row: usize, column: usize) -> bool {
+    pub(crate) fn get(&self, row: usize, column: usize) -> bool {
         get(self.row(row), column)
     }
 
     #[inline]
-    pub(super) fn set(&mut self, row: usize, column: usize) {
+    pub(crate) fn set(&mut self, row: usize, column: usize) {
         set(self.row_mut(row), column);
     }
 
     #[inline]
-    pub(super) fn clear(&mut self, row: usize, column: usize) {
+    pub(crate) fn clear(&mut self, row: usize, column: usize) {
         self.row_mut(row)[column / 64] &= !(1 << (column % 64));
     }
 
     /// Rows as columns; column `k` is row `order[k]`.
-    pub(super) fn transposed(&self, order: &[u32]) -> Self {
+    pub(crate) fn transposed(&self, order: &[u32]) -> Self {
         let n_rows = order.len();
         let mut out = Self::new(self.n_words * 64, n_rows);
         let n_words = out.n_words;
@@ -69,11 +69,17 @@ impl BitTable {
         out
     }
 
-    pub(super) fn words(&self) -> &[u64] {
+    /// How many bits are set.
+    pub(crate) fn count_all(&self) -> u64 {
+        let ones = |w: &u64| u64::from(w.count_ones());
+        self.words.iter().map(ones).sum()
+    }
+
+    pub(crate) fn words(&self) -> &[u64] {
         &self.words
     }
 
-    pub(super) fn words_mut(&mut self) -> &mut [u64] {
+    pub(crate) fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
     }
 }
@@ -94,23 +100,23 @@ fn transpose_block(block: &mut [u64; 64]) {
 }
 
 #[inline]
-pub(super) fn get(row: &[u64], column: usize) -> bool {
+pub(crate) fn get(row: &[u64], column: usize) -> bool {
     row[column / 64] >> (column % 64) & 1 != 0
 }
 
 #[inline]
-pub(super) fn set(row: &mut [u64], column: usize) {
+pub(crate) fn set(row: &mut [u64], column: usize) {
     row[column / 64] |= 1 << (column % 64);
 }
 
 #[inline]
-pub(super) fn clear(row: &mut [u64], column: usize) {
+pub(crate) fn clear(row: &mut [u64], column: usize) {
     row[column / 64] &= !(1 << (column % 64));
 }
 
 /// The bits `start..start + 64`; zeros past the row's end.
 #[inline]
-pub(super) fn window(row: &[u64], start: usize) -> u64 {
+pub(crate) fn window(row: &[u64], start: usize) -> u64 {
     let (word, shift) = (start / 64, start % 64);
     let at = |i: usize| row.get(i).copied().unwrap_or(0);
     at(word) >> shift | (at(word + 1) << 1) << (63 - shift)
@@ -118,7 +124,7 @@ pub(super) fn window(row: &[u64], start: usize) -> u64 {
 
 /// Clears those of the bits `start..start + 64` that are set in `bits`.
 #[inline]
-pub(super) fn clear_window(row: &mut [u64], start: usize, bits: u64) {
+pub(crate) fn clear_window(row: &mut [u64], start: usize, bits: u64) {
     let (word, shift) = (start / 64, start % 64);
     if let Some(low) = row.get_mut(word) {
         *low &= !(bits << shift);
@@ -130,7 +136,7 @@ pub(super) fn clear_window(row: &mut [u64], start: usize, bits: u64) {
 
 /// Positions of the bits that are set, ascending, the first of them being `start`.
 #[inline]
-pub(super) fn ones_from(start: usize, bits: u64) -> impl Iterator<Item = usize> {
+pub(crate) fn ones_from(start: usize, bits: u64) -> impl Iterator<Item = usize> {
     let mut rest = bits;
     std::iter::from_fn(move || {
         (rest != 0).then(|| {
@@ -143,20 +149,20 @@ pub(super) fn ones_from(start: usize, bits: u64) -> impl Iterator<Item = usize> 
 
 /// Positions of the bits that are set, ascending.
 #[inline]
-pub(super) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
+pub(crate) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
     row.iter()
         .enumerate()
         .flat_map(|(i, &word)| ones_from(i * 64, word))
 }
 
 #[inline]
-pub(super) fn count(row: &[u64]) -> usize {
+pub(crate) fn count(row: &[u64]) -> usize {
     row.iter().map(|w| w.count_ones() as usize).sum()
 }
 
 /// Writes `a & b` where `words` says, and says whether it has a bit there in common with `wanted`.
 #[inline]
-pub(super) fn and_into(
+pub(crate) fn and_into(
     words: &[u32],
     out: &mut [u64],
     (a, b): (&[u64], &[u64]),
@@ -176,14 +182,14 @@ pub(super) fn and_into(
 
 /// Takes into a row what another has.
 #[inline]
-pub(super) fn unite(row: &mut [u64], other: &[u64]) {
+pub(crate) fn unite(row: &mut [u64], other: &[u64]) {
     for (word, &more) in row.iter_mut().zip(other) {
         *word |= more;
     }
 }
 
 #[inline]
-pub(super) fn meets(a: &[u64], b: &[u64]) -> bool {
+pub(crate) fn meets(a: &[u64], b: &[u64]) -> bool {
     a.iter().zip(b).any(|(x, y)| x & y != 0)
 }
 

@@ -7,20 +7,21 @@
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use super::bits::{self, BitTable};
-use super::clip::{Arena, Tolerance};
-use super::dirs::{Dirs, Next};
-use super::flow::{back_of, facing, front_of};
-use super::planes::{Four, admits, pack, separators};
+use crate::bits::{self, BitTable};
+use crate::clip::Arena;
+use crate::dirs::{Dirs, Next};
+use crate::flow::{back_of, facing, front_of};
+use crate::planes::{Four, admits, pack, separators};
+use crate::tolerance::Tolerance;
 
-/// Openings a round; see [`super::search`].
+/// Openings a round; see [`crate::search`].
 const ROUND: usize = 128;
 
 /// Clears from `might` what no line through two openings in a row can reach.
 ///
 /// Goes from the openings that might see least to the others, and what is cleared for one serves the rest.
 /// Time: openings, times their next ones, times what those might see.
-pub(super) fn narrow_might(
+pub(crate) fn narrow_might(
     dirs: &Dirs,
     might: &mut BitTable,
     settled: &mut BitTable,

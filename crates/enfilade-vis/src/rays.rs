@@ -2,25 +2,26 @@
 
 use enfilade_geom::DVec3;
 
-use super::dirs::Dirs;
+use crate::dirs::Dirs;
+use crate::rng::Rng;
 
 /// Tells whether something solid lies between two points.
-pub(super) type Blocker<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
+pub(crate) type Blocker<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
 
 /// A line that proves pairs of cells to see each other.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Line {
+pub(crate) struct Line {
     /// A point in the opening that the walk started from.
-    pub(super) origin: DVec3,
+    pub(crate) origin: DVec3,
     /// Any length.
-    pub(super) direction: DVec3,
+    pub(crate) direction: DVec3,
     /// The directions crossed, in order.
-    pub(super) chain: Vec<u32>,
+    pub(crate) chain: Vec<u32>,
 }
 
 /// Sine of the least angle at which a line proves to cross an opening: where one that runs along its plane meets it
 /// is a matter of rounding.
-pub(super) const MIN_SINE: f64 = 1e-9;
+pub(crate) const MIN_SINE: f64 = 1e-9;
 
 /// Longest chain followed.
 const MAX_STEPS: usize = 4096;
@@ -29,7 +30,7 @@ const MAX_STEPS: usize = 4096;
 /// without `first`.
 ///
 /// Counts only crossings that lie `margin` inside an opening, so what it says is proved; it may stop early.
-pub(super) fn walk(
+pub(crate) fn walk(
     dirs: &Dirs,
     first: usize,
     origin: DVec3,
@@ -78,7 +79,7 @@ pub(super) fn walk(
 impl Dirs {
     /// Whether a point of an opening's plane lies at least `margin` inside one of its pieces.
     #[inline]
-    pub(super) fn is_inside(&self, dir: usize, p: DVec3, margin: f64) -> bool {
+    pub(crate) fn is_inside(&self, dir: usize, p: DVec3, margin: f64) -> bool {
         let pieces = &self.all[dir].pieces;
         self.pieces[pieces.start as usize..pieces.end as usize]
             .iter()
@@ -90,7 +91,7 @@ impl Dirs {
     }
 
     /// Whether a line crosses all openings of its chain in order, each this far inside.
-    pub(super) fn is_crossed(&self, line: &Line, margin: f64) -> bool {
+    pub(crate) fn is_crossed(&self, line: &Line, margin: f64) -> bool {
         let mut before = f64::NEG_INFINITY;
         let least = MIN_SINE * line.direction.length();
         line.chain.iter().all(|&d| {
@@ -104,7 +105,7 @@ impl Dirs {
     }
 
     /// A random point of an opening, uniform over a random triangle of its fan.
-    pub(super) fn random_point(&self, dir: usize, rng: &mut Rng) -> DVec3 {
+    pub(crate) fn random_point(&self, dir: usize, rng: &mut Rng) -> DVec3 {
         let pieces = &self.all[dir].pieces;
         let n_pieces = (pieces.end - pieces.start) as usize;
         let piece = &self.pieces[pieces.start as usize + rng.below(n_pieces)];
@@ -115,34 +116,5 @@ impl Dirs {
             (u, v) = (1.0 - u, 1.0 - v);
         }
         corners[0] + (corners[k] - corners[0]) * u + (corners[k + 1] - corners[0]) * v
-    }
-}
-
-/// Xorshift: repeatable, and good enough to spread rays.
-pub(super) struct Rng(u64);
-
-impl Rng {
-    pub(super) fn new(seed: u64) -> Self {
-        // Odd multiplier and a shift spread neighboring seeds; zero must not be the state.
-        let x = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        Self((x ^ (x >> 29)) | 1)
-    }
-
-    #[inline]
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
-    }
-
-    #[inline]
-    pub(super) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    #[inline]
-    pub(super) fn below(&mut self, n: usize) -> usize {
-        (((self.next() >> 32) * n as u64) >> 32) as usize
     }
 }

@@ -6,16 +6,17 @@ use enfilade_cpg::SightGraph;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::bits::{self, BitTable};
-use super::dirs::Next;
-use super::flow::Shared;
-use super::search::Search;
-use super::{VisConfig, VisError, checkpoint, prove};
+use crate::bits::{self, BitTable};
+use crate::config::{KEPT, VisConfig, VisError};
+use crate::dirs::Next;
+use crate::flow::Shared;
+use crate::search::Search;
+use crate::{checkpoint, prove};
 
 const MAGIC: &[u8; 8] = b"ENFEVID4";
 
 /// Writes down what a search found and why.
-pub(super) fn encode(
+pub(crate) fn encode(
     graph: &SightGraph,
     search: &Search<'_>,
     config: &VisConfig,
@@ -32,13 +33,13 @@ pub(super) fn encode(
     let claims = prove::claims(&shared, &search.settled);
     let trace = prove::traces(&shared, &claims).ok_or(VisError::Evidence)?;
     let visible = search.visible();
-    let n_visible = super::count_all(&visible);
+    let n_visible = visible.count_all();
     let n_proved = n_visible - n_undecided(search, &visible);
 
     let mut body = Vec::new();
     body.extend(graph.content_hash().to_le_bytes());
     // What is promised, not what the search kept to.
-    body.extend((search.tolerance.clearance / super::KEPT).to_le_bytes());
+    body.extend((search.tolerance.clearance / KEPT).to_le_bytes());
     body.extend(config.far.unwrap_or(f64::INFINITY).to_le_bytes());
     body.extend(n_visible.to_le_bytes());
     body.extend(n_proved.to_le_bytes());

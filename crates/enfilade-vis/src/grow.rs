@@ -7,17 +7,18 @@
 use enfilade_geom::DVec3;
 use rayon::prelude::*;
 
-use super::bits;
-use super::dirs::Dirs;
-use super::rays::{Line, Rng, walk};
-use super::search::Search;
+use crate::bits;
+use crate::dirs::Dirs;
+use crate::rays::{Line, walk};
+use crate::rng::Rng;
+use crate::search::Search;
 
 /// Lines a round. Those of one round know nothing of each other.
 const ROUND: usize = 512;
 
 impl Search<'_> {
     /// Grows all lines, and those grown from them, until nothing new comes of it.
-    pub(super) fn grow(&mut self) {
+    pub(crate) fn grow(&mut self) {
         let mut first = self.n_grown;
         while first < self.lines.len() {
             let end = self.lines.len().min(first + ROUND);
@@ -37,7 +38,7 @@ impl Search<'_> {
     /// Among openings alone few such pairs are left. Walls inside cells leave more: no plane between openings
     /// speaks of those, but lines that pass between them can still be found.
     /// Goes on while `on_round` says so.
-    pub(super) fn insist(
+    pub(crate) fn insist(
         &mut self,
         n_lines: usize,
         n_rounds: u64,
@@ -194,7 +195,7 @@ impl Search<'_> {
 
 impl Dirs {
     /// Where a line meets the plane of an opening, in lengths of `direction`.
-    pub(super) fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> f64 {
+    pub(crate) fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> f64 {
         let dir = &self.all[d];
         ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / dir.normal.dot(direction)
     }

@@ -6,13 +6,11 @@ use std::io::Read;
 use std::time::Duration;
 
 use common::pack;
-use enfilade_bake::vis::{
-    VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, see_all,
-};
 use enfilade_cpg::{CellId, SightGraph, SightGraphError, SightPortal};
 use enfilade_geom::DVec3;
 use enfilade_testkit::Rng;
 use enfilade_verify::verify_evidence;
+use enfilade_vis::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, see_all};
 use proptest::prelude::*;
 
 /// Rooms of one unit on a grid of `n` by `n`, with a window in most walls between neighbors.

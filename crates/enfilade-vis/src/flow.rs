@@ -15,62 +15,61 @@
 //!
 //! Errs to visible: a chain that neither a plane nor a line settles counts as seen.
 
+mod lines;
+
 use enfilade_geom::DVec3;
 use fearless_simd::{Level, Simd, dispatch};
 
-use super::bits::{self, BitTable};
-use super::clip::{Arena, HalfSpace, Poly, Tolerance};
-use super::dirs::{Dirs, Next};
-use super::planes::{Facing, Four, Side, admits, hide, separators};
-use super::rays::{self, Blocker, Line, MIN_SINE};
-use super::stabbing::{self, Answer, Gate};
+use crate::bits::{self, BitTable};
+use crate::clip::{Arena, Poly};
+use crate::dirs::{Dirs, Next};
+use crate::planes::{Facing, Four, Side, admits, hide, separators};
+use crate::rays::{Blocker, Line};
+use crate::tolerance::{HalfSpace, Tolerance};
 
 /// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
 const MAX_CHAIN: usize = 512;
 
 /// Pieces that a source is split into before a linear programme is asked, and into more only where that does not tell.
-pub(super) const FEW_PIECES: u32 = 4;
-
-/// How often the ends of a line that was guessed are moved.
-const MAX_TURNS: usize = 8;
+pub(crate) const FEW_PIECES: u32 = 4;
 
 /// What stays the same during a round.
-pub(super) struct Shared<'a> {
-    pub(super) dirs: &'a Dirs,
-    pub(super) might: &'a BitTable,
-    pub(super) next: &'a Next,
+pub(crate) struct Shared<'a> {
+    pub(crate) dirs: &'a Dirs,
+    pub(crate) might: &'a BitTable,
+    pub(crate) next: &'a Next,
     /// Pairs of cells that are decided to be visible.
-    pub(super) seen: &'a BitTable,
-    pub(super) tolerance: Tolerance,
-    pub(super) blocker: Option<Blocker<'a>>,
+    pub(crate) seen: &'a BitTable,
+    pub(crate) tolerance: Tolerance,
+    pub(crate) blocker: Option<Blocker<'a>>,
     /// Pieces that a source may be split into to settle one chain.
-    pub(super) max_pieces: u32,
+    pub(crate) max_pieces: u32,
 }
 
 /// What the search from one opening found.
 #[derive(Default)]
-pub(super) struct Found {
-    pub(super) source: usize,
+pub(crate) struct Found {
+    pub(crate) source: usize,
     /// Openings proved to be out of sight, as bits.
-    pub(super) hidden: Vec<u64>,
-    pub(super) lines: Vec<Line>,
+    pub(crate) hidden: Vec<u64>,
+    pub(crate) lines: Vec<Line>,
     /// Cells that could not be decided, and count as seen.
-    pub(super) undecided: Vec<u32>,
-    pub(super) effort: Effort,
+    pub(crate) undecided: Vec<u32>,
+    pub(crate) effort: Effort,
 }
 
 /// How much was done.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Effort {
-    pub(super) steps: u64,
-    pub(super) clips: u64,
-    pub(super) stabs: u64,
-    pub(super) splits: u64,
-    pub(super) rays: u64,
+pub(crate) struct Effort {
+    pub(crate) steps: u64,
+    pub(crate) clips: u64,
+    pub(crate) stabs: u64,
+    pub(crate) splits: u64,
+    pub(crate) rays: u64,
 }
 
 impl Effort {
-    pub(super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.steps += other.steps;
         self.clips += other.clips;
         self.stabs += other.stabs;
@@ -81,17 +80,17 @@ impl Effort {
 
 /// What a search needs besides, kept between searches.
 #[derive(Default)]
-pub(super) struct Flow {
-    pub(super) arena: Arena,
+pub(crate) struct Flow {
+    pub(crate) arena: Arena,
     /// By depth: what all openings of the chain might see.
-    pub(super) reach: Vec<Vec<u64>>,
+    pub(crate) reach: Vec<Vec<u64>>,
     /// Words of the first row of reach that are not zero. The rows of other depths are right in these alone.
-    pub(super) words: Vec<u32>,
+    pub(crate) words: Vec<u32>,
     /// The openings still to be settled from this source.
-    pub(super) wanted: Vec<u64>,
+    pub(crate) wanted: Vec<u64>,
     /// By depth: the chain's openings as clipped.
-    pub(super) chain: Vec<Poly>,
-    pub(super) planes: Vec<Four>,
+    pub(crate) chain: Vec<Poly>,
+    pub(crate) planes: Vec<Four>,
     walked: Vec<u32>,
     unreached: Vec<u64>,
     stack: Vec<u32>,
@@ -108,7 +107,7 @@ enum Stab {
 
 impl Flow {
     /// Settles everything that `source` might see.
-    pub(super) fn search(&mut self, shared: &Shared<'_>, source: usize) -> Found {
+    pub(crate) fn search(&mut self, shared: &Shared<'_>, source: usize) -> Found {
         let dirs = shared.dirs;
         let dir = &dirs.all[source];
         let n_words = shared.might.n_words();
@@ -157,7 +156,7 @@ impl Flow {
     }
 
     /// Starts a chain with the whole of an opening.
-    pub(super) fn begin(&mut self, shared: &Shared<'_>, source: usize) -> Poly {
+    pub(crate) fn begin(&mut self, shared: &Shared<'_>, source: usize) -> Poly {
         self.arena.release(0);
         self.planes.clear();
         self.chain.clear();
@@ -166,7 +165,7 @@ impl Flow {
         poly
     }
 
-    pub(super) fn set_reach(&mut self, depth: usize, row: &[u64]) {
+    pub(crate) fn set_reach(&mut self, depth: usize, row: &[u64]) {
         if self.reach.len() <= depth {
             self.reach.resize(depth + 1, Vec::new());
         }
@@ -175,7 +174,7 @@ impl Flow {
     }
 
     /// Sets [`Flow::words`].
-    pub(super) fn find_words(&mut self) {
+    pub(crate) fn find_words(&mut self) {
         self.words.clear();
         let row = self.reach[0].iter().enumerate();
         self.words
@@ -319,46 +318,8 @@ impl Flow {
         answer
     }
 
-    /// Whether any line passes the chain, whatever planes leave of it.
-    fn stab_at_all(&mut self, shared: &Shared<'_>, source: Poly) -> Stab {
-        let (origin, direction) = match self.stabbed(shared) {
-            Answer::Closed(_) => return Stab::None,
-            Answer::Unknown => return Stab::Unknown,
-            Answer::Guess(origin, direction) => (origin, direction),
-        };
-        let dirs = shared.dirs;
-        let target = self.chain[self.chain.len() - 1];
-        let at = |dir: u32| origin + direction * dirs.crossing(dir as usize, origin, direction);
-        let (mut from, mut to) = (at(source.dir), at(target.dir));
-        // Each end by turns moves to the middle of what is seen from the other.
-        for _ in 0..MAX_TURNS {
-            if self.passes(shared, from, to) {
-                return Stab::Line(from, to);
-            }
-            to = self.middle_seen(shared, from, target).unwrap_or(to);
-            if self.passes(shared, from, to) {
-                return Stab::Line(from, to);
-            }
-            from = self.middle_seen(shared, to, source).unwrap_or(from);
-        }
-        Stab::Unknown
-    }
-
-    pub(super) fn stabbed(&self, shared: &Shared<'_>) -> Answer {
-        let dirs = shared.dirs;
-        let gate = |poly: &Poly| {
-            let dir = &dirs.all[poly.dir as usize];
-            Gate {
-                winding: dirs.winding(poly.dir as usize),
-                turn: dir.turn,
-                normal: dir.normal,
-            }
-        };
-        stabbing::stabbed(&self.chain.iter().map(gate).collect::<Vec<_>>())
-    }
-
     /// The source in two, across its longest side; `None` where it is too small to split.
-    pub(super) fn halves(
+    pub(crate) fn halves(
         &mut self,
         shared: &Shared<'_>,
         source: Poly,
@@ -394,7 +355,7 @@ impl Flow {
     }
 
     /// Clips the whole chain by all planes between the source and it; `None` where nothing is left.
-    pub(super) fn tighten(&mut self, shared: &Shared<'_>, source: Poly) -> Option<Poly> {
+    pub(crate) fn tighten(&mut self, shared: &Shared<'_>, source: Poly) -> Option<Poly> {
         let first_plane = self.planes.len();
         let source = self.tighten_by(shared, source, first_plane);
         self.planes.truncate(first_plane);
@@ -433,7 +394,7 @@ impl Flow {
     }
 
     /// Drops what is wanted and lies behind a plane; says whether anything is left.
-    pub(super) fn check_wanted(
+    pub(crate) fn check_wanted(
         &mut self,
         shared: &Shared<'_>,
         first_plane: usize,
@@ -469,7 +430,7 @@ impl Flow {
         is_left
     }
 
-    pub(super) fn add_planes(&mut self, shared: &Shared<'_>, source: Poly, pass: Poly) {
+    pub(crate) fn add_planes(&mut self, shared: &Shared<'_>, source: Poly, pass: Poly) {
         separators(
             (self.arena.get(source), facing(shared.dirs, source.dir)),
             (self.arena.get(pass), facing(shared.dirs, pass.dir)),
@@ -479,7 +440,7 @@ impl Flow {
     }
 
     /// What is left of the source and of the opening `q` when the chain goes on through it.
-    pub(super) fn narrow(
+    pub(crate) fn narrow(
         &mut self,
         shared: &Shared<'_>,
         source: Poly,
@@ -544,122 +505,10 @@ impl Flow {
         }
         any
     }
-
-    /// Follows a line from the source; everything it crosses is seen.
-    fn shoot(&mut self, shared: &Shared<'_>, from: DVec3, to: DVec3) {
-        let dirs = shared.dirs;
-        let source = self.found.source;
-        self.walked.clear();
-        self.found.effort.rays += 1;
-        rays::walk(
-            dirs,
-            source,
-            from,
-            to - from,
-            shared.tolerance.rounding * 16.0,
-            shared.blocker,
-            &mut self.walked,
-        );
-        let mut is_new = false;
-        for k in 0..self.walked.len() {
-            let crossed = self.walked[k];
-            is_new |= self.settle_cell(dirs, dirs.all[crossed as usize].to);
-        }
-        if is_new {
-            let mut chain = vec![source as u32];
-            chain.extend_from_slice(&self.walked);
-            self.found.lines.push(Line {
-                origin: from,
-                direction: to - from,
-                chain,
-            });
-        }
-    }
-
-    /// Whether a line passes all openings of the chain.
-    fn stab(&mut self, shared: &Shared<'_>, source: Poly, target: Poly) -> Stab {
-        self.found.effort.stabs += 1;
-        let (from, to) = (self.arena.mean(source), self.arena.mean(target));
-        if self.passes(shared, from, to) {
-            return Stab::Line(from, to);
-        }
-        if let Some(to) = self.middle_seen(shared, from, target)
-            && self.passes(shared, from, to)
-        {
-            return Stab::Line(from, to);
-        }
-        if let Some(from) = self.middle_seen(shared, to, source)
-            && self.passes(shared, from, to)
-        {
-            return Stab::Line(from, to);
-        }
-        Stab::Unknown
-    }
-
-    /// Whether the line crosses all openings of the chain.
-    fn passes(&self, shared: &Shared<'_>, from: DVec3, to: DVec3) -> bool {
-        let dirs = shared.dirs;
-        let margin = shared.tolerance.rounding * 16.0;
-        let direction = to - from;
-        let least = MIN_SINE * direction.length();
-        // The ends too: a clip keeps a hair more than the opening.
-        self.chain.iter().all(|poly| {
-            let dir = &dirs.all[poly.dir as usize];
-            let speed = dir.normal.dot(direction);
-            let t = ((dir.low + dir.high) * 0.5 - dir.normal.dot(from)) / speed;
-            speed > least && dirs.is_inside(poly.dir as usize, from + direction * t, margin)
-        })
-    }
-
-    /// The lines from a point at one end through the chain meet its other end in a polygon: the middle of that.
-    fn middle_seen(&mut self, shared: &Shared<'_>, eye: DVec3, end: Poly) -> Option<DVec3> {
-        let mark = self.arena.mark();
-        let seen = self.seen_from(shared, eye, end);
-        let middle = seen.map(|seen| self.arena.mean(seen));
-        self.arena.release(mark);
-        middle
-    }
-
-    /// What of an end of the chain is seen from a point at its other end.
-    fn seen_from(&mut self, shared: &Shared<'_>, eye: DVec3, mut end: Poly) -> Option<Poly> {
-        let dirs = shared.dirs;
-        for k in 1..self.chain.len() - 1 {
-            let pass = self.chain[k].dir as usize;
-            for i in 0..dirs.winding(pass).len() {
-                let Some(plane) = edge_plane(dirs, pass, i, eye) else {
-                    continue;
-                };
-                let turn = dirs.all[end.dir as usize].turn;
-                end = self.arena.clip(end, plane, turn, &shared.tolerance)?;
-            }
-        }
-        Some(end)
-    }
-}
-
-/// The half-space of lines from `eye` that pass edge `i` of an opening on its inner side.
-fn edge_plane(dirs: &Dirs, dir: usize, i: usize, eye: DVec3) -> Option<HalfSpace> {
-    let winding = dirs.winding(dir);
-    let p = winding[i];
-    let q = winding[if i + 1 == winding.len() { 0 } else { i + 1 }];
-    let normal = (q - p).cross(eye - p).normalize_or_zero();
-    if normal == DVec3::ZERO {
-        return None;
-    }
-    let inward = dirs.edges[dirs.all[dir].corners.start as usize + i].0;
-    let normal = if normal.dot(inward) < 0.0 {
-        -normal
-    } else {
-        normal
-    };
-    Some(HalfSpace {
-        normal,
-        offset: normal.dot(p),
-    })
 }
 
 #[inline]
-pub(super) fn facing(dirs: &Dirs, dir: u32) -> Facing {
+pub(crate) fn facing(dirs: &Dirs, dir: u32) -> Facing {
     let dir = &dirs.all[dir as usize];
     Facing {
         turn: dir.turn,
@@ -669,7 +518,7 @@ pub(super) fn facing(dirs: &Dirs, dir: u32) -> Facing {
 
 /// Where a line that has crossed an opening goes.
 #[inline]
-pub(super) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
+pub(crate) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
     let dir = &dirs.all[dir as usize];
     HalfSpace {
         normal: dir.normal,
@@ -679,7 +528,7 @@ pub(super) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
 
 /// Where a line that will cross an opening comes from.
 #[inline]
-pub(super) fn back_of(dirs: &Dirs, dir: usize) -> HalfSpace {
+pub(crate) fn back_of(dirs: &Dirs, dir: usize) -> HalfSpace {
     let dir = &dirs.all[dir];
     HalfSpace {
         normal: -dir.normal,

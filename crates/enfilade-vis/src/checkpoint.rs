@@ -12,15 +12,15 @@ use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
 
-use super::bits::BitTable;
-use super::rays::Line;
-use super::search::{Rest, Search};
-use super::{VisConfig, VisError};
+use crate::bits::BitTable;
+use crate::config::{VisConfig, VisError};
+use crate::rays::Line;
+use crate::search::{Rest, Search};
 
 const MAGIC: &[u8; 8] = b"ENFVCHK2";
 
 /// FNV-1a over all that decides what a search does.
-pub(super) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
+pub(crate) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
     let far = config.far.unwrap_or(f64::INFINITY).to_bits();
     let clearance = config.clearance.unwrap_or(-1.0).to_bits();
     let mut bytes = env!("CARGO_PKG_VERSION").as_bytes().to_vec();
@@ -38,13 +38,13 @@ pub(super) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
 }
 
 /// FNV-1a, 64 bits.
-pub(super) fn fnv(bytes: &[u8]) -> u64 {
+pub(crate) fn fnv(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     })
 }
 
-pub(super) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
+pub(crate) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
     let mut words = vec![rest.done, rest.total, search.effort.steps];
     for table in search.tables() {
         words.extend(table.words());
@@ -73,7 +73,7 @@ pub(super) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
 }
 
 /// Puts a search back where it was.
-pub(super) fn decode(
+pub(crate) fn decode(
     bytes: &[u8],
     search: &mut Search<'_>,
     expected: u64,

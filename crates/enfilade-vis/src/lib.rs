@@ -19,153 +19,40 @@
 mod bits;
 mod checkpoint;
 mod clip;
+mod config;
 mod dirs;
 mod evidence;
 mod flow;
 mod grow;
 mod narrow;
 mod occlude;
+mod output;
 mod planes;
 mod prove;
 mod rays;
+mod rng;
 mod search;
+mod sheets;
 mod stabbing;
+mod tolerance;
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use enfilade_cpg::{CellId, CellSet, SightGraph, SightGraphError};
-use enfilade_geom::{Bvh, DVec3, Triangle};
+use enfilade_cpg::{CellId, CellSet, SightGraph};
+use enfilade_geom::{Bvh, DVec3};
 
-use bits::BitTable;
+use config::KEPT;
 use dirs::Dirs;
-use occlude::Sheets;
 use rays::Blocker;
 use search::{Rest, Search};
+use sheets::Sheets;
 
-/// Share of the clearance that the search itself uses; a checker's sums may differ in the last digits.
-const KEPT: f64 = 0.9;
+pub use config::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
+pub use output::{VisOutput, Witness};
 
 /// Lines tried between cells that walls may hide from each other, and how often, before each beam is looked at.
 const INSIST_LINES: usize = 50;
 const INSIST_ROUNDS: u64 = 2;
-
-/// How thoroughly to look.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum VisMode {
-    /// Sides of planes, and planes between two openings in a row: seconds on any graph, a larger answer.
-    Fast,
-    /// The search over portal chains.
-    #[default]
-    Exact,
-}
-
-/// What to compute.
-#[derive(Clone, Debug, PartialEq)]
-pub struct VisConfig {
-    /// How thoroughly to look.
-    pub mode: VisMode,
-    /// Lines that pass nearer to an opening's edge than this may be lost. `None`: 1e-8 of the largest
-    /// coordinate, less than that coordinate's rounding in `f32`. [Units: wu] [Limit: >= 0]
-    pub clearance: Option<f64>,
-    /// Nothing farther than this is seen. [Units: wu] [Limit: >= 0]
-    pub far: Option<f64>,
-    /// Random lines cast from each portal; more are grown from those that find something.
-    pub n_rays: usize,
-    /// Pieces that an opening may be split into to settle one chain.
-    pub max_pieces: u32,
-    /// Write down proofs: [`VisOutput::evidence`]. Costs about as much again.
-    pub has_evidence: bool,
-}
-
-impl Default for VisConfig {
-    fn default() -> Self {
-        Self {
-            mode: VisMode::Exact,
-            clearance: None,
-            far: None,
-            n_rays: 12,
-            max_pieces: 64,
-            has_evidence: false,
-        }
-    }
-}
-
-/// Why nothing was computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum VisError {
-    /// The graph is broken.
-    #[error(transparent)]
-    Graph(#[from] SightGraphError),
-    /// A setting makes no sense.
-    #[error("{name} is {value}; a number of at least 0 is needed")]
-    Setting {
-        /// The setting.
-        name: &'static str,
-        /// What it is.
-        value: f64,
-    },
-    /// A checkpoint does not fit.
-    #[error("the checkpoint cannot be used: {problem}; delete it to start anew")]
-    Checkpoint {
-        /// Why.
-        problem: &'static str,
-    },
-    /// What was found could not be shown again: a bug, and no evidence is written.
-    #[error("the search could not repeat its proof (a bug); leave the evidence out")]
-    Evidence,
-}
-
-/// A line that proves cells to see each other.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Witness {
-    /// A point in one of the openings it crosses. [Units: wu]
-    pub origin: DVec3,
-    /// Where it goes; any length.
-    pub direction: DVec3,
-    /// The openings it crosses, in order, as directions of [`SightGraph`].
-    pub chain: Vec<u32>,
-}
-
-/// What can be seen.
-#[derive(Clone, Debug, PartialEq)]
-pub struct VisOutput {
-    /// By cell: the cells that might be seen from it, itself included. Symmetric.
-    pub cells: Vec<CellSet>,
-    /// By cell: those of `cells` that no line proves; none of the rest is in doubt.
-    pub undecided: Vec<CellSet>,
-    /// Lines that together prove everything else in `cells`.
-    pub witnesses: Vec<Witness>,
-    /// Whether the search ended by itself; if not, the answer is larger than need be.
-    pub is_complete: bool,
-    /// Pairs left by sides of planes alone, as an upper bound to compare with.
-    pub n_base: u64,
-    /// Chains searched.
-    pub n_steps: u64,
-    /// Proofs of all this, for `enfilade-verify`, where asked for; see `docs/evidence.md`.
-    pub evidence: Option<Vec<u8>>,
-}
-
-/// What surrounds a computation: threads come from the current rayon pool.
-pub struct VisContext<'a> {
-    /// Hears work done and work in all, weighted by cost, and says whether to go on.
-    pub on_round: &'a mut (dyn FnMut(u64, u64) -> bool + Send),
-    /// What else blocks sight; without it, a line is free wherever it passes openings.
-    pub walls: Option<&'a [Triangle]>,
-    /// Where to keep what was found, and what to go on from. Not used by [`VisMode::Fast`].
-    pub checkpoint: Option<VisCheckpoint<'a>>,
-}
-
-/// How a search is kept for another day; what it finds then is what it would have found in one go.
-pub struct VisCheckpoint<'a> {
-    /// What was saved before. Refused where the graph or the settings were others.
-    pub resume: Option<Vec<u8>>,
-    /// A number that changes with [`VisContext::walls`].
-    pub salt: u64,
-    /// How long to search between saves.
-    pub every: Duration,
-    /// Takes the state: when it is due, and when [`VisContext::on_round`] stops the search.
-    pub save: &'a mut (dyn FnMut(Vec<u8>) + Send),
-}
 
 /// Finds what can be seen from every cell.
 ///
@@ -192,7 +79,7 @@ pub fn see_all(
         .map(|bvh| move |a: DVec3, b: DVec3| bvh.any_hit(a, b, |_| false));
     let blocker = is_blocked.as_ref().map(|f| f as Blocker<'_>);
     let mut search = Search::new(&dirs, KEPT * clearance, config.far, blocker);
-    let n_base = count_all(&search.visible());
+    let n_base = search.visible().count_all();
     let salt = context.checkpoint.as_ref().map_or(0, |c| c.salt);
     let key = checkpoint::key(graph, config, salt);
     let resumed = match &context.checkpoint {
@@ -309,12 +196,4 @@ fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
         n_steps,
         evidence: None,
     }
-}
-
-fn count_all(table: &BitTable) -> u64 {
-    table
-        .words()
-        .iter()
-        .map(|w| u64::from(w.count_ones()))
-        .sum()
 }

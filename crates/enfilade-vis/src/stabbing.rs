@@ -22,17 +22,17 @@ const ZERO: f64 = 1e-14;
 const MAX_STEPS: usize = 500;
 
 /// An opening of the chain.
-pub(super) struct Gate<'a> {
-    pub(super) winding: &'a [DVec3],
+pub(crate) struct Gate<'a> {
+    pub(crate) winding: &'a [DVec3],
     /// Unit normal that the corners run counter-clockwise about.
-    pub(super) turn: DVec3,
+    pub(crate) turn: DVec3,
     /// Unit normal the way it is crossed.
-    pub(super) normal: DVec3,
+    pub(crate) normal: DVec3,
 }
 
 /// What the rows say.
 #[derive(Debug, PartialEq)]
-pub(super) enum Answer {
+pub(crate) enum Answer {
     /// Weights of rows whose sum is zero.
     Closed(Vec<(u16, f64)>),
     /// A point and a direction, the best guess for a line.
@@ -44,7 +44,7 @@ pub(super) enum Answer {
 type Row = [f64; 6];
 
 /// Asks whether a line passes all gates inside their edges.
-pub(super) fn stabbed(gates: &[Gate<'_>]) -> Answer {
+pub(crate) fn stabbed(gates: &[Gate<'_>]) -> Answer {
     let (center, size) = frame(gates);
     let rows = rows(gates, center, size);
     if rows.len() > usize::from(u16::MAX) || rows.iter().flatten().any(|x| !x.is_finite()) {
@@ -227,8 +227,8 @@ fn affine(rows: &[Row], weights: &[(usize, f64)]) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rays::Rng;
     use super::*;
+    use crate::rng::Rng;
 
     /// A convex polygon around a point of its plane, and unit normals: of its corners' order, and as crossed.
     struct Made(Vec<DVec3>, DVec3, DVec3);

@@ -7,12 +7,12 @@
 use enfilade_geom::DVec3;
 use rayon::prelude::*;
 
-use super::bits::{self, BitTable};
-use super::clip::Tolerance;
-use super::dirs::{Dirs, Next};
-use super::flow::{Effort, Flow, Found, Shared};
-use super::occlude::Closed;
-use super::rays::{self, Blocker, Line, Rng};
+use crate::bits::{self, BitTable};
+use crate::dirs::{Dirs, Next};
+use crate::flow::{Effort, Flow, Found, Shared};
+use crate::rays::{self, Blocker, Line};
+use crate::rng::Rng;
+use crate::tolerance::Tolerance;
 
 /// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
 const ROUND: usize = 64;
@@ -21,36 +21,45 @@ const ROUND: usize = 64;
 const FAR_KEPT: f64 = 1.0 - 1e-9;
 
 /// What is left to search.
-pub(super) struct Rest {
+pub(crate) struct Rest {
     /// Openings, and before each how many it might see.
-    pub(super) order: Vec<(usize, usize)>,
+    pub(crate) order: Vec<(usize, usize)>,
     /// Work done and work in all.
-    pub(super) done: u64,
-    pub(super) total: u64,
+    pub(crate) done: u64,
+    pub(crate) total: u64,
 }
 
-pub(super) struct Search<'a> {
-    pub(super) dirs: &'a Dirs,
-    pub(super) might: BitTable,
+/// That no line leads through one opening and a later one.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Closed {
+    pub(crate) from: u32,
+    pub(crate) to: u32,
+    /// Trees of beams, one for each two pieces of the openings that a line passes both of.
+    pub(crate) tree: Vec<u8>,
+}
+
+pub(crate) struct Search<'a> {
+    pub(crate) dirs: &'a Dirs,
+    pub(crate) might: BitTable,
     /// Pairs of cells proved visible.
-    pub(super) seen: BitTable,
+    pub(crate) seen: BitTable,
     /// Pairs of cells given up on, in `seen` as well.
-    pub(super) undecided: BitTable,
+    pub(crate) undecided: BitTable,
     /// By opening, what was settled as hidden from it beyond the sides of planes.
-    pub(super) settled: BitTable,
-    pub(super) lines: Vec<Line>,
+    pub(crate) settled: BitTable,
+    pub(crate) lines: Vec<Line>,
     /// Pairs of openings that walls hide from each other.
-    pub(super) closed: Vec<Closed>,
-    pub(super) tolerance: Tolerance,
-    pub(super) blocker: Option<Blocker<'a>>,
+    pub(crate) closed: Vec<Closed>,
+    pub(crate) tolerance: Tolerance,
+    pub(crate) blocker: Option<Blocker<'a>>,
     far: Option<f64>,
-    pub(super) effort: Effort,
+    pub(crate) effort: Effort,
     /// How many of `lines` have been grown.
-    pub(super) n_grown: usize,
+    pub(crate) n_grown: usize,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         dirs: &'a Dirs,
         clearance: f64,
         far: Option<f64>,
@@ -78,7 +87,7 @@ impl<'a> Search<'a> {
     }
 
     /// Random lines from every opening, some aimed at what is not yet seen.
-    pub(super) fn cast(&mut self, n_rays: usize) {
+    pub(crate) fn cast(&mut self, n_rays: usize) {
         let openings: Vec<usize> = (0..self.dirs.len())
             .filter(|&d| self.dirs.all[d].id.is_multiple_of(2))
             .collect();
@@ -150,7 +159,7 @@ impl<'a> Search<'a> {
         lines
     }
 
-    pub(super) fn proves_new(&self, chain: &[u32]) -> bool {
+    pub(crate) fn proves_new(&self, chain: &[u32]) -> bool {
         let dirs = self.dirs;
         (0..chain.len()).any(|i| {
             let row = self.seen.row(dirs.all[chain[i] as usize].from as usize);
@@ -161,7 +170,7 @@ impl<'a> Search<'a> {
     }
 
     /// Marks what lines prove, and keeps those that prove something new.
-    pub(super) fn keep(&mut self, lines: Vec<Line>) {
+    pub(crate) fn keep(&mut self, lines: Vec<Line>) {
         let pieces: Vec<Vec<Line>> = lines
             .into_par_iter()
             .with_min_len(16)
@@ -262,7 +271,7 @@ impl<'a> Search<'a> {
     }
 
     /// All openings, those that might see least first.
-    pub(super) fn all_openings(&self) -> Rest {
+    pub(crate) fn all_openings(&self) -> Rest {
         let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
             .map(|d| (bits::count(self.might.row(d)), d))
             .collect();
@@ -279,7 +288,7 @@ impl<'a> Search<'a> {
     /// whether to go on; work is counted in what openings might see at the start.
     ///
     /// Returns whether all was searched.
-    pub(super) fn run(
+    pub(crate) fn run(
         &mut self,
         max_pieces: u32,
         mut rest: Rest,
@@ -320,12 +329,12 @@ impl<'a> Search<'a> {
     }
 
     /// All that a search finds out beside lines.
-    pub(super) fn tables(&self) -> [&BitTable; 4] {
+    pub(crate) fn tables(&self) -> [&BitTable; 4] {
         [&self.might, &self.settled, &self.seen, &self.undecided]
     }
 
     /// Takes up where another search left off.
-    pub(super) fn restore(&mut self, tables: [BitTable; 4], lines: Vec<Line>, steps: u64) {
+    pub(crate) fn restore(&mut self, tables: [BitTable; 4], lines: Vec<Line>, steps: u64) {
         [self.might, self.settled, self.seen, self.undecided] = tables;
         self.n_grown = lines.len();
         self.lines = lines;
@@ -349,7 +358,7 @@ impl<'a> Search<'a> {
     }
 
     /// Pairs of cells that may see each other.
-    pub(super) fn visible(&self) -> BitTable {
+    pub(crate) fn visible(&self) -> BitTable {
         let n = self.dirs.n_cells;
         let mut visible = BitTable::new(n, n);
         let n_words = visible.n_words().max(1);

@@ -9,14 +9,14 @@
 
 use rayon::prelude::*;
 
-use super::bits::{self, BitTable};
-use super::clip::Poly;
-use super::flow::{FEW_PIECES, Flow, Shared};
-use super::planes::is_admitted;
-use super::stabbing::Answer;
+use crate::bits::{self, BitTable};
+use crate::clip::Poly;
+use crate::flow::{FEW_PIECES, Flow, Shared};
+use crate::planes::is_admitted;
+use crate::stabbing::Answer;
 
 /// Symbols of the trace.
-pub(super) mod symbol {
+pub(crate) mod symbol {
     /// Nothing that is to be shown hidden can lie behind this exit.
     pub(crate) const SKIP: u8 = 0;
     /// Planes leave nothing of the chain through this exit.
@@ -39,7 +39,7 @@ pub(super) mod symbol {
 
 /// For each opening, those that its trace shows to be hidden: what the search settled from it, less what
 /// follows from neighbors.
-pub(super) fn claims(shared: &Shared<'_>, settled: &BitTable) -> BitTable {
+pub(crate) fn claims(shared: &Shared<'_>, settled: &BitTable) -> BitTable {
     let (dirs, might) = (shared.dirs, shared.might);
     let mut claims = settled.clone();
     for s in 0..dirs.len() {
@@ -65,7 +65,7 @@ pub(super) fn claims(shared: &Shared<'_>, settled: &BitTable) -> BitTable {
 /// The traces of all openings that have claims, by direction in the graph's numbers.
 ///
 /// `None` where a claim could not be shown again, which is a bug.
-pub(super) fn traces(shared: &Shared<'_>, claims: &BitTable) -> Option<Vec<u8>> {
+pub(crate) fn traces(shared: &Shared<'_>, claims: &BitTable) -> Option<Vec<u8>> {
     let dirs = shared.dirs;
     let mut order: Vec<usize> = (0..dirs.len())
         .filter(|&s| bits::count(claims.row(s)) > 0)

@@ -4,73 +4,38 @@
 
 use enfilade_geom::DVec3;
 
-use super::dirs::sine;
-use super::planes::{Four, Side, cuts};
-
-/// How far numbers are trusted. [Units: wu]
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Tolerance {
-    /// A clip keeps this much more.
-    pub(super) outward: f64,
-    /// Rounding of `normal · point`.
-    pub(super) rounding: f64,
-    /// A sight line that stays this far inside every opening's edges is never lost.
-    pub(super) clearance: f64,
-}
-
-impl Tolerance {
-    pub(super) fn new(scale: f64, clearance: f64) -> Self {
-        Self {
-            outward: 1e-9 * scale,
-            rounding: 1e-13 * scale,
-            clearance,
-        }
-    }
-}
+use crate::dirs::sine;
+use crate::planes::{Four, Side, cuts};
+use crate::tolerance::{HalfSpace, Tolerance};
 
 /// A polygon in an [`Arena`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Poly {
+pub(crate) struct Poly {
     start: u32,
     len: u32,
     /// Direction whose opening it is part of.
-    pub(super) dir: u32,
+    pub(crate) dir: u32,
 }
 
 /// Corners of the polygons of a search path, as a stack.
 #[derive(Default)]
-pub(super) struct Arena {
+pub(crate) struct Arena {
     points: Vec<DVec3>,
-}
-
-/// The part of space where `normal · p >= offset`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct HalfSpace {
-    pub(super) normal: DVec3,
-    pub(super) offset: f64,
-}
-
-impl HalfSpace {
-    /// Whether a ball (middle, radius) lies in it.
-    #[inline]
-    pub(super) fn holds(&self, [x, y, z, radius]: [f64; 4]) -> bool {
-        self.normal.dot(DVec3::new(x, y, z)) - self.offset >= radius
-    }
 }
 
 impl Arena {
     #[inline]
-    pub(super) fn mark(&self) -> usize {
+    pub(crate) fn mark(&self) -> usize {
         self.points.len()
     }
 
     #[inline]
-    pub(super) fn release(&mut self, mark: usize) {
+    pub(crate) fn release(&mut self, mark: usize) {
         self.points.truncate(mark);
     }
 
     #[inline]
-    pub(super) fn push(&mut self, points: &[DVec3], dir: u32) -> Poly {
+    pub(crate) fn push(&mut self, points: &[DVec3], dir: u32) -> Poly {
         let start = self.points.len() as u32;
         self.points.extend_from_slice(points);
         Poly {
@@ -81,12 +46,12 @@ impl Arena {
     }
 
     #[inline]
-    pub(super) fn get(&self, poly: Poly) -> &[DVec3] {
+    pub(crate) fn get(&self, poly: Poly) -> &[DVec3] {
         &self.points[poly.start as usize..][..poly.len as usize]
     }
 
     #[inline]
-    pub(super) fn mean(&self, poly: Poly) -> DVec3 {
+    pub(crate) fn mean(&self, poly: Poly) -> DVec3 {
         let points = self.get(poly);
         points.iter().sum::<DVec3>() / points.len() as f64
     }
@@ -94,7 +59,7 @@ impl Arena {
     /// The part of `poly` in a half-space, and [`Tolerance::outward`] more; the same polygon where nothing
     /// is cut off. `None` where no line with clearance meets it. `turn` is the polygon's unit normal.
     #[inline]
-    pub(super) fn clip(
+    pub(crate) fn clip(
         &mut self,
         poly: Poly,
         keep: HalfSpace,
@@ -161,7 +126,7 @@ impl Arena {
     ///
     /// Five of six planes cut nothing off, which is seen four at a time; `ball` (middle, radius) is around `poly`.
     #[inline]
-    pub(super) fn clip_all(
+    pub(crate) fn clip_all(
         &mut self,
         mut poly: Poly,
         (planes, side): (&[Four], Side),

@@ -8,16 +8,16 @@
 use enfilade_geom::DVec3;
 use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
 
-use super::clip::{HalfSpace, Tolerance};
-use super::dirs::Dirs;
+use crate::dirs::Dirs;
+use crate::tolerance::{HalfSpace, Tolerance};
 
 /// Planes side by side.
-pub(super) const LANES: usize = 4;
+pub(crate) const LANES: usize = 4;
 
 /// Four planes, each with one polygon behind it and a later one in front of it. A lane without a plane has everything
 /// behind it and in front of it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Four {
+pub(crate) struct Four {
     x: [f64; LANES],
     y: [f64; LANES],
     z: [f64; LANES],
@@ -29,7 +29,7 @@ pub(super) struct Four {
 
 /// Which side of planes counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Side {
+pub(crate) enum Side {
     /// Where a line that will cross both polygons comes from.
     Before,
     /// Where a line that has crossed both polygons goes.
@@ -79,7 +79,7 @@ impl Four {
 
     /// What lies on a side of one of the planes.
     #[inline]
-    pub(super) fn half_space(&self, side: Side, lane: usize) -> HalfSpace {
+    pub(crate) fn half_space(&self, side: Side, lane: usize) -> HalfSpace {
         let normal = DVec3::new(self.x[lane], self.y[lane], self.z[lane]);
         match side {
             Side::Before => HalfSpace {
@@ -96,11 +96,11 @@ impl Four {
 
 /// Shape of an opening: what [`separators`] needs beside the corners.
 #[derive(Clone, Copy)]
-pub(super) struct Facing {
+pub(crate) struct Facing {
     /// Unit normal that the corners run counter-clockwise about.
-    pub(super) turn: DVec3,
+    pub(crate) turn: DVec3,
     /// Unit normal the way it is crossed.
-    pub(super) normal: DVec3,
+    pub(crate) normal: DVec3,
 }
 
 /// Planes through an edge of one polygon and a corner of the other, `a` behind and `b` in front.
@@ -111,7 +111,7 @@ pub(super) struct Facing {
 ///
 /// A plane that holds an edge of each comes twice. Giving it once would spare a little, but then a checker that
 /// cuts by both keeps polygons that differ by rounding, and finds planes that differ by more.
-pub(super) fn separators(
+pub(crate) fn separators(
     a: (&[DVec3], Facing),
     b: (&[DVec3], Facing),
     tolerance: &Tolerance,
@@ -326,13 +326,13 @@ fn through_edges<S: Simd, const FIRST: bool>(
 
 /// [`admits`] for one opening alone.
 #[inline]
-pub(super) fn is_admitted(planes: &[Four], dirs: &Dirs, dir: usize, tolerance: &Tolerance) -> bool {
+pub(crate) fn is_admitted(planes: &[Four], dirs: &Dirs, dir: usize, tolerance: &Tolerance) -> bool {
     dispatch!(Level::new(), simd => admits(simd, planes, dirs, dir, tolerance))
 }
 
 /// Whether an opening reaches in front of every plane.
 #[inline(always)]
-pub(super) fn admits<S: Simd>(
+pub(crate) fn admits<S: Simd>(
     simd: S,
     planes: &[Four],
     dirs: &Dirs,
@@ -387,7 +387,7 @@ fn admits_corners<S: Simd>(
 
 /// Whether a ball (middle, radius) lies behind a plane.
 #[inline]
-pub(super) fn hide(planes: &[Four], ball: [f64; 4]) -> bool {
+pub(crate) fn hide(planes: &[Four], ball: [f64; 4]) -> bool {
     dispatch!(Level::new(), simd => hide_by(simd, planes, ball))
 }
 
@@ -405,7 +405,7 @@ fn hide_by<S: Simd>(simd: S, planes: &[Four], [x, y, z, radius]: [f64; 4]) -> bo
 
 /// Which of four planes cut something off a polygon, as bits; `ball` (middle, radius) is around it.
 #[inline]
-pub(super) fn cuts(
+pub(crate) fn cuts(
     four: &Four,
     side: Side,
     points: &[DVec3],
@@ -435,7 +435,7 @@ fn cuts_by<S: Simd>(
 
 /// The planes that are there, less those that are the same but for rounding (which hold an edge of each opening),
 /// side by side without gaps.
-pub(super) fn pack(planes: &mut Vec<Four>, tolerance: &Tolerance) {
+pub(crate) fn pack(planes: &mut Vec<Four>, tolerance: &Tolerance) {
     let mut kept: Vec<(HalfSpace, f64)> = Vec::with_capacity(planes.len() * LANES);
     for four in &*planes {
         for lane in 0..LANES {
@@ -465,143 +465,4 @@ pub(super) fn pack(planes: &mut Vec<Four>, tolerance: &Tolerance) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::clip::Arena;
-    use super::super::rays::Rng;
-    use super::*;
-
-    /// A convex polygon with 3 to 8 corners around a point, facing up the z axis more or less, and its normal.
-    fn polygon(rng: &mut Rng, center: DVec3) -> (Vec<DVec3>, DVec3) {
-        let mut unit = || 2.0 * rng.unit() - 1.0;
-        let turn = DVec3::new(unit() * 0.5, unit() * 0.5, 1.0).normalize();
-        let across = turn.cross(DVec3::X).normalize();
-        let along = across.cross(turn);
-        let n = 3 + rng.below(6);
-        let corner = |k: usize| {
-            let angle = k as f64 / n as f64 * std::f64::consts::TAU;
-            center + along * angle.cos() * 2.0 + across * angle.sin()
-        };
-        let mut points: Vec<DVec3> = (0..n).map(corner).collect();
-        let normal = (points[1] - points[0]).cross(points[2] - points[0]);
-        if normal.dot(turn) < 0.0 {
-            points.reverse();
-        }
-        (points, turn)
-    }
-
-    fn facing(turn: DVec3) -> Facing {
-        Facing { turn, normal: turn }
-    }
-
-    fn tolerance() -> Tolerance {
-        Tolerance::new(10.0, 1e-7)
-    }
-
-    fn pair(seed: u64) -> [(Vec<DVec3>, DVec3); 2] {
-        let mut rng = Rng::new(seed);
-        let first = polygon(&mut rng, DVec3::ZERO);
-        let side = DVec3::new(6.0 * rng.unit(), 6.0 * rng.unit(), 5.0);
-        let second = polygon(&mut rng, side);
-        [first, second]
-    }
-
-    fn between(seed: u64) -> Vec<Four> {
-        let [(a, a_turn), (b, b_turn)] = pair(seed);
-        let mut planes = Vec::new();
-        let (a, b) = ((&a[..], facing(a_turn)), (&b[..], facing(b_turn)));
-        separators(a, b, &tolerance(), &mut planes);
-        planes
-    }
-
-    /// The planes that are there.
-    fn lanes(planes: &[Four]) -> impl Iterator<Item = (&Four, usize)> {
-        planes
-            .iter()
-            .flat_map(|four| (0..LANES).map(move |lane| (four, lane)))
-            .filter(|(four, lane)| four.front[*lane] > f64::NEG_INFINITY)
-    }
-
-    #[test]
-    fn planes_have_the_first_polygon_behind_and_the_second_in_front() {
-        let mut n_planes = 0;
-        for seed in 0..500 {
-            let [(a, _), (b, _)] = pair(seed);
-            for (four, lane) in lanes(&between(seed)) {
-                let [before, after] =
-                    [Side::Before, Side::After].map(|side| four.half_space(side, lane));
-                // Sums of three products are taken in another order here.
-                let least = |h: HalfSpace, points: &[DVec3]| {
-                    let heights = points.iter().map(|&p| h.normal.dot(p) - h.offset);
-                    heights.fold(f64::INFINITY, f64::min)
-                };
-                assert!(least(before, &a) >= -1e-13, "{seed} {lane}");
-                assert!(least(after, &b) >= -1e-13, "{seed} {lane}");
-                assert!(-before.offset <= after.offset + 1e-12, "{seed} {lane}");
-                n_planes += 1;
-            }
-        }
-        // Two polygons in general position have at least two planes from each, mostly one for each edge.
-        assert!(n_planes > 500 * 4, "{n_planes}");
-    }
-
-    #[test]
-    fn all_processors_round_alike() {
-        for seed in 0..200 {
-            let [(a, a_turn), (b, b_turn)] = pair(seed);
-            let (a, b) = ((&a[..], facing(a_turn)), (&b[..], facing(b_turn)));
-            let mut plain = Vec::new();
-            dispatch!(Level::baseline(), simd => separators_by(simd, a, b, &tolerance(), &mut plain));
-            let bits = |planes: &[Four]| -> Vec<u64> {
-                let rows = planes
-                    .iter()
-                    .flat_map(|f| [f.x, f.y, f.z, f.behind, f.front]);
-                rows.flatten().map(f64::to_bits).collect()
-            };
-            assert_eq!(bits(&plain), bits(&between(seed)), "{seed}");
-        }
-    }
-
-    #[test]
-    fn clips_by_four_planes_are_those_by_one_after_the_other() {
-        let mut n_cut = 0;
-        for seed in 0..500 {
-            let planes = between(seed);
-            let mut rng = Rng::new(seed + 1000);
-            let center = DVec3::new(8.0 * rng.unit() - 2.0, 8.0 * rng.unit() - 2.0, 8.0);
-            let (points, turn) = polygon(&mut rng, center);
-            let ball = [center.x, center.y, center.z, 2.0 + 1e-9];
-            for side in [Side::Before, Side::After] {
-                let mut arena = Arena::default();
-                let whole = arena.push(&points, 0);
-                let all = arena.clip_all(whole, (&planes, side), ball, turn, &tolerance());
-                let all = all.map(|poly| arena.get(poly).to_vec());
-                let one = lanes(&planes).try_fold(whole, |poly, (four, lane)| {
-                    arena.clip(poly, four.half_space(side, lane), turn, &tolerance())
-                });
-                let one = one.map(|poly| arena.get(poly).to_vec());
-                n_cut += usize::from(one.as_ref() != Some(&points));
-                assert_eq!(all, one, "{seed} {side:?}");
-                if hide(&planes, ball) && side == Side::After {
-                    assert_eq!(all, None, "{seed}");
-                }
-            }
-        }
-        assert!(n_cut > 200, "{n_cut}");
-    }
-
-    #[test]
-    fn packed_planes_hide_the_same() {
-        for seed in 0..500 {
-            let planes = between(seed);
-            let mut packed = planes.clone();
-            pack(&mut packed, &tolerance());
-            assert!(packed.len() <= planes.len());
-            let mut rng = Rng::new(seed + 2000);
-            for _ in 0..20 {
-                let [x, y, z] = [(); 3].map(|()| 10.0 * rng.unit() - 2.0);
-                let ball = [x, y, z, rng.unit()];
-                assert_eq!(hide(&planes, ball), hide(&packed, ball), "{seed}");
-            }
-        }
-    }
-}
+mod tests;
