@@ -1,11 +1,12 @@
-//! `enfilade bench facade`: a view of towers with many windows, portals in groups and one by one.
+//! `bench facade`: a view of towers with many windows, portals in groups and one by one.
 
 use std::time::Instant;
 
 use enfilade::runtime::{Sight, SightOptions, SightState, View, Viewer};
 use enfilade_testkit::{Rng, window_tower};
 
-use crate::bench::{Table, quantile};
+use crate::measure::quantile;
+use crate::table::Table;
 
 /// Where the eye is, for a tower of this many squares a side and storeys.
 type Place = fn(&mut Rng, f64, f64) -> ([f64; 3], [f64; 3]);

@@ -1,4 +1,4 @@
-//! `enfilade bench walkthrough`: a walk, drawn whole, with frustum culling and by portals.
+//! `bench walkthrough`: a walk, drawn whole, with frustum culling and by portals.
 
 use std::collections::VecDeque;
 use std::f32::consts::TAU;
@@ -7,19 +7,18 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use enfilade::bake::bsp::{BspConfig, bake_bsp};
-use enfilade::bake::{BakeConfig, BakeContext, Silent};
+use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::{CellId, DetailObject, World};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::{Mesh, Primitive};
 use enfilade::runtime::Sight;
+use enfilade_cli::cameras::{FOV, walk_cameras};
+use enfilade_cli::values::size;
+use enfilade_cli::world::read_world;
 use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Sparing, Studio, Style};
 use enfilade_testkit::{TowerParams, clinic, office_tower};
 
-use crate::bake::bake_scene;
-use crate::bench::Table;
-use crate::cameras::{FOV, walk_cameras};
-use crate::see::size;
-use crate::world::read_world;
+use crate::table::Table;
 
 /// What to walk through.
 #[derive(clap::Args)]
@@ -78,7 +77,8 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
     }
     if let Some(rooms) = args.tower {
         let scene = office_tower(&TowerParams::with_rooms(rooms, 1)).scene;
-        let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
+        let context = BakeContext::new(&Silent, None);
+        let baked = bake(&scene, &BakeConfig::default(), &context)?;
         worlds.push((format!("office tower of {rooms} rooms"), baked.world));
     }
     if let Some(polygons) = args.clinic {

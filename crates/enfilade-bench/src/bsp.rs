@@ -1,6 +1,6 @@
-//! `enfilade bench bsp` and `bench simplify`: the tables of `docs/benchmarks/bsp.md`.
+//! `bench bsp` and `bench simplify`: the tables of `docs/benchmarks/bsp.md`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use enfilade::bake::bsp::{Bsp, BspConfig, BspInput, Guide, Heuristic, bake_bsp};
 use enfilade::bake::simplify::{
@@ -11,27 +11,11 @@ use enfilade::bake::{BakeContext, Silent};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
+use enfilade_cli::world::read_world;
 use enfilade_testkit::clinic;
 
-use crate::bench::Table;
-use crate::world::read_world;
-
-/// Processor seconds that this process has used so far, all threads together; 0 where the system does
-/// not say.
-pub(crate) fn cpu_seconds() -> f64 {
-    let of_task = |entry: std::io::Result<std::fs::DirEntry>| {
-        let text = std::fs::read_to_string(entry.ok()?.path().join("schedstat")).ok()?;
-        text.split_ascii_whitespace().next()?.parse::<f64>().ok()
-    };
-    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
-    tasks.filter_map(of_task).sum::<f64>() * 1e-9
-}
-
-pub(crate) fn name(path: &Path) -> String {
-    path.file_stem()
-        .map(|s| s.to_string_lossy().into_owned())
-        .unwrap_or_default()
-}
+use crate::measure::{cpu_seconds, name};
+use crate::table::Table;
 
 const HEURISTICS: [(&str, Heuristic); 4] = [
     ("default", Heuristic::Default),

@@ -1,4 +1,4 @@
-//! `enfilade bench builders`: the same scenes through each builder, compared.
+//! `bench builders`: the same scenes through each builder, compared.
 
 use std::path::{Path, PathBuf};
 
@@ -12,8 +12,8 @@ use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::Rng;
 use enfilade_verify::{VerifyOptions, verify_world};
 
-use crate::bench::Table;
-use crate::bench_bsp::{cpu_seconds, name};
+use crate::measure::{cpu_seconds, name};
+use crate::table::Table;
 
 /// Points that say how far two graphs agree.
 const POINTS: usize = 20_000;
