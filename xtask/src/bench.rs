@@ -1,9 +1,9 @@
-//! `cargo xtask bench`: how time and memory of a bake grow with the building, and the voxel kernels
-//! beside other implementations.
+//! `cargo xtask bench`: how time and memory of a bake grow with the building, the voxel kernels beside other
+//! implementations, and the tables of `enfilade-bench`.
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
@@ -23,6 +23,24 @@ pub(crate) fn run(peers: Option<&Path>, is_written: bool) -> anyhow::Result<()> 
         kernels(peers)?;
     }
     growth(is_written)
+}
+
+/// Runs the table that `args` begin with; its exit code is ours.
+pub(crate) fn measure(args: &[String]) -> ExitCode {
+    let build = ["build", "--release", "-p", "enfilade-bench"];
+    let run = || {
+        run_to_end(&mut cargo(&build))?;
+        let mut bench = Command::new(binary("enfilade-bench"));
+        let status = bench.args(args).status()?;
+        anyhow::Ok(u8::try_from(status.code().unwrap_or(1)).unwrap_or(1))
+    };
+    run().map_or_else(
+        |error| {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        },
+        ExitCode::from,
+    )
 }
 
 fn kernels(peers: &Path) -> anyhow::Result<()> {

@@ -20,6 +20,7 @@ usage: cargo xtask test
        cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
+       cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
   score   rooms and doors found, against the rooms that architects modeled
@@ -27,7 +28,9 @@ usage: cargo xtask test
           kernels beside other implementations too (scripts/bench_kernels.py);
           messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
-          choose by how names begin
+          choose by how names begin;
+          any other NAME (bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
+          docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 
 --write puts the table into docs/benchmarks/. Real scenes (folders with a scene.glb) are looked for
 in $ENFILADE_SCENES, then in ../shared/scenes.";
@@ -42,6 +45,7 @@ fn main() -> ExitCode {
         Task::Score { is_written, dirs } => score::run(&dirs, is_written),
         Task::Messy(options) => messy::run(&options),
         Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
+        Task::Measure(args) => return bench::measure(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -64,6 +68,8 @@ enum Task {
         peers: Option<PathBuf>,
     },
     Messy(messy::Options),
+    /// Arguments of `enfilade-bench`.
+    Measure(Vec<String>),
 }
 
 impl Task {
@@ -73,6 +79,13 @@ impl Task {
         let (mut is_written, mut dirs, mut peers) = (false, Vec::new(), None);
         let mut messy: Option<messy::Options> = None;
         while let Some(arg) = args.next() {
+            let is_name = arg != "messy" && !arg.starts_with('-');
+            let asks_help = ["--help", "-h"].contains(&arg.as_str());
+            if name == "bench" && messy.is_none() && (is_name || asks_help) {
+                // Nothing of growth and kernels goes before the name.
+                let is_first = !is_written && peers.is_none();
+                return is_first.then(|| Self::Measure([arg].into_iter().chain(args).collect()));
+            }
             match (name.as_str(), arg.as_str()) {
                 ("bench", "messy") => messy = Some(messy::Options::default()),
                 ("bench", option) if messy.is_some() => {
@@ -248,5 +261,16 @@ mod tests {
         assert!(parse("bench messy --write").is_none());
         assert!(parse("bench --json").is_none());
         assert!(parse("score messy --json").is_none());
+    }
+
+    #[test]
+    fn other_benches_get_their_arguments_as_they_are() {
+        let parse = |line: &str| Task::parse(line.split(' ').map(str::to_owned));
+        let Some(Task::Measure(args)) = parse("bench see a.glb --rooms 100 --json") else {
+            panic!("not understood");
+        };
+        assert_eq!(args, ["see", "a.glb", "--rooms", "100", "--json"]);
+        assert!(matches!(parse("bench --help"), Some(Task::Measure(_))));
+        assert!(parse("bench --write see").is_none());
     }
 }

@@ -25,7 +25,7 @@ const PRINT: &[&str] = &["println!", "eprintln!", "print!(", "eprint!("];
 /// Readers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 12] = [
+const FENCES: [Fence; 14] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -46,6 +46,12 @@ const FENCES: [Fence; 12] = [
     },
     Fence {
         name: "enfilade-bake",
+        siblings: &["enfilade-geom", "enfilade-cpg"],
+        not: FORMATS,
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
+        name: "enfilade-vis",
         siblings: &["enfilade-geom", "enfilade-cpg"],
         not: FORMATS,
         words: &["std::fs", "std::thread"],
@@ -82,6 +88,7 @@ const FENCES: [Fence; 12] = [
             "enfilade-import",
             "enfilade-bake",
             "enfilade-runtime",
+            "enfilade-vis",
         ],
         not: &["anyhow", "clap"],
         words: &["std::fs", "std::thread", "fn "],
@@ -99,6 +106,18 @@ const FENCES: [Fence; 12] = [
             "enfilade",
             "enfilade-render",
             "enfilade-report",
+            "enfilade-verify",
+            "enfilade-testkit",
+        ],
+        not: &[],
+        words: &[],
+    },
+    Fence {
+        name: "enfilade-bench",
+        siblings: &[
+            "enfilade",
+            "enfilade-cli",
+            "enfilade-render",
             "enfilade-verify",
             "enfilade-testkit",
         ],
@@ -225,8 +244,9 @@ fn fence_problems(file: &str, text: &str) -> Vec<String> {
     if !rest.starts_with("src/") || !file.ends_with(".rs") || file.ends_with("tests.rs") {
         return Vec::new();
     }
-    // The command writes its results; libraries are silent.
-    let print = if name == "enfilade-cli" { &[] } else { PRINT };
+    // The command and the benchmarks write their results; libraries are silent.
+    let writes = ["enfilade-cli", "enfilade-bench"].contains(&name);
+    let print = if writes { &[] } else { PRINT };
     // Unit tests stand at the foot of the file.
     let end = text.find("\n#[cfg(test)]\nmod tests {");
     let mut problems = Vec::new();

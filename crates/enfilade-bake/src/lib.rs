@@ -17,7 +17,6 @@ mod join;
 pub mod leak;
 pub mod pipeline;
 pub mod simplify;
-pub mod vis;
 pub mod voxel;
 pub mod watershed;
 

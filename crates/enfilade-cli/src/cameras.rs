@@ -9,10 +9,10 @@ use enfilade_render::{Camera, Culling, RenderError, Shown, Studio};
 use enfilade_testkit::Rng;
 
 /// Height of an eye above the floor. [Units: wu]
-pub(crate) const EYE_HEIGHT: f32 = 1.6;
+pub const EYE_HEIGHT: f32 = 1.6;
 
 /// Angle of a picture from its lower to its upper edge, unless said otherwise. [Units: rad]
-pub(crate) const FOV: f32 = 1.1;
+pub const FOV: f32 = 1.1;
 
 fn center(cell: &Cell) -> [f32; 3] {
     [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5)
@@ -31,8 +31,12 @@ fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
 }
 
 /// A camera with much to see: of those that stand in large rooms, the one whose picture shows most
-/// different things, far away, with nothing right before it.
-pub(crate) fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
+/// different things, far away, with nothing right before it. Draws some 300 small pictures.
+///
+/// # Errors
+///
+/// A picture that cannot be drawn.
+pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
     let lines = Sightlines::build(world);
     let mut cells: Vec<(u32, &Cell)> = (0..).zip(&world.graph.cells).collect();
     cells.retain(|(_, c)| !c.outdoor && c.volume > 0.0);
@@ -100,8 +104,9 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     Ok((things.len() as f32).ln_1p() + 2.0 * share(far) - 4.0 * share(near) - share(sky))
 }
 
-/// A walk through the doorways of a world: points on the way, with the way onwards.
-pub(crate) fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
+/// A walk through the doorways of a world, a meter a view: points on the way, with the way onwards. [Units: wu]
+#[must_use]
+pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
     let mut stops = Vec::new();
     let mut been = vec![0_u32; world.graph.cells.len()];
     let Some(first) = world.graph.cells.iter().position(|c| !c.outdoor) else {
@@ -144,8 +149,9 @@ pub(crate) fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3],
     out
 }
 
-/// The same as cameras, at eye height where there is a floor.
-pub(crate) fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> Vec<Camera> {
+/// The same as cameras, at eye height where there is a floor; `fov_y` in radians.
+#[must_use]
+pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> Vec<Camera> {
     let lines = Sightlines::build(world);
     let mut last = [1.0, 0.0, 0.0];
     walk(world, sight, views)
@@ -166,7 +172,11 @@ pub(crate) fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f3
 }
 
 /// Reads a path: a line for each camera, `eye-x eye-y eye-z look-x look-y look-z`, in meters.
-pub(crate) fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
+///
+/// # Errors
+///
+/// A file that cannot be read, a line that is not six numbers, or no line at all.
+pub fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let mut out = Vec::new();
@@ -200,7 +210,8 @@ pub(crate) fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> 
 }
 
 /// The path as [`read_path`] reads it.
-pub(crate) fn path_text(cameras: &[Camera]) -> String {
+#[must_use]
+pub fn path_text(cameras: &[Camera]) -> String {
     let mut out = String::from("# eye x y z, point looked at x y z; meters\n");
     for c in cameras {
         let [x, y, z] = c.eye;
@@ -213,12 +224,7 @@ pub(crate) fn path_text(cameras: &[Camera]) -> String {
 
 /// A random camera of `verify --views`: mostly in a cell, now and then in an opening, or anywhere,
 /// walls and the outside included.
-pub(crate) fn random_camera(
-    rng: &mut Rng,
-    world: &World,
-    sight: &Sight,
-    bounds: [[f32; 3]; 2],
-) -> Camera {
+pub fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds: [[f32; 3]; 2]) -> Camera {
     let in_box = |rng: &mut Rng, [low, high]: [[f32; 3]; 2]| {
         [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32)
     };
@@ -252,8 +258,9 @@ pub(crate) fn random_camera(
     }
 }
 
-/// What opens nearest to where a camera looks, and how far away it is. [Units: wu]
-pub(crate) fn portal_looked_at(
+/// What opens nearest to where a camera looks, and how far away it is. [Units: wu] Time grows with the portals.
+#[must_use]
+pub fn portal_looked_at(
     world: &World,
     lines: &Sightlines,
     camera: &Camera,

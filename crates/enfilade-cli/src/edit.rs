@@ -11,7 +11,7 @@ use enfilade::geom::DVec3;
 
 use crate::output::check_target;
 use crate::simplify::{cost_line, write};
-use crate::world::read_world;
+use enfilade_cli::world::read_world;
 
 /// Takes portals out of a world and puts new ones in.
 #[derive(clap::Args)]

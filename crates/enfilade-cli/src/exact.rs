@@ -12,9 +12,9 @@ use enfilade_render::{
 use enfilade_testkit::Rng;
 use serde::Serialize;
 
-use crate::cameras::random_camera;
 use crate::output::write_atomically;
 use crate::progress::StageBar;
+use enfilade_cli::cameras::random_camera;
 
 /// Eyes drawn for a view, should they lie on surfaces.
 const MAX_DRAWS: usize = 100;

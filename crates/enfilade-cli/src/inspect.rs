@@ -9,7 +9,7 @@ use enfilade::bake::simplify::{CostModel, portal_scores};
 use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
 use serde::Serialize;
 
-use crate::world::read_world;
+use enfilade_cli::world::read_world;
 
 /// Shows the cells, portals and statistics of a world.
 #[derive(clap::Args)]

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use enfilade::cpg::Locator;
 use enfilade::geom::DVec3;
 
-use crate::world::read_world;
+use enfilade_cli::world::read_world;
 
 /// Reads `x y z` lines (meters, +Y up) and prints the id of each point's cell, `-` where there is
 /// none.

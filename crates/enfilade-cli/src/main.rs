@@ -4,11 +4,6 @@
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
 mod bake;
-mod bench;
-mod bench_bsp;
-mod bench_builders;
-mod bench_facade;
-mod cameras;
 mod decimate;
 mod demo;
 mod edit;
@@ -26,8 +21,6 @@ mod simplify;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
-mod walkthrough;
-mod world;
 
 use std::io;
 use std::process::ExitCode;
@@ -45,7 +38,6 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Bake(bake::Bake),
-    Bench(bench::Bench),
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Edit(edit::Edit),
@@ -65,7 +57,6 @@ enum Command {
 fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(args) => bake::run(&args),
-        Command::Bench(args) => bench::run(&args),
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Edit(args) => edit::run(&args),

@@ -6,7 +6,7 @@ use anyhow::bail;
 use enfilade_report::{PlanOptions, plan_svg};
 
 use crate::output::write_atomically;
-use crate::world::read_world;
+use enfilade_cli::world::read_world;
 
 /// Draws the floor plan of every storey as one SVG: rooms colored, doorways at their width.
 #[derive(clap::Args)]

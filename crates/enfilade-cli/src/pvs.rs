@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
 use enfilade::cpg::wire::decode_glb;
 use enfilade::cpg::{CellSet, SightGraph, SightPortal, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
+use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
 
 use enfilade_verify::structural_triangles;
 

@@ -12,10 +12,10 @@ use enfilade_render::{
 };
 use serde_json::json;
 
-use crate::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use crate::output::{check_target, write_atomically};
-use crate::see::{point, size};
-use crate::world::read_world;
+use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
+use enfilade_cli::values::{point, size};
+use enfilade_cli::world::read_world;
 
 /// Draws a picture of a world, or one for each camera of a path, to PNG files; needs no display.
 #[derive(clap::Args)]

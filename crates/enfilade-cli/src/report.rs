@@ -4,18 +4,18 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::bake::vis::{VisConfig, VisContext, see_all};
 use enfilade::cpg::{CellSet, SightGraph, World};
 use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};
+use enfilade::vis::{VisConfig, VisContext, see_all};
 use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, Style};
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
-use crate::cameras::{FOV, good_camera, walk_cameras};
 use crate::output::{check_target, write_atomically};
 use crate::render::{above, portal_marks, smooth};
-use crate::world::read_world;
+use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
+use enfilade_cli::world::read_world;
 
 /// Writes one self-contained page: plans, the graph, what can be seen from where, tables, pictures.
 #[derive(clap::Args)]

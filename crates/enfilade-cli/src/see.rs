@@ -1,6 +1,5 @@
 //! `enfilade see`: what one view sees.
 
-use std::collections::HashMap;
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -9,10 +8,10 @@ use anyhow::Context;
 use clap::ValueEnum;
 use enfilade::cpg::World;
 use enfilade::runtime::{Narrowing, SeeOptions, Seen, Sight, SightState, View, Viewer};
-use enfilade_verify::{Seer, ViewAnswer, ViewQuery};
 use serde_json::json;
 
-use crate::world::read_world;
+use enfilade_cli::values::{point, size};
+use enfilade_cli::world::read_world;
 
 /// Prints the cells, portals and triangles that a view sees, near to far, and how long it took to
 /// find out.
@@ -191,89 +190,4 @@ fn print_table(
         seconds * 1e6
     )?;
     Ok(())
-}
-
-pub(crate) fn point(text: &str) -> Result<[f32; 3], String> {
-    let numbers: Result<Vec<f32>, _> = text.split(',').map(|w| w.trim().parse()).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => Ok([x, y, z]),
-        _ => Err("three numbers of meters are needed, e.g. 1,1.6,-2.5".into()),
-    }
-}
-
-pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
-    let parse = || {
-        let (w, h) = text.split_once('x')?;
-        let (w, h) = (w.parse::<u32>().ok()?, h.parse::<u32>().ok()?);
-        (w > 0 && h > 0).then_some([w, h])
-    };
-    parse().ok_or_else(|| "a width and a height are needed, e.g. 1280x720".into())
-}
-
-/// Answers the views of `verify --sight` and of the tables: the run-time behind the checker's door.
-pub(crate) struct Answers<'w> {
-    pub(crate) sight: &'w Sight,
-    state: SightState,
-    /// By chunk: its triangles as the batch numbers them.
-    triangles: Vec<Vec<u32>>,
-}
-
-impl<'w> Answers<'w> {
-    pub(crate) fn new(world: &World, sight: &'w Sight) -> Self {
-        let mut numbers: Vec<HashMap<[u32; 3], Vec<u32>>> = Vec::new();
-        for batch in &world.batches {
-            let mut by_corners: HashMap<[u32; 3], Vec<u32>> = HashMap::new();
-            for (i, t) in batch.primitive.indices.chunks_exact(3).enumerate() {
-                let corners = [t[0], t[1], t[2]];
-                by_corners.entry(corners).or_default().push(i as u32);
-            }
-            numbers.push(by_corners);
-        }
-        let triangles = sight
-            .chunks()
-            .iter()
-            .map(|c| {
-                let first = c.first_index as usize;
-                let indices = &sight.indices(c.batch)[first..first + c.n_indices as usize];
-                indices
-                    .chunks_exact(3)
-                    .filter_map(|t| numbers[c.batch as usize].get(&[t[0], t[1], t[2]]))
-                    .flatten()
-                    .copied()
-                    .collect()
-            })
-            .collect();
-        Self {
-            sight,
-            state: SightState::new(sight),
-            triangles,
-        }
-    }
-
-    /// One that answers by portals; `options: None` for the view frustum alone.
-    pub(crate) fn seer(&self, options: Option<SeeOptions>) -> Seer<'_> {
-        let mut viewer = Viewer::with_options(self.sight, options.unwrap_or_default());
-        Box::new(move |query: &ViewQuery, answer: &mut ViewAnswer<'_>| {
-            let view =
-                View::perspective(query.eye, query.toward, query.up, query.fov_y, query.aspect);
-            // A view that cannot be is answered by nothing, and shows as misses.
-            let Ok(view) = view else { return };
-            let seen = match options {
-                Some(_) => viewer.see(self.sight, &self.state, &view),
-                None => viewer.see_through_walls(self.sight, &view),
-            };
-            for c in seen.chunks() {
-                let batch = self.sight.chunks()[c.0 as usize].batch;
-                for &t in &self.triangles[c.0 as usize] {
-                    answer.add_triangle(batch, t);
-                }
-            }
-            for d in seen.details() {
-                answer.add_detail(d.0);
-            }
-            for c in seen.cells() {
-                answer.add_cell(c.0);
-            }
-        })
-    }
 }

@@ -20,8 +20,9 @@ use crate::bake::settings::SceneOptions;
 use crate::exact::{Asked, verify_pictures};
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
-use crate::see::{Answers, size};
-use crate::world::read_world;
+use enfilade_cli::answers::Answers;
+use enfilade_cli::values::size;
+use enfilade_cli::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
 #[derive(clap::Args)]

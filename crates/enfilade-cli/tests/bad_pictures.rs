@@ -118,10 +118,6 @@ fn broken_worlds_and_those_of_other_versions_are_refused_by_all_that_draws() {
         );
         folder.refused(&["report", file, "-o", "out.html", "--no-pictures"], words);
         folder.refused(&["view", file, "--adapter", "software"], words);
-        folder.refused(
-            &["bench", "walkthrough", file, "--adapter", "software"],
-            words,
-        );
     }
 }
 
@@ -149,10 +145,6 @@ fn worlds_without_rooms_or_walls_are_drawn_as_they_are() {
             "software",
         ],
         "no room to walk in",
-    );
-    folder.refused(
-        &["bench", "walkthrough", "world.glb", "--adapter", "software"],
-        "no room",
     );
     // Surfaces and no cells: all that meets the view.
     let mut world = grid();

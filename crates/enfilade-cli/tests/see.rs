@@ -1,4 +1,4 @@
-//! Runs `see`, `verify --sight` and `bench` on worlds made in code.
+//! Runs `see` and `verify --sight` on worlds made in code.
 
 use std::fs;
 use std::path::PathBuf;
@@ -128,34 +128,4 @@ fn verify_asks_the_run_time_and_catches_a_door_that_is_not_in_the_graph() {
         "{}",
         text(&done.stderr)
     );
-}
-
-#[test]
-fn benches_print_tables() {
-    let path = file("bench.glb", &two_rooms());
-    let prt = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("bench.prt");
-    fs::write(
-        &prt,
-        "PRT1\n2\n1\n4 0 1 (0 0 0 ) (0 64 0 ) (0 64 64 ) (0 0 64 )\n",
-    )
-    .unwrap();
-    let prt = prt.to_str().unwrap();
-    for (args, rows) in [
-        (
-            vec!["bench", "see", &path, prt, "--rooms", "20", "--views", "10"],
-            9,
-        ),
-        (
-            vec!["bench", "tight", &path, "--views", "4", "--rays", "50"],
-            4,
-        ),
-        (vec!["bench", "maze", &path, "--views", "5"], 4),
-        (vec!["bench", "los", &path, "--pairs", "50"], 1),
-    ] {
-        let done = enfilade(&args);
-        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
-        let table = text(&done.stdout);
-        let n = table.lines().filter(|l| l.starts_with("| ")).count();
-        assert_eq!(n, rows + 2, "{table}");
-    }
 }

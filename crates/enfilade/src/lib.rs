@@ -11,6 +11,7 @@
 //! | [`bake`] | scene → [`World`](cpg::World): finds cells and portals |
 //! | [`cpg`] | the graph, its invariants, the locator, and the file ([`cpg::wire`]) |
 //! | [`runtime`] | questions per frame |
+//! | [`vis`] | what can be seen from each cell, before run-time |
 //! | [`geom`] | boxes, planes, windings, the scene, the bounding volume hierarchy |
 //!
 //! # Reading a world
@@ -93,3 +94,4 @@ pub use enfilade_cpg as cpg;
 pub use enfilade_geom as geom;
 pub use enfilade_import as import;
 pub use enfilade_runtime as runtime;
+pub use enfilade_vis as vis;

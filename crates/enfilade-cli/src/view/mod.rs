@@ -24,11 +24,11 @@ use winit::window::{Window, WindowId};
 
 use self::panel::{Panel, Shown};
 use self::walker::Walker;
-use crate::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
 use crate::output::write_atomically;
 use crate::render::portal_marks;
-use crate::see::{point, size};
-use crate::world::read_world;
+use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
+use enfilade_cli::values::{point, size};
+use enfilade_cli::world::read_world;
 
 /// Opens a window to walk through a world: W A S D and the mouse; F1 there tells the rest.
 #[derive(clap::Args)]

@@ -3,7 +3,7 @@
 use enfilade::cpg::World;
 use enfilade::geom::{Bvh, DVec3, Triangle};
 
-use crate::cameras::EYE_HEIGHT;
+use enfilade_cli::cameras::EYE_HEIGHT;
 
 /// Half the breadth of a body. [Units: wu]
 const RADIUS: f64 = 0.22;

@@ -1,0 +1,183 @@
+//! The experiments behind `docs/benchmarks/`, run by `cargo xtask bench NAME`, printed as Markdown tables or as
+//! lines of JSON.
+
+mod bsp;
+mod builders;
+mod facade;
+mod measure;
+mod sight;
+mod subject;
+mod table;
+mod walkthrough;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use enfilade::runtime::SightOptions;
+
+use bsp::{bench_bsp, bench_simplify};
+use builders::bench_builders;
+use facade::bench_facade;
+use sight::{bench_los, bench_maze, bench_see, bench_tight};
+use table::Table;
+use walkthrough::Walkthrough;
+
+/// Measures, and prints the tables of the documentation.
+#[derive(Parser)]
+#[command(name = "cargo xtask bench", version)]
+struct Cli {
+    #[command(subcommand)]
+    what: What,
+    /// Print a line of JSON for each row.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    /// Binary space partition: tree, portals, separators, cells.
+    Bsp {
+        /// Scenes: Quake maps and any others.
+        scenes: Vec<PathBuf>,
+        /// All heuristics, not only the default.
+        #[arg(long)]
+        heuristics: bool,
+        /// Bake to the end, cells merged up to the threshold.
+        #[arg(long)]
+        bake: bool,
+        /// Merging threshold in polygons of the tree, as in the paper; objects do not count.
+        #[arg(long, default_value_t = 50.0)]
+        min_polygons: f64,
+        /// Polygons of generated clinics, e.g. 11600,50000,200000; prints the growth between them.
+        #[arg(long, value_delimiter = ',')]
+        clinic: Vec<usize>,
+    },
+    /// The same scenes through each builder: cells, portals, how far they agree, promises.
+    Builders {
+        /// Scene files, or folders with `scene.glb` and perhaps `detail.glb`.
+        #[arg(required = true)]
+        scenes: Vec<PathBuf>,
+        /// Rays that try the promises of each world.
+        #[arg(long, default_value_t = 100_000)]
+        rays: u64,
+    },
+    /// Simplifier: expected triangles by either metric at the same number of portals.
+    Simplify {
+        /// Worlds.
+        worlds: Vec<PathBuf>,
+    },
+    /// Time of a view: in worlds, in portal files, in offices of so many rooms, in a courtyard.
+    See {
+        /// Worlds (`.glb`) and Quake portal files (`.prt`).
+        scenes: Vec<PathBuf>,
+        /// Rooms of generated offices, e.g. 100,1000,10000.
+        #[arg(long, value_delimiter = ',')]
+        rooms: Vec<usize>,
+        /// Views of each.
+        #[arg(long, default_value_t = 2000)]
+        views: usize,
+    },
+    /// Time of a view of towers with so many windows, portals in groups and one by one.
+    Facade {
+        /// Windows of each tower.
+        #[arg(long, value_delimiter = ',', default_values_t = [64, 1024, 10_000])]
+        windows: Vec<usize>,
+        /// Views from each place.
+        #[arg(long, default_value_t = 500)]
+        views: usize,
+    },
+    /// How much is answered beyond what rays hit, from ordinary eyes indoors.
+    Tight {
+        /// Worlds.
+        scenes: Vec<PathBuf>,
+        /// Views of each.
+        #[arg(long, default_value_t = 300)]
+        views: u64,
+        /// Rays in each view.
+        #[arg(long, default_value_t = 20_000)]
+        rays: u64,
+    },
+    /// Dirkse's maze: share of the triangles processed on a path of 290 views.
+    Maze {
+        /// The maze, baked.
+        world: PathBuf,
+        /// Views on the path.
+        #[arg(long, default_value_t = 290)]
+        views: usize,
+        /// Height of the view, in degrees; it is 4:3.
+        #[arg(long, default_value_t = 60.0)]
+        fov: f32,
+        /// Triangles culled together.
+        #[arg(long, default_value_t = SightOptions::default().chunk_triangles)]
+        chunk: usize,
+    },
+    /// A walk through rooms, drawn whole, with frustum culling and by portals.
+    Walkthrough(Walkthrough),
+    /// Lines of sight by cells against the tree of the whole world.
+    Los {
+        /// Worlds.
+        scenes: Vec<PathBuf>,
+        /// Rooms of generated offices.
+        #[arg(long, value_delimiter = ',')]
+        rooms: Vec<usize>,
+        /// Pairs of points in each.
+        #[arg(long, default_value_t = 1_000_000)]
+        pairs: usize,
+    },
+}
+
+fn run(args: &Cli) -> anyhow::Result<()> {
+    let mut table = Table::new(args.json);
+    match &args.what {
+        What::Bsp {
+            scenes,
+            heuristics,
+            bake,
+            min_polygons,
+            clinic,
+        } => bench_bsp(
+            &mut table,
+            scenes,
+            clinic,
+            *heuristics,
+            bake.then_some(*min_polygons),
+        )?,
+        What::Builders { scenes, rays } => bench_builders(&mut table, scenes, *rays)?,
+        What::Simplify { worlds } => bench_simplify(&mut table, worlds)?,
+        What::See {
+            scenes,
+            rooms,
+            views,
+        } => bench_see(&mut table, scenes, rooms, *views)?,
+        What::Tight {
+            scenes,
+            views,
+            rays,
+        } => bench_tight(&mut table, scenes, *views, *rays)?,
+        What::Facade { windows, views } => bench_facade(&mut table, windows, *views)?,
+        What::Maze {
+            world,
+            views,
+            fov,
+            chunk,
+        } => bench_maze(&mut table, world, *views, *fov, *chunk)?,
+        What::Walkthrough(args) => walkthrough::bench(&mut table, args)?,
+        What::Los {
+            scenes,
+            rooms,
+            pairs,
+        } => bench_los(&mut table, scenes, rooms, *pairs)?,
+    }
+    table.finish()
+}
+
+fn main() -> ExitCode {
+    match run(&Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bench: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

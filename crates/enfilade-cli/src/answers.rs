@@ -1,0 +1,78 @@
+//! What the run-time answers, in the checker's words.
+
+use std::collections::HashMap;
+
+use enfilade::cpg::World;
+use enfilade::runtime::{SeeOptions, Sight, SightState, View, Viewer};
+use enfilade_verify::{Seer, ViewAnswer, ViewQuery};
+
+/// The run-time behind the checker's door; answers the views of `verify --sight` and of the tables.
+pub struct Answers<'w> {
+    sight: &'w Sight,
+    state: SightState,
+    /// By chunk: its triangles as the batch numbers them.
+    triangles: Vec<Vec<u32>>,
+}
+
+impl<'w> Answers<'w> {
+    /// Finds the number of each chunk's triangles in their batch. Time and memory grow with the world's triangles.
+    #[must_use]
+    pub fn new(world: &World, sight: &'w Sight) -> Self {
+        let mut numbers: Vec<HashMap<[u32; 3], Vec<u32>>> = Vec::new();
+        for batch in &world.batches {
+            let mut by_corners: HashMap<[u32; 3], Vec<u32>> = HashMap::new();
+            for (i, t) in batch.primitive.indices.chunks_exact(3).enumerate() {
+                let corners = [t[0], t[1], t[2]];
+                by_corners.entry(corners).or_default().push(i as u32);
+            }
+            numbers.push(by_corners);
+        }
+        let triangles = sight
+            .chunks()
+            .iter()
+            .map(|c| {
+                let first = c.first_index as usize;
+                let indices = &sight.indices(c.batch)[first..first + c.n_indices as usize];
+                indices
+                    .chunks_exact(3)
+                    .filter_map(|t| numbers[c.batch as usize].get(&[t[0], t[1], t[2]]))
+                    .flatten()
+                    .copied()
+                    .collect()
+            })
+            .collect();
+        Self {
+            sight,
+            state: SightState::new(sight),
+            triangles,
+        }
+    }
+
+    /// One that answers by portals; `options: None` for the view frustum alone.
+    #[must_use]
+    pub fn seer(&self, options: Option<SeeOptions>) -> Seer<'_> {
+        let mut viewer = Viewer::with_options(self.sight, options.unwrap_or_default());
+        Box::new(move |query: &ViewQuery, answer: &mut ViewAnswer<'_>| {
+            let view =
+                View::perspective(query.eye, query.toward, query.up, query.fov_y, query.aspect);
+            // A view that cannot be is answered by nothing, and shows as misses.
+            let Ok(view) = view else { return };
+            let seen = match options {
+                Some(_) => viewer.see(self.sight, &self.state, &view),
+                None => viewer.see_through_walls(self.sight, &view),
+            };
+            for c in seen.chunks() {
+                let batch = self.sight.chunks()[c.0 as usize].batch;
+                for &t in &self.triangles[c.0 as usize] {
+                    answer.add_triangle(batch, t);
+                }
+            }
+            for d in seen.details() {
+                answer.add_detail(d.0);
+            }
+            for c in seen.cells() {
+                answer.add_cell(c.0);
+            }
+        })
+    }
+}

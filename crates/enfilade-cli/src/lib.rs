@@ -1,0 +1,8 @@
+//! What the command `enfilade` and the benchmarks share: files, cameras and values of arguments.
+//!
+//! A tool's own library, without promises to others; programs use the crate `enfilade`.
+
+pub mod answers;
+pub mod cameras;
+pub mod values;
+pub mod world;

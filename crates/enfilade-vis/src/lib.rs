@@ -1,0 +1,199 @@
+//! Visibility before run-time: which cells can be seen from which.
+//!
+//! Works on a [`SightGraph`]: cells and convex openings, from a world, a portal file or a generator.
+//! [`see_all`] runs the stages in order:
+//!
+//! 1. `dirs`: each portal as two directions; what lies on the right sides of planes *might* be seen.
+//! 2. `narrow`: planes between two openings in a row cut most of that.
+//! 3. `rays`, `grow`: random lines, and lines turned from those, prove most of what is visible.
+//! 4. `flow`: a search over portal chains settles the rest, chain by chain, by planes, lines and
+//!    splitting, and at last by `stabbing`, a linear programme. This is the heart; start reading there.
+//! 5. `occlude`: where walls are known, beams settle what they hide inside cells.
+//!
+//! `search` puts them together in rounds, so that results do not depend on threads.
+//!
+//! **The answer is a superset of the truth.** Sight is symmetric and so is the answer. A line that passes
+//! every opening on its way at least [`VisConfig::clearance`] inside its edges is never lost; whatever a
+//! plane or a line cannot settle counts as visible and is counted in [`VisOutput::undecided`].
+
+mod bits;
+mod checkpoint;
+mod clip;
+mod config;
+mod dirs;
+mod evidence;
+mod flow;
+mod grow;
+mod narrow;
+mod occlude;
+mod output;
+mod planes;
+mod prove;
+mod rays;
+mod rng;
+mod search;
+mod sheets;
+mod stabbing;
+mod tolerance;
+
+use std::time::Instant;
+
+use enfilade_cpg::{CellId, CellSet, SightGraph};
+use enfilade_geom::{Bvh, DVec3};
+
+use config::KEPT;
+use dirs::Dirs;
+use rays::Blocker;
+use search::{Rest, Search};
+use sheets::Sheets;
+
+pub use config::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
+pub use output::{VisOutput, Witness};
+
+/// Lines tried between cells that walls may hide from each other, and how often, before each beam is looked at.
+const INSIST_LINES: usize = 50;
+const INSIST_ROUNDS: u64 = 2;
+
+/// Finds what can be seen from every cell.
+///
+/// Memory: a bit for each pair of directions, three times over for short. Time grows with what is to be
+/// told apart: a map of 3,000 portals takes a second, one of 10,000 a minute.
+///
+/// # Errors
+///
+/// A broken graph, a setting that is negative or no number, or a checkpoint that does not fit.
+pub fn see_all(
+    graph: &SightGraph,
+    config: &VisConfig,
+    context: &mut VisContext<'_>,
+) -> Result<VisOutput, VisError> {
+    graph.validate()?;
+    check("clearance", config.clearance)?;
+    check("the far plane", config.far)?;
+    let dirs = Dirs::new(graph);
+    let clearance = config.clearance.unwrap_or(1e-8 * dirs.scale);
+    // The search keeps more than it promises, so that a checker that rounds otherwise still closes every chain.
+    let bvh = context.walls.map(Bvh::build);
+    let is_blocked = bvh
+        .as_ref()
+        .map(|bvh| move |a: DVec3, b: DVec3| bvh.any_hit(a, b, |_| false));
+    let blocker = is_blocked.as_ref().map(|f| f as Blocker<'_>);
+    let mut search = Search::new(&dirs, KEPT * clearance, config.far, blocker);
+    let n_base = search.visible().count_all();
+    let salt = context.checkpoint.as_ref().map_or(0, |c| c.salt);
+    let key = checkpoint::key(graph, config, salt);
+    let resumed = match &context.checkpoint {
+        Some(VisCheckpoint {
+            resume: Some(bytes),
+            ..
+        }) if config.mode == VisMode::Exact => Some(checkpoint::decode(bytes, &mut search, key)?),
+        _ => None,
+    };
+    if resumed.is_none() {
+        narrow::narrow_might(
+            &dirs,
+            &mut search.might,
+            &mut search.settled,
+            &search.tolerance,
+        );
+    }
+    let is_complete = match (config.mode, resumed) {
+        (VisMode::Fast, _) => {
+            search.cast(config.n_rays);
+            search.grow();
+            true
+        }
+        (VisMode::Exact, Some(rest)) => run(&mut search, config, context, rest, key),
+        (VisMode::Exact, None) => {
+            search.cast(config.n_rays);
+            search.grow();
+            let rest = search.all_openings();
+            run(&mut search, config, context, rest, key)
+        }
+    };
+    if config.mode == VisMode::Exact
+        && is_complete
+        && let (Some(walls), Some(bvh)) = (context.walls, &bvh)
+    {
+        search.insist(INSIST_LINES, INSIST_ROUNDS, &mut *context.on_round);
+        let sheets = Sheets::new(walls, bvh);
+        search.settle_by_walls(&sheets, clearance, &mut *context.on_round);
+    }
+    let evidence = config
+        .has_evidence
+        .then(|| evidence::encode(graph, &search, config))
+        .transpose()?;
+    Ok(VisOutput {
+        evidence,
+        ..output(search, n_base, is_complete)
+    })
+}
+
+/// Searches, and saves what was found now and then, and when told to stop.
+fn run(
+    search: &mut Search<'_>,
+    config: &VisConfig,
+    context: &mut VisContext<'_>,
+    rest: Rest,
+    key: u64,
+) -> bool {
+    let VisContext {
+        on_round,
+        checkpoint,
+        ..
+    } = context;
+    let mut saved = Instant::now();
+    search.run(config.max_pieces, rest, |search, rest| {
+        let goes_on = on_round(rest.done, rest.total);
+        if let Some(at) = checkpoint
+            && (!goes_on || saved.elapsed() >= at.every)
+        {
+            (at.save)(checkpoint::encode(search, rest, key));
+            saved = Instant::now();
+        }
+        goes_on
+    })
+}
+
+fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
+    match value {
+        Some(value) if value.is_nan() || value < 0.0 => Err(VisError::Setting { name, value }),
+        _ => Ok(()),
+    }
+}
+
+fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
+    let n = search.dirs.n_cells;
+    let visible = search.visible();
+    let mut cells = vec![CellSet::new(n); n];
+    let mut undecided = cells.clone();
+    for a in 0..n {
+        for b in bits::ones(visible.row(a)) {
+            let id = CellId(b as u32);
+            cells[a].insert(id);
+            if !search.seen.get(a, b) || search.undecided.get(a, b) {
+                undecided[a].insert(id);
+            }
+        }
+    }
+    let n_steps = search.effort.steps;
+    let id = |d: u32| search.dirs.all[d as usize].id;
+    let witnesses = search
+        .lines
+        .into_iter()
+        .map(|line| Witness {
+            origin: line.origin,
+            direction: line.direction,
+            chain: line.chain.into_iter().map(id).collect(),
+        })
+        .collect();
+    VisOutput {
+        cells,
+        undecided,
+        witnesses,
+        is_complete,
+        n_base,
+        n_steps,
+        evidence: None,
+    }
+}

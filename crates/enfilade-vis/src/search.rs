@@ -1,0 +1,377 @@
+//! Rounds of searches over all openings, the same on any number of threads.
+//!
+//! Openings that might see least come first, as in the Quake tools, because what they settle narrows the
+//! others. Those of one round see what earlier rounds settled and nothing of each other, so the order in
+//! which threads finish does not matter.
+
+use enfilade_geom::DVec3;
+use rayon::prelude::*;
+
+use crate::bits::{self, BitTable};
+use crate::dirs::{Dirs, Next};
+use crate::flow::{Effort, Flow, Found, Shared};
+use crate::rays::{self, Blocker, Line};
+use crate::rng::Rng;
+use crate::tolerance::Tolerance;
+
+/// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
+const ROUND: usize = 64;
+
+/// Share of the far plane that lines keep to; a checker's sums may differ in the last digits.
+const FAR_KEPT: f64 = 1.0 - 1e-9;
+
+/// What is left to search.
+pub(crate) struct Rest {
+    /// Openings, and before each how many it might see.
+    pub(crate) order: Vec<(usize, usize)>,
+    /// Work done and work in all.
+    pub(crate) done: u64,
+    pub(crate) total: u64,
+}
+
+/// That no line leads through one opening and a later one.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Closed {
+    pub(crate) from: u32,
+    pub(crate) to: u32,
+    /// Trees of beams, one for each two pieces of the openings that a line passes both of.
+    pub(crate) tree: Vec<u8>,
+}
+
+pub(crate) struct Search<'a> {
+    pub(crate) dirs: &'a Dirs,
+    pub(crate) might: BitTable,
+    /// Pairs of cells proved visible.
+    pub(crate) seen: BitTable,
+    /// Pairs of cells given up on, in `seen` as well.
+    pub(crate) undecided: BitTable,
+    /// By opening, what was settled as hidden from it beyond the sides of planes.
+    pub(crate) settled: BitTable,
+    pub(crate) lines: Vec<Line>,
+    /// Pairs of openings that walls hide from each other.
+    pub(crate) closed: Vec<Closed>,
+    pub(crate) tolerance: Tolerance,
+    pub(crate) blocker: Option<Blocker<'a>>,
+    far: Option<f64>,
+    pub(crate) effort: Effort,
+    /// How many of `lines` have been grown.
+    pub(crate) n_grown: usize,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(
+        dirs: &'a Dirs,
+        clearance: f64,
+        far: Option<f64>,
+        blocker: Option<Blocker<'a>>,
+    ) -> Self {
+        let n = dirs.n_cells;
+        let mut seen = BitTable::new(n, n);
+        for c in 0..n {
+            seen.set(c, c);
+        }
+        Self {
+            dirs,
+            might: dirs.might_see(clearance, far),
+            seen,
+            undecided: BitTable::new(n, n),
+            settled: BitTable::new(dirs.len(), dirs.len()),
+            lines: Vec::new(),
+            closed: Vec::new(),
+            tolerance: Tolerance::new(dirs.scale, clearance),
+            blocker,
+            far,
+            effort: Effort::default(),
+            n_grown: 0,
+        }
+    }
+
+    /// Random lines from every opening, some aimed at what is not yet seen.
+    pub(crate) fn cast(&mut self, n_rays: usize) {
+        let openings: Vec<usize> = (0..self.dirs.len())
+            .filter(|&d| self.dirs.all[d].id.is_multiple_of(2))
+            .collect();
+        for round in openings.chunks(ROUND * 4) {
+            let lines: Vec<Vec<Line>> = round
+                .par_iter()
+                .map(|&d| self.cast_from(d, n_rays))
+                .collect();
+            self.keep(lines.into_iter().flatten().collect());
+        }
+    }
+
+    fn cast_from(&self, opening: usize, n_rays: usize) -> Vec<Line> {
+        let dirs = self.dirs;
+        let mut rng = Rng::new(u64::from(dirs.all[opening].id));
+        let mut lines = Vec::new();
+        let mut wanted = [Vec::new(), Vec::new()];
+        let both = [opening, dirs.reverse[opening] as usize];
+        for (list, &d) in wanted.iter_mut().zip(&both) {
+            let from = dirs.all[d].from as usize;
+            let seen = self.seen.row(from);
+            list.extend(
+                bits::ones(self.might.row(d))
+                    .filter(|&t| !bits::get(seen, dirs.all[t].to as usize)),
+            );
+        }
+        let (mut ahead, mut behind) = (Vec::new(), Vec::new());
+        let margin = self.tolerance.rounding * 16.0;
+        for i in 0..n_rays {
+            let side = i % 2;
+            let d = both[side];
+            let (origin, direction) = if i == 0 {
+                // Straight through: neighbors see each other, whatever else is in sight.
+                let piece = dirs.pieces[dirs.all[d].pieces.start as usize].clone();
+                let corners = &dirs.points[piece.start as usize..piece.end as usize];
+                let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
+                (middle, dirs.all[d].normal)
+            } else if wanted[side].is_empty() {
+                continue;
+            } else {
+                let target = wanted[side][rng.below(wanted[side].len())];
+                let origin = dirs.random_point(d, &mut rng);
+                (origin, dirs.random_point(target, &mut rng) - origin)
+            };
+            if direction.dot(dirs.all[d].normal) <= 0.0 || !dirs.is_inside(d, origin, margin) {
+                continue;
+            }
+            ahead.clear();
+            behind.clear();
+            let blocker = self.blocker;
+            rays::walk(dirs, d, origin, direction, margin, blocker, &mut ahead);
+            let back = both[1 - side];
+            rays::walk(dirs, back, origin, -direction, margin, blocker, &mut behind);
+            let chain: Vec<u32> = behind
+                .iter()
+                .rev()
+                .map(|&b| dirs.reverse[b as usize])
+                .chain([d as u32])
+                .chain(ahead.iter().copied())
+                .collect();
+            if self.proves_new(&chain) {
+                lines.push(Line {
+                    origin,
+                    direction,
+                    chain,
+                });
+            }
+        }
+        lines
+    }
+
+    pub(crate) fn proves_new(&self, chain: &[u32]) -> bool {
+        let dirs = self.dirs;
+        (0..chain.len()).any(|i| {
+            let row = self.seen.row(dirs.all[chain[i] as usize].from as usize);
+            chain[i..]
+                .iter()
+                .any(|&b| !bits::get(row, dirs.all[b as usize].to as usize))
+        })
+    }
+
+    /// Marks what lines prove, and keeps those that prove something new.
+    pub(crate) fn keep(&mut self, lines: Vec<Line>) {
+        let pieces: Vec<Vec<Line>> = lines
+            .into_par_iter()
+            .with_min_len(16)
+            .map(|line| self.sure_pieces(line))
+            .collect();
+        for piece in pieces.into_iter().flatten() {
+            self.mark(piece);
+        }
+    }
+
+    /// The parts of a line that a checker, on other sums, takes for proofs.
+    fn sure_pieces(&self, line: Line) -> Vec<Line> {
+        let mut out = Vec::new();
+        // Lines that graze an opening may have slipped through.
+        if !self.dirs.is_crossed(&line, self.tolerance.rounding * 8.0) {
+            return out;
+        }
+        if self.far.is_none() && self.blocker.is_none() {
+            self.part(line, &mut out);
+            return out;
+        }
+        // What is solid and what is far, judged as a checker does: between crossings as computed from the
+        // line's origin.
+        let dirs = self.dirs;
+        let ts: Vec<f64> = line
+            .chain
+            .iter()
+            .map(|&d| dirs.crossing(d as usize, line.origin, line.direction))
+            .collect();
+        let is_free: Vec<bool> = ts
+            .windows(2)
+            .map(|t| {
+                let [a, b] = [t[0], t[1]].map(|t| line.origin + line.direction * t);
+                self.blocker.is_none_or(|is_blocked| !is_blocked(a, b))
+            })
+            .collect();
+        let most = self.far.unwrap_or(f64::INFINITY) * FAR_KEPT / line.direction.length();
+        let mut covered = 0;
+        for first in 0..ts.len() {
+            let mut end = first + 1;
+            while end < ts.len() && is_free[end - 1] && ts[end] - ts[first] <= most {
+                end += 1;
+            }
+            if end > covered {
+                covered = end;
+                let piece = Line {
+                    chain: line.chain[first..end].to_vec(),
+                    ..line.clone()
+                };
+                self.part(piece, &mut out);
+            }
+        }
+        out
+    }
+
+    /// Parts a line where openings on it were shown to be hidden from each other: one that passes an edge nearer than the
+    /// clearance may cross what no line with clearance does.
+    fn part(&self, mut line: Line, out: &mut Vec<Line>) {
+        loop {
+            let chain = &line.chain;
+            let might = |i: usize, j: usize| self.might.get(chain[i] as usize, chain[j] as usize);
+            let end = (1..chain.len()).find(|&j| (0..j).any(|i| !might(i, j)));
+            let Some(end) = end else { break };
+            // The rest begins behind the last opening that does not go with it.
+            let first = (0..end)
+                .rev()
+                .find(|&i| !might(i, end))
+                .map_or(end, |i| i + 1);
+            let rest = chain[first..].to_vec();
+            line.chain.truncate(end);
+            out.push(Line {
+                chain: std::mem::replace(&mut line.chain, rest),
+                ..line
+            });
+        }
+        out.push(line);
+    }
+
+    fn mark(&mut self, line: Line) {
+        let all = &self.dirs.all;
+        let mut is_new = false;
+        for i in 0..line.chain.len() {
+            let a = all[line.chain[i] as usize].from as usize;
+            for &b in &line.chain[i..] {
+                let b = all[b as usize].to as usize;
+                if !self.seen.get(a, b) || self.undecided.get(a, b) {
+                    self.seen.set(a, b);
+                    self.seen.set(b, a);
+                    self.undecided.clear(a, b);
+                    self.undecided.clear(b, a);
+                    is_new = true;
+                }
+            }
+        }
+        if is_new {
+            self.lines.push(line);
+        }
+    }
+
+    /// All openings, those that might see least first.
+    pub(crate) fn all_openings(&self) -> Rest {
+        let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
+            .map(|d| (bits::count(self.might.row(d)), d))
+            .collect();
+        order.sort_unstable();
+        let total = order.iter().map(|&(n, _)| n as u64).sum();
+        Rest {
+            order,
+            done: 0,
+            total,
+        }
+    }
+
+    /// Searches from the openings that are left. `on_round` hears of each round before it starts and says
+    /// whether to go on; work is counted in what openings might see at the start.
+    ///
+    /// Returns whether all was searched.
+    pub(crate) fn run(
+        &mut self,
+        max_pieces: u32,
+        mut rest: Rest,
+        mut on_round: impl FnMut(&Self, &Rest) -> bool,
+    ) -> bool {
+        let mut next = Next::new(self.dirs, &self.might);
+        while !rest.order.is_empty() {
+            if !on_round(self, &rest) {
+                return false;
+            }
+            let left = rest.order.split_off(rest.order.len().min(ROUND));
+            let round = std::mem::replace(&mut rest.order, left);
+            rest.done += round.iter().map(|&(n, _)| n as u64).sum::<u64>();
+            let shared = Shared {
+                dirs: self.dirs,
+                might: &self.might,
+                next: &next,
+                seen: &self.seen,
+                tolerance: self.tolerance,
+                blocker: self.blocker,
+                max_pieces,
+            };
+            // The longest first, so that no thread begins one when the others have ended.
+            let found: Vec<Found> = round
+                .par_iter()
+                .rev()
+                .with_max_len(1)
+                .map_init(Flow::default, |flow, &(_, d)| flow.search(&shared, d))
+                .collect();
+            // All that is hidden before any line: none is kept that says otherwise.
+            for found in &found {
+                self.merge(found, &mut next);
+            }
+            self.keep(found.into_iter().flat_map(|f| f.lines).collect());
+            self.grow();
+        }
+        true
+    }
+
+    /// All that a search finds out beside lines.
+    pub(crate) fn tables(&self) -> [&BitTable; 4] {
+        [&self.might, &self.settled, &self.seen, &self.undecided]
+    }
+
+    /// Takes up where another search left off.
+    pub(crate) fn restore(&mut self, tables: [BitTable; 4], lines: Vec<Line>, steps: u64) {
+        [self.might, self.settled, self.seen, self.undecided] = tables;
+        self.n_grown = lines.len();
+        self.lines = lines;
+        self.effort.steps = steps;
+    }
+
+    fn merge(&mut self, found: &Found, next: &mut Next) {
+        next.hide(self.dirs, &mut self.might, found.source, &found.hidden);
+        bits::unite(self.settled.row_mut(found.source), &found.hidden);
+        let a = self.dirs.all[found.source].from as usize;
+        for &b in &found.undecided {
+            let b = b as usize;
+            if !self.seen.get(a, b) {
+                for (x, y) in [(a, b), (b, a)] {
+                    self.seen.set(x, y);
+                    self.undecided.set(x, y);
+                }
+            }
+        }
+        self.effort.add(&found.effort);
+    }
+
+    /// Pairs of cells that may see each other.
+    pub(crate) fn visible(&self) -> BitTable {
+        let n = self.dirs.n_cells;
+        let mut visible = BitTable::new(n, n);
+        let n_words = visible.n_words().max(1);
+        let rows = visible.words_mut().par_chunks_mut(n_words);
+        rows.enumerate().with_min_len(16).for_each(|(cell, row)| {
+            bits::set(row, cell);
+            for d in self.dirs.exits(cell as u32) {
+                bits::set(row, self.dirs.all[d].to as usize);
+                for t in bits::ones(self.might.row(d)) {
+                    bits::set(row, self.dirs.all[t].to as usize);
+                }
+            }
+        });
+        visible
+    }
+}
