@@ -119,7 +119,7 @@ fn rooms_and_doors_are_found_in_spite_of_faults() {
         for door in doors.filter(|o| o.kind == OpeningKind::Door) {
             assert!(is_found(&graph, door), "{what}: {}", door.name);
         }
-        let is_indoor = |c: &CellId| !graph.cells[c.0 as usize].outdoor;
+        let is_indoor = |c: &CellId| !graph[*c].outdoor;
         let extra = graph
             .portals
             .iter()

@@ -108,7 +108,10 @@ fn a_deleted_portal_makes_one_cell_of_two() {
         assert_eq!(gone.world.graph.cells.len() + 1, world.graph.cells.len());
         assert!(gone.world.graph.portals.len() <= last);
         let [a, b] = world.graph.portals[last].cells;
-        assert_eq!(gone.cell_of[a.0 as usize], gone.cell_of[b.0 as usize]);
+        assert_eq!(gone.cell_of[a.idx()], gone.cell_of[b.idx()]);
+        for (id, cell) in gone.world.graph.indoor_cells() {
+            assert_eq!(cell.name, id.to_string());
+        }
         holds(&gone.world);
         assert!(delete_portal(&world, PortalId(last as u32 + 1)).is_none());
     }

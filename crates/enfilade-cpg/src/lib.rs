@@ -5,6 +5,7 @@
 //! the file: a GLB with the `ENFILADE_cell_portal_graph` extension ([`wire`]). It does not know how a
 //! graph was made, touches no file system and starts no thread.
 
+mod access;
 mod cell_set;
 mod graph;
 mod holes;
@@ -15,6 +16,7 @@ mod sight_graph;
 mod validate;
 pub mod wire;
 
+pub use access::Exit;
 pub use cell_set::CellSet;
 pub use graph::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Portal, PortalId, PortalKind, Provenance,

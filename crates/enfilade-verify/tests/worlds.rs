@@ -142,7 +142,7 @@ fn a_sliver_thinner_than_rounding_may_have_its_portals_in_any_order() {
     for portal in [back, shifted(1e-6)] {
         let id = enfilade_cpg::PortalId(world.graph.portals.len() as u32);
         for c in [A, B] {
-            world.graph.cells[c.0 as usize].portals.push(id);
+            world.graph[c].portals.push(id);
         }
         world.graph.portals.push(portal);
     }

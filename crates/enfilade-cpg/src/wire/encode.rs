@@ -193,7 +193,7 @@ fn lay_out_batches<'a>(
         }
         let name = match cells {
             [] => "unseen".to_owned(),
-            [cell] => world.graph.cells[cell.0 as usize].name.clone(),
+            [cell] => world.graph[*cell].name.clone(),
             _ => format!("shared-{}", shared.len()),
         };
         let parts = members
