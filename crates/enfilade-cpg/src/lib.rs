@@ -11,6 +11,7 @@ mod graph;
 mod holes;
 mod locator;
 mod look;
+mod pvs;
 mod seals;
 mod sight_graph;
 mod validate;
@@ -24,6 +25,7 @@ pub use graph::{
 };
 pub use holes::{Hole, HoleReason};
 pub use locator::{Locator, LocatorNode};
+pub use pvs::Pvs;
 pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use validate::{GraphError, MAX_REPORTED};

@@ -206,6 +206,7 @@ pub(crate) fn cut_cell(
 
     // 3. Everything that names the cell.
     let mut out = world.clone();
+    out.pvs = None;
     out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids);
     let halved = parts.hand_out_portals(&mut out, complex.opening_tolerance());
     let mut new_portals: Vec<Portal> = Vec::new();

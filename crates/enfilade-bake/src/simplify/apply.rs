@@ -85,6 +85,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
         }
     }
     let mut out = world.clone();
+    out.pvs = None;
     out.graph.locator = locator(&old.locator, &cell_of);
     out.graph.cells = cells;
     out.graph.portals = portals;

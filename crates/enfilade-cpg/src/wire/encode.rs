@@ -109,6 +109,10 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         .sum();
     let portal_corners = layout.view(corners as u64 * 12);
     let locator = lay_out_locator(layout, world);
+    let pvs = world.pvs.as_ref().map(|pvs| json::Pvs {
+        rows: layout.view(pvs.ends.len() as u64 * 4),
+        runs: layout.view(pvs.runs.len() as u64 * 8),
+    });
     let n_bin = layout.len.next_multiple_of(4);
     let generator = match graph.provenance.generator.as_str() {
         "" => "enfilade",
@@ -148,6 +152,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 detail_meshes,
                 locator,
                 leak_path,
+                pvs,
                 provenance: json::Provenance {
                     generator: graph.provenance.generator.clone(),
                     method: graph.provenance.method.clone(),
