@@ -88,10 +88,12 @@ const FENCES: [Fence; 14] = [
             "enfilade-import",
             "enfilade-bake",
             "enfilade-runtime",
+            "enfilade-render",
+            "enfilade-verify",
             "enfilade-vis",
         ],
-        not: &["anyhow", "clap"],
-        words: &["std::fs", "std::thread", "fn "],
+        not: &["anyhow", "clap", "rayon"],
+        words: &["std::thread"],
     },
     Fence {
         name: "enfilade-testkit",
@@ -131,6 +133,9 @@ const FENCES: [Fence; 14] = [
         words: &[],
     },
 ];
+
+/// What every program of the façade links; all else of ours is behind a feature.
+const FACADE_ALWAYS: [&str; 3] = ["enfilade-geom", "enfilade-cpg", "enfilade-runtime"];
 
 /// Lines a source file may have.
 const MAX_LINES: usize = 800;
@@ -195,6 +200,10 @@ fn dependency_problems(metadata: &Value) -> Vec<String> {
             if (is_ours && !fence.siblings.contains(&dependency)) || fence.not.contains(&dependency)
             {
                 problems.push(format!("{name} may not depend on {dependency}"));
+            }
+            let is_small = FACADE_ALWAYS.contains(&dependency) || !is_ours;
+            if name == "enfilade" && !is_small && d["optional"] != true {
+                problems.push(format!("{name}: {dependency} must be behind a feature"));
             }
         }
     }
@@ -307,6 +316,20 @@ mod tests {
             |kind| dependency_problems(&metadata("enfilade-geom", "enfilade-testkit", Some(kind)));
         assert!(problems("dev").is_empty());
         assert_eq!(problems("build").len(), 1);
+    }
+
+    #[test]
+    fn the_facade_makes_nobody_link_a_builder() {
+        let problems = |dependency: &str, optional: bool| {
+            dependency_problems(&serde_json::json!({"packages": [{"name": "enfilade",
+                "dependencies": [{"name": dependency, "kind": null, "optional": optional}]}]}))
+        };
+        assert!(problems("enfilade-cpg", false).is_empty());
+        assert!(problems("enfilade-bake", true).is_empty());
+        assert_eq!(
+            problems("enfilade-bake", false),
+            ["enfilade: enfilade-bake must be behind a feature"]
+        );
     }
 
     #[test]

@@ -99,6 +99,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         textures: scene.textures.clone(),
         images: scene.images.clone(),
         leak_path: Vec::new(),
+        pvs: None,
     }
 }
 

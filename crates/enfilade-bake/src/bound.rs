@@ -101,11 +101,12 @@ impl Bounded {
             cells.len()
         );
         for o in self.over.iter().take(TOLD) {
-            let [low, high] = cells[o.cell.0 as usize].aabb;
+            let cell = &self.world.graph[o.cell];
+            let [low, high] = cell.aabb;
             let [x, y, z] = [0, 1, 2].map(|k| low[k].midpoint(high[k]));
             text += &format!(
-                "\n  cell {} about {x:.2} {y:.2} {z:.2} costs {:.0}: {}",
-                o.cell.0, o.cost, o.reason
+                "\n  {} about {x:.2} {y:.2} {z:.2} costs {:.0}: {}",
+                cell.name, o.cost, o.reason
             );
         }
         if self.over.len() > TOLD {
@@ -178,7 +179,7 @@ impl Cutting<'_> {
             if cost <= bound {
                 continue;
             }
-            let is_outdoor = self.world.graph.cells[cell.0 as usize].outdoor;
+            let is_outdoor = self.world.graph[cell].outdoor;
             let added = match (is_outdoor, n_left) {
                 (true, _) if !settings.outdoors => Err(Reason::Outdoors),
                 (true, _) => cut_outdoors(&self.world, cell).ok_or(Reason::Shared),
@@ -213,7 +214,7 @@ impl Cutting<'_> {
         model: &CostModel,
     ) -> Result<Added, Reason> {
         let surfaces = surfaces_of(&self.world, cell, model);
-        let boxed = &self.world.graph.cells[cell.0 as usize].aabb;
+        let boxed = &self.world.graph[cell].aabb;
         let [min, max] = boxed.map(|p| DVec3::from(p.map(f64::from)));
         let extent = min.abs().max(max.abs()).max_element();
         // Beyond what corners are rounded by.

@@ -58,6 +58,13 @@ const DELAUNAY_STAGES: [&str; 6] = [
     "hand out geometry",
 ];
 
+/// Tells nobody, and is not stopped.
+impl Default for BakeContext<'_> {
+    fn default() -> Self {
+        Self::new(&Silent, None)
+    }
+}
+
 impl<'a> BakeContext<'a> {
     /// The names of the stages, in order, as [`Progress::stage`] hears them.
     pub const STAGES: &'static [&'static str] = &STAGES;

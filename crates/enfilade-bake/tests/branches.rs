@@ -73,7 +73,7 @@ fn side_tubes_are_cells_and_a_stub_is_none() {
     }
     let cells: BTreeSet<_> = tips.iter().map(|&p| at(p)).chain([trunk]).collect();
     assert_eq!(cells.len(), 4);
-    let indoor = world.graph.cells.iter().filter(|c| !c.outdoor).count();
+    let indoor = world.graph.indoor_cells().count();
     assert_eq!(indoor, 4);
     let open: Vec<_> = world
         .graph

@@ -158,7 +158,7 @@ fn shape(world: &World) -> (Vec<i64>, Vec<(i64, i64, i64)>) {
         .portals
         .iter()
         .map(|p| {
-            let [a, b] = p.cells.map(|c| round(graph.cells[c.0 as usize].volume));
+            let [a, b] = p.cells.map(|c| round(graph[c].volume));
             (a.min(b), a.max(b), round(p.area))
         })
         .collect();

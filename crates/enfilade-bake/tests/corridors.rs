@@ -37,7 +37,7 @@ fn plan(air: &[[f64; 4]]) -> CellPortalGraph {
 }
 
 fn n_indoors(graph: &CellPortalGraph) -> usize {
-    graph.cells.iter().filter(|c| !c.outdoor).count()
+    graph.indoor_cells().count()
 }
 
 /// Where along x the portals are, ascending.

@@ -21,7 +21,7 @@ fn baked(g: &Generated) -> World {
 fn problems(g: &Generated, what: &str) -> Vec<String> {
     let world = baked(g);
     let mut out = Vec::new();
-    let indoor = world.graph.cells.iter().filter(|c| !c.outdoor).count();
+    let indoor = world.graph.indoor_cells().count();
     if indoor != g.truth.rooms.len() {
         out.push(format!(
             "{what}: {indoor} rooms, not {}",

@@ -69,7 +69,7 @@ fn only_the_cell_changed(before: &World, added: &Added, rng: &mut Rng) {
         }
     }
     for &(a, b) in &added.halved {
-        let area = |w: &World, p: PortalId| f64::from(w.graph.portals[p.0 as usize].area);
+        let area = |w: &World, p: PortalId| f64::from(w.graph[p].area);
         let (whole, sum) = (
             area(before, a),
             area(&added.world, a) + area(&added.world, b),
@@ -143,7 +143,7 @@ fn a_polygon_across_a_cell_parts_it_and_keeps_every_promise() {
                 assert!(!polygon.contains_in_plane(at, -1e-4), "{at} is on it");
             }
             Err(AddPortalError::Endless { cell, .. }) => {
-                assert!(before.graph.cells[cell.0 as usize].outdoor);
+                assert!(before.graph[cell].outdoor);
             }
             Err(other) => panic!("{other}"),
         }
@@ -180,7 +180,7 @@ fn baked_worlds_take_portals_across_each_of_their_rooms() {
             let polygon = Winding::square(&Plane::through(middle, DVec3::X), middle, 50.0);
             let added = add_portal(&world, &polygon.points).unwrap();
             holds(&added.world);
-            let volume = |w: &World, c: CellId| f64::from(w.graph.cells[c.0 as usize].volume);
+            let volume = |w: &World, c: CellId| f64::from(w.graph[c].volume);
             let whole = volume(&world, added.cell);
             let sum = volume(&added.world, added.cell) + volume(&added.world, added.new_cell);
             // Volumes are `f32`, and slivers at walls may be matter now.

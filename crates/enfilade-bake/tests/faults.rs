@@ -119,7 +119,7 @@ fn rooms_doors_and_windows_are_found_in_spite_of_faults() {
         for opening in &g.truth.openings {
             assert!(is_found(&graph, opening), "{what}: {}", opening.name);
         }
-        let is_indoor = |c: &CellId| !graph.cells[c.0 as usize].outdoor;
+        let is_indoor = |c: &CellId| !graph[*c].outdoor;
         let extra = graph
             .portals
             .iter()

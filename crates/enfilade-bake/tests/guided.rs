@@ -35,7 +35,7 @@ fn baked(g: &Generated, config: &BspConfig) -> World {
 }
 
 fn n_indoors(world: &World) -> usize {
-    world.graph.cells.iter().filter(|c| !c.outdoor).count()
+    world.graph.indoor_cells().count()
 }
 
 #[test]

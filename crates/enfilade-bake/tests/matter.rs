@@ -45,7 +45,7 @@ fn n_indoors(baked: &BakeOutput) -> usize {
 fn is_indoors(baked: &BakeOutput, p: [f64; 3]) -> bool {
     let graph = &baked.world.graph;
     let cell = graph.locator.locate(DVec3::from(p));
-    cell.is_some_and(|c| !graph.cells[c.0 as usize].outdoor)
+    cell.is_some_and(|c| !graph[c].outdoor)
 }
 
 /// Turns over the triangles of which `is_turned` says so, by their number.

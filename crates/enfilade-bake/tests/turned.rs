@@ -32,7 +32,7 @@ fn turned_buildings_keep_their_rooms_and_doorways() {
             let g = rotated(make(), degrees);
             let what = format!("{} turned by {degrees} degrees", g.truth.scene);
             let after = graph_of(&g);
-            let indoors = |g: &CellPortalGraph| g.cells.iter().filter(|c| !c.outdoor).count();
+            let indoors = |g: &CellPortalGraph| g.indoor_cells().count();
             assert_eq!(indoors(&before), indoors(&after), "{what}");
             for room in &g.truth.rooms {
                 let cells: std::collections::BTreeSet<_> = room

@@ -411,7 +411,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
 pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
     let count = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
-    let indoor = graph.cells.iter().filter(|c| !c.outdoor).count();
+    let indoor = graph.indoor_cells().count();
     let rows = [
         (
             "triangles",

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use enfilade::cpg::{Cell, CellId, Portal, PortalId, World};
+use enfilade::cpg::{Cell, CellId, PortalId, World};
 use enfilade::runtime::{Sight, Sightlines};
 use enfilade_render::{Camera, Culling, RenderError, Shown, Studio};
 use enfilade_testkit::Rng;
@@ -16,11 +16,6 @@ pub const FOV: f32 = 1.1;
 
 fn center(cell: &Cell) -> [f32; 3] {
     [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5)
-}
-
-fn middle(portal: &Portal) -> [f32; 3] {
-    let n = portal.outline.len().max(1) as f32;
-    [0, 1, 2].map(|k| portal.outline.iter().map(|c| c[k]).sum::<f32>() / n)
 }
 
 /// The eye of somebody who stands below `p`.
@@ -108,29 +103,24 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
 #[must_use]
 pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
     let mut stops = Vec::new();
-    let mut been = vec![0_u32; world.graph.cells.len()];
-    let Some(first) = world.graph.cells.iter().position(|c| !c.outdoor) else {
+    let graph = &world.graph;
+    let mut been = vec![0_u32; graph.cells.len()];
+    let Some((first, _)) = graph.indoor_cells().next() else {
         return Vec::new();
     };
     let (mut cell, mut came_by) = (first, None);
-    stops.push(center(&world.graph.cells[cell]));
+    stops.push(center(&graph[cell]));
     // Always to the neighbor that was visited least, by the first such portal.
     while stops.len() < 2 * views {
-        been[cell] += 1;
-        let next = world.graph.cells[cell]
-            .portals
-            .iter()
-            .map(|&id| {
-                let p = &world.graph.portals[id.0 as usize];
-                let to = p.cells[usize::from(p.cells[0].0 as usize == cell)].0 as usize;
-                (been[to], Some(id) == came_by, id, to)
-            })
-            .filter(|(.., to)| !world.graph.cells[*to].outdoor)
-            .min_by_key(|&(n, is_back, id, _)| (n, is_back, id));
-        let Some((_, _, id, to)) = next else { break };
-        stops.push(middle(&world.graph.portals[id.0 as usize]));
-        stops.push(center(&world.graph.cells[to]));
-        (cell, came_by) = (to, Some(id));
+        been[cell.idx()] += 1;
+        let next = graph
+            .exits(cell)
+            .filter(|exit| !graph[exit.to].outdoor)
+            .min_by_key(|exit| (been[exit.to.idx()], Some(exit.id) == came_by, exit.id));
+        let Some(exit) = next else { break };
+        stops.push(exit.portal.center());
+        stops.push(center(&graph[exit.to]));
+        (cell, came_by) = (exit.to, Some(exit.id));
     }
     // A stretch of a meter a view.
     let mut out = Vec::new();
@@ -234,7 +224,7 @@ pub fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds: [[f32;
     if kind == 0 && !graph.portals.is_empty() {
         // On its plane but for a rounding, or a little beside it.
         let portal = &graph.portals[rng.below(graph.portals.len())];
-        let middle = middle(portal);
+        let middle = portal.center();
         let corner = portal.outline[rng.below(portal.outline.len())];
         let t = rng.unit() as f32 * 0.95;
         let off = [0.0, 1e-5, 1e-3, 0.03][rng.below(4)];

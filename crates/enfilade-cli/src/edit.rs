@@ -92,21 +92,17 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
         let area: f32 = added
             .portals
             .iter()
-            .map(|p| added.world.graph.portals[p.0 as usize].area)
+            .map(|p| added.world.graph[*p].area)
             .sum();
-        let cells = [added.cell, added.new_cell].map(|c| c.0);
-        let volumes = cells.map(|c| added.world.graph.cells[c as usize].volume);
+        let cells = [added.cell, added.new_cell].map(|c| &added.world.graph[c]);
+        let [(one, v1), (other, v2)] = cells.map(|c| (&c.name, c.volume));
         writeln!(
             note,
-            "portal {} of {area:.2} m² parts cell {}: now {} ({:.1} m³) and {} ({:.1} m³)",
-            added.portals[0].0, cells[0], cells[0], volumes[0], cells[1], volumes[1]
+            "{} of {area:.2} m² parts {one}: now {one} ({v1:.1} m³) and {other} ({v2:.1} m³)",
+            added.portals[0]
         )?;
         for (kept, new) in &added.halved {
-            writeln!(
-                note,
-                "portal {} is cut in two: now {} and {}",
-                kept.0, kept.0, new.0
-            )?;
+            writeln!(note, "{kept} is cut in two: now {kept} and {new}")?;
         }
         world = Some(added.world);
     }

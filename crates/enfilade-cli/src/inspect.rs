@@ -258,17 +258,17 @@ pub(crate) fn write_holes(
         holes.len()
     )?;
     for h in holes.iter().take(most) {
-        let p = &graph.portals[h.portal.0 as usize];
+        let p = &graph[h.portal];
         let ([x, y, z], [width, height]) = (h.position, p.size());
         let cell = p
             .cells
             .iter()
-            .find(|c| !graph.cells[c.0 as usize].outdoor)
-            .map_or(0, |c| c.0);
+            .find(|&&c| !graph[c].outdoor)
+            .map_or("-", |&c| &graph[c].name);
         writeln!(
             out,
-            "  at {x:.2} {y:.2} {z:.2}: {width:.2} × {height:.2} m, portal {} of cell {cell}, {}",
-            h.portal.0, h.reason
+            "  at {x:.2} {y:.2} {z:.2}: {width:.2} × {height:.2} m, {} of {cell}, {}",
+            h.portal, h.reason
         )?;
     }
     if holes.len() > most {
@@ -299,7 +299,7 @@ pub(crate) fn write_seals(out: &mut impl Write, world: &World) -> io::Result<()>
 fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
     let mut row = |name: &str, value: String| writeln!(out, "{name:<22} {value}");
-    let indoor = graph.cells.iter().filter(|c| !c.outdoor).count();
+    let indoor = graph.indoor_cells().count();
     let outdoors = if indoor < graph.cells.len() {
         " and outdoors"
     } else {

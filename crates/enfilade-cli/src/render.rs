@@ -245,7 +245,7 @@ fn report(
     let list = studio.list(&view, camera.eye, args.mode.culling(), args.size);
     let (n_triangles, n_draws) = (list.n_triangles(), list.n_draws());
     let cell = studio.sight.locate(camera.eye);
-    let name = cell.map(|c| world.graph.cells[c.0 as usize].name.as_str());
+    let name = cell.map(|c| world.graph[c].name.as_str());
     let look = [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]);
     if args.json {
         let line = json!({
@@ -282,7 +282,7 @@ pub(crate) fn portal_marks(
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let mut marks = Vec::new();
     for p in seen.portals() {
-        let outline = &world.graph.portals[p.0 as usize].outline;
+        let outline = &world.graph[*p].outline;
         let mark = |shape, color, width, on_top| Mark {
             shape,
             color,
@@ -340,13 +340,13 @@ pub(crate) fn above(
         ));
     }
     for p in seen.portals() {
-        let outline = world.graph.portals[p.0 as usize].outline.clone();
+        let outline = world.graph[*p].outline.clone();
         marks.push(line(Shape::Outline(outline), [1.0, 0.42, 0.0, 1.0], width));
     }
     // Rooms are what pictures from above are of: the ground around them is not.
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
-    for cell in world.graph.cells.iter().filter(|c| !c.outdoor) {
+    for (_, cell) in world.graph.indoor_cells() {
         for k in 0..3 {
             low[k] = low[k].min(cell.aabb[0][k]);
             high[k] = high[k].max(cell.aabb[1][k]);

@@ -141,7 +141,7 @@ fn a_portal_is_put_in_and_what_parts_nothing_is_refused() {
     assert!(out.status.success(), "{}", text(&out.stderr));
     let told = text(&out.stdout);
     assert!(
-        told.contains("of 12.00 m² parts cell 1: now 1 (24.0 m³)"),
+        told.contains("of 12.00 m² parts cell-1: now cell-1 (24.0 m³)"),
         "{told}"
     );
     assert!(told.contains("cost of a cell"), "{told}");

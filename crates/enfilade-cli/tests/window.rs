@@ -148,9 +148,9 @@ fn before_a_doorway(world: &World) -> [f32; 3] {
     let graph = &world.graph;
     let door = graph.portals.iter().find(|p| {
         let heights = || p.outline.iter().map(|c| c[1]);
-        let floor = graph.cells[p.cells[0].0 as usize].aabb[0][1];
+        let floor = graph[p.cells[0]].aabb[0][1];
         p.normal[0].abs() > 0.99
-            && p.cells.iter().all(|c| !graph.cells[c.0 as usize].outdoor)
+            && p.cells.iter().all(|c| !graph[*c].outdoor)
             // Somebody of 1.6 m looks through it.
             && heights().fold(f32::INFINITY, f32::min) < floor + 0.2
             && heights().fold(0.0, f32::max) > floor + 1.7

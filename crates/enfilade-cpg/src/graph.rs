@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
 
-use crate::Locator;
+use crate::{Locator, Pvs};
 
 /// Index of a cell in [`CellPortalGraph::cells`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -118,6 +118,8 @@ pub struct World {
     /// A line for people to look at: the way out of air that should be a room, where it is widest. Of two points or more, in
     /// world space; empty where none was asked for. No matter to anything that reads a world. [Units: wu]
     pub leak_path: Vec<[f32; 3]>,
+    /// What can be seen from each cell, if it was computed. What changes cells or portals drops it.
+    pub pvs: Option<Pvs>,
 }
 
 /// Structural triangles of one material that are seen from exactly the same cells.

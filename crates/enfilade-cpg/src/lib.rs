@@ -5,16 +5,19 @@
 //! the file: a GLB with the `ENFILADE_cell_portal_graph` extension ([`wire`]). It does not know how a
 //! graph was made, touches no file system and starts no thread.
 
+mod access;
 mod cell_set;
 mod graph;
 mod holes;
 mod locator;
 mod look;
+mod pvs;
 mod seals;
 mod sight_graph;
 mod validate;
 pub mod wire;
 
+pub use access::Exit;
 pub use cell_set::CellSet;
 pub use graph::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Portal, PortalId, PortalKind, Provenance,
@@ -22,6 +25,7 @@ pub use graph::{
 };
 pub use holes::{Hole, HoleReason};
 pub use locator::{Locator, LocatorNode};
+pub use pvs::Pvs;
 pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use validate::{GraphError, MAX_REPORTED};

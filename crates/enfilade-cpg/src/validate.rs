@@ -61,6 +61,14 @@ pub enum GraphError {
     /// The leak path has a single point, or one that is not finite.
     #[error("the leak path must be of two finite points or more, or empty")]
     LeakPath,
+    /// A row of the potentially visible set does not fit the graph.
+    #[error("potentially visible set, cell {cell}: {problem}")]
+    Pvs {
+        /// The cell.
+        cell: u32,
+        /// What is wrong with its row.
+        problem: &'static str,
+    },
     /// A portal joins a cell to itself or to a cell that does not exist.
     #[error("portal {portal} joins cells {cells:?}; they must differ and lie below {n_cells}")]
     PortalCells {
@@ -356,6 +364,10 @@ impl World {
         let is_finite = self.leak_path.as_flattened().iter().all(|v| v.is_finite());
         if self.leak_path.len() == 1 || !is_finite {
             found.push(GraphError::LeakPath);
+        }
+        let pvs = self.pvs.as_ref().and_then(|p| p.problem(n_cells));
+        if let Some((cell, problem)) = pvs {
+            found.push(GraphError::Pvs { cell, problem });
         }
         crate::look::check(self, &mut |owner, problem| {
             found.push(GraphError::Look { owner, problem });

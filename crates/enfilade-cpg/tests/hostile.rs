@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::two_rooms;
+use common::{two_rooms, two_rooms_with_pvs};
 use enfilade_cpg::World;
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
 use proptest::prelude::*;
@@ -62,7 +62,7 @@ fn taking_a_file_apart_and_together_changes_nothing() {
 
 #[test]
 fn every_prefix_is_an_error() {
-    let bytes = encode_glb(&two_rooms()).unwrap();
+    let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
     for n in 0..bytes.len() {
         assert!(decode_glb(&bytes[..n]).is_err(), "{n} bytes decoded");
         // With the header made to fit, too.
@@ -79,7 +79,7 @@ fn every_prefix_is_an_error() {
 
 #[test]
 fn every_bit_flip_is_an_error_or_a_valid_world() {
-    let bytes = encode_glb(&two_rooms()).unwrap();
+    let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
     for i in 0..bytes.len() * 8 {
         let mut flipped = bytes.clone();
         flipped[i / 8] ^= 1 << (i % 8);
@@ -221,6 +221,50 @@ fn a_leak_path_that_is_no_line_is_an_error() {
             &format!("\"leakPath\":{node},\"provenance\":"),
         );
         assert!(matches!(bad, Err(WireError::Structure { .. })), "{node}");
+    }
+}
+
+#[test]
+fn a_broken_set_of_what_is_seen_is_an_error() {
+    let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
+    let n = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let text = String::from_utf8(bytes[20..20 + n].to_vec()).unwrap();
+    let bin = &bytes[28 + n..];
+    let root: Value = serde_json::from_str(&text).unwrap();
+    let views = root["bufferViews"].as_array().unwrap();
+    let (rows, runs) = (views.len() - 2, views.len() - 1);
+    let named = format!("\"pvs\":{{\"rows\":{rows},\"runs\":{runs}}}");
+    assert!(text.contains(&named), "{text}");
+    for bad in [
+        format!("\"pvs\":{{\"rows\":{runs},\"runs\":{rows}}}"),
+        format!("\"pvs\":{{\"rows\":999,\"runs\":{runs}}}"),
+        // The planes of the locator.
+        format!("\"pvs\":{{\"rows\":{rows},\"runs\":{}}}", rows - 2),
+        format!("\"pvs\":{{\"runs\":{runs}}}"),
+        "\"pvs\":{}".to_owned(),
+    ] {
+        let result = decode_glb(&glb(&text.replacen(&named, &bad, 1), bin));
+        assert!(
+            matches!(
+                result,
+                Err(WireError::Structure { .. } | WireError::Invalid(_))
+            ),
+            "{bad}"
+        );
+    }
+    // Each word made large.
+    let at = |view: usize, field: &str| views[view][field].as_u64().unwrap_or_default() as usize;
+    for view in [rows, runs] {
+        for word in 0..at(view, "byteLength") / 4 {
+            let mut bin = bin.to_vec();
+            let first = at(view, "byteOffset") + 4 * word;
+            bin[first..first + 4].fill(0xff);
+            let result = decode_glb(&glb(&text, &bin));
+            assert!(
+                matches!(result, Err(WireError::Invalid(_))),
+                "{view} {word}"
+            );
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{nasty_rooms, two_rooms};
+use common::{nasty_rooms, two_rooms, two_rooms_with_pvs};
 use enfilade_cpg::World;
 use enfilade_cpg::wire::{EXTENSION, encode_glb};
 use serde_json::{Value, json};
@@ -147,7 +147,8 @@ fn encoded_worlds_follow_the_schema() {
         leak_path: vec![[0.0; 3], [1.0; 3]],
         ..two_rooms()
     };
-    for world in [two_rooms(), nasty_rooms(), World::default(), leaking] {
+    let seen = two_rooms_with_pvs();
+    for world in [two_rooms(), nasty_rooms(), World::default(), leaking, seen] {
         assert_eq!(check(&schema, &schema, &extension(&world), ""), Ok(()));
     }
 }
@@ -158,16 +159,17 @@ fn the_schema_names_every_field_that_is_written() {
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
     let good = extension(&World {
         leak_path: vec![[0.0; 3], [1.0; 3]],
-        ..two_rooms()
+        ..two_rooms_with_pvs()
     });
     for (pointer, optional) in [
-        ("", &["portalCorners", "leakPath"][..]),
+        ("", &["portalCorners", "leakPath", "pvs"][..]),
         ("/cells/2", &["outdoor"]),
         ("/portals/1", &[]),
         ("/batches/0", &[]),
         ("/details/0", &[]),
         ("/locator", &["bounds", "outside", "planes", "nodes"]),
         ("/provenance", &[]),
+        ("/pvs", &[]),
     ] {
         let keys: Vec<String> = good
             .pointer(pointer)

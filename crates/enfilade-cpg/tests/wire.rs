@@ -3,8 +3,8 @@
 mod common;
 
 use common::{floor, nasty_rooms, two_rooms};
-use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
-use enfilade_cpg::{Batch, CellId, World};
+use enfilade_cpg::wire::{EXTENSION, WireError, decode_glb, encode_glb};
+use enfilade_cpg::{Batch, CellId, CellSet, Pvs, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3};
 use proptest::prelude::*;
@@ -62,6 +62,35 @@ fn a_leak_path_comes_back_as_a_line_that_is_no_surface() {
     assert_eq!(root["accessors"][position]["count"], 3);
     // Where none is asked for nothing tells of it.
     assert!(!without.to_string().contains("leak"));
+}
+
+#[test]
+fn what_is_seen_from_each_cell_comes_back_and_costs_nothing_where_there_is_none() {
+    let mut world = two_rooms();
+    let without = encode_glb(&world).unwrap();
+    let n = world.graph.cells.len();
+    let mut rows: Vec<CellSet> = (0..n).map(|_| CellSet::new(n)).collect();
+    for (c, row) in rows.iter_mut().enumerate() {
+        row.insert(CellId(c as u32));
+        row.insert(CellId(0));
+    }
+    world.pvs = Some(Pvs::of_rows(&rows));
+    let bytes = encode_glb(&world).unwrap();
+    let read = decode_glb(&bytes).unwrap();
+    assert_eq!(read.pvs, world.pvs);
+    assert!(json(&without)["extensions"][EXTENSION].get("pvs").is_none());
+    // Everything else is where it was.
+    let plain = World { pvs: None, ..read };
+    assert_eq!(encode_glb(&plain).unwrap(), without);
+    // One of another graph is not written.
+    world.pvs = Some(Pvs::of_rows(&rows[1..]));
+    assert!(matches!(encode_glb(&world), Err(WireError::Invalid(_))));
+    let nothing = World {
+        pvs: Some(Pvs::default()),
+        ..World::default()
+    };
+    let read = decode_glb(&encode_glb(&nothing).unwrap()).unwrap();
+    assert_eq!(read.pvs, nothing.pvs);
 }
 
 #[test]

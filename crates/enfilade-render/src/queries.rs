@@ -128,9 +128,8 @@ impl Studio {
             let mut corners: Vec<[f32; 3]> = Vec::new();
             let mut asked = Vec::new();
             for &cell in &last {
-                for &portal in &world.graph.cells[cell.0 as usize].portals {
-                    let p = &world.graph.portals[portal.0 as usize];
-                    let to = p.cells[usize::from(p.cells[0] == cell)];
+                for exit in world.graph.exits(cell) {
+                    let (portal, p, to) = (exit.id, exit.portal, exit.to);
                     if seen.contains(&to) || !self.state.is_open(portal) || self.state.is_locked(to)
                     {
                         continue;

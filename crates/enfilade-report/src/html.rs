@@ -122,7 +122,7 @@ footer{color:#777;font-size:.8rem;margin-top:2rem;overflow-wrap:anywhere}\
 
 fn summary(world: &World) -> String {
     let graph = &world.graph;
-    let indoors = graph.cells.iter().filter(|c| !c.outdoor);
+    let indoors = graph.indoor_cells().map(|(_, c)| c);
     let n = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
     let volume: f32 = indoors.clone().map(|c| c.volume).sum();
     format!(

@@ -118,12 +118,7 @@ fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
 
 /// The rectangle (x and z) around all indoor cells; around the triangles where there is none.
 fn extent(world: &World) -> (DVec2, DVec2) {
-    let indoor = world
-        .graph
-        .cells
-        .iter()
-        .filter(|c| !c.outdoor)
-        .flat_map(|c| c.aabb);
+    let indoor = world.graph.indoor_cells().flat_map(|(_, c)| c.aabb);
     let mut corners: Vec<[f32; 3]> = indoor.collect();
     if corners.is_empty() {
         corners.extend(

@@ -62,7 +62,7 @@ impl Section {
                 let z = min.y + (row as f64 + 0.5) * step;
                 labels.push(match world.graph.locator.locate(DVec3::new(x, y, z)) {
                     None => Label::Solid,
-                    Some(c) if world.graph.cells[c.0 as usize].outdoor => Label::Outdoor,
+                    Some(c) if world.graph[c].outdoor => Label::Outdoor,
                     Some(c) => Label::Cell(c.0),
                 });
             }

@@ -34,7 +34,7 @@ pub struct Storey {
 #[must_use]
 pub fn find_storeys(world: &World) -> Vec<Storey> {
     let mut votes = floor_votes(world);
-    let indoor = || world.graph.cells.iter().filter(|c| !c.outdoor);
+    let indoor = || world.graph.indoor_cells().map(|(_, c)| c);
     if votes.is_empty() {
         // No floors, as in a shell without one: where the cells begin.
         votes = indoor()
@@ -91,7 +91,7 @@ fn heaviest_level(votes: &[(f64, f64)], is_taken: &[bool]) -> Option<(usize, usi
 fn floor_votes(world: &World) -> Vec<(f64, f64)> {
     let mut votes = Vec::new();
     for batch in &world.batches {
-        let is_indoor = |c: &enfilade_cpg::CellId| !world.graph.cells[c.0 as usize].outdoor;
+        let is_indoor = |c: &enfilade_cpg::CellId| !world.graph[*c].outdoor;
         if !batch.cells.iter().any(is_indoor) {
             continue;
         }
@@ -130,7 +130,7 @@ fn vote(world: &World, t: &Triangle, area: f64, votes: &mut Vec<(f64, f64)>) {
             let p = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
             let is_indoor = |up: f64| {
                 let cell = world.graph.locator.locate(p + DVec3::Y * up);
-                cell.is_some_and(|c| !world.graph.cells[c.0 as usize].outdoor)
+                cell.is_some_and(|c| !world.graph[c].outdoor)
             };
             if ABOVE.into_iter().all(is_indoor) {
                 votes.push((p.y, each));

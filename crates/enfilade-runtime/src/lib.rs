@@ -6,7 +6,7 @@
 //! knows which cell something is in as it moves.
 //!
 //! ```
-//! use enfilade_runtime::{Sight, SightState, View, Viewer};
+//! use enfilade_runtime::{DrawList, Sight, SightState, View, Viewer};
 //! use enfilade_testkit::{GridParams, room_grid};
 //!
 //! // Once. A program reads its world with `enfilade_cpg::wire::decode_glb`.
@@ -14,19 +14,18 @@
 //! let sight = Sight::build(&world)?;
 //! let mut state = SightState::new(&sight);
 //! let mut viewer = Viewer::new(&sight); // one a camera
+//! let mut list = DrawList::new();
 //!
 //! // Every frame.
 //! let eye = [6.0, 1.6, 6.0];
 //! let view = View::perspective(eye, [1.0, 0.0, 0.2], [0.0, 1.0, 0.0], 1.0, 16.0 / 9.0)?;
 //! let seen = viewer.see(&sight, &state, &view);
-//! for chunk in seen.chunks() {
-//!     let chunk = sight.chunks()[chunk.0 as usize];
-//!     let first = chunk.first_index as usize;
-//!     let _triangles = &sight.indices(chunk.batch)[first..first + chunk.n_indices as usize];
-//!     // ... draw them with the positions of `world.batches[chunk.batch]`
+//! list.fill(&sight, &seen);
+//! for draw in &list {
+//!     let (_triangles, _positions) = (draw.indices(&sight), &draw.batch(&world).primitive.positions);
 //! }
-//! for detail in seen.details() {
-//!     let _object = &world.details[detail.0 as usize];
+//! for &detail in seen.details() {
+//!     let _object = &world[detail]; // a mesh and a transform
 //! }
 //! assert!(seen.cells().len() < world.graph.cells.len() / 2);
 //!
@@ -65,9 +64,12 @@
 
 mod boxes;
 mod chunks;
+mod details;
+mod draw;
 mod exits;
 mod follow;
 mod occluder;
+mod pick;
 mod region;
 mod see;
 mod seen;
@@ -77,7 +79,9 @@ mod state;
 mod view;
 
 pub use chunks::Chunk;
+pub use draw::{Draw, DrawList};
 pub use follow::{Follower, Step};
+pub use pick::{Hit, NotFinite, Target};
 pub use region::Narrowing;
 pub use see::{SeeOptions, Viewer};
 pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};

@@ -319,6 +319,12 @@ impl Sight {
         self.n_portals
     }
 
+    /// How many structural batches there are.
+    #[must_use]
+    pub fn n_batches(&self) -> usize {
+        self.indices.len()
+    }
+
     /// Structural triangles and those of placed details.
     #[must_use]
     pub fn n_triangles(&self) -> u64 {

@@ -11,20 +11,20 @@
 //! matter, leaves a cell where no portal is, or meets a triangle that another of other cells overlaps.
 //! The tests of triangles are the same in all trees, to the bit.
 
-use enfilade_cpg::{CellId, Locator, PortalId, World};
+use enfilade_cpg::{CellId, Locator, World};
 use enfilade_geom::ray::hit_triangle;
 use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
+use crate::details::Details;
 use crate::sight::point;
-use crate::state::SightState;
 
 /// Cells followed before the whole world's tree is asked; it is the faster one by then.
 const MAX_CELLS: usize = 6;
 
 const NONE: u32 = u32::MAX;
 
-/// The first structural triangle on a segment.
+/// The first structural triangle on a segment, as [`Sightlines::first_hit`] tells it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SightHit {
     /// Where along the segment, 0 to 1.
@@ -41,9 +41,9 @@ pub struct SightHit {
 
 /// A triangle of an opening.
 #[derive(Clone, Debug)]
-struct Opening {
-    corners: Triangle,
-    portal: u32,
+pub(crate) struct Opening {
+    pub(crate) corners: Triangle,
+    pub(crate) portal: u32,
     /// The two cells.
     cells: [u32; 2],
     /// Which edges, opposite each corner, are the opening's rim.
@@ -54,18 +54,22 @@ struct Opening {
 const OPENING: u32 = 1 << 30;
 
 /// A world made ready for lines of sight. Apart from [`Sight`](crate::Sight), because it holds the
-/// triangles themselves: about 150 bytes each, more for those that several cells see.
+/// triangles themselves: about 150 bytes each, more for those that several cells see; those of a detail mesh once, however
+/// often it is placed.
 #[derive(Clone, Debug)]
 pub struct Sightlines {
-    locator: Locator,
-    whole: Bvh,
+    pub(crate) locator: Locator,
+    pub(crate) whole: Bvh,
     /// Batch and number in it.
-    source: Vec<(u32, u32)>,
+    pub(crate) source: Vec<(u32, u32)>,
     /// Overlapped by a triangle that other cells list.
     is_doubtful: Vec<bool>,
     /// Of all walls, for the cells.
-    triangles: Vec<Triangle>,
-    openings: Vec<Opening>,
+    pub(crate) triangles: Vec<Triangle>,
+    pub(crate) openings: Vec<Opening>,
+    /// Over the openings.
+    pub(crate) shut: Bvh,
+    pub(crate) details: Details,
     trees: BoxTrees,
     /// By cell: over its walls and openings.
     roots: Vec<Root>,
@@ -80,7 +84,8 @@ enum Walk {
 }
 
 impl Sightlines {
-    /// Makes a valid world ready: O(n log n) in its triangles.
+    /// Makes a valid world ready: O(n log n) in its triangles. [`Sightlines::pick`] and [`Sightlines::is_clear`] are what
+    /// to ask it.
     #[must_use]
     pub fn build(world: &World) -> Self {
         let mut triangles: Vec<Triangle> = Vec::new();
@@ -90,7 +95,7 @@ impl Sightlines {
             let p = &batch.primitive;
             for (i, t) in p.indices.chunks_exact(3).enumerate() {
                 for c in &batch.cells {
-                    by_cell[c.0 as usize].push(triangles.len() as u32);
+                    by_cell[c.idx()].push(triangles.len() as u32);
                 }
                 triangles.push([0, 1, 2].map(|k| point(p.positions[t[k] as usize])));
                 source.push((b as u32, i as u32));
@@ -112,7 +117,7 @@ impl Sightlines {
                 let n = piece.len();
                 for k in 1..n.saturating_sub(1) {
                     for c in portal.cells {
-                        opening_boxes[c.0 as usize].push(openings.len() as u32);
+                        opening_boxes[c.idx()].push(openings.len() as u32);
                     }
                     openings.push(Opening {
                         corners: [piece[0], piece[k], piece[k + 1]].map(point),
@@ -149,6 +154,8 @@ impl Sightlines {
             source,
             is_doubtful,
             triangles,
+            shut: Bvh::build(&openings.iter().map(|o| o.corners).collect::<Vec<_>>()),
+            details: Details::build(world),
             openings,
             trees,
             roots,
@@ -186,32 +193,6 @@ impl Sightlines {
             front,
             cell,
         }
-    }
-
-    /// Whether a segment meets neither a structural triangle nor a portal that is closed in `state`.
-    #[must_use]
-    pub fn is_clear(&self, state: &SightState, a: [f32; 3], b: [f32; 3]) -> bool {
-        let (a, b) = (point(a), point(b));
-        !self.whole.any_hit(a, b, |_| false) && !self.meets_closed(state, a, b)
-    }
-
-    fn meets_closed(&self, state: &SightState, a: DVec3, b: DVec3) -> bool {
-        let Some(look) = Look::new(&Ray::segment(a, b), self.near) else {
-            return false;
-        };
-        let (mut t, mut came_by) = (0.0, NONE);
-        let mut cell = self.locator.locate(a).map(|c| c.0);
-        while let Some(from) = cell {
-            let Some((at, portal, to)) = self.next_opening(from, &look, t, came_by) else {
-                return false;
-            };
-            if !state.is_open(PortalId(portal)) {
-                return true;
-            }
-            // Every step is farther along, so it ends.
-            (t, came_by, cell) = (at.next_up(), portal, Some(to));
-        }
-        false
     }
 
     fn hit_of_whole(&self, a: DVec3, b: DVec3) -> Option<(f64, u32, bool)> {
@@ -265,36 +246,6 @@ impl Sightlines {
                 limit(&found)
             });
         found
-    }
-
-    /// The first opening of a cell from `t` on, but for the portal come by: where, its portal, and
-    /// the cell behind.
-    fn next_opening(
-        &self,
-        cell: u32,
-        look: &Look,
-        t: f64,
-        came_by: u32,
-    ) -> Option<(f64, u32, u32)> {
-        let mut first = (f64::INFINITY, NONE);
-        let root = self.roots[cell as usize];
-        self.trees.for_each_on_ray(root, &look.boxes, 1.0, |item| {
-            if item & OPENING != 0 {
-                let opening = &self.openings[(item & !OPENING) as usize];
-                let met = look.meet(&opening.corners, self.near, [false; 3]);
-                if let Met::Inside(at) = met
-                    && opening.portal != came_by
-                    && at >= t
-                    && at <= 1.0
-                    && at < first.0
-                {
-                    first = (at, item & !OPENING);
-                }
-            }
-            1.0
-        });
-        let opening = self.openings.get(first.1 as usize)?;
-        Some((first.0, opening.portal, opening.other(cell)))
     }
 
     /// Follows the segment from cell to cell.

@@ -2,6 +2,8 @@
 
 use enfilade_cpg::{CellId, PortalId};
 
+use enfilade_geom::DVec3;
+
 use crate::sight::{Sight, point};
 
 /// Half-spaces that narrow one portal, at most.
@@ -98,6 +100,17 @@ impl SightState {
             .get(cell.0 as usize)
             .copied()
             .unwrap_or_default()
+    }
+
+    /// Whether nothing passes a portal at a point of its opening: it is closed, or a plane that narrows it leaves the
+    /// point out. O(1). [Units: wu]
+    #[must_use]
+    pub(crate) fn is_shut_at(&self, portal: PortalId, p: DVec3) -> bool {
+        let is_out = |cut: &[f32; 4]| {
+            let [x, y, z, d] = cut.map(f64::from);
+            DVec3::new(x, y, z).dot(p) + d < 0.0
+        };
+        !self.is_open(portal) || self.cuts(portal.0).iter().any(is_out)
     }
 
     #[inline]

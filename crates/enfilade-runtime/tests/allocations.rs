@@ -1,6 +1,8 @@
 //! No question allocates once its buffers have grown.
 
-use enfilade_runtime::{Follower, Narrowing, SeeOptions, Sight, SightState, View, Viewer};
+use enfilade_runtime::{
+    DrawList, Follower, Narrowing, SeeOptions, Sight, SightState, Sightlines, View, Viewer,
+};
 use enfilade_testkit::{GridParams, Rng, courtyard, room_grid};
 
 #[test]
@@ -14,6 +16,7 @@ fn nothing_is_allocated_once_warm() {
     ];
     for world in worlds {
         let sight = Sight::build(&world).unwrap();
+        let lines = Sightlines::build(&world);
         let state = SightState::new(&sight);
         for narrowing in [Narrowing::Rectangle, Narrowing::Polygon] {
             let options = SeeOptions {
@@ -34,10 +37,16 @@ fn nothing_is_allocated_once_warm() {
                 })
                 .collect();
             let mut follower = Follower::new(&sight, views[0].eye());
+            let mut list = DrawList::new();
             let mut ask = || {
                 let mut n = 0;
                 for view in &views {
-                    n += viewer.see(&sight, &state, view).chunks().len();
+                    let seen = viewer.see(&sight, &state, view);
+                    list.fill(&sight, &seen);
+                    n += seen.chunks().len() + list.draws().len();
+                    n += usize::from(lines.is_clear(&state, view.eye(), views[0].eye()));
+                    let hit = lines.pick(&state, view.eye(), views[0].eye());
+                    n += usize::from(hit.is_ok_and(|h| h.is_some()));
                     follower.step(&sight, view.eye());
                 }
                 n

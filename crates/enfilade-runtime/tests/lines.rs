@@ -116,7 +116,7 @@ fn things_are_followed_through_portals_and_found_again() {
                 // The portals lead from cell to cell.
                 let mut cell = before.unwrap();
                 for p in follower.crossed() {
-                    let [a, b] = world.graph.portals[p.0 as usize].cells;
+                    let [a, b] = world.graph[*p].cells;
                     assert!(cell == a || cell == b);
                     cell = if cell == a { b } else { a };
                 }

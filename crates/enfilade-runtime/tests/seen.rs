@@ -626,7 +626,7 @@ fn portals_of_a_small_share_are_listed_and_not_followed() {
         let behind: BTreeSet<CellId> = some.stopped().iter().map(|s| s.1).collect();
         assert!(some.cells().len() == cells.len() || !behind.is_empty());
         for &(portal, cell) in some.stopped() {
-            assert!(world.graph.portals[portal.0 as usize].cells.contains(&cell));
+            assert!(world.graph[portal].cells.contains(&cell));
             assert!(all.portals().contains(&portal), "view {i}");
         }
         // No visit is smaller.

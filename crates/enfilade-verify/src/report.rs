@@ -73,6 +73,8 @@ pub enum FailureKind {
     Unlisted,
     /// *Complete*: no batch holds the triangle of the source that was met.
     MissingTriangle,
+    /// *Conservative*: a straight line leads to a cell that the world's own potentially visible set hides from its start.
+    Hidden,
 }
 
 impl FailureKind {
@@ -81,6 +83,7 @@ impl FailureKind {
     pub fn promise(self) -> &'static str {
         match self {
             Self::Unlisted | Self::MissingTriangle => "complete",
+            Self::Hidden => "conservative",
             _ => "sealed",
         }
     }
@@ -94,6 +97,7 @@ impl FailureKind {
             Self::InSolid => "the locator says solid in open air",
             Self::Unlisted => "a triangle's batch lacks a cell that sees it",
             Self::MissingTriangle => "a triangle of the source is in no batch",
+            Self::Hidden => "a cell is seen that the world's set of what is seen lacks",
         }
     }
 }

@@ -55,7 +55,7 @@ pub(crate) fn draw_segment(subject: &Subject, rng: &mut Rng, i: u64) -> (DVec3, 
         7 if has_portals => {
             let first = subject.crossable[rng.below(subject.crossable.len())];
             let cell = subject.portals[first.0 as usize].cells[rng.below(2)];
-            let exits = &subject.world.graph.cells[cell.0 as usize].portals;
+            let exits = &subject.world.graph[cell].portals;
             let second = if exits.is_empty() {
                 first
             } else {

@@ -96,6 +96,14 @@ pub(crate) fn follow(
         if cell != from {
             return Err(wrong(FailureKind::WrongSide, cell, from));
         }
+        if subject
+            .world
+            .pvs
+            .as_ref()
+            .is_some_and(|p| !p.sees(start, to))
+        {
+            return Err(wrong(FailureKind::Hidden, start, to));
+        }
         cell = to;
         t = crossing.t;
     }

@@ -343,7 +343,7 @@ impl<'a> Court<'a> {
             .sampled
             .iter()
             .copied()
-            .filter(|c| !world.graph.cells[c.0 as usize].outdoor)
+            .filter(|c| !world.graph[*c].outdoor)
             .collect();
         Self {
             subject,

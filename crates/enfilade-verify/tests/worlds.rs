@@ -3,7 +3,7 @@
 mod common;
 
 use common::{A, B, DOOR, DOOR_X, OUTDOORS, WINDOW, house, house_with_locator_plane, moved};
-use enfilade_cpg::World;
+use enfilade_cpg::{CellSet, Pvs, World};
 use enfilade_geom::{DMat4, DVec3, Triangle};
 use enfilade_verify::{FailureKind, VerifyOptions, VerifyReport, verify_world};
 
@@ -142,7 +142,7 @@ fn a_sliver_thinner_than_rounding_may_have_its_portals_in_any_order() {
     for portal in [back, shifted(1e-6)] {
         let id = enfilade_cpg::PortalId(world.graph.portals.len() as u32);
         for c in [A, B] {
-            world.graph.cells[c.0 as usize].portals.push(id);
+            world.graph[c].portals.push(id);
         }
         world.graph.portals.push(portal);
     }
@@ -211,6 +211,21 @@ fn a_batch_that_lacks_a_cell_is_seen() {
             .iter()
             .all(|f| f.expected == Some(B.0) && f.triangle.is_some())
     );
+}
+
+#[test]
+fn a_cell_that_the_worlds_own_set_hides_is_seen() {
+    let mut world = house();
+    let n = world.graph.cells.len();
+    let mut rows = vec![CellSet::all(n); n];
+    world.pvs = Some(Pvs::of_rows(&rows));
+    assert!(verify(&world).holds());
+    let [a, b] = world.graph.portals[0].cells;
+    rows[a.idx()].remove(b);
+    world.pvs = Some(Pvs::of_rows(&rows));
+    let report = verify(&world);
+    assert_eq!(kinds(&report), [FailureKind::Hidden], "{report}");
+    assert!(report.to_string().contains("conservative"), "{report}");
 }
 
 #[test]

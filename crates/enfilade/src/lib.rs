@@ -2,96 +2,158 @@
 //! from then on what can be seen and reached from where.
 //!
 //! ```text
-//! scene ──► bake ──► cell-and-portal graph ──► world file (.glb) ──► your engine
+//! scene ──► bake ──► cell-and-portal graph ──► world file (.glb) ──► your program
 //! ```
 //!
-//! | module | does |
-//! | --- | --- |
-//! | [`import`] | reads glTF, OBJ, PLY and STL into one [`Scene`](geom::scene::Scene) |
-//! | [`bake`] | scene → [`World`](cpg::World): finds cells and portals |
-//! | [`cpg`] | the graph, its invariants, the locator, and the file ([`cpg::wire`]) |
-//! | [`runtime`] | questions per frame |
-//! | [`vis`] | what can be seen from each cell, before run-time |
-//! | [`geom`] | boxes, planes, windings, the scene, the bounding volume hierarchy |
+//! # From a file to a frame
 //!
-//! # Reading a world
+//! A scene becomes a world once, by the command `enfilade bake house.glb -o world.glb` or in code (features `import` and
+//! `bake`). Here the scene is a house that the test kit makes:
+#![cfg_attr(all(feature = "import", feature = "bake"), doc = "```")]
+#![cfg_attr(not(all(feature = "import", feature = "bake")), doc = "```ignore")]
+//! use enfilade::bake::{BakeConfig, BakeContext, bake};
+//! use enfilade::import::{ImportOptions, import};
 //!
-//! A world file is a GLB that any viewer opens; `docs/format.md` describes it. Here one is made in
-//! code, as `enfilade bake` would write it: two rooms of 4 × 3 × 5 m with a doorway between.
+//! # let folder = std::env::temp_dir().join(format!("enfilade-tour-{}", std::process::id()));
+//! # std::fs::create_dir_all(&folder)?;
+//! # let (house, baked) = (folder.join("house.glb"), folder.join("world.glb"));
+//! # let scene = enfilade_testkit::furnished_house().scene;
+//! # std::fs::write(&house, enfilade::import::export_glb(&scene))?;
+//! let imported = import(&[house], &[], &ImportOptions::default())?;
+//! let output = bake(&imported.scene, &BakeConfig::default(), &BakeContext::default())?;
+//! enfilade::save(&baked, &output.world)?;
 //!
-//! ```
-//! use enfilade::cpg::wire::{decode_glb, encode_glb};
-//! use enfilade::cpg::{
-//!     Cell, CellId, CellPortalGraph, Locator, LocatorNode, Portal, PortalId, PortalKind, World,
-//! };
-//! use enfilade::geom::{Aabb, DVec3};
-//!
-//! let room = |name: &str, x: f32| Cell {
-//!     name: name.into(),
-//!     aabb: [[x, 0.0, 0.0], [x + 4.0, 3.0, 5.0]],
-//!     volume: 60.0,
-//!     portals: vec![PortalId(0)],
-//!     ..Cell::default()
-//! };
-//! // Counter-clockwise seen from the second cell, which the normal points to.
-//! let outline = vec![[4.0, 0.0, 2.0], [4.0, 2.1, 2.0], [4.0, 2.1, 3.0], [4.0, 0.0, 3.0]];
-//! let graph = CellPortalGraph {
-//!     cells: vec![room("cell-0", 0.0), room("cell-1", 4.0)],
-//!     portals: vec![Portal {
-//!         cells: [CellId(0), CellId(1)],
-//!         kind: PortalKind::Open,
-//!         normal: [1.0, 0.0, 0.0],
-//!         pieces: vec![outline.clone()],
-//!         outline,
-//!         area: 2.1,
-//!     }],
-//!     locator: Locator {
-//!         bounds: Aabb::new(DVec3::ZERO, DVec3::new(8.0, 3.0, 5.0)),
-//!         planes: vec![[1.0, 0.0, 0.0, -4.0]],
-//!         nodes: vec![LocatorNode {
-//!             plane: 0,
-//!             children: [Locator::leaf(Some(CellId(1))), Locator::leaf(Some(CellId(0)))],
-//!         }],
-//!         root: 0,
-//!         ..Locator::default()
-//!     },
-//!     ..CellPortalGraph::default()
-//! };
-//! let bytes = encode_glb(&World { graph, ..World::default() })?;
-//!
-//! // From here on it is what an engine does with a file.
-//! let world = decode_glb(&bytes)?; // checked: every invariant holds, or this is an error
-//! let eye = DVec3::new(1.0, 1.6, 2.0);
-//! let cell = world.graph.locator.locate(eye).expect("the eye is in a room");
-//! assert_eq!(world.graph.cells[cell.0 as usize].name, "cell-0");
-//!
-//! // Where do its doorways lead?
-//! for portal in &world.graph.cells[cell.0 as usize].portals {
-//!     let portal = &world.graph.portals[portal.0 as usize];
-//!     let [from, to] = portal.cells;
-//!     let next = if from == cell { to } else { from };
-//!     assert_eq!(world.graph.cells[next.0 as usize].name, "cell-1");
-//! }
-//!
-//! // What is drawn from here without looking through a doorway?
-//! let own = world.batches.iter().filter(|b| b.cells.contains(&cell));
-//! assert_eq!(own.count(), 0); // this world has no walls
+//! let world = enfilade::open(&baked)?; // checked: every invariant holds, or this is an error
+//! assert_eq!(world.graph.indoor_cells().count(), 12);
+//! # std::fs::remove_dir_all(&folder)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! The graph: each cell knows its portals, each portal its two cells.
+//!
+//! ```
+//! # let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(24, 1));
+//! let graph = &world.graph;
+//! let cell = graph.cell_named("cell-3").expect("there is a cell-3");
+//! println!("{} has {:.0} m³", graph[cell].name, graph[cell].volume);
+//! for exit in graph.exits(cell) {
+//!     println!("{}, {:?}, leads to {}", exit.id, exit.portal.kind, graph[exit.to].name);
+//!     assert_eq!(graph[exit.id].beyond(exit.to), cell);
+//! }
+//! ```
+//!
+//! A frame: a [`Sight`] is made once; a [`Viewer`] (one a camera) answers what a [`View`] sees; a [`DrawList`] is that as
+//! few ranges of triangles.
+//!
+//! ```
+//! use enfilade::{DrawList, Sight, SightState, View, Viewer};
+//! # let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(24, 1));
+//!
+//! let sight = Sight::build(&world)?;
+//! let mut state = SightState::new(&sight); // which doors are open; all
+//! let (mut viewer, mut list) = (Viewer::new(&sight), DrawList::new());
+//!
+//! // Every frame, nothing of which allocates once it is warm:
+//! let view = View::perspective([2.0, 1.6, 2.0], [1.0, 0.0, 0.3], [0.0, 1.0, 0.0], 1.0, 16.0 / 9.0)?;
+//! let seen = viewer.see(&sight, &state, &view);
+//! list.fill(&sight, &seen);
+//! for draw in &list {
+//!     let primitive = &draw.batch(&world).primitive; // positions, normals, uvs, material
+//!     let triangles = draw.indices(&sight);
+//!     // ... draw them
+//! #     assert!(triangles.iter().all(|&i| (i as usize) < primitive.positions.len()));
+//! }
+//! for &detail in seen.details() {
+//!     let object = &world[detail];
+//!     // ... draw `world.detail_meshes[object.mesh as usize]` with `object.transform`
+//! #     assert!((object.mesh as usize) < world.detail_meshes.len());
+//! }
+//! assert!(list.n_triangles() < sight.n_triangles());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Doors, picking and lines of sight: a portal that is closed hides what is behind it and stops a line.
+//!
+//! ```
+//! use enfilade::{Sight, Sightlines, SightState, Target};
+//! # let mut params = enfilade_testkit::GridParams::offices(24, 1);
+//! # params.furniture = 0;
+//! # let world = enfilade_testkit::room_grid(&params);
+//!
+//! let sight = Sight::build(&world)?;
+//! let lines = Sightlines::build(&world);
+//! let mut state = SightState::new(&sight);
+//!
+//! let (door, portal) = (enfilade::PortalId(0), &world.graph.portals[0]);
+//! let [x, y, z] = portal.center();
+//! let step = portal.normal.map(|n| 0.2 * n);
+//! let (here, there) = ([x - step[0], y - step[1], z - step[2]], [x + step[0], y + step[1], z + step[2]]);
+//!
+//! assert!(lines.is_clear(&state, here, there));
+//! state.close(door);
+//! let hit = lines.pick(&state, here, there)?.expect("a closed door");
+//! assert_eq!(hit.target, Target::Portal(door));
+//! assert_eq!(hit.cell, sight.locate(here));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The folder `examples` has all of this as programs: `bake_a_file`, `game_loop`, `doors`, and `own_builder`, which makes a
+//! world without a bake.
+//!
+//! # Features
+//!
+//! | feature | module | does |
+//! | --- | --- | --- |
+//! | always | [`cpg`] | the graph, its invariants, the locator, and the file ([`cpg::wire`]) |
+//! | always | [`runtime`] | questions per frame |
+//! | always | [`geom`] | boxes, planes, windings, the scene, the bounding volume hierarchy |
+//! | `import` | `import` | reads glTF, OBJ, PLY and STL into one [`Scene`](geom::scene::Scene) |
+//! | `bake` | `bake` | scene → [`World`]: finds cells and portals |
+//! | `vis` | `vis` | what can be seen from each cell, before run-time |
+//! | `render` | `render` | pictures of a world with wgpu |
+//! | `verify` | `verify` | tests the promises of a world |
+//!
+//! None is on by default: a game that reads worlds and asks them links neither importers nor builders.
 //!
 //! # Conventions, everywhere
 //!
 //! Right-handed, +Y up, meters; front faces are counter-clockwise; ranges are half-open; building
-//! computes in `f64`, files hold `f32`; ids are positions in lists.
+//! computes in `f64`, files hold `f32`; ids are positions in lists. Points and directions that go into a question of the
+//! run-time or come out of it are `[f32; 3]`, as in the file.
 //!
 //! # What is not promised
 //!
 //! Cells need not be convex, and a scene without rooms has none but the outdoors. Geometry that
 //! moves (door leaves, furniture) is detail: it bounds no cell.
 
-pub use enfilade_bake as bake;
+mod file;
+
 pub use enfilade_cpg as cpg;
 pub use enfilade_geom as geom;
-pub use enfilade_import as import;
 pub use enfilade_runtime as runtime;
+
+#[cfg(feature = "bake")]
+pub use enfilade_bake as bake;
+#[cfg(feature = "vis")]
 pub use enfilade_vis as vis;
+#[cfg(feature = "import")]
+pub use enfilade_import as import;
+#[cfg(feature = "render")]
+pub use enfilade_render as render;
+#[cfg(feature = "verify")]
+pub use enfilade_verify as verify;
+
+pub use cpg::{
+    Batch, Cell, CellId, CellPortalGraph, DetailObject, Exit, Portal, PortalId, PortalKind, Pvs,
+    World,
+};
+pub use file::{FileError, open, save};
+pub use runtime::{
+    ChunkId, DetailId, Draw, DrawList, Follower, Hit, NotFinite, Seen, Sight, SightError,
+    SightState, Sightlines, Step, Target, View, ViewError, Viewer,
+};
+
+/// The README's programs, compiled with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

@@ -206,6 +206,7 @@ pub(crate) fn cut_cell(
 
     // 3. Everything that names the cell.
     let mut out = world.clone();
+    out.pvs = None;
     out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids);
     let halved = parts.hand_out_portals(&mut out, complex.opening_tolerance());
     let mut new_portals: Vec<Portal> = Vec::new();
@@ -350,8 +351,8 @@ impl Parts {
     /// Portals of the old cell go to one part; those that both border on are cut in two.
     fn hand_out_portals(&self, out: &mut World, outward: f64) -> Vec<(PortalId, PortalId)> {
         let mut halved = Vec::new();
-        for id in out.graph.cells[self.cell.0 as usize].portals.clone() {
-            let p = &out.graph.portals[id.0 as usize];
+        for id in out.graph[self.cell].portals.clone() {
+            let p = &out.graph[id];
             let end = usize::from(p.cells[1] == self.cell);
             let normal = DVec3::from(p.normal.map(f64::from)).normalize_or_zero();
             // From the portal into the cell.
@@ -403,7 +404,7 @@ impl Parts {
                     let small = renamed(*b, small.clone());
                     let beyond = base.cells[1 - end].0 as usize;
                     out.graph.cells[beyond].portals.push(second);
-                    out.graph.portals[id.0 as usize] = renamed(*a, big.clone());
+                    out.graph[id] = renamed(*a, big.clone());
                     out.graph.portals.push(small);
                     halved.push((id, second));
                 }
@@ -411,7 +412,7 @@ impl Parts {
                     // Whole as it was, but for the cell's number.
                     let side = rest.first().map_or(FRONT, |(side, _)| *side);
                     kept.cells[end] = self.id(side);
-                    out.graph.portals[id.0 as usize] = kept;
+                    out.graph[id] = kept;
                 }
             }
         }
@@ -483,7 +484,7 @@ impl Parts {
     }
 
     fn measure_cells(&self, out: &mut World, partition: &Partition) {
-        let old = out.graph.cells[self.cell.0 as usize].clone();
+        let old = out.graph[self.cell].clone();
         let taken = |name: &str| out.graph.cells.iter().any(|c| c.name == name);
         let new_name = (out.graph.cells.len()..)
             .map(|i| format!("cell-{i}"))
@@ -519,7 +520,7 @@ impl Parts {
                 .map(|(i, _)| PortalId(i as u32))
                 .collect();
             let b = partition.aabbs[side as usize];
-            let cell = &mut out.graph.cells[id.0 as usize];
+            let cell = &mut out.graph[id];
             cell.n_triangles = triangles as u32;
             cell.n_detail_triangles = detail_triangles as u32;
             cell.portals = portals;

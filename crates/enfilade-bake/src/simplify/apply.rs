@@ -7,7 +7,8 @@ use enfilade_geom::scene::Primitive;
 
 /// The world with each cell part of the cell that `into` says, and the new number of each old cell.
 ///
-/// `into` names a cell of each group for all of it. Linear in the world.
+/// `into` names a cell of each group for all of it. Names such as `cell-3` follow the new numbers, others stay. Linear
+/// in the world.
 pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     let old = &world.graph;
     let mut number = vec![u32::MAX; into.len()];
@@ -37,6 +38,11 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
             }
         }
         cell_of.push(CellId(*slot));
+    }
+    for (i, cell) in (0..).zip(&mut cells) {
+        if is_numbered(&cell.name) {
+            cell.name = CellId(i).to_string();
+        }
     }
     let renumbered = |list: &[CellId]| {
         let mut out: Vec<CellId> = list.iter().map(|c| cell_of[c.0 as usize]).collect();
@@ -79,12 +85,19 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
         }
     }
     let mut out = world.clone();
+    out.pvs = None;
     out.graph.locator = locator(&old.locator, &cell_of);
     out.graph.cells = cells;
     out.graph.portals = portals;
     out.batches = batches;
     out.details = details;
     (out, cell_of)
+}
+
+/// Whether a name is one that a builder gave by number.
+fn is_numbered(name: &str) -> bool {
+    let number = name.strip_prefix("cell-");
+    number.is_some_and(|n| n.parse::<u32>().is_ok())
 }
 
 /// Batches under way: one for each list of cells, material and set of attributes, seals apart.

@@ -154,11 +154,7 @@ const STEPS: usize = 48;
 pub(super) fn views(world: &World, n_eyes: usize, first: u32) -> Eyes {
     let locator = &world.graph.locator;
     let bvh = Bvh::build(&triangles_of(world));
-    let indoor = |p: DVec3| {
-        locator
-            .locate(p)
-            .filter(|c| !world.graph.cells[c.0 as usize].outdoor)
-    };
+    let indoor = |p: DVec3| locator.locate(p).filter(|c| !world.graph[*c].outdoor);
     let b = locator.bounds;
     // Halton's sequence: even, and the same every time.
     let halton = |mut i: u32, base: u32| {

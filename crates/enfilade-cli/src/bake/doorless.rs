@@ -12,16 +12,15 @@ const PERSON: [f32; 3] = [0.6, 1.8, 0.6];
 
 /// Says which rooms have windows and cracks at most, if any, largest first; whether there are any.
 pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
-    let mut rooms: Vec<(usize, &Cell)> = graph
-        .cells
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| !c.outdoor && is_room(c) && !has_doorway(graph, c))
+    let mut rooms: Vec<&Cell> = graph
+        .indoor_cells()
+        .map(|(_, c)| c)
+        .filter(|c| is_room(c) && !has_doorway(graph, c))
         .collect();
     if rooms.is_empty() {
         return Ok(false);
     }
-    rooms.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume));
+    rooms.sort_by(|a, b| b.volume.total_cmp(&a.volume));
     let (n, noun) = match rooms.len() {
         1 => (1, "room has"),
         n => (n, "rooms have"),
@@ -31,12 +30,12 @@ pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> i
         "{n} {noun} no doorway: if door leaves are objects of their own, \
          use --detail-name 'PATTERN' (-v prints names)"
     )?;
-    for (id, cell) in rooms.iter().take(SHOWN) {
+    for cell in rooms.iter().take(SHOWN) {
         let [x, y, z] = [0, 1, 2].map(|k| 0.5 * (cell.aabb[0][k] + cell.aabb[1][k]));
         writeln!(
             out,
-            "  cell {id}: {:.1} m³ around {x:.2} {y:.2} {z:.2}",
-            cell.volume
+            "  {}: {:.1} m³ around {x:.2} {y:.2} {z:.2}",
+            cell.name, cell.volume
         )?;
     }
     if rooms.len() > SHOWN {
@@ -47,7 +46,7 @@ pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> i
 
 /// Says that a scene has no room, if it has none, and what is mostly the reason; whether it has none.
 pub(super) fn write_roomless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
-    if graph.cells.iter().any(|c| !c.outdoor) {
+    if graph.indoor_cells().next().is_some() {
         return Ok(false);
     }
     let size = graph
@@ -69,10 +68,7 @@ fn is_room(cell: &Cell) -> bool {
 }
 
 fn has_doorway(graph: &CellPortalGraph, cell: &Cell) -> bool {
-    cell.portals.iter().any(|p| {
-        matches!(
-            graph.portals[p.0 as usize].kind,
-            PortalKind::Open | PortalKind::Door
-        )
-    })
+    cell.portals
+        .iter()
+        .any(|p| matches!(graph[*p].kind, PortalKind::Open | PortalKind::Door))
 }

@@ -307,11 +307,11 @@ impl App<'_> {
         };
         if open.closed.remove(&portal) {
             open.studio.state.open(portal);
-            open.say(format!("portal {} is open", portal.0));
+            open.say(format!("{portal} is open"));
         } else {
             open.closed.insert(portal);
             open.studio.state.close(portal);
-            open.say(format!("portal {} is closed", portal.0));
+            open.say(format!("{portal} is closed"));
         }
     }
 

@@ -281,6 +281,14 @@ impl<'a> Layout<'a> {
                 bulk.out.extend_from_slice(&node.children[1].to_le_bytes());
             }
         }
+        if let Some(pvs) = &world.pvs {
+            for words in [&pvs.ends[..], pvs.runs.as_flattened()] {
+                bulk.align(ALIGNMENT);
+                for word in words {
+                    bulk.out.extend_from_slice(&word.to_le_bytes());
+                }
+            }
+        }
         bulk.align(4);
     }
 }

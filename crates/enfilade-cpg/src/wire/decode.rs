@@ -16,7 +16,7 @@ use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, W
 use crate::look::material_of_text;
 use crate::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
-    PortalKind, Provenance, Statistics, World,
+    PortalKind, Provenance, Pvs, Statistics, World,
 };
 
 /// Decodes a world from one GLB.
@@ -198,6 +198,7 @@ impl<'a> Reader<'a> {
         });
         let images = images.collect::<Result<_, _>>()?;
         let leak_path = self.leak_path()?;
+        let pvs = self.pvs()?;
         let graph = self.graph()?;
         Ok(World {
             graph,
@@ -208,6 +209,7 @@ impl<'a> Reader<'a> {
             textures,
             images,
             leak_path,
+            pvs,
         })
     }
 
@@ -224,6 +226,28 @@ impl<'a> Reader<'a> {
             .and_then(|p| p.attributes.get("POSITION"));
         let line = line.ok_or_else(|| broken("the leak path", "its node is no polyline"))?;
         self.rows(*line)
+    }
+
+    fn pvs(&mut self) -> Result<Option<Pvs>, WireError> {
+        let Some(pvs) = &self.root.extensions.graph.pvs else {
+            return Ok(None);
+        };
+        let of = "the potentially visible set";
+        let (rows, runs) = (
+            self.optional_view(pvs.rows, of)?,
+            self.optional_view(pvs.runs, of)?,
+        );
+        self.spend(rows.len() as u64 + runs.len() as u64)?;
+        let (rows, rows_rest) = rows.as_chunks::<4>();
+        let (runs, runs_rest) = runs.as_chunks::<8>();
+        if !rows_rest.is_empty() || !runs_rest.is_empty() {
+            return Err(broken(of, "a buffer view is cut off"));
+        }
+        let run = |r: &[u8; 8]| [0, 4].map(|at| u32::from_le_bytes(four(r, at)));
+        Ok(Some(Pvs {
+            ends: rows.iter().map(|&r| u32::from_le_bytes(r)).collect(),
+            runs: runs.iter().map(run).collect(),
+        }))
     }
 
     fn graph(&mut self) -> Result<CellPortalGraph, WireError> {

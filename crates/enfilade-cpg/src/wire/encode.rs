@@ -109,6 +109,10 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         .sum();
     let portal_corners = layout.view(corners as u64 * 12);
     let locator = lay_out_locator(layout, world);
+    let pvs = world.pvs.as_ref().map(|pvs| json::Pvs {
+        rows: layout.view(pvs.ends.len() as u64 * 4),
+        runs: layout.view(pvs.runs.len() as u64 * 8),
+    });
     let n_bin = layout.len.next_multiple_of(4);
     let generator = match graph.provenance.generator.as_str() {
         "" => "enfilade",
@@ -148,6 +152,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 detail_meshes,
                 locator,
                 leak_path,
+                pvs,
                 provenance: json::Provenance {
                     generator: graph.provenance.generator.clone(),
                     method: graph.provenance.method.clone(),
@@ -193,7 +198,7 @@ fn lay_out_batches<'a>(
         }
         let name = match cells {
             [] => "unseen".to_owned(),
-            [cell] => world.graph.cells[cell.0 as usize].name.clone(),
+            [cell] => world.graph[*cell].name.clone(),
             _ => format!("shared-{}", shared.len()),
         };
         let parts = members

@@ -168,6 +168,8 @@ pub(super) struct Graph {
     /// Node of the leak path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) leak_path: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) pvs: Option<Pvs>,
     pub(super) provenance: Provenance,
     pub(super) statistics: BTreeMap<String, f64>,
 }
@@ -240,6 +242,16 @@ pub(super) struct Locator {
     /// Buffer view of nodes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) nodes: Option<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Pvs {
+    /// Buffer view: by cell, where its runs end. Absent where there is no cell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) rows: Option<u32>,
+    /// Buffer view of runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) runs: Option<u32>,
 }
 
 #[derive(Serialize, Deserialize)]

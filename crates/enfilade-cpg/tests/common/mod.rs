@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use enfilade_cpg::{
-    Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
-    PortalKind, Provenance, Statistics, World,
+    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Locator, LocatorNode, Portal,
+    PortalId, PortalKind, Provenance, Pvs, Statistics, World,
 };
 use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
 use enfilade_geom::{Aabb, DVec3};
@@ -208,7 +208,18 @@ pub(crate) fn two_rooms() -> World {
             bytes: Vec::new(),
         }],
         leak_path: Vec::new(),
+        pvs: None,
     }
+}
+
+/// The two rooms with what is seen from each: all but the second room from the outdoors.
+pub(crate) fn two_rooms_with_pvs() -> World {
+    let mut world = two_rooms();
+    let n = world.graph.cells.len();
+    let mut rows = vec![CellSet::all(n); n];
+    rows[n - 1].remove(CellId(1));
+    world.pvs = Some(Pvs::of_rows(&rows));
+    world
 }
 
 /// The two rooms with everything in them that inputs hold and glTF forbids.

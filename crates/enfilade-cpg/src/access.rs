@@ -1,0 +1,265 @@
+//! Ways into a graph: by id, by name, from cell to cell.
+
+use std::fmt;
+use std::ops::{Index, IndexMut};
+
+use enfilade_geom::DVec3;
+
+use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, World};
+
+impl CellId {
+    /// Its position in [`CellPortalGraph::cells`].
+    #[inline]
+    #[must_use]
+    pub fn idx(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl PortalId {
+    /// Its position in [`CellPortalGraph::portals`].
+    #[inline]
+    #[must_use]
+    pub fn idx(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// `cell-3`: the name that builders give the cell, unless it is the outdoors.
+impl fmt::Display for CellId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cell-{}", self.0)
+    }
+}
+
+/// `portal-3`. Portals have no names of their own.
+impl fmt::Display for PortalId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "portal-{}", self.0)
+    }
+}
+
+/// A portal as left from one of its cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exit<'a> {
+    /// The portal's id.
+    pub id: PortalId,
+    /// The portal.
+    pub portal: &'a Portal,
+    /// The cell behind it.
+    pub to: CellId,
+}
+
+impl Portal {
+    /// The cell on the other side, seen from `cell`. O(1).
+    ///
+    /// `cell` must be one of its two; for any other the answer is the first of these. A debug build
+    /// panics then.
+    #[inline]
+    #[must_use]
+    pub fn beyond(&self, cell: CellId) -> CellId {
+        debug_assert!(self.cells.contains(&cell), "{cell} is not at this portal");
+        self.cells[usize::from(self.cells[0] == cell)]
+    }
+}
+
+impl CellPortalGraph {
+    /// The ids of all cells, ascending.
+    pub fn cell_ids(&self) -> impl ExactSizeIterator<Item = CellId> + use<> {
+        (0..self.cells.len() as u32).map(CellId)
+    }
+
+    /// The ids of all portals, ascending.
+    pub fn portal_ids(&self) -> impl ExactSizeIterator<Item = PortalId> + use<> {
+        (0..self.portals.len() as u32).map(PortalId)
+    }
+
+    /// The portals of a cell, ascending, each with the cell behind it. Ends in time linear in their number; empty for
+    /// a cell that does not exist.
+    pub fn exits(&self, cell: CellId) -> impl Iterator<Item = Exit<'_>> + Clone {
+        let ids = self.cells.get(cell.idx()).map_or(&[][..], |c| &c.portals);
+        ids.iter().map(move |&id| {
+            let portal = &self[id];
+            Exit {
+                id,
+                portal,
+                to: portal.beyond(cell),
+            }
+        })
+    }
+
+    /// The cells but for the outdoors, ascending. O(cells).
+    pub fn indoor_cells(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
+        let numbered = (0..).map(CellId).zip(&self.cells);
+        numbered.filter(|(_, cell)| !cell.outdoor)
+    }
+
+    /// The cell that is the outdoors, if there is one. O(cells).
+    #[must_use]
+    pub fn outdoors(&self) -> Option<CellId> {
+        self.cell_ids().find(|&c| self[c].outdoor)
+    }
+
+    /// The cell of a name, such as `cell-3` or `outdoors`; its name is `graph[cell].name`. O(cells).
+    #[must_use]
+    pub fn cell_named(&self, name: &str) -> Option<CellId> {
+        self.cell_ids().find(|&c| self[c].name == name)
+    }
+
+    /// The cell of a point; `None` in solid matter, and for what is no number. About 100 ns. [Units: wu]
+    #[must_use]
+    pub fn locate(&self, p: [f32; 3]) -> Option<CellId> {
+        let is_point = p.iter().all(|x| x.is_finite());
+        let p = DVec3::from_array(p.map(f64::from));
+        self.locator.locate(p).filter(|_| is_point)
+    }
+
+    /// The portals that join two cells, ascending; none for cells that are not neighbors.
+    pub fn portals_between(&self, a: CellId, b: CellId) -> impl Iterator<Item = PortalId> {
+        self.exits(a).filter(move |e| e.to == b).map(|e| e.id)
+    }
+}
+
+/// # Panics
+///
+/// When the graph has no such cell.
+impl Index<CellId> for CellPortalGraph {
+    type Output = Cell;
+
+    #[inline]
+    fn index(&self, cell: CellId) -> &Cell {
+        &self.cells[cell.idx()]
+    }
+}
+
+/// # Panics
+///
+/// When the graph has no such cell.
+impl IndexMut<CellId> for CellPortalGraph {
+    #[inline]
+    fn index_mut(&mut self, cell: CellId) -> &mut Cell {
+        &mut self.cells[cell.idx()]
+    }
+}
+
+/// # Panics
+///
+/// When the graph has no such portal.
+impl Index<PortalId> for CellPortalGraph {
+    type Output = Portal;
+
+    #[inline]
+    fn index(&self, portal: PortalId) -> &Portal {
+        &self.portals[portal.idx()]
+    }
+}
+
+/// # Panics
+///
+/// When the graph has no such portal.
+impl IndexMut<PortalId> for CellPortalGraph {
+    #[inline]
+    fn index_mut(&mut self, portal: PortalId) -> &mut Portal {
+        &mut self.portals[portal.idx()]
+    }
+}
+
+impl World {
+    /// The batches that one cell sees without passing a portal, in the order of the file. O(batches).
+    pub fn batches_of(&self, cell: CellId) -> impl Iterator<Item = &Batch> {
+        let sees = move |b: &&Batch| b.cells.binary_search(&cell).is_ok();
+        self.batches.iter().filter(sees)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PortalKind;
+
+    fn three_cells() -> CellPortalGraph {
+        let cell = |name: &str, portals: &[u32]| Cell {
+            name: name.into(),
+            portals: portals.iter().copied().map(PortalId).collect(),
+            outdoor: name == "outdoors",
+            ..Cell::default()
+        };
+        let portal = |a, b| Portal {
+            cells: [CellId(a), CellId(b)],
+            kind: PortalKind::Open,
+            normal: [1.0, 0.0, 0.0],
+            outline: vec![
+                [0.0, 0.0, 0.0],
+                [0.0, 2.0, 0.0],
+                [0.0, 2.0, 2.0],
+                [0.0, 0.0, 2.0],
+            ],
+            pieces: Vec::new(),
+            area: 4.0,
+        };
+        CellPortalGraph {
+            cells: vec![
+                cell("cell-0", &[0, 1, 2]),
+                cell("outdoors", &[0]),
+                cell("cell-2", &[1, 2]),
+            ],
+            portals: vec![portal(0, 1), portal(2, 0), portal(0, 2)],
+            ..CellPortalGraph::default()
+        }
+    }
+
+    #[test]
+    fn exits_lead_to_the_other_side_either_way() {
+        let graph = three_cells();
+        let to = |c| {
+            graph
+                .exits(CellId(c))
+                .map(|e| (e.id.0, e.to.0))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(to(0), [(0, 1), (1, 2), (2, 2)]);
+        assert_eq!(to(1), [(0, 0)]);
+        assert_eq!(to(2), [(1, 0), (2, 0)]);
+        assert_eq!(to(3), []);
+        let between: Vec<_> = graph.portals_between(CellId(2), CellId(0)).collect();
+        assert_eq!(between, [PortalId(1), PortalId(2)]);
+        assert_eq!(graph.portals_between(CellId(2), CellId(1)).count(), 0);
+    }
+
+    #[test]
+    fn names_lead_to_ids_and_back() {
+        let mut graph = three_cells();
+        for cell in graph.cell_ids() {
+            assert_eq!(graph.cell_named(&graph[cell].name), Some(cell));
+        }
+        assert_eq!(graph.cell_named("cell-1"), None);
+        assert_eq!(graph.outdoors(), Some(CellId(1)));
+        graph.locator.outside = graph.outdoors();
+        assert_eq!(graph.locate([1.0, 2.0, 3.0]), Some(CellId(1)));
+        assert_eq!(graph.locate([1.0, f32::NAN, 3.0]), None);
+        assert_eq!(graph.locate([f32::INFINITY, 2.0, 3.0]), None);
+        assert_eq!(graph.cell_named(&CellId(2).to_string()), Some(CellId(2)));
+        assert_eq!(PortalId(1).to_string(), "portal-1");
+        let indoors: Vec<_> = graph
+            .indoor_cells()
+            .map(|(id, c)| (id.0, &c.name[..]))
+            .collect();
+        assert_eq!(indoors, [(0, "cell-0"), (2, "cell-2")]);
+        graph[CellId(2)].name = "kitchen".into();
+        assert_eq!(graph.cell_named("kitchen"), Some(CellId(2)));
+    }
+
+    #[test]
+    fn a_cell_draws_the_batches_that_list_it() {
+        let batch = |cells: &[u32]| Batch {
+            cells: cells.iter().copied().map(CellId).collect(),
+            ..Batch::default()
+        };
+        let world = World {
+            batches: vec![batch(&[0]), batch(&[1]), batch(&[0, 1, 2]), batch(&[])],
+            ..World::default()
+        };
+        let n = |c| world.batches_of(CellId(c)).count();
+        assert_eq!([n(0), n(1), n(2), n(3)], [2, 2, 1, 0]);
+    }
+}

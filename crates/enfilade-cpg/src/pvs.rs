@@ -1,0 +1,150 @@
+//! What can be seen from each cell, as a world may carry it.
+
+use crate::{CellId, CellSet};
+
+/// The potentially visible set of a graph: for each cell, the cells of which something may be seen from somewhere in it with
+/// all portals open.
+///
+/// A superset of the truth: what is not in it is never seen. Kept as runs of neighboring ids, which rooms have because
+/// builders number them by place; a question takes a binary search. Made by `enfilade pvs --into`, or from the answer of
+/// the search in code.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Pvs {
+    /// By cell: where its runs end in `runs`.
+    pub(crate) ends: Vec<u32>,
+    /// First cell and the one after the last; in each row ascending, with a gap between any two.
+    pub(crate) runs: Vec<[u32; 2]>,
+}
+
+impl Pvs {
+    /// The set of a graph in which `rows[c]` are the cells that may be seen from cell `c`. Linear in the rows.
+    ///
+    /// Whether each cell sees itself, and all ids exist, [`World::validate`](crate::World::validate) checks.
+    #[must_use]
+    pub fn of_rows(rows: &[CellSet]) -> Self {
+        let mut pvs = Self::default();
+        for row in rows {
+            pvs.runs.extend(row.ranges().iter().map(|&(a, b)| [a, b]));
+            pvs.ends.push(pvs.runs.len() as u32);
+        }
+        pvs
+    }
+
+    /// Number of cells of its graph.
+    #[must_use]
+    pub fn n_cells(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether something of `to` may be seen from `from`. O(log runs); allocates nothing. True where it does not know: for a
+    /// cell `from` that its graph does not have.
+    #[must_use]
+    pub fn sees(&self, from: CellId, to: CellId) -> bool {
+        if from.idx() >= self.ends.len() {
+            return true;
+        }
+        let row = self.row(from);
+        let at = row.partition_point(|run| run[1] <= to.0);
+        row.get(at).is_some_and(|run| run[0] <= to.0)
+    }
+
+    /// The cells that may be seen from a cell, ascending, itself among them; empty for one that its graph does not have.
+    /// Allocates nothing.
+    pub fn visible_from(&self, cell: CellId) -> impl Iterator<Item = CellId> + Clone + '_ {
+        let cells = self.row(cell).iter().flat_map(|&[a, b]| a..b);
+        cells.map(CellId)
+    }
+
+    /// The runs of a cell; none for one that is not there.
+    fn row(&self, cell: CellId) -> &[[u32; 2]] {
+        let Some(&end) = self.ends.get(cell.idx()) else {
+            return &[];
+        };
+        let before = cell.idx().checked_sub(1);
+        let first = before.map_or(0, |c| self.ends[c]);
+        &self.runs[first as usize..end as usize]
+    }
+
+    /// The first cell whose row breaks an invariant, and how. Linear.
+    pub(crate) fn problem(&self, n_cells: usize) -> Option<(u32, &'static str)> {
+        if self.ends.len() != n_cells {
+            return Some((0, "there must be a row for each cell of the graph"));
+        }
+        let mut first = 0;
+        for (cell, &end) in (0..).zip(&self.ends) {
+            if end < first || end as usize > self.runs.len() {
+                return Some((cell, "its runs must lie within the list"));
+            }
+            let row = &self.runs[first as usize..end as usize];
+            let is_run = |run: &[u32; 2]| run[0] < run[1] && run[1] as usize <= n_cells;
+            if !row.iter().all(is_run) || row.windows(2).any(|w| w[0][1] >= w[1][0]) {
+                return Some((
+                    cell,
+                    "its runs must be of cells that exist, ascending and apart",
+                ));
+            }
+            if !row.iter().any(|run| (run[0]..run[1]).contains(&cell)) {
+                return Some((cell, "it must see itself"));
+            }
+            first = end;
+        }
+        let is_all = first as usize == self.runs.len();
+        (!is_all).then_some((n_cells as u32, "there are runs of no cell"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(of: &[&[u32]]) -> Vec<CellSet> {
+        let row = |cells: &&[u32]| {
+            let mut set = CellSet::new(of.len());
+            for &c in *cells {
+                set.insert(CellId(c));
+            }
+            set
+        };
+        of.iter().map(row).collect()
+    }
+
+    #[test]
+    fn rows_come_back_cell_by_cell() {
+        let sets = rows(&[&[0, 1, 4], &[0, 1], &[2], &[2, 3, 4], &[0, 3, 4]]);
+        let pvs = Pvs::of_rows(&sets);
+        assert_eq!(pvs.n_cells(), 5);
+        assert_eq!(pvs.problem(5), None);
+        for (from, set) in (0..).map(CellId).zip(&sets) {
+            assert!(pvs.visible_from(from).eq(set.iter()));
+            for to in (0..7).map(CellId) {
+                assert_eq!(pvs.sees(from, to), set.contains(to), "{from} {to}");
+            }
+        }
+        assert!(pvs.sees(CellId(5), CellId(0)));
+        assert_eq!(pvs.visible_from(CellId(5)).count(), 0);
+        assert_eq!(Pvs::default().problem(0), None);
+    }
+
+    #[test]
+    fn broken_rows_are_found() {
+        let good = Pvs::of_rows(&rows(&[&[0, 2], &[1], &[0, 2]]));
+        let broken = |change: &dyn Fn(&mut Pvs)| {
+            let mut pvs = good.clone();
+            change(&mut pvs);
+            pvs.problem(3).map(|p| p.0)
+        };
+        assert_eq!(broken(&|_| {}), None);
+        assert_eq!(
+            good.problem(4),
+            Some((0, "there must be a row for each cell of the graph"))
+        );
+        assert_eq!(broken(&|p| p.ends[1] = 1), Some(1));
+        assert_eq!(broken(&|p| p.ends[2] = 9), Some(2));
+        assert_eq!(broken(&|p| p.ends[2] = 4), Some(2));
+        assert_eq!(broken(&|p| p.runs[1] = [2, 4]), Some(0));
+        assert_eq!(broken(&|p| p.runs[1] = [2, 2]), Some(0));
+        assert_eq!(broken(&|p| p.runs[1] = [1, 3]), Some(0));
+        assert_eq!(broken(&|p| p.runs[2] = [2, 3]), Some(1));
+        assert_eq!(broken(&|p| p.runs.push([0, 1])), Some(3));
+    }
+}

@@ -1,0 +1,185 @@
+//! The first thing on a segment, whatever it is: a wall, a detail object, or a portal that is shut there.
+//!
+//! Exact but for the rounding of `f64`: no box and no tolerance decides. A portal is shut where it is closed, or beyond a plane
+//! that narrows it ([`SightState::narrow`]).
+
+use enfilade_cpg::{CellId, PortalId};
+use enfilade_geom::{DVec3, Ray, Triangle};
+
+use crate::seen::DetailId;
+use crate::sight::point;
+use crate::sightline::Sightlines;
+use crate::state::SightState;
+
+/// Where a picked surface is looked at from, so far before it. [Units: wu]
+///
+/// Farther than any rounding of a wall, and thinner than any leaf.
+const BEFORE: f64 = 1e-3;
+
+/// What a segment meets first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Target {
+    /// A structural triangle, or one of a seal.
+    Wall {
+        /// Index into `World::batches`.
+        batch: u32,
+        /// The triangle in its batch.
+        triangle: u32,
+    },
+    /// A triangle of a detail object.
+    Detail {
+        /// The object.
+        detail: DetailId,
+        /// The primitive of its mesh.
+        primitive: u32,
+        /// The triangle in its primitive.
+        triangle: u32,
+    },
+    /// A portal that is closed, or narrowed so that it is shut there.
+    Portal(PortalId),
+}
+
+/// Where a segment ends, and at what.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Where along the segment, 0 to 1.
+    pub t: f64,
+    /// The point. [Units: wu]
+    pub position: [f32; 3],
+    /// Unit normal of what was met, on the side of the segment's start.
+    pub normal: [f32; 3],
+    /// Whether the front of a triangle was met, from which its corners run counter-clockwise; of a portal, whether it was
+    /// met from its second cell.
+    pub front: bool,
+    /// What was met.
+    pub target: Target,
+    /// The cell from which it was met; `None` where that is matter.
+    pub cell: Option<CellId>,
+}
+
+/// A segment with an end that is no point.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the segment from {from:?} to {to:?} has a coordinate that is not finite")]
+pub struct NotFinite {
+    /// Its start.
+    pub from: [f32; 3],
+    /// Its end.
+    pub to: [f32; 3],
+}
+
+impl Sightlines {
+    /// What the closed segment from `a` to `b` meets first, if anything: for picking, bullets, hands. [Units: wu]
+    ///
+    /// Walls and seals, all detail objects, and portals that `state` shuts where the segment crosses them. Costs a descent of
+    /// three trees, about a microsecond; allocates nothing. Locked cells stop nothing.
+    ///
+    /// # Errors
+    ///
+    /// When a coordinate is not finite.
+    pub fn pick(
+        &self,
+        state: &SightState,
+        a: [f32; 3],
+        b: [f32; 3],
+    ) -> Result<Option<Hit>, NotFinite> {
+        self.pick_where(state, a, b, |_| true)
+    }
+
+    /// The same, passing by detail objects for which `counts` is false: the leaf of a door that stands open, glass, what
+    /// has been carried away.
+    ///
+    /// # Errors
+    ///
+    /// When a coordinate is not finite.
+    pub fn pick_where(
+        &self,
+        state: &SightState,
+        a: [f32; 3],
+        b: [f32; 3],
+        counts: impl FnMut(DetailId) -> bool,
+    ) -> Result<Option<Hit>, NotFinite> {
+        if !is_finite(a, b) {
+            return Err(NotFinite { from: a, to: b });
+        }
+        let mut ray = Ray::segment(point(a), point(b));
+        if ray.direction == DVec3::ZERO {
+            return Ok(None);
+        }
+        let mut first = None;
+        if let Some(hit) = self.whole.closest_hit(&ray, |_| false) {
+            let (batch, triangle) = self.source[hit.triangle as usize];
+            let corners = &self.triangles[hit.triangle as usize];
+            let target = Target::Wall { batch, triangle };
+            first = Some(self.hit(&ray, hit.t, corners, hit.front, target));
+            ray.t_max = hit.t;
+        }
+        // Of two at the same place, a portal or an object lies on the wall.
+        if let Some(hit) = self.details.first_hit(&ray, counts) {
+            let target = Target::Detail {
+                detail: hit.detail,
+                primitive: hit.primitive,
+                triangle: hit.triangle,
+            };
+            first = Some(self.hit(&ray, hit.t, &hit.corners, hit.front, target));
+            ray.t_max = hit.t;
+        }
+        if let Some((t, opening, front)) = self.first_shut(state, &ray) {
+            let opening = &self.openings[opening as usize];
+            let target = Target::Portal(PortalId(opening.portal));
+            first = Some(self.hit(&ray, t, &opening.corners, front, target));
+        }
+        Ok(first)
+    }
+
+    /// Whether the closed segment from `a` to `b` meets neither wall, nor seal, nor a portal that `state` shuts where it is
+    /// crossed. Details do not count: ask [`Sightlines::pick`]. False where a coordinate is not finite.
+    #[must_use]
+    pub fn is_clear(&self, state: &SightState, a: [f32; 3], b: [f32; 3]) -> bool {
+        if !is_finite(a, b) {
+            return false;
+        }
+        let (from, to) = (point(a), point(b));
+        from == to
+            || !self.whole.any_hit(from, to, |_| false)
+                && self.first_shut(state, &Ray::segment(from, to)).is_none()
+    }
+
+    /// The first opening that is shut where the ray crosses it: `t`, its number, and from which side.
+    fn first_shut(&self, state: &SightState, ray: &Ray) -> Option<(f64, u32, bool)> {
+        let mut best: Option<(f64, u32, bool)> = None;
+        self.shut.for_each_hit(ray, |hit| {
+            let portal = PortalId(self.openings[hit.triangle as usize].portal);
+            let is_nearer = best.is_none_or(|(t, i, _)| (hit.t, hit.triangle) < (t, i));
+            if is_nearer && state.is_shut_at(portal, ray.at(hit.t)) {
+                best = Some((hit.t, hit.triangle, hit.front));
+            }
+        });
+        best
+    }
+
+    fn hit(&self, ray: &Ray, t: f64, corners: &Triangle, front: bool, target: Target) -> Hit {
+        let p = ray.at(t);
+        let length = ray.direction.length();
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let normal = normal.normalize_or_zero();
+        let back = (t - BEFORE / length).max(0.0);
+        Hit {
+            t,
+            position: p.as_vec3().to_array(),
+            normal: if normal.dot(ray.direction) > 0.0 {
+                -normal
+            } else {
+                normal
+            }
+            .as_vec3()
+            .to_array(),
+            front,
+            target,
+            cell: self.locator.locate(ray.at(back)),
+        }
+    }
+}
+
+fn is_finite(a: [f32; 3], b: [f32; 3]) -> bool {
+    a.iter().chain(&b).all(|x| x.is_finite())
+}

@@ -1,0 +1,81 @@
+//! World files by path.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use enfilade_cpg::World;
+use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+
+/// Why a world could not be read or written. Messages say which file and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is no world, or the world breaks an invariant.
+    #[error("{}: {source}", path.display())]
+    World {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: WireError,
+    },
+}
+
+/// Reads a world that `enfilade bake` or [`save`] wrote. Linear in the file, which is held in memory while it is decoded.
+///
+/// A world that is returned satisfies every invariant ([`World::validate`]), so that what is asked of it later cannot fail.
+///
+/// # Errors
+///
+/// When the file cannot be read, or is no world or a damaged one.
+pub fn open(path: impl AsRef<Path>) -> Result<World, FileError> {
+    let path = path.as_ref();
+    let bytes = fs::read(path).map_err(|source| FileError::Read {
+        path: path.into(),
+        source,
+    })?;
+    decode_glb(&bytes).map_err(|source| FileError::World {
+        path: path.into(),
+        source,
+    })
+}
+
+/// Writes a world as one GLB, aside first and then renamed: nobody finds half a file. Linear in the world.
+///
+/// # Errors
+///
+/// When the file cannot be written, or the world breaks an invariant. An earlier file of that name is left as it was then.
+pub fn save(path: impl AsRef<Path>, world: &World) -> Result<(), FileError> {
+    let path = path.as_ref();
+    let bytes = encode_glb(world).map_err(|source| FileError::World {
+        path: path.into(),
+        source,
+    })?;
+    let mut aside = OsString::from(path);
+    aside.push(format!(".{}.part", std::process::id()));
+    let written = fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, path));
+    written.map_err(|source| {
+        // What is left of it is of no use; that the first failure is told matters more than this one.
+        let _ = fs::remove_file(&aside);
+        FileError::Write {
+            path: path.into(),
+            source,
+        }
+    })
+}
