@@ -9,9 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::{
-    bake_command, binary, cargo, output_of, root, run_to_end, target_dir, write_between_marks,
-};
+use crate::{RELEASE, output_of, root, run_to_end, target_dir, write_between_marks};
 
 /// Rooms of the towers, a factor of 4 apart.
 const SIZES: [usize; 4] = [16, 64, 256, 1024];
@@ -27,10 +25,9 @@ pub(crate) fn run(peers: Option<&Path>, is_written: bool) -> anyhow::Result<()> 
 
 /// Runs the table that `args` begin with; its exit code is ours.
 pub(crate) fn measure(args: &[String]) -> ExitCode {
-    let build = ["build", "--release", "-p", "enfilade-bench"];
     let run = || {
-        run_to_end(&mut cargo(&build))?;
-        let mut bench = Command::new(binary("enfilade-bench"));
+        run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-bench"]))?;
+        let mut bench = Command::new(RELEASE.binary("enfilade-bench"));
         let status = bench.args(args).status()?;
         anyhow::Ok(u8::try_from(status.code().unwrap_or(1)).unwrap_or(1))
     };
@@ -44,21 +41,17 @@ pub(crate) fn measure(args: &[String]) -> ExitCode {
 }
 
 fn kernels(peers: &Path) -> anyhow::Result<()> {
-    run_to_end(&mut cargo(&[
+    run_to_end(&mut RELEASE.cargo(
         "build",
-        "--release",
-        "-p",
-        "enfilade-bake",
-        "--example",
-        "kernel_bench",
-    ]))?;
+        &["-p", "enfilade-bake", "--example", "kernel_bench"],
+    ))?;
     let data = target_dir().join("kernel-bench");
     std::fs::create_dir_all(&data)?;
     let mut python = Command::new("python3");
     python
         .arg(root().join("scripts/bench_kernels.py"))
         .arg("--bench")
-        .arg(target_dir().join("release/examples/kernel_bench"))
+        .arg(RELEASE.binary("examples/kernel_bench"))
         .arg("--data")
         .arg(data)
         .arg("--peers")
@@ -67,15 +60,11 @@ fn kernels(peers: &Path) -> anyhow::Result<()> {
 }
 
 fn growth(is_written: bool) -> anyhow::Result<()> {
-    run_to_end(&mut cargo(&["build", "--release", "-p", "enfilade-cli"]))?;
-    run_to_end(&mut cargo(&[
+    run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-cli"]))?;
+    run_to_end(&mut RELEASE.cargo(
         "build",
-        "--release",
-        "-p",
-        "enfilade-testkit",
-        "--example",
-        "generate",
-    ]))?;
+        &["-p", "enfilade-testkit", "--example", "generate"],
+    ))?;
     let mut table = String::from(
         "| rooms | cells | triangles | M voxels | M occupied | wall s | user s | exponent | peak MiB | bytes a voxel |\n\
          | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
@@ -146,7 +135,7 @@ struct Tower {
 
 fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     let dir = target_dir().join(format!("tower-{rooms}"));
-    let mut generate = Command::new(target_dir().join("release/examples/generate"));
+    let mut generate = Command::new(RELEASE.binary("examples/generate"));
     output_of(
         generate
             .args(["tower", "--rooms", &rooms.to_string(), "-o"])
@@ -155,9 +144,9 @@ fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     )?;
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)?;
     let world = dir.join("world.glb");
-    let used = used_by(bake_command(&dir, &world).arg("-v"))?;
+    let used = used_by(RELEASE.bake_command(&dir, &world).arg("-v"))?;
     let graph: Value = serde_json::from_str(&output_of(
-        Command::new(binary("enfilade"))
+        Command::new(RELEASE.binary("enfilade"))
             .arg("inspect")
             .arg(&world)
             .arg("--json"),

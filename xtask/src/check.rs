@@ -1,17 +1,21 @@
 //! `cargo xtask test`: everything that must hold before a change lands.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
 
 use crate::{
-    apt, bake_command, binary, cargo, output_of, root, run_to_end, scenes, score, target_dir, tidy,
+    GATE, add_scene_files, apt, cargo, features, floors, output_of, root, run_to_end, scenes,
+    score, target_dir, tidy,
 };
 
-/// Sight lines and completeness rays on each scene; the whole 10⁷ are for by hand.
+/// Segments and rays tested on each scene; the whole 10⁷ are run by hand.
 const RAYS: &str = "200000";
+
+/// Views of each scene in which the run-time's answer, details included, is compared with what rays hit.
+const SIGHT_VIEWS: &str = "200";
 
 /// Runs all steps, stops at the first that fails, and prints `N passed, N failed` last.
 pub(crate) fn run() -> anyhow::Result<()> {
@@ -33,21 +37,14 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("format", || {
         run_to_end(&mut cargo(&["fmt", "--all", "--check"]))
     })?;
+    steps.step("features", features::run)?;
     steps.step("lint", || {
-        let args = [
-            "clippy",
-            "--release",
-            "--workspace",
-            "--all-targets",
-            "--",
-            "-D",
-            "warnings",
-        ];
-        run_to_end(&mut cargo(&args))
+        let args = ["--workspace", "--all-targets", "--", "-D", "warnings"];
+        run_to_end(&mut GATE.cargo("clippy", &args))
     })?;
     steps.step("tests", || {
-        let mut tests = cargo(&["test", "--release", "--workspace"]);
-        // The window's test passes itself over where it has no display, but not here.
+        let mut tests = GATE.cargo("test", &["--workspace"]);
+        // The window's test skips itself where it has no display, but not here.
         run_to_end(
             tests
                 .env("NODE_PATH", node_path())
@@ -56,26 +53,23 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     })?;
     steps.step("docs", || {
         run_to_end(
-            cargo(&["doc", "--release", "--workspace", "--no-deps"])
+            GATE.cargo("doc", &["--workspace", "--no-deps"])
                 .env("RUSTDOCFLAGS", "-D warnings"),
         )
     })?;
     steps.step("build", || {
-        run_to_end(&mut cargo(&["build", "--release", "--workspace"]))
+        run_to_end(&mut GATE.cargo("build", &["--workspace"]))
     })?;
     steps.step("demo", demo)?;
-    for scene in scenes() {
-        let name = scene
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        steps.step(&format!("scene {name}"), || check_scene(&scene, &name))?;
+    let scenes = scenes();
+    for scene in &scenes {
+        let name = name_of(scene);
+        steps.step(&format!("scene {name}"), || check_scene(scene, &name))?;
     }
-    if scenes().is_empty() {
+    if scenes.is_empty() {
         println!("no real scenes: set ENFILADE_SCENES to their folder to run them too");
     } else {
-        steps.step("score", || score::run(&[], false))?;
+        steps.step("score", || check_scores(&scenes))?;
     }
     Ok(())
 }
@@ -148,7 +142,7 @@ fn tools() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn validate(world: &std::path::Path) -> anyhow::Result<()> {
+fn validate(world: &Path) -> anyhow::Result<()> {
     let mut node = Command::new("node");
     node.current_dir(root())
         .env("NODE_PATH", node_path())
@@ -165,35 +159,58 @@ fn validate(world: &std::path::Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn verify(world: &std::path::Path) -> anyhow::Result<()> {
-    let mut command = Command::new(binary("enfilade"));
+/// Tests the promises of a world. With the folder of its scene, the triangles of the scene's own files decide what
+/// blocks, not those that the world says it holds.
+fn verify(world: &Path, scene: Option<&Path>) -> anyhow::Result<()> {
+    let mut command = Command::new(GATE.binary("enfilade"));
     command.arg("verify").arg(world).args(["--rays", RAYS]);
+    if let Some(scene) = scene {
+        command.args(["--sight", SIGHT_VIEWS]);
+        add_scene_files(&mut command, scene, Some("--source"));
+    }
     print!("{}", output_of(&mut command, None)?);
     Ok(())
 }
 
 fn demo() -> anyhow::Result<()> {
     let dir = target_dir().join("demo");
-    print!(
-        "{}",
-        output_of(
-            Command::new(binary("enfilade"))
-                .arg("demo")
-                .arg("-o")
-                .arg(&dir),
-            None
-        )?
-    );
+    let mut demo = Command::new(GATE.binary("enfilade"));
+    print!("{}", output_of(demo.arg("demo").arg("-o").arg(&dir), None)?);
     let world = dir.join("world.glb");
     validate(&world)?;
-    verify(&world)
+    verify(&world, None)
 }
 
-fn check_scene(scene: &std::path::Path, name: &str) -> anyhow::Result<()> {
-    let dir = target_dir().join("scenes");
-    std::fs::create_dir_all(&dir)?;
-    let world = dir.join(name).with_extension("glb");
-    print!("{}", output_of(&mut bake_command(scene, &world), None)?);
+fn name_of(scene: &Path) -> String {
+    let name = scene.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Where the world of the scene `name` is baked to.
+fn world_of(name: &str) -> PathBuf {
+    target_dir().join("scenes").join(name).with_extension("glb")
+}
+
+fn check_scene(scene: &Path, name: &str) -> anyhow::Result<()> {
+    let world = world_of(name);
+    std::fs::create_dir_all(target_dir().join("scenes"))?;
+    print!(
+        "{}",
+        output_of(&mut GATE.bake_command(scene, &world), None)?
+    );
     validate(&world)?;
-    verify(&world)
+    verify(&world, Some(scene))
+}
+
+/// Scores the worlds that were just baked; fails where a figure lies below its floor.
+fn check_scores(scenes: &[PathBuf]) -> anyhow::Result<()> {
+    let mut rows = Vec::new();
+    for scene in scenes.iter().filter(|s| s.join("truth.json").is_file()) {
+        let world = world_of(&name_of(scene));
+        let graph = score::inspect(GATE, &world)?;
+        let row = score::score_world(GATE, scene, &world, &graph);
+        rows.push(row.with_context(|| scene.display().to_string())?);
+    }
+    score::print(&rows);
+    floors::check(&rows)
 }

@@ -1,4 +1,4 @@
-//! The project's chores: `cargo xtask test | score | bench`.
+//! The project's chores: `cargo xtask test | tidy | score | bench`.
 //!
 //! `test` is what decides whether a change may land; `score` and `bench` print the tables of
 //! `docs/benchmarks/`.
@@ -6,6 +6,8 @@
 mod apt;
 mod bench;
 mod check;
+mod features;
+mod floors;
 mod messy;
 mod score;
 mod tidy;
@@ -17,12 +19,14 @@ use anyhow::{Context, bail};
 
 const USAGE: &str = "\
 usage: cargo xtask test
+       cargo xtask tidy
        cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
+  tidy    of these, what needs no build: who may use whom, lengths, links, features that tests name
   score   rooms and doors found, against the rooms that architects modeled
   bench   growth of time and memory with the size of an office tower; with --peers, the voxel
           kernels beside other implementations too (scripts/bench_kernels.py);
@@ -42,7 +46,8 @@ fn main() -> ExitCode {
     };
     let result = match task {
         Task::Test => check::run(),
-        Task::Score { is_written, dirs } => score::run(&dirs, is_written),
+        Task::Tidy => tidy::run().and_then(|()| features::run()),
+        Task::Score { is_written, dirs } => score::run(RELEASE, &dirs, is_written),
         Task::Messy(options) => messy::run(&options),
         Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
         Task::Measure(args) => return bench::measure(&args),
@@ -59,6 +64,7 @@ fn main() -> ExitCode {
 /// What is asked for.
 enum Task {
     Test,
+    Tidy,
     Score {
         is_written: bool,
         dirs: Vec<PathBuf>,
@@ -108,6 +114,7 @@ impl Task {
         }
         match name.as_str() {
             "test" => Some(Self::Test),
+            "tidy" => Some(Self::Tidy),
             "score" => Some(Self::Score { is_written, dirs }),
             "bench" if messy.is_some() => messy.map(Self::Messy),
             "bench" => Some(Self::Bench { is_written, peers }),
@@ -129,12 +136,47 @@ fn target_dir() -> PathBuf {
     root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// The release binary `name`.
-fn binary(name: &str) -> PathBuf {
-    target_dir()
-        .join("release")
-        .join(name)
-        .with_extension(std::env::consts::EXE_EXTENSION)
+/// A profile of `Cargo.toml` that commands are built with.
+#[derive(Clone, Copy)]
+struct Profile(&'static str);
+
+/// What users get, and what is measured.
+const RELEASE: Profile = Profile("release");
+/// A release that ends where a `debug_assert!` is wrong or an integer overflows: what the gate runs. All of the
+/// gate uses this one, so that nothing is built twice.
+const GATE: Profile = Profile("gate");
+
+impl Profile {
+    /// The binary `name`.
+    fn binary(self, name: &str) -> PathBuf {
+        target_dir()
+            .join(self.0)
+            .join(name)
+            .with_extension(std::env::consts::EXE_EXTENSION)
+    }
+
+    /// `cargo COMMAND --profile SELF ARGS`, in the root.
+    fn cargo(self, command: &str, args: &[&str]) -> Command {
+        cargo(&[&[command, "--profile", self.0], args].concat())
+    }
+
+    /// The bake of a scene folder with default settings.
+    fn bake_command(self, scene: &Path, world: &Path) -> Command {
+        let mut command = Command::new(self.binary("enfilade"));
+        command.arg("bake");
+        add_scene_files(&mut command, scene, None);
+        command.arg("-o").arg(world);
+        command
+    }
+}
+
+/// Adds the files of a scene folder to a command, the structure after the option `name` if there is one.
+fn add_scene_files(command: &mut Command, scene: &Path, name: Option<&str>) {
+    command.args(name).arg(scene.join("scene.glb"));
+    let detail = scene.join("detail.glb");
+    if detail.is_file() {
+        command.arg("--detail").arg(detail);
+    }
 }
 
 /// The folder of real scenes, where there is one.
@@ -179,18 +221,6 @@ fn run_to_end(command: &mut Command) -> anyhow::Result<()> {
         bail!("{command:?} failed: {status}");
     }
     Ok(())
-}
-
-/// The bake of a scene folder with default settings.
-fn bake_command(scene: &Path, world: &Path) -> Command {
-    let mut command = Command::new(binary("enfilade"));
-    command.arg("bake").arg(scene.join("scene.glb"));
-    let detail = scene.join("detail.glb");
-    if detail.is_file() {
-        command.arg("--detail").arg(detail);
-    }
-    command.arg("-o").arg(world);
-    command
 }
 
 /// Puts `text` between the two marks of a page of `docs/benchmarks/`; what people wrote around it stays.

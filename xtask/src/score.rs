@@ -12,9 +12,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::{
-    bake_command, binary, cargo, output_of, run_to_end, scenes, target_dir, write_between_marks,
-};
+use crate::{Profile, floors, output_of, run_to_end, scenes, target_dir, write_between_marks};
 
 pub(crate) type V3 = [f64; 3];
 
@@ -67,7 +65,7 @@ pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
 
 /// One row of the table; `None` where a scene has nothing of the kind.
 pub(crate) struct Row {
-    name: String,
+    pub(crate) name: String,
     n_rooms: usize,
     /// By [`COLUMNS`].
     pub(crate) figures: [Option<f64>; 6],
@@ -75,11 +73,11 @@ pub(crate) struct Row {
     failed: Vec<String>,
 }
 
-const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
+pub(crate) const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
 
 /// Scores `dirs`, or all the real scenes where that is empty; prints the table, and puts it into
-/// `docs/benchmarks/rooms.md` if `is_written`.
-pub(crate) fn run(dirs: &[PathBuf], is_written: bool) -> anyhow::Result<()> {
+/// `docs/benchmarks/rooms.md` if `is_written`. Fails where a figure lies below its floor.
+pub(crate) fn run(profile: Profile, dirs: &[PathBuf], is_written: bool) -> anyhow::Result<()> {
     let mut dirs = if dirs.is_empty() {
         scenes()
     } else {
@@ -89,22 +87,31 @@ pub(crate) fn run(dirs: &[PathBuf], is_written: bool) -> anyhow::Result<()> {
     if dirs.is_empty() {
         bail!("no scene with a truth.json; name folders, or set ENFILADE_SCENES");
     }
-    run_to_end(&mut cargo(&["build", "--release", "-p", "enfilade-cli"]))?;
+    run_to_end(&mut profile.cargo("build", &["-p", "enfilade-cli"]))?;
     let rows = dirs
         .iter()
-        .map(|d| score_scene(d).with_context(|| d.display().to_string()))
+        .map(|d| score_scene(profile, d).with_context(|| d.display().to_string()))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    println!("{}", table(&rows, true));
-    for row in &rows {
-        if !row.failed.is_empty() {
-            println!("{}: {}", row.name, row.failed.join("; "));
-        }
-    }
+    print(&rows);
     if is_written {
         // Without seconds: they say more about the machine than about us.
         write_between_marks("rooms.md", &table(&rows, false))?;
     }
-    Ok(())
+    floors::check(&rows)
+}
+
+/// Prints the table, and what was missed in each scene.
+pub(crate) fn print(rows: &[Row]) {
+    // Worlds that something else baked have no time of a bake.
+    println!(
+        "{}",
+        table(rows, rows.iter().all(|r| r.seconds.is_finite()))
+    );
+    for row in rows {
+        if !row.failed.is_empty() {
+            println!("{}: {}", row.name, row.failed.join("; "));
+        }
+    }
 }
 
 /// Markdown; the last row is the average over the scenes that have a figure.
@@ -151,13 +158,15 @@ fn table(rows: &[Row], with_seconds: bool) -> String {
 }
 
 /// The cell of each point, `-` for none.
-pub(crate) fn locate(world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
+pub(crate) fn locate(profile: Profile, world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
     let text: String = points
         .iter()
         .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
         .collect();
     let said = output_of(
-        Command::new(binary("enfilade")).arg("locate").arg(world),
+        Command::new(profile.binary("enfilade"))
+            .arg("locate")
+            .arg(world),
         Some(&text),
     )?;
     let lines: Vec<String> = said.split_whitespace().map(str::to_owned).collect();
@@ -193,25 +202,30 @@ fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
     group
 }
 
-fn score_scene(dir: &Path) -> anyhow::Result<Row> {
+fn score_scene(profile: Profile, dir: &Path) -> anyhow::Result<Row> {
     let name = dir.file_name().unwrap_or_default().to_string_lossy();
     let world = target_dir().join(format!("score-{name}.glb"));
     let start = Instant::now();
-    output_of(&mut bake_command(dir, &world), None)?;
+    output_of(&mut profile.bake_command(dir, &world), None)?;
     let seconds = start.elapsed().as_secs_f64();
-    let row = score_world(dir, &world, &inspect(&world)?)?;
+    let row = score_world(profile, dir, &world, &inspect(profile, &world)?)?;
     Ok(Row { seconds, ..row })
 }
 
 /// What `inspect --json` says.
-pub(crate) fn inspect(world: &Path) -> anyhow::Result<Value> {
-    let mut command = Command::new(binary("enfilade"));
+pub(crate) fn inspect(profile: Profile, world: &Path) -> anyhow::Result<Value> {
+    let mut command = Command::new(profile.binary("enfilade"));
     command.arg("inspect").arg(world).arg("--json");
     Ok(serde_json::from_str(&output_of(&mut command, None)?)?)
 }
 
 /// Scores a world, with what `inspect` says of it, against the truth in its scene's folder.
-pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Result<Row> {
+pub(crate) fn score_world(
+    profile: Profile,
+    dir: &Path,
+    world: &Path,
+    graph: &Value,
+) -> anyhow::Result<Row> {
     let name = dir
         .file_name()
         .unwrap_or_default()
@@ -233,7 +247,7 @@ pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Re
             owner.push(text(&r["id"]));
         }
     }
-    let cells = locate(world, &points)?;
+    let cells = locate(profile, world, &points)?;
     // A point that is nowhere shares its cell with no other.
     let found: Vec<String> = cells
         .iter()
@@ -308,7 +322,7 @@ pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Re
         let (c, n, t) = place(o).context("an opening without place")?;
         probes.extend([along(c, n, 0.35 + t / 2.0), along(c, n, -0.35 - t / 2.0)]);
     }
-    let sides = locate(world, &probes)?;
+    let sides = locate(profile, world, &probes)?;
     let (mut hits, mut tried) = (
         BTreeMap::<String, usize>::new(),
         BTreeMap::<String, usize>::new(),

@@ -37,6 +37,9 @@ pub(crate) struct Verify {
     /// those that the world holds. It is read by the settings below; give those of the bake.
     #[arg(long, num_args = 1.., value_name = "IN")]
     source: Vec<PathBuf>,
+    /// The files of the source whose objects are all detail, as in the bake.
+    #[arg(long, value_name = "FILE", requires = "source")]
+    detail: Vec<PathBuf>,
     #[command(flatten)]
     scene: SceneOptions,
     /// Segments for `sealed`, and as many rays for `complete`.
@@ -81,7 +84,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let source = if args.source.is_empty() {
         None
     } else {
-        Some(read_source(&args.source, &args.scene)?)
+        Some(read_source(args)?)
     };
     let options = VerifyOptions {
         rays: args.rays,
@@ -213,8 +216,8 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
 }
 
 /// The structural triangles of a scene, as the builder saw them.
-fn read_source(paths: &[PathBuf], options: &SceneOptions) -> anyhow::Result<Vec<Triangle>> {
-    let scene = import(paths, &[], &options.resolve()?)?.scene;
+fn read_source(args: &Verify) -> anyhow::Result<Vec<Triangle>> {
+    let scene = import(&args.source, &args.detail, &args.scene.resolve()?)?.scene;
     Ok(scene
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))

@@ -80,13 +80,17 @@ fn every_prefix_is_an_error() {
 #[test]
 fn every_bit_flip_is_an_error_or_a_valid_world() {
     let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
+    let mut n_accepted = 0;
     for i in 0..bytes.len() * 8 {
         let mut flipped = bytes.clone();
         flipped[i / 8] ^= 1 << (i % 8);
         if let Ok(world) = decode_glb(&flipped) {
             world.validate().unwrap();
+            n_accepted += 1;
         }
     }
+    // Names and low bits of corners may be anything; most of the rest may not.
+    assert!((1..bytes.len() * 8).contains(&n_accepted), "{n_accepted}");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Wavefront OBJ (Wavefront, *Advanced Visualizer Manual*, appendix B1): polygons, groups,
 //! materials.
 //!
-//! An own reader instead of `tobj`: it splits polygons as fans, which covers a concave one twice,
-//! gives no line numbers, and rounds far-off coordinates to `f32` before anyone can move them.
+//! A reader of our own: `tobj` joins no lines that end in `\`, makes a new object of a group that is named again, and
+//! its errors have no line numbers (`docs/dependencies.md`).
 
 use crate::ImportError;
 use crate::builder::Builder;

@@ -1,7 +1,7 @@
 //! PLY (Turk, *The PLY Polygon File Format*, 1994), ASCII and binary of either byte order.
 //!
-//! An own reader instead of `ply-rs-bw`: it reserves memory by the header's counts, so that forty
-//! bytes can ask for terabytes, and it holds each element as a map of names.
+//! A reader of our own: `ply-rs-bw` wants each ASCII element on a line of its own, and of two elements with one name it
+//! drops the first in silence (`docs/dependencies.md`).
 
 use crate::builder::Builder;
 use crate::obj::shortened;

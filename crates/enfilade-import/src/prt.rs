@@ -464,6 +464,23 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_changed_byte_ends_in_a_file_or_an_error() {
+        let mut n_read = 0;
+        for i in 0..PRT2.len() {
+            for byte in [b'0', b'1', b'3', b'-', b'.', b' ', b'\n'] {
+                let mut changed = PRT2.as_bytes().to_vec();
+                changed[i] = byte;
+                let text = String::from_utf8(changed).unwrap();
+                if let Ok(file) = read_prt(&text) {
+                    assert_eq!(read_prt(&write_prt(&file)).unwrap(), file, "{text:?}");
+                    n_read += 1;
+                }
+            }
+        }
+        assert!((1..PRT2.len() * 7).contains(&n_read), "{n_read}");
+    }
+
     proptest! {
         #[test]
         fn any_text_ends_in_a_file_or_an_error(text in "(PRT1|PRT2|PRT1-AM)[ \n0-9().-]{0,200}") {

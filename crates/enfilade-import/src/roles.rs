@@ -429,6 +429,7 @@ mod tests {
         }
     }
 
+    // Covers S4.
     #[test]
     fn names_of_things_that_stand_in_rooms_are_detail() {
         for name in [

@@ -1,7 +1,8 @@
 //! STL (3D Systems, *StereoLithography Interface Specification*, 1989), ASCII and binary.
 //!
-//! An own reader instead of `stl_io`: it trusts the binary header's count and knows no lines. Equal
-//! corners are made one vertex, bit for bit; facet normals follow from the corners and are dropped.
+//! A reader of our own: `stl_io` loses the names of solids, the lines of errors and the shape of far-off ASCII files
+//! (`docs/dependencies.md`). Vertices with equal bits become one; facet normals follow from the vertices and are
+//! dropped.
 
 use crate::builder::Builder;
 use crate::obj::shortened;

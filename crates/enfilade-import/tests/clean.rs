@@ -1,4 +1,4 @@
-//! The cleaning report against surfaces whose faults are known.
+//! The cleaning report against surfaces whose faults are known. Covers S5.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! glTF: nodes, placements, materials, and every kind of accessor, on hand-made files.
+//! glTF: nodes, placements, materials, and every kind of accessor, on hand-made files. Covers S1.
 
 mod common;
 

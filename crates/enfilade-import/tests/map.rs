@@ -1,4 +1,4 @@
-//! Quake maps: what their brushes become, and where what is wrong with them is said to be.
+//! Quake maps: what their brushes become, and where what is wrong with them is said to be. Covers S2.
 
 use enfilade_geom::scene::Role;
 use enfilade_import::{ImportOptions, decode_map};

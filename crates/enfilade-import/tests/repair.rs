@@ -1,4 +1,4 @@
-//! Repairs against surfaces whose faults are known.
+//! Repairs against surfaces whose faults are known. Covers S5.
 
 mod common;
 

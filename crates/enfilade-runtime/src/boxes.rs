@@ -314,6 +314,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        // Covers R5.
         #[test]
         fn a_tree_finds_what_looking_at_every_box_finds(
             corners in prop::collection::vec((prop::array::uniform3(-9.0f64..9.0),

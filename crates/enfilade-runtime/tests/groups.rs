@@ -1,4 +1,4 @@
-//! Portals in groups: the answers are those of portals one by one.
+//! Portals in groups: the answers are those of portals one by one. Covers P7.
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_runtime::{

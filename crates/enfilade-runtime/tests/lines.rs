@@ -10,6 +10,7 @@ fn point(rng: &mut Rng, world: &World) -> [f32; 3] {
     [0, 1, 2].map(|k| b[0][k] + (b[1][k] - b[0][k]) * rng.unit() as f32)
 }
 
+// Covers R6.
 #[test]
 fn a_million_segments_equal_brute_force() {
     let mut n_by_cells = 0;
@@ -78,6 +79,7 @@ fn closed_doors_and_odd_points_stop_a_line() {
     assert!(lines.first_hit(at(-1.0), at(-1.0)).is_none());
 }
 
+// Covers P6.
 #[test]
 fn things_are_followed_through_portals_and_found_again() {
     let world = room_grid(&GridParams {

@@ -166,6 +166,7 @@ const MODES: [Narrowing; 4] = [
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
+    // Covers R1, R2 and R3.
     #[test]
     fn whatever_a_ray_hits_is_in_the_answer_in_every_mode(
         seed in 0_u64..1 << 32, rooms in 2_usize..160, merges in 0.0_f64..0.5,
@@ -248,6 +249,7 @@ proptest! {
 
 /// Where nothing is joined, a tighter region sees less. (Joining is by what waits together, which the
 /// order of visits decides, so only sums can be compared in general; see `docs/benchmarks/sight.md`.)
+// Covers R2.
 #[test]
 fn polygons_answer_no_more_than_rectangles() {
     let (mut polygon, mut rectangle, mut joined) = (0, 0, 0);
@@ -297,6 +299,7 @@ fn polygons_answer_no_more_than_rectangles() {
     );
 }
 
+// Covers R4.
 #[test]
 fn a_courtyard_of_64_windows_is_bounded() {
     for one_room in [false, true] {
@@ -604,6 +607,7 @@ fn a_round_window_of_a_thousand_corners() {
     }
 }
 
+// Covers R7.
 #[test]
 fn portals_of_a_small_share_are_listed_and_not_followed() {
     let world = room_grid(&GridParams::offices(100, 3));

@@ -134,14 +134,14 @@ pub use enfilade_runtime as runtime;
 
 #[cfg(feature = "bake")]
 pub use enfilade_bake as bake;
-#[cfg(feature = "vis")]
-pub use enfilade_vis as vis;
 #[cfg(feature = "import")]
 pub use enfilade_import as import;
 #[cfg(feature = "render")]
 pub use enfilade_render as render;
 #[cfg(feature = "verify")]
 pub use enfilade_verify as verify;
+#[cfg(feature = "vis")]
+pub use enfilade_vis as vis;
 
 pub use cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Exit, Portal, PortalId, PortalKind, Pvs,

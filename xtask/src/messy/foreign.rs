@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::Bench;
 use super::measure::n_indoors;
 use crate::score::{V3, inspect};
-use crate::{binary, output_of, scenes_dir};
+use crate::{RELEASE, output_of, scenes_dir};
 
 /// A storey that is glazed all around encloses this point. [Units: wu]
 const IN_HALL: V3 = [10.0, 3.0, -6.0];
@@ -35,14 +35,14 @@ pub(super) fn run(bench: &mut Bench<'_>) -> anyhow::Result<()> {
         }
         bench.rows.scene = file.into();
         let world = bench.folder.join("foreign.glb");
-        let mut bake = Command::new(binary("enfilade"));
+        let mut bake = Command::new(RELEASE.binary("enfilade"));
         bake.arg("bake")
             .arg(&path)
             .args(settings)
             .arg("-o")
             .arg(&world);
         let judged = output_of(&mut bake, None)
-            .and_then(|_| inspect(&world))
+            .and_then(|_| inspect(RELEASE, &world))
             .and_then(|graph| judge(bench, &path, &world, &graph));
         if let Err(error) = judged {
             bench.rows.failed(&error);

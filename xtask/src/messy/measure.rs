@@ -8,8 +8,8 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
+use crate::RELEASE;
 use crate::score::{V3, center_and_area, dot, inspect, locate, score_world, sub, unit, vec3};
-use crate::{bake_command, binary};
 
 /// What came out of a bake.
 #[derive(Clone)]
@@ -56,7 +56,7 @@ pub(super) fn measure(
     let mut seconds = f64::INFINITY;
     let mut said = String::new();
     for i in 0..REPEATS {
-        let mut command = bake_command(dir, world);
+        let mut command = RELEASE.bake_command(dir, world);
         command.args(settings);
         let start = Instant::now();
         let done = command.output().context("cannot start enfilade")?;
@@ -69,8 +69,8 @@ pub(super) fn measure(
             break;
         }
     }
-    let graph = inspect(world)?;
-    let row = score_world(dir, world, &graph)?;
+    let graph = inspect(RELEASE, world)?;
+    let row = score_world(RELEASE, dir, world, &graph)?;
     let [rooms, doors, windows, _, extra, _] = row.figures;
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)?;
     let matter: Vec<V3> = list(&truth["matter"]).iter().filter_map(vec3).collect();
@@ -108,13 +108,13 @@ pub(super) fn n_indoors(graph: &Value, world: &Path, points: &[V3]) -> anyhow::R
         .filter(|c| c["outdoor"] != true)
         .map(|c| c["id"].to_string())
         .collect();
-    let cells = locate(world, points)?;
+    let cells = locate(RELEASE, world, points)?;
     Ok(cells.iter().filter(|&id| indoors.contains(id)).count())
 }
 
 /// Promises that `verify` finds broken; lines that the source's triangles block are not tried.
 fn broken(scene: &Path, world: &Path, rays: u64) -> Result<u64, String> {
-    let mut command = Command::new(binary("enfilade"));
+    let mut command = Command::new(RELEASE.binary("enfilade"));
     command.arg("verify").arg(world).arg("--source").arg(scene);
     command.args(["--rays", &rays.to_string(), "--json"]);
     let done = command.output().map_err(|e| e.to_string())?;

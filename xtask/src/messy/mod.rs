@@ -14,7 +14,7 @@ use std::process::Command;
 use anyhow::Context;
 use serde_json::json;
 
-use crate::{binary, cargo, output_of, run_to_end, scenes, scenes_in, target_dir};
+use crate::{RELEASE, output_of, run_to_end, scenes, scenes_in, target_dir};
 use measure::{Measured, measure};
 
 /// What is asked for.
@@ -389,9 +389,7 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
         &["enfilade-cli"][..],
         &["enfilade-testkit", "--example", "generate"],
     ] {
-        run_to_end(&mut cargo(
-            &[&["build", "--release", "-p"], example].concat(),
-        ))?;
+        run_to_end(&mut RELEASE.cargo("build", &[&["-p"], example].concat()))?;
     }
     let mut bench = Bench {
         options,
@@ -406,7 +404,7 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
         folder: target_dir().join("messy"),
     };
     let has_hole = output_of(
-        Command::new(binary("enfilade")).args(["bake", "--help"]),
+        Command::new(RELEASE.binary("enfilade")).args(["bake", "--help"]),
         None,
     )?
     .contains("--smallest-hole");
@@ -460,8 +458,7 @@ fn name_of(dir: &Path) -> String {
 
 /// Runs the test kit's `generate`.
 fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
-    let example = target_dir().join("release/examples/generate");
-    let example = example.with_extension(std::env::consts::EXE_EXTENSION);
+    let example = RELEASE.binary("examples/generate");
     output_of(Command::new(example).args(args).arg("-o").arg(to), None).map(drop)
 }
 

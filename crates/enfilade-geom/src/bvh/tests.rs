@@ -55,14 +55,18 @@ proptest! {
 
     #[test]
     fn hits_are_those_of_exact_predicates(t in [point(), point(), point()], a in point(), b in point()) {
-        let found = hit_triangle(&Ray::segment(a, b), &t);
-        if let Some(expected) = oracle(a, b, &t) {
-            prop_assert_eq!(found.is_some(), expected);
-        }
-        if let Some(hit) = found {
-            // Front is where the volume of triangle and start is negative (robust's orient3d).
-            let start = side(t[0], t[1], t[2], a);
-            prop_assert!(start == 0 || hit.front == (start < 0));
+        // A random segment, which misses more often than not, and one through the middle of the triangle.
+        let middle = (t[0] + t[1] + t[2]) / 3.0;
+        for b in [b, middle * 2.0 - a] {
+            let found = hit_triangle(&Ray::segment(a, b), &t);
+            if let Some(expected) = oracle(a, b, &t) {
+                prop_assert_eq!(found.is_some(), expected);
+            }
+            if let Some(hit) = found {
+                // Front is where the volume of triangle and start is negative (robust's orient3d).
+                let start = side(t[0], t[1], t[2], a);
+                prop_assert!(start == 0 || hit.front == (start < 0));
+            }
         }
     }
 

@@ -90,6 +90,7 @@ fn what_a_room_is_built_of_stays() {
     assert_eq!(Build::room().details(), [""; 0]);
 }
 
+// Covers S4.
 #[test]
 fn what_stands_in_a_room_is_detail() {
     let mut b = Build::room();

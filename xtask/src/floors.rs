@@ -1,0 +1,126 @@
+//! The least score that each real scene must keep.
+//!
+//! A floor lies 0.01 below the figure in `docs/benchmarks/rooms.md`: rounding passes, one room or door less does
+//! not. Where figures get better, write them (`cargo xtask score --write`) and raise the floors here; a test
+//! compares the two.
+
+use anyhow::bail;
+
+use crate::score::{COLUMNS, Row};
+
+/// The least shares of rooms, doors and windows: the first three of [`COLUMNS`].
+struct Floor {
+    scene: &'static str,
+    shares: [f64; 3],
+}
+
+const FLOORS: [Floor; 6] = [
+    Floor {
+        scene: "duplex",
+        shares: [0.89, 0.99, 0.99],
+    },
+    Floor {
+        scene: "fzk-haus",
+        shares: [0.99, 0.99, 0.99],
+    },
+    Floor {
+        scene: "institute",
+        shares: [0.98, 0.99, 0.99],
+    },
+    Floor {
+        scene: "jasmin-sun",
+        shares: [0.89, 0.87, 0.91],
+    },
+    Floor {
+        scene: "kit-edc",
+        shares: [0.99, 0.99, 0.99],
+    },
+    Floor {
+        scene: "samplehouse4",
+        shares: [0.74, 0.99, 0.99],
+    },
+];
+
+/// Fails with a line for each figure below its floor. Scenes without a floor pass, and are named.
+pub(crate) fn check(rows: &[Row]) -> anyhow::Result<()> {
+    let mut low = Vec::new();
+    for row in rows {
+        let shares = [row.figures[0], row.figures[1], row.figures[2]];
+        match FLOORS.iter().find(|f| f.scene == row.name) {
+            Some(floor) => low.extend(below(floor, shares)),
+            None => println!("{}: no floor in xtask/src/floors.rs", row.name),
+        }
+    }
+    if !low.is_empty() {
+        bail!("{}", low.join("\n"));
+    }
+    Ok(())
+}
+
+/// The figures that lie below their floors, or are not there.
+fn below(floor: &Floor, shares: [Option<f64>; 3]) -> Vec<String> {
+    (0..3)
+        .filter(|&k| !shares[k].is_some_and(|share| share >= floor.shares[k]))
+        .map(|k| {
+            let share = shares[k].map_or_else(|| "none".to_owned(), |s| format!("{s:.3}"));
+            format!(
+                "{}: {} {share}, below the floor of {}",
+                floor.scene, COLUMNS[k], floor.shares[k]
+            )
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLOOR: Floor = Floor {
+        scene: "a house",
+        shares: [0.89, 0.99, 0.99],
+    };
+
+    #[test]
+    fn a_room_less_is_below_the_floor_and_rounding_is_not() {
+        let of_21 = |rooms: f64| below(&FLOOR, [Some(rooms / 21.0), Some(1.0), Some(1.0)]);
+        assert!(of_21(19.0).is_empty());
+        assert_eq!(
+            of_21(18.0),
+            ["a house: rooms 0.857, below the floor of 0.89"]
+        );
+    }
+
+    #[test]
+    fn a_figure_that_is_gone_is_below_the_floor() {
+        assert_eq!(below(&FLOOR, [Some(1.0), None, Some(1.0)]).len(), 1);
+        assert_eq!(below(&FLOOR, [Some(f64::NAN); 3]).len(), 3);
+    }
+
+    #[test]
+    fn floors_lie_a_hundredth_below_what_is_written() {
+        let page = std::fs::read_to_string(crate::root().join("docs/benchmarks/rooms.md"));
+        let page = page.expect("the page of the scores");
+        for floor in &FLOORS {
+            let row = page
+                .lines()
+                .find_map(|l| l.strip_prefix(&format!("| {} |", floor.scene)))
+                .unwrap_or_else(|| panic!("{} has no row", floor.scene));
+            let written: Vec<f64> = row
+                .split('|')
+                .skip(1)
+                .take(3)
+                .map(|f| f.trim().parse().expect("a figure"))
+                .collect();
+            for (k, written) in written.iter().enumerate() {
+                let gap = written - floor.shares[k];
+                assert!(
+                    (gap - 0.01).abs() < 1e-9,
+                    "{}: {} is written as {written}, its floor is {}",
+                    floor.scene,
+                    COLUMNS[k],
+                    floor.shares[k]
+                );
+            }
+        }
+    }
+}
