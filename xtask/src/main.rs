@@ -7,6 +7,7 @@ mod apt;
 mod bench;
 mod check;
 mod messy;
+mod mutual;
 mod score;
 mod tidy;
 

@@ -4,8 +4,8 @@
 //! bytes can ask for terabytes, and it holds each element as a map of names.
 
 use crate::builder::Builder;
-use crate::obj::shortened;
 use crate::polygon::Splitter;
+use crate::soup::shortened;
 use crate::{ImportError, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};

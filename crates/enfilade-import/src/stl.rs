@@ -4,7 +4,7 @@
 //! corners are made one vertex, bit for bit; facet normals follow from the corners and are dropped.
 
 use crate::builder::Builder;
-use crate::obj::shortened;
+use crate::soup::shortened;
 use crate::{ImportError, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};

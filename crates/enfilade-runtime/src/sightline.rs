@@ -16,7 +16,7 @@ use enfilade_geom::ray::hit_triangle;
 use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
-use crate::sight::point;
+use crate::point::point;
 use crate::state::SightState;
 
 /// Cells followed before the whole world's tree is asked; it is the faster one by then.
