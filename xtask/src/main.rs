@@ -9,6 +9,7 @@ mod check;
 mod features;
 mod floors;
 mod messy;
+mod mutual;
 mod score;
 mod tidy;
 

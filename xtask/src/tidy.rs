@@ -1,14 +1,16 @@
-//! What no lint checks: who may use whom, file lengths, strings that must not be there, links.
+//! What no lint checks: who may use whom, files that import each other, file lengths, strings that must not be
+//! there, links.
 //!
 //! The table here is the "may not" column of ARCHITECTURE.md; change both together.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::bail;
 use serde_json::Value;
 
-use crate::{cargo, output_of, root};
+use crate::{cargo, mutual, output_of, root};
 
 /// What one crate may use. Dependencies for its tests alone are free.
 struct Fence {
@@ -160,6 +162,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     )?;
     let mut problems = dependency_problems(&serde_json::from_str(&said)?);
     let mut n_files = 0;
+    let mut sources = BTreeMap::new();
     for file in listed.lines() {
         // What is no text (images, fuzz seeds), or is deleted but not yet committed.
         let Ok(text) = std::fs::read_to_string(root().join(file)) else {
@@ -172,8 +175,11 @@ pub(crate) fn run() -> anyhow::Result<()> {
             problems.extend(link_problems(file, &text, &|path| {
                 root().join(path).exists()
             }));
+        } else if file.ends_with(".rs") {
+            sources.insert(file.to_owned(), text);
         }
     }
+    problems.extend(mutual::problems(&sources));
     if !problems.is_empty() {
         bail!("{}", problems.join("\n"));
     }

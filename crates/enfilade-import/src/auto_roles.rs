@@ -7,11 +7,10 @@
 //! between floor and ceiling, the lintel between two jambs, the tile between its neighbors.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, Bvh, DVec3, Sets, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
 use fillers::Surroundings;
-use std::collections::HashMap;
 use std::ops::Range;
-use units::Unit;
+use units::{Unit, key};
 
 mod fillers;
 mod furniture;
@@ -319,40 +318,6 @@ fn goes_on_at_its_rim(
         .map(|[a, b]| a.distance(b))
         .sum();
     on_others > RIM_SHARE * 4.0 * bounds.size().element_sum()
-}
-
-/// A corner as what can be compared.
-fn key(p: DVec3) -> [u64; 3] {
-    // + 0.0 makes one zero of two.
-    (p + 0.0).to_array().map(f64::to_bits)
-}
-
-/// The connected part of each triangle, and the parts' boxes: triangles that share a corner hang
-/// together.
-fn parts(triangles: &[Triangle]) -> (Vec<u32>, Vec<Aabb>) {
-    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut sets = Sets::new(triangles.len());
-    for (i, t) in (0..).zip(triangles) {
-        for p in t {
-            sets.join(i, *first_at.entry(key(*p)).or_insert(i));
-        }
-    }
-    let mut part_of = vec![u32::MAX; triangles.len()];
-    let mut boxes: Vec<Aabb> = Vec::new();
-    let of_triangles = (0..)
-        .zip(triangles)
-        .map(|(i, t)| {
-            let part = &mut part_of[sets.find(i) as usize];
-            if *part == u32::MAX {
-                *part = boxes.len() as u32;
-                boxes.push(Aabb::EMPTY);
-            }
-            let own = &mut boxes[*part as usize];
-            *own = own.union(Aabb::of_points(t));
-            *part
-        })
-        .collect();
-    (of_triangles, boxes)
 }
 
 /// Why one sees around a small object, if one does: it stands, hangs or leans, and stands between

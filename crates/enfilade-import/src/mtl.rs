@@ -5,7 +5,7 @@
 
 use crate::builder::Builder;
 use crate::gltf::read_picture_file;
-use crate::obj::shortened;
+use crate::soup::shortened;
 use crate::{ImportError, files, soup};
 use enfilade_geom::scene::{Image, Material, Texture};
 use serde_json::{Map, Value, json};

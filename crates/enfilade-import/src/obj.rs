@@ -7,6 +7,7 @@
 use crate::ImportError;
 use crate::builder::Builder;
 use crate::polygon::Splitter;
+use crate::soup::shortened;
 use crate::{mtl, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};
@@ -449,13 +450,4 @@ fn resolve(field: &str, n: usize) -> Option<u32> {
         _ => index.checked_add(i64::try_from(n).ok()?)?,
     };
     u32::try_from(index).ok().filter(|&i| (i as usize) < n)
-}
-
-/// A word short enough for a message.
-pub(crate) fn shortened(word: &str) -> String {
-    if word.chars().count() <= 60 {
-        word.to_owned()
-    } else {
-        word.chars().take(57).chain("...".chars()).collect()
-    }
 }

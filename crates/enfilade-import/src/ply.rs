@@ -4,8 +4,8 @@
 //! drops the first in silence (`docs/dependencies.md`).
 
 use crate::builder::Builder;
-use crate::obj::shortened;
 use crate::polygon::Splitter;
+use crate::soup::shortened;
 use crate::{ImportError, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};

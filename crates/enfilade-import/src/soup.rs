@@ -75,3 +75,12 @@ pub(crate) fn stem(builder: &Builder<'_>) -> String {
 pub(crate) fn unit(builder: &Builder<'_>) -> f64 {
     builder.options.unit.unwrap_or(1.0)
 }
+
+/// A word short enough for a message.
+pub(crate) fn shortened(word: &str) -> String {
+    if word.chars().count() <= 60 {
+        word.to_owned()
+    } else {
+        word.chars().take(57).chain("...".chars()).collect()
+    }
+}

@@ -5,7 +5,7 @@
 //! dropped.
 
 use crate::builder::Builder;
-use crate::obj::shortened;
+use crate::soup::shortened;
 use crate::{ImportError, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};

@@ -3,7 +3,7 @@
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::sight::point;
+use crate::point::point;
 
 /// A group of triangles of one batch that is culled, and drawn, as one.
 #[derive(Clone, Copy, Debug, PartialEq)]

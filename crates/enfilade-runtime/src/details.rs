@@ -7,8 +7,8 @@ use enfilade_cpg::World;
 use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Ray, Triangle};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
+use crate::point::point;
 use crate::seen::DetailId;
-use crate::sight::point;
 
 /// The triangles of a mesh, in its own space or, for an object that is flattened, in the world's.
 #[derive(Clone, Debug)]

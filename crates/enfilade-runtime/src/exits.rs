@@ -12,11 +12,28 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::sight::{Exit, point};
+use crate::point::point;
 
 /// Cells with so few exits are not grouped. Offices with 4 to 15 exits a room gain nothing; a facade
 /// of 64 windows does.
 const MIN_EXITS: usize = 16;
+
+/// A portal as left from one cell. 48 bytes, side by side for each cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Exit {
+    /// A point of its plane, in the middle of the outline.
+    pub(crate) center: [f32; 3],
+    /// Of the sphere around `center` that holds the outline. [Units: wu]
+    pub(crate) radius: f32,
+    /// Unit normal, towards `to`.
+    pub(crate) normal: [f32; 3],
+    pub(crate) to: u32,
+    pub(crate) portal: u32,
+    pub(crate) first_corner: u32,
+    pub(crate) n_corners: u32,
+    /// Whether the corners run counter-clockwise about `normal`.
+    pub(crate) is_turned: bool,
+}
 
 /// Exits of one cell, side by side, or groups of them. One line of cache.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,9 @@
 use enfilade_cpg::{CellId, PortalId};
 use glam::DVec3;
 
-use crate::sight::{Exit, Sight, point};
+use crate::exits::Exit;
+use crate::point::point;
+use crate::sight::Sight;
 
 /// Portals that one step reports, at most; it may cross more.
 const MAX_CROSSED: usize = 16;

@@ -14,7 +14,8 @@ use enfilade_geom::scene::Material;
 use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
 use glam::{Vec3, Vec4};
 
-use crate::sight::{SightOptions, point};
+use crate::options::SightOptions;
+use crate::point::point;
 
 /// Corners that an occluder may have.
 const MAX_CORNERS: usize = 8;

@@ -6,8 +6,8 @@
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::{DVec3, Ray, Triangle};
 
+use crate::point::point;
 use crate::seen::DetailId;
-use crate::sight::point;
 use crate::sightline::Sightlines;
 use crate::state::SightState;
 

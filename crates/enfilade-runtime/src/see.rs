@@ -23,11 +23,13 @@ use enfilade_cpg::{CellId, PortalId};
 use glam::{DVec3, Vec3};
 
 use crate::boxes::{Planes, Root};
+use crate::exits::Exit;
 use crate::exits::Group;
 use crate::occluder::Shadows;
+use crate::point::point;
 use crate::region::{Clipped, Clipper, Narrowing, Region};
 use crate::seen::{ChunkId, DetailId, Lists, SeeCounts, Seen, Visit};
-use crate::sight::{Exit, Sight, point};
+use crate::sight::Sight;
 use crate::state::SightState;
 use crate::view::{Face, View};
 

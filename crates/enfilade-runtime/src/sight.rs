@@ -5,8 +5,10 @@ use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
 
 use crate::boxes::{BoxTrees, Boxed, Root};
 use crate::chunks::{Chunk, chunks_of};
-use crate::exits::{Group, Runs, group};
+use crate::exits::{Exit, Group, Runs, group};
 use crate::occluder::{Occluders, occluders_of};
+use crate::options::SightOptions;
+use crate::point::point;
 use crate::region::{MAX_CORNERS, reduced_around};
 
 /// Why a world cannot be asked.
@@ -40,52 +42,6 @@ pub enum SightError {
         /// Which one.
         index: u32,
     },
-}
-
-/// How a world is made ready.
-#[derive(Clone, Copy, Debug)]
-pub struct SightOptions {
-    /// Triangles that are culled together, at most. [Limit: above 0]
-    ///
-    /// Smaller chunks are culled more tightly, and cost a box test of about 2 ns each.
-    pub chunk_triangles: usize,
-    /// Large polygons kept of each cell, behind which things are not seen. [Limit: 0 for none]
-    pub occluders: usize,
-    /// Smallest area of such a polygon. [Units: wu²]
-    pub occluder_area: f32,
-    /// Portals of a cell that are skipped together, at most, where it has more than 16. Changes what a
-    /// question costs, not its answer. [Limit: 0 for each by itself]
-    pub portal_group: usize,
-}
-
-impl Default for SightOptions {
-    fn default() -> Self {
-        Self {
-            // A wall with a door is 8 to 20 triangles, a room's shell about 50 (office towers,
-            // Dirkse's maze): 12 splits rooms by their walls.
-            chunk_triangles: 4,
-            occluders: 16,
-            occluder_area: 2.0,
-            portal_group: 8,
-        }
-    }
-}
-
-/// A portal as left from one cell. 48 bytes, side by side for each cell.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Exit {
-    /// A point of its plane, in the middle of the outline.
-    pub(crate) center: [f32; 3],
-    /// Of the sphere around `center` that holds the outline. [Units: wu]
-    pub(crate) radius: f32,
-    /// Unit normal, towards `to`.
-    pub(crate) normal: [f32; 3],
-    pub(crate) to: u32,
-    pub(crate) portal: u32,
-    pub(crate) first_corner: u32,
-    pub(crate) n_corners: u32,
-    /// Whether the corners run counter-clockwise about `normal`.
-    pub(crate) is_turned: bool,
 }
 
 /// A detail object, placed.
@@ -126,10 +82,6 @@ pub struct Sight {
     pub(crate) tolerance: f64,
     /// Largest absolute coordinate. [Units: wu]
     pub(crate) extent: f64,
-}
-
-pub(crate) fn point(p: [f32; 3]) -> DVec3 {
-    DVec3::new(p[0].into(), p[1].into(), p[2].into())
 }
 
 /// Pieces are used instead of the outline where there are at most so many.

@@ -17,7 +17,7 @@ use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
 use crate::details::Details;
-use crate::sight::point;
+use crate::point::point;
 
 /// Cells followed before the whole world's tree is asked; it is the faster one by then.
 const MAX_CELLS: usize = 6;

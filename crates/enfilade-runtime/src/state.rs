@@ -4,7 +4,8 @@ use enfilade_cpg::{CellId, PortalId};
 
 use enfilade_geom::DVec3;
 
-use crate::sight::{Sight, point};
+use crate::point::point;
+use crate::sight::Sight;
 
 /// Half-spaces that narrow one portal, at most.
 const MAX_CUTS: usize = 4;

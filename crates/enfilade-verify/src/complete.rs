@@ -3,9 +3,9 @@
 
 use enfilade_geom::{DVec3, Ray};
 
-use crate::report::{Failure, FailureKind, Tally};
+use crate::report::{Break, Failure, FailureKind, Tally};
 use crate::rng::Rng;
-use crate::sealed::{Break, follow};
+use crate::sealed::follow;
 use crate::subject::Subject;
 
 /// Casts ray number `i` from a random point of a random cell and judges what it meets.

@@ -33,6 +33,7 @@
 
 mod complete;
 mod evidence;
+mod options;
 mod outlines;
 mod report;
 mod rng;
@@ -49,6 +50,7 @@ use enfilade_geom::Triangle;
 use rayon::prelude::*;
 
 pub use evidence::{EvidenceError, EvidenceReport, verify_evidence};
+pub use options::VerifyOptions;
 pub use report::{CompleteCounts, Failure, FailureKind, SealedCounts, VerifyReport};
 pub use subject::{structural_triangles, tolerance};
 pub use views::{Missed, Seer, ViewAnswer, ViewOptions, ViewQuery, ViewReport, verify_views};
@@ -59,30 +61,6 @@ use subject::Subject;
 
 /// Rays that share a random sequence. Fixed, so that threads cannot change what is drawn.
 const CHUNK: u64 = 2048;
-
-/// What to try, and how hard.
-#[derive(Clone, Debug)]
-pub struct VerifyOptions {
-    /// Segments tried for *sealed*, and as many rays for *complete*.
-    pub rays: u64,
-    /// Start of the random sequences; equal seeds give equal reports.
-    pub seed: u64,
-    /// `eps` of the [crate page](crate); `None` for [`tolerance`] of the triangles. [Units: wu]
-    pub tolerance: Option<f64>,
-    /// Kinds of failure listed at most, the most frequent first.
-    pub max_listed: usize,
-}
-
-impl Default for VerifyOptions {
-    fn default() -> Self {
-        Self {
-            rays: 1_000_000,
-            seed: 1,
-            tolerance: None,
-            max_listed: 20,
-        }
-    }
-}
 
 /// Tries the promises on `world`; see the [crate page](crate).
 ///

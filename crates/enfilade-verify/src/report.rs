@@ -7,9 +7,17 @@ use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 use serde::Serialize;
 
-use crate::VerifyOptions;
-use crate::sealed::Break;
+use crate::options::VerifyOptions;
 use crate::subject::{Crossing, Subject};
+
+/// Where following a segment went wrong.
+pub(crate) struct Break {
+    pub(crate) kind: FailureKind,
+    pub(crate) expected: Option<CellId>,
+    pub(crate) found: Option<CellId>,
+    pub(crate) portal: Option<PortalId>,
+    pub(crate) at: DVec3,
+}
 
 /// Failures of one kind in one chunk whose clearance is measured; it costs many times a ray.
 const MEASURED: u64 = 4;

@@ -1,24 +1,15 @@
 //! *Sealed*: the portals that an unblocked segment crosses lead from its first cell to its last.
 
-use enfilade_cpg::{CellId, PortalId};
+use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
 
-use crate::report::{Failure, FailureKind, Tally};
+use crate::report::{Break, Failure, FailureKind, Tally};
 use crate::rng::Rng;
 use crate::sample::draw_segment;
 use crate::subject::{Crossing, Subject};
 
 /// Draws before a segment is given up because its ends lie on surfaces.
 const DRAWS: usize = 4;
-
-/// Where following a segment went wrong.
-pub(crate) struct Break {
-    pub(crate) kind: FailureKind,
-    pub(crate) expected: Option<CellId>,
-    pub(crate) found: Option<CellId>,
-    pub(crate) portal: Option<PortalId>,
-    pub(crate) at: DVec3,
-}
 
 /// Draws segment number `i` and judges it.
 pub(crate) fn try_segment(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) {

@@ -6,7 +6,7 @@ use enfilade_cpg::{CellId, Locator, PortalId, World};
 use enfilade_geom::ray::{segment_distance_squared, segment_to_edges_distance};
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle};
 
-use crate::VerifyOptions;
+use crate::options::VerifyOptions;
 use crate::rng::Rng;
 
 /// Points tried in a cell's box to learn how much of it the cell fills.

@@ -11,7 +11,7 @@ use enfilade_geom::{Bvh, DMat4, DVec3, Ray, Triangle};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::VerifyOptions;
+use crate::options::VerifyOptions;
 use crate::rng::Rng;
 use crate::subject::{Subject, point_in, to_dvec};
 

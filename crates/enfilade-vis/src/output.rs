@@ -10,7 +10,7 @@ pub struct Witness {
     pub origin: DVec3,
     /// Where it goes; any length.
     pub direction: DVec3,
-    /// The openings it crosses, in order, as directions of [`SightGraph`].
+    /// The openings it crosses, in order, as directions of [`SightGraph`](enfilade_cpg::SightGraph).
     pub chain: Vec<u32>,
 }
 

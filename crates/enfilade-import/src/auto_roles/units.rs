@@ -1,6 +1,7 @@
 //! Objects as what hangs together in them: all windows of a facade may be one mesh.
 
-use super::parts;
+use std::collections::HashMap;
+
 use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
 
 /// Parts nearer than this are one thing: a handle and its leaf, the triangles of a mesh that shares
@@ -228,4 +229,38 @@ fn canonical(d: DVec3) -> DVec3 {
     } else {
         d
     }
+}
+
+/// A corner as what can be compared.
+pub(super) fn key(p: DVec3) -> [u64; 3] {
+    // + 0.0 makes one zero of two.
+    (p + 0.0).to_array().map(f64::to_bits)
+}
+
+/// The connected part of each triangle, and the parts' boxes: triangles that share a corner hang
+/// together.
+fn parts(triangles: &[Triangle]) -> (Vec<u32>, Vec<Aabb>) {
+    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut sets = Sets::new(triangles.len());
+    for (i, t) in (0..).zip(triangles) {
+        for p in t {
+            sets.join(i, *first_at.entry(key(*p)).or_insert(i));
+        }
+    }
+    let mut part_of = vec![u32::MAX; triangles.len()];
+    let mut boxes: Vec<Aabb> = Vec::new();
+    let of_triangles = (0..)
+        .zip(triangles)
+        .map(|(i, t)| {
+            let part = &mut part_of[sets.find(i) as usize];
+            if *part == u32::MAX {
+                *part = boxes.len() as u32;
+                boxes.push(Aabb::EMPTY);
+            }
+            let own = &mut boxes[*part as usize];
+            *own = own.union(Aabb::of_points(t));
+            *part
+        })
+        .collect();
+    (of_triangles, boxes)
 }

@@ -13,7 +13,6 @@
 mod parse;
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use enfilade_geom::scene::{Entity, Material, Mesh, Primitive, Role};
 use enfilade_geom::solid::exposed_faces;
@@ -22,6 +21,7 @@ use serde_json::json;
 
 use crate::builder::Builder;
 use crate::{ImportError, Up};
+use parse::Place;
 use parse::{Brush, MAX_COORDINATE, RawEntity};
 
 /// Meters in a unit of a map, if nothing else is said.
@@ -30,19 +30,6 @@ const UNIT: f64 = 1.0 / 32.0;
 const WELD: f64 = 1e-3;
 /// Most sides of a brush; clipping is quadratic in them. Editors make up to some dozens.
 const MAX_SIDES: usize = 256;
-
-/// A place in the text, both from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
-    line: u32,
-    column: u32,
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}:{}", self.line, self.column)
-    }
-}
 
 /// Whether the text looks like a map: it begins, comments aside, with a brace and a quote.
 pub(crate) fn is_map(bytes: &[u8]) -> bool {

@@ -1,9 +1,22 @@
 //! The text of a `.map` file: entities, their properties and their brushes' planes.
 
-use super::Place;
+use std::fmt;
 
 /// Numbers beyond this are taken for damage.
 pub(super) const MAX_COORDINATE: f64 = 1e6;
+
+/// A place in the text, both from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) line: u32,
+    pub(super) column: u32,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}:{}", self.line, self.column)
+    }
+}
 
 /// Something wrong at a place in the text.
 #[derive(Debug)]
