@@ -16,7 +16,7 @@ use crate::voxel::{
     ENCLOSED, Grid, WidestPath, ascend, deepest_enclosed, distance_squared, enclosure, voxelize,
     widest_path,
 };
-use crate::watershed::{Frame, bounds_of, closure_triangles};
+use crate::watershed::{Frame, bounds_of, plates};
 use crate::{BakeConfig, BakeError};
 
 /// A way from air that should be a room to the outdoors, as wide as can be.
@@ -124,8 +124,8 @@ pub fn find_leak_trail(
     }
     let frame = Frame::of(&matter);
     let grid = config.grid(&bounds_of(&frame.triangles_to_grid(&matter)))?;
-    let leaves = closure_triangles(scene, &Bvh::build(&matter));
-    matter.extend(leaves);
+    // Leaves that stand open, too: a room ends at its doorways.
+    matter.extend(plates(scene).concat());
     let matter = frame.triangles_to_grid(&matter);
     let distances = distance_squared(&voxelize(&grid, &matter));
     let enclosure = enclosure(grid.dims, &distances);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::cpg::wire::decode_glb;
+use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{CellSet, SightGraph, SightPortal, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
@@ -29,6 +29,9 @@ pub(crate) struct Pvs {
     /// Where to write the answer, as text.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+    /// Write the world with the answer in it, for programs to ask; may be the input itself.
+    #[arg(long, value_name = "OUT.glb", conflicts_with = "far")]
+    into: Option<PathBuf>,
     /// How thoroughly to look.
     #[arg(long, value_enum, default_value_t = Mode::Exact)]
     mode: Mode,
@@ -98,6 +101,12 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     let input = read_input(&args.input)?;
     let graph = &input.graph;
     let output = output_path(args)?;
+    if args.into.is_some() && input.world.is_none() {
+        bail!(
+            "{} is a portal file: only a world holds an answer (--into)",
+            args.input.display()
+        );
+    }
     let start = Instant::now();
     let vis = compute(args, &input)?;
     let report = report(graph, &vis, start.elapsed());
@@ -118,6 +127,11 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     if let Some(path) = &args.mutual {
         let text = statistics::mutual(&vis.cells, input.world.as_ref());
         write_atomically(path, text.as_bytes())?;
+    }
+    if let (Some(path), Some(world)) = (&args.into, input.world) {
+        let pvs = Some(enfilade::cpg::Pvs::of_rows(&vis.cells));
+        let bytes = encode_glb(&World { pvs, ..world })?;
+        write_atomically(path, &bytes)?;
     }
     print(&report, args.json)
 }

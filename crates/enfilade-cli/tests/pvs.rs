@@ -220,3 +220,36 @@ fn a_portal_file_is_simplified_and_answers_as_before() {
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
     assert!(said.contains("cost of a cluster 2 to 2"), "{said}");
 }
+
+#[test]
+fn a_world_takes_the_answer_along_and_a_portal_file_cannot() {
+    let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(12, 1));
+    let (glb, pvs, told) = (place("bare.glb"), place("told.pvs"), place("told.glb"));
+    enfilade::save(&glb, &world).unwrap();
+    let [p, o, i] = ["pvs", "-o", "--into"].map(Path::new);
+    let done = enfilade(&[p, &glb, o, &pvs, i, &told]);
+    assert!(done.status.success(), "{done:?}");
+    let answer = enfilade::open(&told).unwrap().pvs.unwrap();
+    let text = fs::read_to_string(&pvs).unwrap();
+    let rows = enfilade::import::read_pvs_text(&text).unwrap().rows;
+    for (from, row) in world.graph.cell_ids().zip(&rows) {
+        let seen = row.iter().flat_map(|&(a, b)| a..b);
+        assert!(answer.visible_from(from).map(|c| c.0).eq(seen));
+    }
+    // A rough answer, into the input itself.
+    let [m, fast] = ["--mode", "fast"].map(Path::new);
+    let done = enfilade(&[p, &glb, o, &pvs, i, &glb, m, fast]);
+    assert!(done.status.success(), "{done:?}");
+    let rough = enfilade::open(&glb).unwrap().pvs.unwrap();
+    for from in world.graph.cell_ids() {
+        assert!(answer.visible_from(from).all(|to| rough.sees(from, to)));
+    }
+
+    let prt = place("no-world.prt");
+    fs::write(&prt, PRT).unwrap();
+    let done = enfilade(&[p, &prt, o, &pvs, i, &told]);
+    assert_eq!(done.status.code(), Some(1), "{done:?}");
+    let [far, ten] = ["--far", "10"].map(Path::new);
+    let done = enfilade(&[p, &glb, o, &pvs, i, &told, far, ten]);
+    assert_eq!(done.status.code(), Some(2), "{done:?}");
+}
