@@ -181,6 +181,7 @@ macro_rules! builder_tests {
         /// Of a tower that this builder takes seconds for.
         const ROOMS: usize = $rooms;
 
+        // Covers V7.
         #[test]
         fn mixed_scenes_keep_the_promises() {
             for g in enfilade_testkit::mixed::all() {
@@ -203,6 +204,7 @@ macro_rules! builder_tests {
             }
         }
 
+        // Covers V6.
         #[test]
         fn cells_hold_free_space_and_portals_lie_between_them() {
             let turned = gjorup_rooms(Variant::Distorted, [0.0, 7.0, 0.0]);

@@ -1,4 +1,4 @@
-//! Corridors as high as the rooms that they open to, without a frame at their mouths.
+//! Corridors as high as the rooms that they open to, without a frame at their mouths. Covers V12.
 
 use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade_cpg::CellPortalGraph;

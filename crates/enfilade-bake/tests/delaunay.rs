@@ -59,6 +59,7 @@ fn problems(g: &Generated, what: &str) -> Vec<String> {
     out
 }
 
+// Covers T3 and Z4.
 #[test]
 fn rooms_of_the_thesis_are_parted_by_exactly_their_openings() {
     let mut all = Vec::new();
@@ -84,6 +85,7 @@ fn the_cavern_is_parted_at_its_necks_however_it_is_turned() {
 }
 
 /// The stairs stand in the hall, whose door leads outdoors; walls and roofs have insides. A gap is no portal.
+// Covers T2.
 #[test]
 fn no_room_is_lost_to_the_outdoors_and_no_solid_is_a_cell() {
     let mut all = Vec::new();
@@ -225,6 +227,7 @@ fn rooms_left(g: &Generated, session: &Session, n: usize, config: &DelaunayConfi
     n_rooms
 }
 
+// Covers T5.
 #[test]
 fn a_person_s_choices_hold_and_steps_go_back() {
     let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
@@ -306,6 +309,7 @@ fn a_choice_is_about_one_portal_whatever_the_scale() {
     }
 }
 
+// Covers T4.
 #[test]
 fn the_weight_has_no_scale() {
     // The same rooms eight times as large, with openings eight times as wide asked for.

@@ -1,4 +1,4 @@
-//! Portals added to finished worlds: promises kept, all else as it was, or an error that says where.
+//! Portals added to finished worlds: promises kept, all else as it was, or an error that says where. Covers P4.
 
 use enfilade_bake::edit::{AddPortalError, Added, add_portal};
 use enfilade_bake::simplify::delete_portal;

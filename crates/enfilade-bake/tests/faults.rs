@@ -1,4 +1,4 @@
-//! Buildings with the faults of real models, baked with default settings, against their truth.
+//! Buildings with the faults of real models, baked with default settings, against their truth. Covers V1.
 //!
 //! Rooms and doors are judged as in `docs/benchmarks/rooms.md`; points in closed solids lie in no
 //! room.

@@ -1,4 +1,4 @@
-//! Gjørup's rooms and cavern through the watershed: exactly the openings, however the model is turned.
+//! Gjørup's rooms and cavern through the watershed: exactly the openings, however the model is turned. Covers Z4.
 
 use std::collections::BTreeSet;
 

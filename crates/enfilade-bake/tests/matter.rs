@@ -95,6 +95,7 @@ fn house(things: &[([f64; 3], [f64; 3])]) -> Scene {
     scene
 }
 
+// Covers V1.
 #[test]
 fn things_that_stand_in_rooms_are_solid_whichever_way_they_face() {
     // Free of the walls, so that the rooms flow around: a block, a column from floor to ceiling, and

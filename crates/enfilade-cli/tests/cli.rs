@@ -126,6 +126,7 @@ fn the_demo_makes_a_house_and_its_hints_work() {
     }
 }
 
+// Covers P5.
 #[test]
 fn inspect_prints_a_table_for_people() {
     let path = two_rooms_file("table.glb");
@@ -145,6 +146,7 @@ fn inspect_prints_a_table_for_people() {
     assert!(table.find("outdoors").unwrap() < table.find("cell-0").unwrap());
 }
 
+// Covers P6.
 #[test]
 fn locate_answers_line_by_line() {
     let path = two_rooms_file("locate.glb");

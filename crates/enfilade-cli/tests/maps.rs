@@ -73,6 +73,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+// Covers B2, P1 and P4.
 #[test]
 fn a_map_is_baked_by_partition_verified_simplified_and_edited() {
     let folder = Folder::new("whole");
@@ -319,6 +320,7 @@ fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
     }
 }
 
+// Covers B4 and B6.
 #[test]
 fn separators_of_levels_end_on_solids_and_each_parts_two_cells() {
     use enfilade::import::{ImportOptions, import};
@@ -341,6 +343,7 @@ fn separators_of_levels_end_on_solids_and_each_parts_two_cells() {
     }
 }
 
+// Covers B2, B4 and B6.
 #[test]
 fn separators_of_buildings_end_on_surfaces_and_each_parts_two_cells() {
     use enfilade::import::{ImportOptions, import};

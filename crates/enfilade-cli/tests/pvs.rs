@@ -98,6 +98,7 @@ fn a_search_without_time_is_saved_and_taken_up_again() {
     assert!(text.contains("\n0: 0-2\n1: 0-3\n"), "{text}");
 }
 
+// Covers Q7 and Q9.
 #[test]
 fn a_world_has_statistics_and_mutual_lists() {
     let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(12, 1));
@@ -169,6 +170,7 @@ fn evidence_of_real_portal_files_is_accepted() {
     }
 }
 
+// Covers Q6.
 #[test]
 fn far_planes_and_walls_leave_evidence_that_is_accepted() {
     let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(40, 3));

@@ -64,6 +64,7 @@ fn n_lost(studio: &mut Studio, world: &World, views: usize, seed: u64) -> [usize
     n
 }
 
+// Covers R1.
 #[test]
 fn culling_by_portals_changes_no_pixel() {
     let world = grid();
@@ -88,6 +89,7 @@ fn a_traversal_that_loses_a_room_is_noticed() {
     );
 }
 
+// Covers R9.
 #[test]
 fn the_adapter_asked_about_portals_loses_no_pixel_either() {
     let world = grid();
@@ -127,6 +129,7 @@ fn the_adapter_asked_about_portals_loses_no_pixel_either() {
     );
 }
 
+// Covers R7.
 #[test]
 fn a_portal_of_few_pixels_is_filled_or_left_out() {
     let world = grid();
@@ -210,6 +213,7 @@ fn ball() -> Mesh {
     }
 }
 
+// Covers R7.
 #[test]
 fn objects_far_away_have_fewer_triangles_and_look_the_same() {
     let mut world = World {
@@ -267,6 +271,7 @@ fn objects_far_away_have_fewer_triangles_and_look_the_same() {
     assert!(last * 12 < n, "{last} of {n} triangles");
 }
 
+// Covers Z1.
 #[test]
 fn portals_draw_less_than_the_frustum_and_that_less_than_everything() {
     let world = grid();

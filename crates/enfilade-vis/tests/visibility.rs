@@ -119,6 +119,7 @@ fn sees(vis: &VisOutput, a: usize, b: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
+    // Covers Q1.
     #[test]
     fn no_line_that_passes_is_lost_and_the_evidence_is_accepted(seed in 0u64..1 << 32, n in 2usize..7) {
         let grid = Grid::new(n, seed);
@@ -440,6 +441,7 @@ fn there_and_back() -> SightGraph {
     }
 }
 
+// Covers Q4.
 #[test]
 fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
     let graph = there_and_back();

@@ -348,7 +348,8 @@ impl Merger<'_> {
             };
             let pair = (bay.min(home), bay.max(home));
             let shared = self.contacts[&pair].iter().filter(is_upright).count();
-            let rest = sides[bay as usize] + sides[home as usize] - 2 * shared;
+            // The sides of the outdoors are not counted, nor asked for.
+            let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared);
             merges.push((pair.0, pair.1, share as f32));
             self.merge(pair.0, pair.1);
             let whole = self.find(bay);
