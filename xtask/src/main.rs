@@ -48,7 +48,9 @@ fn main() -> ExitCode {
     let result = match task {
         Task::Test => check::run(),
         Task::Tidy => tidy::run().and_then(|()| features::run()),
-        Task::Score { is_written, dirs } => score::run(RELEASE, &dirs, is_written),
+        Task::Score { is_written, dirs } => {
+            score::run(RELEASE, &dirs, is_written).and_then(|rows| floors::check(&rows))
+        }
         Task::Messy(options) => messy::run(&options),
         Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
         Task::Measure(args) => return bench::measure(&args),

@@ -4,15 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
 
-use crate::{Locator, Pvs};
-
-/// Index of a cell in [`CellPortalGraph::cells`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct CellId(pub u32);
-
-/// Index of a portal in [`CellPortalGraph::portals`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PortalId(pub u32);
+use crate::{CellId, Locator, PortalId, Pvs};
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -9,6 +9,7 @@ mod access;
 mod cell_set;
 mod graph;
 mod holes;
+mod ids;
 mod locator;
 mod look;
 mod pvs;
@@ -20,10 +21,10 @@ pub mod wire;
 pub use access::Exit;
 pub use cell_set::CellSet;
 pub use graph::{
-    Batch, Cell, CellId, CellPortalGraph, DetailObject, Portal, PortalId, PortalKind, Provenance,
-    Statistics, World,
+    Batch, Cell, CellPortalGraph, DetailObject, Portal, PortalKind, Provenance, Statistics, World,
 };
 pub use holes::{Hole, HoleReason};
+pub use ids::{CellId, PortalId};
 pub use locator::{Locator, LocatorNode};
 pub use pvs::Pvs;
 pub use seals::Seals;
