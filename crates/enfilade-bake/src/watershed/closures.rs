@@ -67,7 +67,7 @@ pub fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
 /// All plates but the leaves of doors that stand open: those whose rim does not run along walls or other plates nearly all
 /// around, but is held below and at the hinges alone. They shut nothing, and would cut a corridor in two.
 ///
-/// [`RIM_SAMPLES`] queries of box trees a side.
+/// Eight queries of box trees for each side of a plate.
 #[must_use]
 pub fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Vec<Vec<Triangle>> {
     let owner: Vec<usize> = (0..plates.len())
