@@ -33,11 +33,11 @@ pub(crate) struct Cut<'a> {
     pub(crate) closed_share: f64,
 }
 
-/// An opening and what it is taken for.
+/// A portal and its classification.
 struct Judged {
     portal: PartitionPortal,
     kind: PortalKind,
-    /// It begins at a floor.
+    /// Its lower edge is at a floor, with no sill below it.
     is_on_floor: bool,
 }
 
@@ -248,10 +248,10 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
 /// Parapets higher than this make a window of an opening. [Units: wu]
 const PARAPET: f64 = 0.4;
 
-/// Lower ones that are closed are no doors. [Units: wu]
+/// Least height of a door: a lower opening that a pane or leaf fills is a window. [Units: wu]
 const LEAST_DOOR: f64 = 1.5;
 
-/// What an opening is taken for, and whether it begins at a floor.
+/// The kind of a portal, and whether its lower edge is at a floor.
 fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
         return (PortalKind::Crack, false);

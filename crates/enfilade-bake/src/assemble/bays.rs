@@ -1,5 +1,8 @@
-//! Panes above each other from the floor up are one window: transoms divide the bays of a glazed wall, mullions part them.
-//! Windows above a sill stay as they are.
+//! Merges the panes of a glazed bay into one window portal.
+//!
+//! In a glazed wall, vertical mullions separate the bays, and horizontal transoms divide each bay into panes. Panes that stand
+//! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay separate.
+//! **What can go wrong:** panes whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
 //!
 //! Time `O(p log p)` in windows, as long as few lie in one column of one plane.
 
@@ -11,9 +14,9 @@ use enfilade_geom::{DVec3, Sets, Winding};
 use super::Judged;
 use crate::complex::PartitionPortal;
 
-/// Transoms are no higher, and the sides of panes in one bay are no farther apart. [Units: wu]
+/// Greatest height of a transom, and greatest offset between the sides of two panes of one bay. [Units: wu]
 const BAR: f64 = 0.15;
-/// Windows whose planes are no farther apart lie in one. [Units: wu]
+/// Greatest distance between the planes of two windows that count as coplanar. [Units: wu]
 const ONE_PLANE: f64 = 1e-6;
 
 /// Where a window lies in its facade. [Units: wu]
@@ -99,7 +102,7 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
 }
 
 impl Judged {
-    /// Makes one portal of two in one plane.
+    /// Adds the pieces of a coplanar portal.
     fn take_in(&mut self, other: PartitionPortal) {
         let whole = &mut self.portal;
         whole.pieces.extend(other.pieces);

@@ -18,13 +18,13 @@ const MAX_THICKNESS: f64 = 0.4;
 const MIN_EXTENT: f64 = 0.35;
 /// … and at least this many times wider than thick.
 const MIN_FLATNESS: f64 = 2.0;
-/// Leaves of doors are higher. [Units: wu]
+/// Least height of a door leaf. [Units: wu]
 const MIN_LEAF_HEIGHT: f64 = 1.6;
-/// … and fill at least this share of the rectangle around them; the bars of a railing do not.
+/// Least share of its bounding rectangle that a door leaf fills; the bars of a railing fill less.
 const MIN_FILL: f64 = 0.5;
-/// What is this near to a plate's rim holds it. [Units: wu] Frames are as thick.
+/// A point of a plate's rim is held when a wall or another plate is within this distance, which bridges a frame. [Units: wu]
 const HELD_WITHIN: f64 = 0.2;
-/// Share of its rim by which a plate is held that shuts something: three of four sides, nearly.
+/// Least share of its rim that is held when a leaf is shut: nearly three of its four sides.
 const MIN_HELD: f64 = 0.7;
 /// Samples along each side of a plate's rim.
 const RIM_SAMPLES: usize = 8;

@@ -1,4 +1,4 @@
-//! Fronts: the faces where two cells of a flooded volume meet, told into openings.
+//! Fronts: the voxel faces where two cells of a flooded volume meet, grouped into openings.
 
 use std::collections::BTreeMap;
 
