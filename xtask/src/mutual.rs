@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs that are still there, to be parted by who works on them next; none may be added.
-const KNOWN: [[&str; 2]; 11] = [
+const KNOWN: [[&str; 2]; 8] = [
     [
         "crates/enfilade-bake/src/bsp/mod.rs",
         "crates/enfilade-bake/src/bsp/portals.rs",
@@ -24,10 +24,6 @@ const KNOWN: [[&str; 2]; 11] = [
         "crates/enfilade-bake/src/complex/seen.rs",
     ],
     [
-        "crates/enfilade-bake/src/delaunay/bake.rs",
-        "crates/enfilade-bake/src/delaunay/rooms.rs",
-    ],
-    [
         "crates/enfilade-bake/src/delaunay/branches.rs",
         "crates/enfilade-bake/src/delaunay/branches/forks.rs",
     ],
@@ -40,16 +36,8 @@ const KNOWN: [[&str; 2]; 11] = [
         "crates/enfilade-bake/src/delaunay/space.rs",
     ],
     [
-        "crates/enfilade-bake/src/simplify/merge.rs",
-        "crates/enfilade-bake/src/simplify/mod.rs",
-    ],
-    [
         "crates/enfilade-bake/src/voxel/watershed.rs",
         "crates/enfilade-bake/src/voxel/watershed/flood.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/watershed/regions.rs",
-        "crates/enfilade-bake/src/watershed/sections.rs",
     ],
 ];
 

@@ -17,7 +17,7 @@ use enfilade_geom::{Aabb, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
 use rayon::prelude::*;
 
 use crate::complex::{Partition, PartitionPortal};
-use crate::watershed::Screen;
+use crate::structure::Candidate;
 
 /// A scene in cells, whatever found them: what the last stage, which all builders share, is made from.
 pub(crate) struct Cut<'a> {
@@ -26,7 +26,7 @@ pub(crate) struct Cut<'a> {
     pub(crate) triangles: &'a [Triangle],
     pub(crate) bvh: &'a Bvh,
     pub(crate) partition: Partition,
-    pub(crate) screens: &'a [Screen],
+    pub(crate) candidates: &'a [Candidate],
     /// Outlines are grown by this much, so that rounding never cuts into an opening. [Units: wu]
     pub(crate) outward: f64,
     /// Share of an opening that a leaf or pane must fill to make a door of it.
@@ -256,7 +256,7 @@ fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
         return (PortalKind::Crack, false);
     }
-    let closed = p.screen.map_or(0.0, |s| cut.screens[s as usize].closed);
+    let closed = p.screen.map_or(0.0, |s| cut.candidates[s as usize].closed);
     let is_closed = closed >= cut.closed_share;
     let is_upright = p.plane.normal.y.abs() < 0.5;
     let up = p.outline.points.iter().map(|q| q.y);

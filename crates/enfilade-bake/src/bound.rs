@@ -159,6 +159,23 @@ pub fn keep_bounds(world: &World, settings: &SimplifySettings) -> Bounded {
     out
 }
 
+/// Keeps a baked world within bounds, where any are given, and says in the notes and in the file's provenance which.
+pub(crate) fn keep_costs(world: &mut World, notes: &mut Vec<String>, asked: &SimplifySettings) {
+    let nothing = SimplifySettings {
+        cost: asked.cost.clone(),
+        outdoors: asked.outdoors,
+        ..SimplifySettings::default()
+    };
+    if *asked == nothing {
+        return;
+    }
+    let bounded = keep_bounds(world, asked);
+    notes.extend(bounded.note());
+    *world = bounded.world;
+    let settings = &mut world.graph.provenance.settings;
+    settings.extend(asked.to_settings());
+}
+
 struct Cutting<'a> {
     world: Cow<'a, World>,
     n_cuts: usize,

@@ -4,38 +4,53 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::Aabb;
 
-use crate::BakeError;
+use crate::bsp::BspConfig;
+use crate::delaunay::DelaunayConfig;
+use crate::simplify::SimplifySettings;
+use crate::structure::MergeSettings;
 use crate::voxel::Grid;
-use crate::watershed::MergeSettings;
+use crate::{BakeError, Method};
 
 /// Settings of a bake. The defaults are meant for everything; none is tuned to a scene.
 #[derive(Clone, Debug)]
 pub struct BakeConfig {
-    /// Edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size.
-    /// [Units: wu] [Limit: above 0]
-    pub voxel: Option<f64>,
+    /// How cells are found.
+    pub method: Method,
     /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: above 0]
     pub min_opening: f64,
     /// Narrower openings are closed by seals. [Units: wu]
     pub smallest_hole: SmallestHole,
-    /// Most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
+    /// Where rooms end.
+    pub merge: MergeSettings,
+    /// Bounds on the cells, and what a cell costs; nothing is bounded if not given.
+    pub costs: SimplifySettings,
+    /// Watershed: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size.
+    /// [Units: wu] [Limit: above 0]
+    pub voxel: Option<f64>,
+    /// Watershed: most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
     /// beyond that an error. About 3 bytes each. [Limit: at least 1,000]
     pub max_voxels: usize,
-    /// Basins shallower than this are noise. [Units: wu]
+    /// Watershed: basins shallower than this are noise. [Units: wu]
     pub noise: f64,
-    /// How basins become rooms.
-    pub merge: MergeSettings,
+    /// What only the binary space partition asks.
+    pub bsp: BspConfig,
+    /// What only tetrahedra ask.
+    pub delaunay: DelaunayConfig,
 }
 
 impl Default for BakeConfig {
     fn default() -> Self {
         Self {
-            voxel: None,
+            method: Method::Auto,
             min_opening: 0.6,
             smallest_hole: SmallestHole::default(),
+            merge: MergeSettings::default(),
+            costs: SimplifySettings::default(),
+            voxel: None,
             max_voxels: 1_600_000_000,
             noise: 0.015,
-            merge: MergeSettings::default(),
+            bsp: BspConfig::default(),
+            delaunay: DelaunayConfig::default(),
         }
     }
 }
@@ -108,9 +123,17 @@ impl SmallestHole {
 pub(crate) const PADDING: usize = 10;
 
 impl BakeConfig {
-    /// Every setting by name, as text, for the provenance of the file.
+    /// The defaults for one method.
     #[must_use]
-    pub fn to_settings(&self) -> BTreeMap<String, String> {
+    pub fn of(method: Method) -> Self {
+        Self {
+            method,
+            ..Self::default()
+        }
+    }
+
+    /// What the watershed goes by, each setting as text by its name, for the provenance of the file.
+    pub(crate) fn watershed_settings(&self) -> BTreeMap<String, String> {
         let m = &self.merge;
         [
             (
@@ -136,22 +159,16 @@ impl BakeConfig {
         .into()
     }
 
+    /// Checks the width of the narrowest opening.
+    pub(crate) fn check_opening(&self) -> Result<(), BakeError> {
+        positive("min_opening", self.min_opening).map(|_| ())
+    }
+
     /// The grid for a scene of these bounds. All checks of settings live here.
     ///
     /// # Errors
     /// When a setting is out of its limits, or the budget leaves voxels that no opening fits.
     pub(crate) fn grid(&self, bounds: &Aabb) -> Result<Grid, BakeError> {
-        let positive = |name: &'static str, value: f64| {
-            if value > 0.0 && value.is_finite() {
-                Ok(value)
-            } else {
-                Err(BakeError::Setting {
-                    name,
-                    value: value.to_string(),
-                    limit: "a number above 0",
-                })
-            }
-        };
         positive("min_opening", self.min_opening)?;
         self.smallest_hole.check()?;
         let wanted = positive("voxel", self.voxel.unwrap_or(self.min_opening / 6.0))?;
@@ -179,6 +196,17 @@ impl BakeConfig {
         }
         Ok(Grid::covering(bounds, voxel, PADDING))
     }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<f64, BakeError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(value);
+    }
+    Err(BakeError::Setting {
+        name,
+        value: value.to_string(),
+        limit: "a number above 0",
+    })
 }
 
 /// Peak memory of a bake, rounded from `docs/benchmarks/growth.md`.

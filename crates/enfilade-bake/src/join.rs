@@ -7,7 +7,7 @@ use enfilade_cpg::{CellId, Locator, PortalKind};
 use enfilade_geom::DVec3;
 
 use crate::complex::{Partition, Vote};
-use crate::watershed::OUTDOORS;
+use crate::structure::OUTDOORS;
 
 /// Marks the label of a void; the rest of the label is the region that the void belongs to.
 pub(crate) const VOID: u32 = 1 << 31;

@@ -11,12 +11,12 @@
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, DVec3};
 
-use crate::pipeline::structural_triangles;
+use crate::structure::{Frame, bounds_of, plates, structural_triangles};
 use crate::voxel::{
     ENCLOSED, Grid, WidestPath, ascend, deepest_enclosed, distance_squared, enclosure, voxelize,
     widest_path,
 };
-use crate::watershed::{Frame, bounds_of, plates};
+
 use crate::{BakeConfig, BakeError};
 
 /// A way from air that should be a room to the outdoors, as wide as can be.
@@ -102,7 +102,7 @@ pub enum NoTrail {
 }
 
 /// Finds the widest way to the outdoors from `from`, or else from the middle of the largest air that is enclosed on four
-/// sides or more, open to outdoors, and as wide as a room ([`MergeSettings::min_radius`](crate::watershed::MergeSettings)).
+/// sides or more, open to outdoors, and as wide as a room ([`MergeSettings::min_radius`](crate::MergeSettings)).
 /// A point is moved to the middle of its surroundings first, lest its own distance to a wall be the narrowest.
 /// [Units: wu]
 ///

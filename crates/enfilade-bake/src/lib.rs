@@ -1,10 +1,19 @@
 //! Finds the rooms and doorways of a scene.
 //!
-//! Start with [`pipeline`]: one function lists the stages in order. The *watershed* decides where
-//! rooms end, on voxels ([`voxel`], [`watershed`]); the *cell complex* makes it exact
-//! ([`complex`]), so that the promises hold whatever the voxels missed.
+//! Start with [`bake()`]: a method *proposes* where rooms and their openings are, and the exact cell complex *realizes* the
+//! proposal, so that the promises hold whatever the method missed.
+//!
+//! | room | question |
+//! | --- | --- |
+//! | `structure` | what is there: walls, stairs, door leaves and panes, slabs; where an opening is a pinch |
+//! | [`watershed`], [`bsp`], [`delaunay`] | where do rooms end: three methods, none of which knows another |
+//! | [`complex`] | what is open: convex leaves and the facets between them, exactly |
+//! | `realize`, `assemble` | which leaves are a cell, what each cell sees: the world |
+//! | [`simplify`], [`bound`], [`edit`] | a world, changed |
+//! | [`leak`] | where a model is open that should be closed |
 
 mod assemble;
+mod bake;
 pub mod bound;
 pub mod bsp;
 pub mod complex;
@@ -15,12 +24,22 @@ pub mod edit;
 mod error;
 mod join;
 pub mod leak;
-pub mod pipeline;
+mod method;
+mod output;
+mod proposal;
+mod realize;
 pub mod simplify;
+mod stage;
+mod structure;
+mod vessel;
 pub mod voxel;
 pub mod watershed;
 
+pub use bake::bake;
 pub use config::{BakeConfig, SmallestHole};
 pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;
-pub use pipeline::{BakeOutput, bake};
+pub use method::Method;
+pub use output::{BakeOutput, Resolution};
+pub use stage::Stage;
+pub use structure::MergeSettings;

@@ -2,7 +2,7 @@
 
 use enfilade_bake::bound::{Reason, keep_bounds};
 use enfilade_bake::simplify::{CostModel, SimplifySettings, costs};
-use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
+use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::World;
 use enfilade_testkit::{GridParams, Rng, furnished_house, room_grid};
 use enfilade_verify::{VerifyOptions, verify_world};
@@ -151,19 +151,15 @@ fn a_bound_below_what_one_object_costs_is_told_and_does_not_cut_forever() {
 fn a_cost_of_a_material_that_there_is_not_is_an_error_with_those_that_there_are() {
     let mut scene = furnished_house().scene;
     let name = scene.materials[0].name.clone();
-    let mut config = enfilade_bake::bsp::BspConfig::default();
-    config
-        .simplify
-        .cost
-        .materials
-        .insert("waterr".to_owned(), 3.0);
+    let mut config = BakeConfig::of(Method::Bsp);
+    config.costs.cost.materials.insert("waterr".to_owned(), 3.0);
     let context = BakeContext::new(&Silent, None);
-    let bsp = |scene: &_, config: &_| enfilade_bake::bsp::bake_bsp(scene, config, &context);
+    let bsp = |scene: &_, config: &_| bake(scene, config, &context);
     let told = bsp(&scene, &config).err().unwrap().to_string();
     assert!(
         told.contains("'waterr'") && told.contains(&format!("'{name}'")),
         "{told}"
     );
     scene.materials[0].name = "waterr".to_owned();
-    assert!(config.simplify.cost.check(&scene.materials).is_ok());
+    assert!(config.costs.cost.check(&scene.materials).is_ok());
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use enfilade_bake::delaunay::{DelaunayConfig, Session, bake_delaunay};
-use enfilade_bake::{BakeContext, Silent};
+use enfilade_bake::delaunay::Session;
+use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::PortalKind;
 use enfilade_geom::DVec3;
 use enfilade_testkit::{Generated, Tube, tubes};
@@ -28,9 +28,9 @@ fn trunk(half: f64, radius: f64) -> Tube {
 
 /// The room of each point after the default stop.
 fn rooms_at(g: &Generated, scale: f64, points: &[DVec3]) -> Vec<u32> {
-    let mut config = DelaunayConfig::default();
-    config.common.min_opening *= scale;
-    config.common.merge.min_radius *= scale;
+    let mut config = BakeConfig::of(Method::Delaunay);
+    config.min_opening *= scale;
+    config.merge.min_radius *= scale;
     let context = BakeContext::new(&Silent, None);
     let session = Session::begin(&g.scene, &config, &context).unwrap();
     let room_of_cell = session.decimation.after(session.decimation.stop);
@@ -64,7 +64,7 @@ fn side_tubes_are_cells_and_a_stub_is_none() {
     let (all, tips, stub) = vessel();
     let g = tubes(&all, 0.17);
     let context = BakeContext::new(&Silent, None);
-    let world = bake_delaunay(&g.scene, &DelaunayConfig::default(), &context)
+    let world = bake(&g.scene, &BakeConfig::of(Method::Delaunay), &context)
         .unwrap()
         .world;
     let at = |p: DVec3| world.graph.locator.locate(p).unwrap();
@@ -366,7 +366,7 @@ fn a_vessel_that_is_open_at_its_ends_is_indoors() {
         for n_open in 1..=ends.len() {
             let g = opened(tubes(&arms, 0.12), &ends[..n_open]);
             let context = BakeContext::new(&Silent, None);
-            let world = bake_delaunay(&g.scene, &DelaunayConfig::default(), &context)
+            let world = bake(&g.scene, &BakeConfig::of(Method::Delaunay), &context)
                 .unwrap()
                 .world;
             let graph = &world.graph;

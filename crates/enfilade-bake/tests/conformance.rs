@@ -5,9 +5,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use enfilade_bake::bsp::{BspConfig, bake_bsp};
-use enfilade_bake::delaunay::{DelaunayConfig, bake_delaunay};
-use enfilade_bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Silent, bake};
+use enfilade_bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Silent, bake};
 use enfilade_cpg::wire::{decode_glb, encode_glb};
 use enfilade_cpg::{CellPortalGraph, World};
 use enfilade_geom::scene::{Role, Scene};
@@ -23,15 +21,15 @@ use enfilade_verify::{VerifyOptions, verify_world};
 type Result = std::result::Result<BakeOutput, BakeError>;
 
 fn watershed(scene: &Scene, context: &BakeContext<'_>) -> Result {
-    bake(scene, &BakeConfig::default(), context)
+    bake(scene, &BakeConfig::of(Method::Watershed), context)
 }
 
 fn bsp(scene: &Scene, context: &BakeContext<'_>) -> Result {
-    bake_bsp(scene, &BspConfig::default(), context)
+    bake(scene, &BakeConfig::of(Method::Bsp), context)
 }
 
 fn delaunay(scene: &Scene, context: &BakeContext<'_>) -> Result {
-    bake_delaunay(scene, &DelaunayConfig::default(), context)
+    bake(scene, &BakeConfig::of(Method::Delaunay), context)
 }
 
 type Builder = fn(&Scene, &BakeContext<'_>) -> Result;

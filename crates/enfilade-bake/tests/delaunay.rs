@@ -1,8 +1,8 @@
 //! The thesis's cases through the Delaunay builder: with the default stop, the portals that stand are
 //! exactly the separations of the rooms.
 
-use enfilade_bake::delaunay::{DelaunayConfig, JOINED, Session, bake_delaunay, bake_session};
-use enfilade_bake::{BakeContext, Silent};
+use enfilade_bake::delaunay::{JOINED, Session, bake_session};
+use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::{PortalKind, World};
 use enfilade_geom::DVec3;
 use enfilade_testkit::mixed::{pitched_roof_attic, room_within_room, stair_hall, two_rooms_crack};
@@ -13,7 +13,7 @@ use enfilade_verify::{VerifyOptions, verify_world};
 
 fn baked(g: &Generated) -> World {
     let context = BakeContext::new(&Silent, None);
-    let out = bake_delaunay(&g.scene, &DelaunayConfig::default(), &context).unwrap();
+    let out = bake(&g.scene, &BakeConfig::of(Method::Delaunay), &context).unwrap();
     out.world
 }
 
@@ -108,7 +108,7 @@ fn a_slit_between_rooms_is_weighed_by_its_width() {
     for width in [0.05, 0.15, 0.25, 0.35] {
         let g = two_rooms_crack(width);
         let context = BakeContext::new(&Silent, None);
-        let config = DelaunayConfig::default();
+        let config = BakeConfig::of(Method::Delaunay);
         let session = Session::begin(&g.scene, &config, &context).unwrap();
         let ahead = &session.decimation.steps[session.decimation.stop..];
         let weights: Vec<f64> = ahead.iter().map(|s| s.weight).collect();
@@ -217,7 +217,7 @@ fn a_small_door_of_a_large_hall_is_found() {
 }
 
 /// Rooms that a walk counts after some steps; a bake has to come to the same.
-fn rooms_left(g: &Generated, session: &Session, n: usize, config: &DelaunayConfig) -> usize {
+fn rooms_left(g: &Generated, session: &Session, n: usize, config: &BakeConfig) -> usize {
     let context = BakeContext::new(&Silent, None);
     let out = bake_session(&g.scene, session, n, config, &context).unwrap();
     let cells = &out.world.graph.cells;
@@ -232,7 +232,7 @@ fn rooms_left(g: &Generated, session: &Session, n: usize, config: &DelaunayConfi
 fn a_person_s_choices_hold_and_steps_go_back() {
     let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
     let context = BakeContext::new(&Silent, None);
-    let mut config = DelaunayConfig::default();
+    let mut config = BakeConfig::of(Method::Delaunay);
     let mut session = Session::begin(&g.scene, &config, &context).unwrap();
     let stop = session.decimation.stop;
     // A step forwards joins two of the rooms; back again, they are four.
@@ -240,14 +240,14 @@ fn a_person_s_choices_hold_and_steps_go_back() {
     assert_eq!(rooms_left(&g, &session, stop, &config), 4);
     // The same, decided for good.
     let door = session.decimation.steps[stop].position;
-    config.choices.join.push(door);
+    config.delaunay.choices.join.push(door);
     session.decimate(&config);
     let stop = session.decimation.stop;
     assert_eq!(rooms_left(&g, &session, stop, &config), 3);
     // And the other way round: a portal is kept that would go.
-    config.choices.join.clear();
-    config.choices.keep.push(door);
-    config.stop = Some(4.0);
+    config.delaunay.choices.join.clear();
+    config.delaunay.choices.keep.push(door);
+    config.delaunay.stop = Some(4.0);
     session.decimate(&config);
     let stop = session.decimation.stop;
     let steps = &session.decimation.steps[..stop];
@@ -260,7 +260,7 @@ fn a_person_s_choices_hold_and_steps_go_back() {
 fn each_portal_ahead_can_be_joined_and_the_walk_s_count_is_the_bake_s() {
     let g = stair_hall();
     let context = BakeContext::new(&Silent, None);
-    let mut config = DelaunayConfig::default();
+    let mut config = BakeConfig::of(Method::Delaunay);
     let mut session = Session::begin(&g.scene, &config, &context).unwrap();
     let stop = session.decimation.stop;
     let n = rooms_left(&g, &session, stop, &config);
@@ -268,7 +268,7 @@ fn each_portal_ahead_can_be_joined_and_the_walk_s_count_is_the_bake_s() {
     let ahead = session.decimation.steps[stop..].to_vec();
     assert_eq!(ahead.len(), n);
     for (i, step) in ahead.iter().enumerate() {
-        config.choices.join = vec![step.position];
+        config.delaunay.choices.join = vec![step.position];
         session.decimate(&config);
         let joined = session.decimation.stop;
         let last = &session.decimation.steps[joined - 1];
@@ -288,9 +288,9 @@ fn a_choice_is_about_one_portal_whatever_the_scale() {
     let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
     for scale in [0.01, 1.0, 30.0] {
         let g = scaled(g.clone(), scale);
-        let mut config = DelaunayConfig::default();
-        config.common.min_opening *= scale;
-        config.common.merge.min_radius *= scale;
+        let mut config = BakeConfig::of(Method::Delaunay);
+        config.min_opening *= scale;
+        config.merge.min_radius *= scale;
         let context = BakeContext::new(&Silent, None);
         let mut session = Session::begin(&g.scene, &config, &context).unwrap();
         let stop = session.decimation.stop;
@@ -301,7 +301,7 @@ fn a_choice_is_about_one_portal_whatever_the_scale() {
         };
         // Openings are 0.45 in radius: half of that aside is about the same one, more than that about none.
         for (aside, n) in [(0.0, 1), (0.2, 1), (0.6, 0)] {
-            config.choices.join = vec![ahead[0].position + DVec3::Y * (aside * scale)];
+            config.delaunay.choices.join = vec![ahead[0].position + DVec3::Y * (aside * scale)];
             session.decimate(&config);
             assert_eq!(joins(&session), n, "{scale} {aside}");
             assert_eq!(session.decimation.stop, stop + n, "{scale} {aside}");
@@ -326,9 +326,9 @@ fn the_weight_has_no_scale() {
         }
     }
     let last = |scene: &enfilade_geom::scene::Scene, scale: f64| -> Vec<f64> {
-        let mut config = DelaunayConfig::default();
-        config.common.min_opening *= scale;
-        config.common.merge.min_radius *= scale;
+        let mut config = BakeConfig::of(Method::Delaunay);
+        config.min_opening *= scale;
+        config.merge.min_radius *= scale;
         let context = BakeContext::new(&Silent, None);
         let d = Session::begin(scene, &config, &context).unwrap().decimation;
         d.steps[d.stop..].iter().map(|s| s.weight).collect()

@@ -1,7 +1,6 @@
 //! Guided partitions of scenes without a wall: vessels and caves. Covers B3.
 
-use enfilade_bake::bsp::{BspConfig, bake_bsp};
-use enfilade_bake::{BakeContext, Silent};
+use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::World;
 use enfilade_geom::DVec3;
 use enfilade_testkit::{Generated, Tube, Variant, gjorup_rooms, tubes};
@@ -21,9 +20,9 @@ fn vessel() -> Generated {
     tubes(&all, 0.25)
 }
 
-fn baked(g: &Generated, config: &BspConfig) -> World {
+fn baked(g: &Generated, config: &BakeConfig) -> World {
     let context = BakeContext::new(&Silent, None);
-    let world = bake_bsp(&g.scene, config, &context).unwrap().world;
+    let world = bake(&g.scene, config, &context).unwrap().world;
     world.validate().unwrap();
     let options = VerifyOptions {
         rays: 20_000,
@@ -42,12 +41,12 @@ fn n_indoors(world: &World) -> usize {
 fn a_grid_makes_cells_in_a_vessel_whichever_way_it_faces() {
     let mut g = vessel();
     for is_turned in [false, true] {
-        let mut config = BspConfig::default();
+        let mut config = BakeConfig::of(Method::Bsp);
         let unguided = n_indoors(&baked(&g, &config));
         assert!(unguided <= 1, "{unguided}");
         // Across the trunk at every multiple, and across the side tubes.
         for (grid, least) in [(4.0, 4), (2.5, 6)] {
-            config.guide.grid = Some(grid);
+            config.bsp.guide.grid = Some(grid);
             let world = baked(&g, &config);
             let n = n_indoors(&world);
             assert!(n >= least, "{grid} {is_turned}: {n}");
@@ -64,8 +63,8 @@ fn a_grid_makes_cells_in_a_vessel_whichever_way_it_faces() {
 #[test]
 fn a_grid_leaves_the_rooms_of_a_building_as_they_are() {
     let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
-    let mut config = BspConfig::default();
+    let mut config = BakeConfig::of(Method::Bsp);
     let rooms = n_indoors(&baked(&g, &config));
-    config.guide.grid = Some(1.7);
+    config.bsp.guide.grid = Some(1.7);
     assert_eq!(n_indoors(&baked(&g, &config)), rooms);
 }

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use enfilade::bake::bsp::{Bsp, BspConfig, BspInput, Guide, Heuristic, bake_bsp};
+use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
 use enfilade::bake::simplify::{
     CostModel, Metric, SimplifySettings, expected_cost, expected_cost_after, least_expected_cost,
     simplify,
 };
-use enfilade::bake::{BakeContext, Silent};
+use enfilade::bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
@@ -92,19 +92,17 @@ fn measure(
             // As in the paper, whose polygons are those of the tree: a polygon costs as many triangles as they have on
             // average, and objects cost nothing.
             let min_cost = min_polygons * c.n_triangles as f64 / c.n_polygons.max(1) as f64;
-            let config = BspConfig {
-                heuristic,
-                simplify: SimplifySettings {
-                    min_cost,
-                    cost: CostModel {
-                        detail: 0.0,
-                        ..CostModel::default()
-                    },
-                    ..SimplifySettings::default()
+            let mut config = BakeConfig::of(Method::Bsp);
+            config.bsp.heuristic = heuristic;
+            config.costs = SimplifySettings {
+                min_cost,
+                cost: CostModel {
+                    detail: 0.0,
+                    ..CostModel::default()
                 },
-                ..BspConfig::default()
+                ..SimplifySettings::default()
             };
-            let world = bake_bsp(scene, &config, &BakeContext::new(&Silent, None))?.world;
+            let world = bake(scene, &config, &BakeContext::new(&Silent, None))?.world;
             let fewer = |n: usize, of: usize| 100.0 * (1.0 - n as f64 / of.max(1) as f64);
             let (cells, portals) = (world.graph.cells.len(), world.graph.portals.len());
             format!(

@@ -2,9 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use enfilade::bake::bsp::{BspConfig, bake_bsp};
-use enfilade::bake::delaunay::{DelaunayConfig, bake_delaunay};
-use enfilade::bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Silent, bake};
+use enfilade::bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Silent, bake};
 use enfilade::cpg::{CellPortalGraph, PortalKind};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::{Aabb, DVec3};
@@ -51,14 +49,16 @@ fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     (vec![path.join("scene.glb")], detail)
 }
 
+fn by(method: Method, scene: &Scene, context: &BakeContext<'_>) -> Result<BakeOutput, BakeError> {
+    bake(scene, &BakeConfig::of(method), context)
+}
+
 type Builder = fn(&Scene, &BakeContext<'_>) -> Result<BakeOutput, BakeError>;
 
 const BUILDERS: [(&str, Builder); 3] = [
-    ("watershed", |s, c| bake(s, &BakeConfig::default(), c)),
-    ("bsp", |s, c| bake_bsp(s, &BspConfig::default(), c)),
-    ("delaunay", |s, c| {
-        bake_delaunay(s, &DelaunayConfig::default(), c)
-    }),
+    ("watershed", |s, c| by(Method::Watershed, s, c)),
+    ("bsp", |s, c| by(Method::Bsp, s, c)),
+    ("delaunay", |s, c| by(Method::Delaunay, s, c)),
 ];
 
 fn compare(table: &mut Table, name: &str, scene: &Scene, rays: u64) -> anyhow::Result<()> {

@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::bsp::{BspConfig, bake_bsp};
-use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
+use enfilade::bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade::cpg::{CellId, DetailObject, World};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::{Mesh, Primitive};
@@ -84,7 +83,7 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
     if let Some(polygons) = args.clinic {
         let scene = clinic(polygons, 1);
         let context = BakeContext::new(&Silent, None);
-        let baked = bake_bsp(&scene, &BspConfig::default(), &context)?;
+        let baked = bake(&scene, &BakeConfig::of(Method::Bsp), &context)?;
         worlds.push((format!("clinic of {polygons} polygons"), baked.world));
     }
     if worlds.is_empty() {

@@ -1,7 +1,6 @@
 //! `enfilade bake`: a scene becomes a world.
 
 mod cracks;
-mod curved;
 pub(crate) mod delaunay;
 mod doorless;
 mod leak_path;
@@ -12,11 +11,9 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::bound::keep_bounds;
-use enfilade::bake::bsp::{bake_bsp, find_leak};
-use enfilade::bake::delaunay::{LEAST_BALL, bake_delaunay};
-use enfilade::bake::simplify::SimplifySettings;
-use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, bake};
+use enfilade::bake::bsp::find_leak;
+use enfilade::bake::delaunay::LEAST_BALL;
+use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::{Role, Scene};
@@ -54,7 +51,6 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         );
     }
     let settings = settings::resolve(options)?;
-    let config = &settings.watershed;
     check_target(&args.output)?;
     let bar = StageBar::new();
     bar.start("reading", 0);
@@ -62,7 +58,8 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     bar.finish();
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
-    settings.bsp.simplify.cost.check(&scene.materials)?;
+    let config = &settings.config_for(scene);
+    config.costs.cost.check(&scene.materials)?;
     refuse_leak(scene, options)?;
     let mut leak_path = match options.leak_path {
         Some(from) => Some(leak_path::look_as_asked(
@@ -73,36 +70,11 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         )?),
         None => None,
     };
-    let (method, reason) = method_for(scene, options.method);
-    let mut baked = bake_by(method, &reason, scene, options, &settings)?;
-    if options.method == settings::Method::Auto
-        && method == Builder::Watershed
-        && n_indoors(&baked) <= 1
-        && curved::is_vessel(scene)
-    {
-        let found = if n_indoors(&baked) == 1 {
-            "one cell"
-        } else {
-            "no cell"
-        };
-        let reason = format!(
-            "the surface is curved and closed but for its ends, and the watershed finds {found} in it; \
-             tetrahedra find branches, too"
-        );
-        let other = bake_by(Builder::Delaunay, &reason, scene, options, &settings)?;
-        if n_indoors(&other) > n_indoors(&baked) {
-            baked = other;
-        } else {
-            writeln!(io::stderr(), "there are none: the watershed's is kept")?;
-        }
-    }
+    let mut baked = bake_scene(scene, config, options.threads)?;
     if let Some(path) = &leak_path {
         baked.world.leak_path = path.points();
-    } else if n_indoors(&baked) == 0 {
+    } else if baked.n_indoors() == 0 {
         leak_path = Some(leak_path::look_unasked(scene, config, options.threads)?);
-    }
-    if method != Builder::Bsp {
-        keep_costs(&mut baked, &settings.costs_of_rooms());
     }
     if let Some(repair) = settings.import.repair {
         let told = &mut baked.world.graph.provenance.settings;
@@ -133,110 +105,6 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         bytes.len() as f64 / 1e6
     )?;
     Ok(())
-}
-
-/// Bakes with one builder, and says which and why.
-fn bake_by(
-    method: Builder,
-    reason: &str,
-    scene: &Scene,
-    options: &settings::BakeOptions,
-    settings: &settings::Resolved,
-) -> anyhow::Result<BakeOutput> {
-    writeln!(io::stderr(), "method {}: {reason}", method.name())?;
-    if method != Builder::Delaunay && options.delaunay.choices.is_some() {
-        writeln!(
-            io::stderr(),
-            "the choices are not asked: they are about portals of --method delaunay"
-        )?;
-    }
-    let config = &settings.watershed;
-    let bar = BakeBar::new(scene, config, method.stages());
-    let ctx = BakeContext::new(&bar, None);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads.map_or(0, usize::from))
-        .build()?;
-    let baked = match method {
-        Builder::Watershed => pool.install(|| bake(scene, config, &ctx)),
-        Builder::Bsp => {
-            let mut config = settings.bsp.clone();
-            if scene.solids.is_empty() {
-                config.simplify = settings.costs_of_rooms();
-            }
-            pool.install(|| bake_bsp(scene, &config, &ctx))
-        }
-        Builder::Delaunay => {
-            let config = options.delaunay.resolve(config)?;
-            pool.install(|| bake_delaunay(scene, &config, &ctx))
-        }
-    }?;
-    Ok(baked)
-}
-
-/// Cuts and merges cells of a builder that knows of no costs, where bounds are given.
-pub(crate) fn keep_costs(baked: &mut BakeOutput, asked: &SimplifySettings) {
-    let nothing = SimplifySettings {
-        cost: asked.cost.clone(),
-        outdoors: asked.outdoors,
-        ..SimplifySettings::default()
-    };
-    if *asked == nothing {
-        return;
-    }
-    let bounded = keep_bounds(&baked.world, asked);
-    baked.notes.extend(bounded.note());
-    baked.world = bounded.world;
-    let told = &mut baked.world.graph.provenance.settings;
-    told.extend(asked.to_settings());
-}
-
-fn n_indoors(baked: &BakeOutput) -> usize {
-    let cells = &baked.world.graph.cells;
-    cells.iter().filter(|c| !c.outdoor).count()
-}
-
-/// What finds the cells.
-#[derive(Clone, Copy, PartialEq)]
-enum Builder {
-    Watershed,
-    Bsp,
-    Delaunay,
-}
-
-impl Builder {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Watershed => "watershed",
-            Self::Bsp => "bsp",
-            Self::Delaunay => "delaunay",
-        }
-    }
-
-    fn stages(self) -> &'static [&'static str] {
-        match self {
-            Self::Watershed => BakeContext::STAGES,
-            Self::Bsp => BakeContext::BSP_STAGES,
-            Self::Delaunay => BakeContext::DELAUNAY_STAGES,
-        }
-    }
-}
-
-/// The builder that is asked for or fits the input, and why.
-fn method_for(scene: &Scene, asked: settings::Method) -> (Builder, String) {
-    let asked_for = |builder| (builder, "asked for".to_owned());
-    match asked {
-        settings::Method::Watershed => asked_for(Builder::Watershed),
-        settings::Method::Bsp => asked_for(Builder::Bsp),
-        settings::Method::Delaunay => asked_for(Builder::Delaunay),
-        settings::Method::Auto if scene.solids.is_empty() => (
-            Builder::Watershed,
-            "the structure is triangles, which may have cracks".to_owned(),
-        ),
-        settings::Method::Auto => (
-            Builder::Bsp,
-            format!("the structure is made of {} brushes", scene.solids.len()),
-        ),
-    }
 }
 
 /// Ends the bake of a map whose inside is open to the void, with the way out.
@@ -287,15 +155,15 @@ fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Bakes on a pool of its own, with a progress line.
+/// Bakes on a pool of its own, with a progress line; says which method was chosen and why.
 pub(crate) fn bake_scene(
     scene: &Scene,
     config: &BakeConfig,
-    threads: Option<usize>,
+    threads: Option<u16>,
 ) -> anyhow::Result<BakeOutput> {
-    let bar = BakeBar::new(scene, config, BakeContext::STAGES);
+    let bar = BakeBar::new(scene, config);
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.unwrap_or(0))
+        .num_threads(threads.map_or(0, usize::from))
         .build()?;
     let baked = pool.install(|| bake(scene, config, &BakeContext::new(&bar, None)))?;
     drop(bar);
@@ -335,43 +203,43 @@ const LEAKS_SHOWN: usize = 10;
 
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
     let mut err = io::stderr().lock();
-    let [nx, ny, nz] = baked.dims;
-    let wanted = if nx > 0 {
-        writeln!(err, "voxels of {:.3} m, {nx} × {ny} × {nz}", baked.voxel)?;
-        config.voxel.unwrap_or(config.min_opening / 6.0)
-    } else if baked.voxel > 0.0 {
-        writeln!(
-            err,
-            "surfaces have points for all air at least {:.3} m in radius",
-            baked.voxel
-        )?;
-        let wanted = config.min_opening * LEAST_BALL;
-        if baked.voxel > wanted {
+    match baked.resolution {
+        Resolution::Voxels { edge, dims } => {
+            let [nx, ny, nz] = dims;
+            writeln!(err, "voxels of {edge:.3} m, {nx} × {ny} × {nz}")?;
+            let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
+            // The grid grows its voxels by tenths, if at all.
+            if edge > wanted * 1.05 {
+                writeln!(
+                    err,
+                    "not the {wanted:.3} m that were wanted: those would be more than {} voxels \
+                     (max_voxels in a --config file)",
+                    config.max_voxels
+                )?;
+            }
+        }
+        Resolution::Balls { radius } => {
             writeln!(
                 err,
-                "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \
-                 narrower openings are found, but may be weighed wrongly"
+                "surfaces have points for all air at least {radius:.3} m in radius"
             )?;
+            let wanted = config.min_opening * LEAST_BALL;
+            if radius > wanted {
+                writeln!(
+                    err,
+                    "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \
+                     narrower openings are found, but may be weighed wrongly"
+                )?;
+            }
         }
-        f64::INFINITY
-    } else {
-        f64::INFINITY // planes need neither
-    };
-    // The grid grows its voxels by tenths, if at all.
-    if baked.voxel > wanted * 1.05 {
-        writeln!(
-            err,
-            "not the {wanted:.3} m that were wanted: those would be more than {} voxels \
-             (max_voxels in a --config file)",
-            config.max_voxels
-        )?;
+        Resolution::Planes => {}
     }
     for note in &baked.notes {
         writeln!(err, "{note}")?;
     }
     if verbose || io::stderr().is_terminal() {
         for (stage, time) in &baked.times {
-            writeln!(err, "{stage:>20} {:>8.3} s", time.as_secs_f64())?;
+            writeln!(err, "{:>20} {:>8.3} s", stage.name(), time.as_secs_f64())?;
         }
     }
     if !baked.leaks.is_empty() {

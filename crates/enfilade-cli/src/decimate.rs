@@ -8,15 +8,14 @@ use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::delaunay::{DelaunayConfig, JOINED, Session, Step, bake_session};
-use enfilade::bake::simplify::SimplifySettings;
-use enfilade::bake::{BakeContext, Silent};
+use enfilade::bake::delaunay::{JOINED, Session, Step, bake_session};
+use enfilade::bake::{BakeConfig, BakeContext, Method, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 use enfilade::import::import;
 
 use crate::bake::delaunay::choices_text;
-use crate::bake::{keep_costs, print_summary, settings};
+use crate::bake::{print_summary, settings};
 use crate::output::{check_target, write_atomically};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
@@ -44,11 +43,12 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         check_target(path)?;
     }
-    let settings = settings::resolve(&args.options)?;
-    let config = args.options.delaunay.resolve(&settings.watershed)?;
+    let mut settings = settings::resolve(&args.options)?;
+    settings.config.method = Method::Delaunay;
     let imported = import(&args.inputs, &args.options.detail, &settings.import)?;
     let scene = &imported.scene;
-    settings.bsp.simplify.cost.check(&scene.materials)?;
+    let config = settings.config_for(scene);
+    config.costs.cost.check(&scene.materials)?;
     let session = Session::begin(scene, &config, &BakeContext::new(&Silent, None))?;
     let n = session.decimation.steps.len();
     if let Some(at) = args.at.filter(|&at| at > n) {
@@ -59,7 +59,6 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         at: args.at.unwrap_or(session.decimation.stop),
         session,
         config,
-        costs: settings.costs_of_rooms(),
         made: Vec::new(),
         is_saved: true,
     };
@@ -101,9 +100,7 @@ fn weight_of(step: &Step) -> String {
 struct Walk<'a> {
     scene: &'a Scene,
     session: Session,
-    config: DelaunayConfig,
-    /// Bounds on the cells that a bake makes.
-    costs: SimplifySettings,
+    config: BakeConfig,
     /// Steps taken.
     at: usize,
     /// Decisions of this walk, true to keep, in order.
@@ -175,7 +172,7 @@ impl Walk<'_> {
             return writeln!(out, "no portal is left to decide about");
         };
         let p = step.position;
-        let choices = &mut self.config.choices;
+        let choices = &mut self.config.delaunay.choices;
         if keep {
             choices.keep.push(p);
         } else {
@@ -194,7 +191,7 @@ impl Walk<'_> {
     }
 
     fn undo(&mut self, out: &mut impl Write) -> io::Result<()> {
-        let choices = &mut self.config.choices;
+        let choices = &mut self.config.delaunay.choices;
         let taken = match self.made.pop() {
             Some(true) => choices.keep.pop(),
             Some(false) => choices.join.pop(),
@@ -217,7 +214,7 @@ impl Walk<'_> {
     }
 
     fn save(&mut self, path: &Path) -> anyhow::Result<()> {
-        write_atomically(path, choices_text(&self.config.choices).as_bytes())?;
+        write_atomically(path, choices_text(&self.config.delaunay.choices).as_bytes())?;
         self.is_saved = true;
         Ok(())
     }
@@ -271,8 +268,7 @@ impl Walk<'_> {
 
     fn bake(&self, path: &Path, out: &mut impl Write) -> anyhow::Result<()> {
         let context = BakeContext::new(&Silent, None);
-        let mut baked = bake_session(self.scene, &self.session, self.at, &self.config, &context)?;
-        keep_costs(&mut baked, &self.costs);
+        let baked = bake_session(self.scene, &self.session, self.at, &self.config, &context)?;
         for note in &baked.notes {
             writeln!(out, "{note}")?;
         }
@@ -303,14 +299,13 @@ mod tests {
     #[test]
     fn a_walk_forwards_and_back_overruled_taken_back_and_saved() {
         let scene = gjorup_rooms(Variant::Optimised, [0.0; 3]).scene;
-        let config = DelaunayConfig::default();
+        let config = BakeConfig::of(Method::Delaunay);
         let session = Session::begin(&scene, &config, &BakeContext::new(&Silent, None)).unwrap();
         let stop = session.decimation.stop;
         let mut walk = Walk {
             scene: &scene,
             session,
             config,
-            costs: SimplifySettings::default(),
             at: stop,
             made: Vec::new(),
             is_saved: true,
@@ -330,7 +325,7 @@ mod tests {
         let text = said(&mut walk, &["join"]);
         assert!(text.starts_with("joins the portal at "), "{text}");
         assert_eq!(walk.left()[0], n_cells - 1);
-        assert_eq!(walk.config.choices.join.len(), 1);
+        assert_eq!(walk.config.delaunay.choices.join.len(), 1);
         let folder = std::env::temp_dir().join(format!("enfilade-walk-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let inside = folder.join("choices.toml");
@@ -348,7 +343,7 @@ mod tests {
         std::fs::remove_dir_all(&folder).unwrap();
 
         said(&mut walk, &["undo"]);
-        assert_eq!(walk.config.choices, Choices::default());
+        assert_eq!(walk.config.delaunay.choices, Choices::default());
         assert_eq!((walk.at, walk.left()[0]), (stop, n_cells));
         assert!(said(&mut walk, &["undo"]).contains("no decision"));
         // What is kept outlasts all that has a weight.

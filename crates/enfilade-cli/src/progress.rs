@@ -1,10 +1,10 @@
 //! Progress on standard error, when that is a terminal.
 
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, Write as _, stderr};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use enfilade::bake::{BakeConfig, Progress};
+use enfilade::bake::{BakeConfig, Method, Progress, Stage};
 use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -64,20 +64,21 @@ impl Drop for StageBar {
 ///
 /// Measured on buildings of 1 to 17 million voxels with two cores. Only their proportions matter
 /// for long: what the first stages take on this machine and scene scales the rest.
-fn cost(stage: &str) -> [f64; 2] {
+fn cost(stage: Stage) -> [f64; 2] {
     match stage {
-        "voxelize" => [0.002, 0.001],
-        "distance" => [0.012, 0.0],
-        "flood" => [0.04, 0.0],
-        "merge basins" => [0.055, 0.0],
-        "fit screens" => [0.03, 0.002],
-        "tree" => [0.0, 0.08],
-        "tetrahedra" => [0.0, 0.1],
-        "decimation" => [0.0, 0.5],
-        "separators" => [0.0, 0.2],
-        "cell complex" => [0.0, 0.015],
-        "cells and portals" => [0.001, 0.012],
-        "hand out geometry" => [0.0, 0.001],
+        Stage::Structure => [0.0, 0.002],
+        Stage::Voxelize => [0.002, 0.001],
+        Stage::Distance => [0.012, 0.0],
+        Stage::Flood => [0.04, 0.0],
+        Stage::Rooms => [0.055, 0.0],
+        Stage::Candidates => [0.03, 0.002],
+        Stage::Tree => [0.0, 0.08],
+        Stage::Tetrahedra => [0.0, 0.1],
+        Stage::Decimation => [0.0, 0.5],
+        Stage::Separators => [0.0, 0.2],
+        Stage::Complex => [0.0, 0.015],
+        Stage::Partition => [0.001, 0.012],
+        Stage::Geometry => [0.0, 0.001],
         // A stage that nobody has measured yet.
         _ => [0.005, 0.005],
     }
@@ -97,8 +98,8 @@ impl TimeLeft {
     /// The table's seconds count as much as this long of watching. [Units: s]
     const TRUST: f64 = 0.5;
 
-    fn new(stages: &[&str], n_voxels: f64, n_triangles: f64) -> Self {
-        let seconds = |stage: &&str| {
+    fn new(stages: &[Stage], n_voxels: f64, n_triangles: f64) -> Self {
+        let seconds = |&stage: &Stage| {
             let [of_voxels, of_triangles] = cost(stage);
             // Even a stage with nothing to do is seen for a moment.
             1e-3 + n_voxels / 1e6 * of_voxels + n_triangles / 1e3 * of_triangles
@@ -147,9 +148,12 @@ fn clock(seconds: f64) -> String {
 pub(crate) struct BakeBar {
     bar: ProgressBar,
     state: Arc<Mutex<Clock>>,
+    /// Voxels and triangles that there are to do with.
+    work: (f64, f64),
 }
 
 struct Clock {
+    stages: &'static [Stage],
     left: TimeLeft,
     began: Instant,
     stage_began: Instant,
@@ -166,16 +170,17 @@ impl BakeBar {
     const CELLS: usize = 30;
 
     /// A bar for a bake of `scene`; it shows nothing where standard error is no terminal.
-    pub(crate) fn new(scene: &Scene, config: &BakeConfig, stages: &[&str]) -> Self {
+    pub(crate) fn new(scene: &Scene, config: &BakeConfig) -> Self {
         let now = Instant::now();
         let is_shown = stderr().is_terminal();
-        let (n_voxels, n_triangles) = if is_shown {
+        let work = if is_shown {
             work_of(scene, config)
         } else {
             (0.0, 0.0)
         };
         let state = Arc::new(Mutex::new(Clock {
-            left: TimeLeft::new(stages, n_voxels, n_triangles),
+            stages: &[],
+            left: TimeLeft::new(&[], work.0, work.1),
             began: now,
             stage_began: now,
         }));
@@ -219,18 +224,32 @@ impl BakeBar {
         if is_shown {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Self { bar, state }
+        Self { bar, state, work }
     }
 }
 
 impl Progress for BakeBar {
-    fn stage(&self, name: &'static str, index: usize, count: usize) {
-        {
+    fn method(&self, method: Method, reason: &str) {
+        // Whoever closed standard error does not want to know.
+        self.bar.suspend(|| {
+            let _ = writeln!(stderr(), "method {}: {reason}", method.name());
+        });
+        let mut clock = self.state.lock().expect("no panic holds it");
+        clock.stages = method.stages();
+        clock.left = TimeLeft::new(clock.stages, self.work.0, self.work.1);
+        clock.began = Instant::now();
+    }
+
+    fn stage(&self, stage: Stage) {
+        let (index, count) = {
             let mut clock = self.state.lock().expect("no panic holds it");
             clock.stage_began = Instant::now();
             let spent = clock.began.elapsed().as_secs_f64();
+            let index = clock.stages.iter().position(|s| *s == stage).unwrap_or(0);
             clock.left.begin(index, spent);
-        }
+            (index, clock.stages.len())
+        };
+        let name = stage.name();
         self.bar
             .set_message(format!("{}/{count} {name}", index + 1));
     }
@@ -269,8 +288,6 @@ fn work_of(scene: &Scene, config: &BakeConfig) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use enfilade::bake::BakeContext;
-
     use super::*;
 
     fn of_stages(expected: &[f64]) -> TimeLeft {
@@ -314,13 +331,12 @@ mod tests {
 
     #[test]
     fn every_stage_of_every_bake_has_a_measured_cost() {
-        let of_others = BakeContext::BSP_STAGES
-            .iter()
-            .chain(BakeContext::DELAUNAY_STAGES);
-        for stage in BakeContext::STAGES.iter().chain(of_others) {
-            assert_ne!(cost(stage), cost("no such stage"), "{stage}");
+        for method in [Method::Watershed, Method::Bsp, Method::Delaunay] {
+            for &stage in method.stages() {
+                assert_ne!(cost(stage), [0.005; 2], "{stage:?}");
+            }
         }
-        let t = TimeLeft::new(BakeContext::STAGES, 0.0, 0.0);
+        let t = TimeLeft::new(Method::Watershed.stages(), 0.0, 0.0);
         assert!(t.left(0.0) > 0.0 && t.left(0.0) < 0.1);
     }
 

@@ -144,6 +144,7 @@ proptest! {
     }
 }
 
+// Covers Q2 and Q3.
 #[test]
 fn windows_in_line_are_seen_through_and_windows_out_of_line_are_not() {
     let window = |x: f64, z: f64| SightPortal {

@@ -13,7 +13,7 @@ use enfilade_geom::Aabb;
 use rayon::prelude::*;
 
 use crate::complex::poly::{self, Poly, Sides};
-use crate::watershed::MergeSettings;
+use crate::structure::MergeSettings;
 
 use super::portals::{LeafPortal, leaf_portals};
 use super::tree::{Node, Tree, leaf_index};

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use enfilade_geom::DVec3;
 
-use crate::watershed::{MergeSettings, connected_count, rim_share};
+use crate::structure::{MergeSettings, connected_count, rim_share};
 
 use super::Bsp;
 use super::separator::Separator;

@@ -21,18 +21,19 @@
 //!
 //! Where it departs from the paper: with brushes, the surface of their union is made first and what
 //! only the void sees is dropped, so that no leaf lies in it; and the world is not made from these
-//! leaves but from [`crate::complex`], which takes the separators as screens and the cells as votes, so
+//! leaves but from [`crate::complex`], which takes the separators as candidates and the cells as votes, so
 //! that a separator that rounding spoils costs a room and never a promise.
 
 mod arrange;
 mod cells;
-mod decompose;
+mod config;
 mod guide;
 mod guided;
 mod inside;
 mod lattice;
 mod leak;
 mod portals;
+mod propose;
 mod rooms;
 mod separator;
 mod shape;
@@ -41,9 +42,10 @@ mod tree;
 
 use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding};
 
-pub use decompose::{BspConfig, Rooms, bake_bsp};
+pub use config::{BspConfig, Rooms};
 pub use guide::Guide;
 pub use leak::{LeakPath, find_leak};
+pub(crate) use propose::propose;
 
 use portals::LeafPortal;
 use tree::{Content, Tree};

@@ -3,7 +3,7 @@
 //! Separators of a building stand in every plane of it: at both faces of a wall, along every pier and
 //! beam. Lefebvre & Hornus 2003 (§3) let a cost bound choose among them; in a building that joins a toilet
 //! to its corridor before it joins the two halves of a hall, for a room has fewer triangles than a stair. So
-//! the watershed's measure is taken here, too (`watershed/regions.rs`): an opening parts two rooms when it
+//! the watershed's measure is taken here, too (`structure/pinch.rs`): an opening parts two rooms when it
 //! is narrower than the sections of space beside it. It is the same rule with the same settings; sections
 //! are looked up in the tree. Crossing separators need no choosing: all are kept until one is no pinch.
 //!
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::complex::poly;
 use crate::complex::region::Shape;
-use crate::watershed::MergeSettings;
+use crate::structure::{MergeSettings, Mergeable, Pair, join_rooms};
 
 use super::Bsp;
 use super::cells::{self, Cells, NO_CELL};
@@ -45,8 +45,8 @@ pub(super) struct Evidence<'a> {
     pub(super) slabs: &'a [f64],
 }
 
-/// Part of a separator between two cells.
-type Opening = (u32, Vec<u32>);
+/// Part of a separator between two cells: the separator, and portals by their places in its list.
+type SeparatorPart = (u32, Vec<u32>);
 
 struct Merger<'a> {
     bsp: &'a Bsp,
@@ -63,7 +63,7 @@ struct Merger<'a> {
     version: Vec<u32>,
     outer: u32,
     neighbors: Vec<BTreeSet<u32>>,
-    openings: BTreeMap<(u32, u32), Vec<Opening>>,
+    openings: BTreeMap<(u32, u32), Vec<SeparatorPart>>,
     storeys_apart: bool,
 }
 
@@ -113,7 +113,7 @@ pub(super) fn part(
     for storeys_apart in [true, false] {
         merger.storeys_apart = storeys_apart;
         merger.run_separators();
-        merger.run();
+        join_rooms(&mut merger);
     }
     merger.absorb_passages();
     let cell_of: Vec<u32> = (0..n_cells as u32).map(|c| merger.find(c)).collect();
@@ -230,28 +230,6 @@ fn closed_shares(
         .collect()
 }
 
-/// A pair that waits to be merged; least pinched first, ties by number.
-#[derive(PartialEq)]
-struct Candidate {
-    pinch: f64,
-    pair: (u32, u32),
-    versions: (u32, u32),
-}
-impl Eq for Candidate {}
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.pinch
-            .total_cmp(&other.pinch)
-            .then_with(|| other.pair.cmp(&self.pair))
-            .then_with(|| other.versions.cmp(&self.versions))
-    }
-}
-
 impl Merger<'_> {
     fn find(&self, mut c: u32) -> u32 {
         while self.parent[c as usize] != c {
@@ -297,12 +275,12 @@ impl Merger<'_> {
         }
     }
 
-    fn area(&self, (s, places): &Opening) -> f64 {
+    fn area(&self, (s, places): &SeparatorPart) -> f64 {
         let areas = &self.areas[*s as usize];
         places.iter().map(|&k| areas[k as usize]).sum()
     }
 
-    fn closed_share(&self, (s, places): &Opening) -> f64 {
+    fn closed_share(&self, (s, places): &SeparatorPart) -> f64 {
         let (areas, closed) = (&self.areas[*s as usize], &self.closed[*s as usize]);
         let sum: f64 = places
             .iter()
@@ -315,35 +293,6 @@ impl Merger<'_> {
         let plane = &self.bsp.tree.planes[self.separators[s as usize].plane as usize];
         let height = -plane.d * plane.normal.y;
         plane.normal.y.abs() > 0.9 && self.evidence.slabs.iter().any(|h| (h - height).abs() < 0.2)
-    }
-
-    /// How little of a pinch the openings between two cells are; 1 and more joins them.
-    fn pinch(&self, pair: (u32, u32)) -> f64 {
-        let Some(openings) = self.openings.get(&pair) else {
-            return 0.0;
-        };
-        // Largest first; two are enough: a third between the same two is smaller still.
-        let mut groups = self.together(pair, openings);
-        groups.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
-        groups
-            .into_iter()
-            .take(2)
-            .map(|(area, o)| {
-                let (s, places) = o;
-                let apart = self.storeys_apart && self.lies_in_slab(*s);
-                if apart || self.closed_share(o) >= self.settings.closed_share {
-                    return 0.0;
-                }
-                let is_seed = |k: u32| places.binary_search(&k).is_ok();
-                let in_side = |_: usize, leaf: u32| match self.cell_of(leaf) {
-                    c if c == pair.0 => 0,
-                    c if c == pair.1 => 1,
-                    _ => 2,
-                };
-                let endless = (pair.0 == self.outer).then_some(0);
-                self.measure(*s, area, &is_seed, &in_side, endless)
-            })
-            .fold(0.0, f64::max)
     }
 
     fn measure(
@@ -360,9 +309,7 @@ impl Merger<'_> {
         if endless.is_some() {
             found.ratio *= settings.outdoor_gain;
         }
-        let wall = (found.wall / settings.wall_rim).min(1.0);
-        let (open, walled) = (settings.threshold, settings.wall_threshold);
-        found.ratio / (open + (walled - open) * wall)
+        settings.openness(found.ratio, found.wall)
     }
 
     /// Cells before and behind each portal of a separator that still parts two.
@@ -430,7 +377,7 @@ impl Merger<'_> {
             for (_, [a, b]) in self.sides(s) {
                 let pair = self.ordered(self.find(a), self.find(b));
                 if pair.0 != pair.1 {
-                    self.merge(pair);
+                    self.join(pair);
                 }
             }
         }
@@ -438,11 +385,15 @@ impl Merger<'_> {
 
     /// Openings that touch each other in an edge are one that bends: its area is the length of the
     /// vector area. Each with the largest flat part of it.
-    fn together<'a>(&self, pair: (u32, u32), openings: &'a [Opening]) -> Vec<(f64, &'a Opening)> {
+    fn together<'a>(
+        &self,
+        pair: (u32, u32),
+        openings: &'a [SeparatorPart],
+    ) -> Vec<(f64, &'a SeparatorPart)> {
         let n = openings.len();
         let mut group: Vec<usize> = (0..n).collect();
         let eps = 4.0 * self.bsp.tolerance.plane;
-        let portals = |o: &'a Opening| {
+        let portals = |o: &'a SeparatorPart| {
             let all = &self.separators[o.0 as usize].portals;
             o.1.iter()
                 .map(move |&k| &self.bsp.portals[all[k as usize] as usize])
@@ -467,7 +418,7 @@ impl Merger<'_> {
                 }
             }
         }
-        let mut out: Vec<(f64, &Opening)> = Vec::new();
+        let mut out: Vec<(f64, &SeparatorPart)> = Vec::new();
         for g in 0..n {
             let members = || (0..n).filter(|&i| group[i] == g);
             let vector: DVec3 = members()
@@ -486,72 +437,6 @@ impl Merger<'_> {
             }
         }
         out
-    }
-
-    fn run(&mut self) {
-        let candidate = |merger: &Self, pair: (u32, u32)| Candidate {
-            pinch: merger.pinch(pair),
-            pair,
-            versions: (
-                merger.version[pair.0 as usize],
-                merger.version[pair.1 as usize],
-            ),
-        };
-        let pairs: Vec<(u32, u32)> = self.openings.keys().copied().collect();
-        let weighed: Vec<Candidate> = pairs.par_iter().map(|&p| candidate(self, p)).collect();
-        let joins = |c: &Candidate| c.pinch >= 1.0;
-        let mut queue: BinaryHeap<Candidate> = weighed.into_iter().filter(joins).collect();
-        while let Some(top) = queue.pop() {
-            if !self.openings.contains_key(&top.pair) {
-                continue;
-            }
-            let now = (
-                self.version[top.pair.0 as usize],
-                self.version[top.pair.1 as usize],
-            );
-            if now != top.versions {
-                queue.extend(Some(candidate(self, top.pair)).filter(joins));
-                continue;
-            }
-            let changed = self.merge(top.pair);
-            let weighed: Vec<Candidate> = changed.par_iter().map(|&p| candidate(self, p)).collect();
-            queue.extend(weighed.into_iter().filter(joins));
-        }
-    }
-
-    /// Joins two cells; returns the pairs whose openings have changed.
-    fn merge(&mut self, (a, b): (u32, u32)) -> Vec<(u32, u32)> {
-        self.parent[b as usize] = a;
-        self.version[a as usize] += 1;
-        self.openings.remove(&(a, b));
-        self.neighbors[a as usize].remove(&b);
-        let mut changed = Vec::new();
-        for c in std::mem::take(&mut self.neighbors[b as usize]) {
-            if c == a {
-                continue;
-            }
-            let moved = self
-                .openings
-                .remove(&self.ordered(b, c))
-                .unwrap_or_default();
-            let pair = self.ordered(a, c);
-            let all = self.openings.entry(pair).or_default();
-            for (s, places) in moved {
-                // Parts of one separator are one opening again.
-                if let Some(same) = all.iter_mut().find(|o| o.0 == s) {
-                    same.1.extend(places);
-                    same.1.sort_unstable();
-                } else {
-                    all.push((s, places));
-                }
-            }
-            all.sort_unstable();
-            self.neighbors[c as usize].remove(&b);
-            self.neighbors[c as usize].insert(a);
-            self.neighbors[a as usize].insert(c);
-            changed.push(pair);
-        }
-        changed
     }
 
     /// Joins cells that are but the depth of an opening (the way through a wall) to the neighbor that
@@ -605,8 +490,84 @@ impl Merger<'_> {
             {
                 let pair = self.ordered(c, n);
                 volumes[pair.0 as usize] += volumes[pair.1 as usize];
-                self.merge(pair);
+                self.join(pair);
             }
         }
+    }
+}
+
+impl Mergeable for Merger<'_> {
+    fn pairs(&self) -> Vec<Pair> {
+        self.openings.keys().copied().collect()
+    }
+
+    fn is_pair(&self, pair: Pair) -> bool {
+        self.openings.contains_key(&pair)
+    }
+
+    fn ages(&self, (a, b): Pair) -> [u32; 2] {
+        [a, b].map(|c| self.version[c as usize])
+    }
+
+    fn openness(&self, pair: Pair) -> f64 {
+        let Some(openings) = self.openings.get(&pair) else {
+            return 0.0;
+        };
+        // Largest first; two are enough: a third between the same two is smaller still.
+        let mut groups = self.together(pair, openings);
+        groups.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+        groups
+            .into_iter()
+            .take(2)
+            .map(|(area, o)| {
+                let (s, places) = o;
+                let apart = self.storeys_apart && self.lies_in_slab(*s);
+                if apart || self.closed_share(o) >= self.settings.closed_share {
+                    return 0.0;
+                }
+                let is_seed = |k: u32| places.binary_search(&k).is_ok();
+                let in_side = |_: usize, leaf: u32| match self.cell_of(leaf) {
+                    c if c == pair.0 => 0,
+                    c if c == pair.1 => 1,
+                    _ => 2,
+                };
+                let endless = (pair.0 == self.outer).then_some(0);
+                self.measure(*s, area, &is_seed, &in_side, endless)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    fn join(&mut self, (a, b): Pair) -> Vec<Pair> {
+        self.parent[b as usize] = a;
+        self.version[a as usize] += 1;
+        self.openings.remove(&(a, b));
+        self.neighbors[a as usize].remove(&b);
+        let mut changed = Vec::new();
+        for c in std::mem::take(&mut self.neighbors[b as usize]) {
+            if c == a {
+                continue;
+            }
+            let moved = self
+                .openings
+                .remove(&self.ordered(b, c))
+                .unwrap_or_default();
+            let pair = self.ordered(a, c);
+            let all = self.openings.entry(pair).or_default();
+            for (s, places) in moved {
+                // Parts of one separator are one opening again.
+                if let Some(same) = all.iter_mut().find(|o| o.0 == s) {
+                    same.1.extend(places);
+                    same.1.sort_unstable();
+                } else {
+                    all.push((s, places));
+                }
+            }
+            all.sort_unstable();
+            self.neighbors[c as usize].remove(&b);
+            self.neighbors[c as usize].insert(a);
+            self.neighbors[a as usize].insert(c);
+            changed.push(pair);
+        }
+        changed
     }
 }

@@ -6,7 +6,7 @@ use enfilade_geom::solid::exposed_faces;
 use enfilade_geom::{Aabb, ConvexSolid, DVec3, Plane, Triangle};
 
 use crate::complex::poly::{self, Poly};
-use crate::pipeline::in_own_order;
+use crate::structure::in_own_order;
 
 use super::tree::Fragment;
 use super::{BspInput, Tolerance};

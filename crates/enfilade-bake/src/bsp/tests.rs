@@ -6,7 +6,7 @@ use enfilade_testkit::{Rng, clinic};
 
 use super::*;
 use crate::complex::poly;
-use crate::{BakeContext, Silent};
+use crate::{BakeConfig, BakeContext, Method, Silent, bake};
 
 fn boxed(min: [f64; 3], max: [f64; 3]) -> ConvexSolid {
     let mut planes = Vec::new();
@@ -93,6 +93,7 @@ pub(super) fn random_hall(seed: u64) -> Bsp {
     bsp_of(&solids, &[], Heuristic::Default, &Guide::default())
 }
 
+// Covers B1 and B2.
 #[test]
 fn leaves_fill_what_the_solids_leave_free() {
     let mut rng = Rng::new(3);
@@ -321,8 +322,8 @@ fn scene_of(solids: &[ConvexSolid], inside: &[DVec3]) -> Scene {
     }
 }
 
-fn baked(scene: &Scene, config: &BspConfig) -> enfilade_cpg::World {
-    let out = bake_bsp(scene, config, &BakeContext::new(&Silent, None)).unwrap();
+fn baked(scene: &Scene, config: &BakeConfig) -> enfilade_cpg::World {
+    let out = bake(scene, config, &BakeContext::new(&Silent, None)).unwrap();
     out.world.validate().unwrap();
     out.world
 }
@@ -331,13 +332,13 @@ fn baked(scene: &Scene, config: &BspConfig) -> enfilade_cpg::World {
 fn worlds_keep_their_promises_whatever_the_settings() {
     use enfilade_verify::{VerifyOptions, verify_world};
     let mut rng = Rng::new(23);
-    let mut with_void = BspConfig::default();
-    with_void.simplify.min_cost = 30.0;
-    let mut small = BspConfig::default();
-    small.simplify.max_cost = Some(20.0);
-    let mut guided = BspConfig::default();
-    guided.guide.tetrahedra = Some(5.0);
-    for (i, config) in [BspConfig::default(), with_void, small, guided]
+    let mut with_void = BakeConfig::of(Method::Bsp);
+    with_void.costs.min_cost = 30.0;
+    let mut small = BakeConfig::of(Method::Bsp);
+    small.costs.max_cost = Some(20.0);
+    let mut guided = BakeConfig::of(Method::Bsp);
+    guided.bsp.guide.tetrahedra = Some(5.0);
+    for (i, config) in [BakeConfig::of(Method::Bsp), with_void, small, guided]
         .iter()
         .enumerate()
     {
@@ -363,23 +364,22 @@ fn worlds_keep_their_promises_whatever_the_settings() {
 #[test]
 fn rooms_of_a_row_are_found_and_large_ones_are_cut() {
     let scene = scene_of(&row(3), &[INSIDE]);
-    let count = |config: &BspConfig| {
+    let count = |config: &BakeConfig| {
         let g = baked(&scene, config).graph;
         (g.cells.len(), g.portals.len())
     };
     // Every separator: both faces of each wall, the doorway between them a cell.
-    assert_eq!(count(&BspConfig::default()), (5, 4));
+    assert_eq!(count(&BakeConfig::of(Method::Bsp)), (5, 4));
     // By their shape: a doorway is part of a room.
-    let by_shape = BspConfig {
-        rooms: Rooms::Always,
-        ..BspConfig::default()
-    };
+    let mut by_shape = BakeConfig::of(Method::Bsp);
+    by_shape.bsp.rooms = Rooms::Always;
     assert_eq!(count(&by_shape), (3, 2));
-    let mut config = BspConfig::default();
-    config.simplify.max_cost = Some(8.0);
+    let mut config = BakeConfig::of(Method::Bsp);
+    config.costs.max_cost = Some(8.0);
     assert!(count(&config).0 > 5);
 }
 
+// Covers B8.
 #[test]
 fn a_building_of_overlapping_walls_has_a_cell_a_room_however_it_is_turned() {
     // Walls that run into each other and into the slabs, as triangles that nobody knows to be solids.
@@ -390,7 +390,7 @@ fn a_building_of_overlapping_walls_has_a_cell_a_room_however_it_is_turned() {
         let mut scene = scene_of(&solids, &[]);
         scene.solids.clear();
         scene.objects[0].transform = DMat4::from_rotation_y(turn);
-        let g = baked(&scene, &BspConfig::default()).graph;
+        let g = baked(&scene, &BakeConfig::of(Method::Bsp)).graph;
         let rooms: Vec<f64> = g
             .cells
             .iter()
@@ -421,7 +421,7 @@ fn the_hollow_behind_a_lining_is_no_room_but_a_deeper_closet_is() {
             let mut scene = scene_of(&solids, &[]);
             scene.solids.clear();
             scene.objects[0].transform = DMat4::from_rotation_y(turn);
-            let g = baked(&scene, &BspConfig::default()).graph;
+            let g = baked(&scene, &BakeConfig::of(Method::Bsp)).graph;
             let rooms = g.cells.iter().filter(|c| !c.outdoor);
             let volumes: Vec<f32> = rooms.map(|c| c.volume).collect();
             assert_eq!(volumes.len(), n, "{depth} {turn}: {volumes:?}");
@@ -432,6 +432,7 @@ fn the_hollow_behind_a_lining_is_no_room_but_a_deeper_closet_is() {
     }
 }
 
+// Covers B5.
 #[test]
 fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
     // Guides along the jambs and the lintel leave no cut in the planes of the walls.
@@ -457,7 +458,7 @@ fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
         })
     };
     assert_eq!(faces(&bsp), [false; 2], "the guide hides them");
-    arrange::refine(&mut bsp, &crate::watershed::MergeSettings::default());
+    arrange::refine(&mut bsp, &crate::structure::MergeSettings::default());
     assert_eq!(faces(&bsp), [true; 2]);
 }
 
@@ -465,8 +466,8 @@ fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
 fn the_number_of_threads_changes_nothing() {
     let mut rng = Rng::new(31);
     let scene = scene_of(&hall(&mut rng, 12), &[]);
-    let mut config = BspConfig::default();
-    config.simplify.min_cost = 40.0;
+    let mut config = BakeConfig::of(Method::Bsp);
+    config.costs.min_cost = 40.0;
     let bytes = |n: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(n)

@@ -32,8 +32,8 @@ use std::f64::consts::PI;
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 
 use super::decimate::OUTDOOR_CELL;
-use super::rooms::connected;
 use super::space::{Space, circumsphere};
+use super::standing::connected;
 use forks::Walls;
 
 mod forks;
@@ -644,7 +644,7 @@ impl<'a> Search<'a> {
 mod tests {
     use super::super::space::divide;
     use super::*;
-    use crate::pipeline::structural_triangles;
+    use crate::structure::structural_triangles;
     use enfilade_testkit::{Tube, tubes};
 
     #[test]

@@ -1,7 +1,7 @@
-//! The Delaunay builder: tetrahedra between the surfaces, put together to rooms.
+//! The Delaunay builder: tetrahedra between the surfaces, merged into rooms.
 //!
 //! Gjørup, "Portal techniques for large interactive worlds" (1999), chapter 4. As with the
-//! watershed, what comes out are screens and votes, and the cell complex makes them exact.
+//! watershed, what comes out are candidate portals and votes, and the cell complex makes them exact.
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
@@ -11,17 +11,20 @@
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
 //! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
-//! | screens and votes | `rooms` | ours |
+//! | candidates and votes | `rooms` | ours |
 
-mod bake;
 mod branches;
+mod config;
 mod cut;
 mod decimate;
 mod order;
 mod predicate;
+mod propose;
 mod refine;
 mod rooms;
+mod session;
 mod space;
+mod standing;
 mod tetrahedra;
 
 #[cfg(test)]
@@ -29,10 +32,13 @@ mod space_tests;
 #[cfg(test)]
 mod tests;
 
-pub use bake::{DelaunayConfig, Session, bake_delaunay, bake_session};
+pub use config::DelaunayConfig;
 pub use decimate::{
     CellPortal, Cells, Choices, Decimation, JOINED, OUTDOOR_CELL, Step, Weight, decimate,
     default_stop, flow_together,
 };
+pub use propose::bake_session;
+pub(crate) use propose::propose;
+pub use session::Session;
 pub use space::{LEAST_BALL, Link, Space, divide};
 pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};

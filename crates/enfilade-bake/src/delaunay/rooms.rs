@@ -1,18 +1,19 @@
-//! From cells of tetrahedra to what the cell complex needs: screens, and votes.
+//! From cells of tetrahedra to what the cell complex needs: candidates, and votes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray};
+use enfilade_geom::{Bvh, DVec3, Plane};
 use rayon::prelude::*;
 
-use super::bake::Session;
-use super::decimate::{Cells, OUTDOOR_CELL};
+use super::decimate::OUTDOOR_CELL;
+use super::session::Session;
 use super::space::Space;
+use super::standing::Standing;
 use crate::complex::Vote;
-use crate::watershed::{OUTDOORS, Opening, Screen, fit_screen_at};
+use crate::structure::{Candidate, OUTDOORS, Opening, fit_candidate, is_inside};
 
-/// Tetrahedra this close to where two rooms meet do not vote: a screen may lie on either side of
-/// them. [Units: wu]
+/// Tetrahedra this close to where two rooms meet do not vote: a candidate may lie on either
+/// side of them. [Units: wu]
 const UNSURE: f64 = 0.35;
 /// Tetrahedra with their middle this close to a wall do not vote: what is there may be the space
 /// between two polygons that nearly touch. [Units: wu]
@@ -25,14 +26,9 @@ const MAX_CENTERS: f64 = 4000.0;
 const CLOSE_BY: f64 = 0.15;
 /// Openings smaller than this are left to the complex, which finds them as cracks. [Units: wu²]
 const MIN_AREA: f64 = 0.04;
-/// Points of a region that ask around whether it is a room.
-const POINTS: usize = 32;
-/// Regions in which no ball of this radius fits are dropped when most rays see backs. [Units: wu]
-const NARROW: f64 = 0.5;
-
 /// What the complex makes a world of.
 pub(super) struct Rooms {
-    pub(super) screens: Vec<Screen>,
+    pub(super) candidates: Vec<Candidate>,
     pub(super) votes: Vec<Vote>,
 }
 
@@ -41,64 +37,7 @@ fn label(cell: u32) -> u32 {
     cell - OUTDOOR_CELL + OUTDOORS
 }
 
-/// The rooms that decimation left, and what of it is none.
-struct Standing {
-    /// Room of each cell, the void in the outdoors.
-    room_of_cell: Vec<u32>,
-    /// Openings between two rooms: links that touch.
-    patches: Vec<((u32, u32), Vec<u32>)>,
-    /// Rooms that are the insides of walls and solids.
-    hollow: BTreeSet<u32>,
-}
-
-impl Standing {
-    fn of(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh, min_radius: f64) -> Self {
-        let room_of_cell = void_joined(space, cells, room_of_cell, bvh);
-        let mut between: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
-        for (&(a, b), portal) in &cells.portals {
-            let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
-            if a != b {
-                // Pieces of an opening that tetrahedra cut off are missed by nobody.
-                let wide = |l: &&u32| !space.is_crack(&space.links[**l as usize]);
-                between
-                    .entry((a.min(b), a.max(b)))
-                    .or_default()
-                    .extend(portal.links.iter().filter(wide));
-            }
-        }
-        let patches: Vec<((u32, u32), Vec<u32>)> = between
-            .into_iter()
-            .flat_map(|(pair, links)| {
-                connected(space, &links)
-                    .into_iter()
-                    .map(move |patch| (pair, patch))
-            })
-            .collect();
-        let hollow = hollow_rooms(space, cells, &room_of_cell, &patches, bvh, min_radius);
-        Self {
-            room_of_cell,
-            patches,
-            hollow,
-        }
-    }
-}
-
-/// How many rooms a decimation left, and how many cells besides: crevices, and the insides of walls.
-pub(super) fn count_rooms(
-    space: &Space,
-    cells: &Cells,
-    room_of_cell: &[u32],
-    bvh: &Bvh,
-    min_radius: f64,
-) -> [usize; 2] {
-    let standing = Standing::of(space, cells, room_of_cell, bvh, min_radius);
-    let mut all: BTreeSet<u32> = standing.room_of_cell.into_iter().collect();
-    all.remove(&OUTDOOR_CELL);
-    let n_hollow = all.intersection(&standing.hollow).count();
-    [all.len() - n_hollow, n_hollow]
-}
-
-/// Screens where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
+/// Candidates where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
 /// rooms and are no part of them.
 pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f64) -> Rooms {
     let Session {
@@ -117,22 +56,15 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
     } = Standing::of(space, cells, room_of_cell, bvh, min_radius);
     let room_at = |t: u32| room_of_cell[cells.cell_of_part[t as usize] as usize];
     let leaves = Bvh::build(closures);
-    let found: Vec<(Vec<DVec3>, Option<Screen>)> = patches
+    let found: Vec<(Vec<DVec3>, Option<Candidate>)> = patches
         .par_iter()
         .map(|(pair, patch)| {
             let (centers, opening) = opening_of(space, *pair, patch, &room_at, &leaves);
             if opening.area < MIN_AREA {
                 return (centers, None);
             }
-            let near = |bounds: &Aabb| {
-                let mut found = Vec::new();
-                bvh.for_each_in_box(bounds, |t| found.push(t));
-                found.sort_unstable();
-                found
-            };
-            let regions = [label(pair.0), label(pair.1)];
-            let screen = fit_screen_at(&centers, STEP, &opening, regions, walls, &near);
-            (centers, Some(screen))
+            let candidate = fit_candidate(&centers, STEP, &opening, walls, bvh);
+            (centers, Some(candidate))
         })
         .collect();
 
@@ -190,70 +122,9 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
             .map(|(_, &t)| vote(t)),
     );
     Rooms {
-        screens: found.into_iter().filter_map(|f| f.1).collect(),
+        candidates: found.into_iter().filter_map(|f| f.1).collect(),
         votes,
     }
-}
-
-/// Rooms with the void joined to the outdoors. Where the outdoors sees backs, the model has insides
-/// only, and whatever else sees backs is part of the same void.
-fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) -> Vec<u32> {
-    let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (t, &c) in cells.cell_of_part.iter().enumerate() {
-        members
-            .entry(room_of_cell[c as usize])
-            .or_default()
-            .push(t as u32);
-    }
-    let void: BTreeSet<u32> = members
-        .into_par_iter()
-        .filter_map(|(room, mut tets)| {
-            (share_of_backs(space, bvh, &mut tets) > 0.6).then_some(room)
-        })
-        .collect();
-    let room = |&r: &u32| {
-        if void.contains(&OUTDOOR_CELL) && void.contains(&r) {
-            OUTDOOR_CELL
-        } else {
-            r
-        }
-    };
-    room_of_cell.iter().map(room).collect()
-}
-
-/// Groups of links whose facets share corners.
-pub(super) fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
-    let facet = |l: u32| space.vertices_about(&space.links[l as usize]);
-    let mut by_corner: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (i, &l) in links.iter().enumerate() {
-        for v in facet(l) {
-            by_corner.entry(v).or_default().push(i);
-        }
-    }
-    let mut taken = vec![false; links.len()];
-    let mut out = Vec::new();
-    for first in 0..links.len() {
-        if taken[first] {
-            continue;
-        }
-        taken[first] = true;
-        let mut patch = vec![first];
-        let mut next = 0;
-        while next < patch.len() {
-            for v in facet(links[patch[next]]) {
-                for &i in &by_corner[&v] {
-                    if !taken[i] {
-                        taken[i] = true;
-                        patch.push(i);
-                    }
-                }
-            }
-            next += 1;
-        }
-        patch.sort_unstable();
-        out.push(patch.into_iter().map(|i| links[i]).collect());
-    }
-    out
 }
 
 /// Points all over the facets of an opening, and its measures.
@@ -308,115 +179,6 @@ fn opening_of(
         center,
         area: vector.length(),
         closed: closed as f64 / centers.len().max(1) as f64,
-        faces: Vec::new(),
     };
     (centers, opening)
-}
-
-/// Rooms that are none: the insides of walls and solids, which nothing can get into and from which
-/// one sees the backs of surfaces. The rule is the watershed's (`watershed/hollow.rs`).
-fn hollow_rooms(
-    space: &Space,
-    cells: &Cells,
-    room_of_cell: &[u32],
-    patches: &[((u32, u32), Vec<u32>)],
-    bvh: &Bvh,
-    min_radius: f64,
-) -> BTreeSet<u32> {
-    let mut group: BTreeMap<u32, u32> = room_of_cell.iter().map(|&r| (r, r)).collect();
-    fn root(group: &BTreeMap<u32, u32>, mut r: u32) -> u32 {
-        while group[&r] != r {
-            r = group[&r];
-        }
-        r
-    }
-    for ((a, b), _) in patches {
-        let (a, b) = (root(&group, *a), root(&group, *b));
-        group.insert(a.max(b), a.min(b));
-    }
-    let group_of: BTreeMap<u32, u32> = group.keys().map(|&r| (r, root(&group, r))).collect();
-    let group_at = |t: usize| group_of[&room_of_cell[cells.cell_of_part[t] as usize]];
-    let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    let mut radius: BTreeMap<u32, f64> = BTreeMap::new();
-    for t in 0..space.middles.len() {
-        let g = group_at(t);
-        members.entry(g).or_default().push(t as u32);
-        let r = radius.entry(g).or_insert(0.0);
-        *r = r.max(space.radii[t]);
-    }
-    let share = |tets: &mut Vec<u32>| share_of_backs(space, bvh, tets);
-    let (mut hollow, mut doubtful) = (BTreeSet::new(), Vec::new());
-    let outdoor_group = group_of[&OUTDOOR_CELL];
-    let mut outdoors = members.remove(&outdoor_group).unwrap_or_default();
-    let trusted = share(&mut outdoors) < 0.1;
-    let mut any_room = group_of
-        .iter()
-        .any(|(&r, &g)| g == outdoor_group && r != OUTDOOR_CELL);
-    for (g, mut tets) in members {
-        let widest = radius[&g];
-        let back = share(&mut tets);
-        if widest < min_radius || (back > 0.6 && widest < NARROW) {
-            hollow.insert(g);
-        } else if back > 0.9 && trusted {
-            doubtful.push(g);
-        } else {
-            any_room = true;
-        }
-    }
-    // A closed shell of a building, with nothing modelled inside, is a building and not a boulder.
-    if any_room {
-        hollow.extend(doubtful);
-    }
-    group_of
-        .into_iter()
-        .filter(|(_, g)| hollow.contains(g))
-        .map(|(r, _)| r)
-        .collect()
-}
-
-/// Whether whatever way one looks from `p`, one sees the backs of some surfaces.
-fn is_inside(surfaces: &Bvh, p: DVec3) -> bool {
-    surfaces.bounds().contains(p)
-        && (0..6).all(|i| {
-            surfaces
-                .closest_hit(&ray(p, i), |_| false)
-                .is_some_and(|hit| !hit.front)
-        })
-}
-
-/// One of rays all around: six along the axes, then eight along the diagonals.
-fn ray(origin: DVec3, i: usize) -> Ray {
-    let bit = |k: usize| if i >> k & 1 == 0 { 1.0 } else { -1.0 };
-    let direction = if i < 6 {
-        DVec3::AXES[i / 2] * bit(0)
-    } else {
-        DVec3::new(bit(0), bit(1), bit(2))
-    };
-    Ray {
-        origin,
-        // Off the axes a little, so that rays do not run along edges.
-        direction: direction + DVec3::new(0.013, 0.007, -0.011),
-        t_max: f64::INFINITY,
-    }
-}
-
-/// Of the rays from the largest of some tetrahedra, the share that meets backs.
-fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32]) -> f64 {
-    // The largest speak for a region: those at its surface are many and see little.
-    tets.sort_by(|&a, &b| {
-        space.volumes[b as usize]
-            .total_cmp(&space.volumes[a as usize])
-            .then(a.cmp(&b))
-    });
-    let (mut back, mut all) = (0.0, 0.0);
-    for &t in tets.iter().take(POINTS) {
-        for i in 0..14 {
-            let ray = ray(space.middles[t as usize], i);
-            if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
-                all += 1.0;
-                back += f64::from(u8::from(!hit.front));
-            }
-        }
-    }
-    if all == 0.0 { 0.0 } else { back / all }
 }

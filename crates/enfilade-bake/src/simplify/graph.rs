@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_cpg::SightGraph;
 use enfilade_geom::Winding;
 
-use super::SimplifySettings;
 use super::merge::{Badness, Bounds, CostGraph, merge};
+use super::settings::SimplifySettings;
 
 /// Which cells of a graph are one, and how that compares.
 #[derive(Clone, Debug, PartialEq)]

@@ -226,6 +226,7 @@ pub(super) fn views(world: &World, n_eyes: usize, first: u32) -> Eyes {
 mod tests {
     use super::*;
 
+    // Covers P2.
     #[test]
     fn every_piece_of_a_portal_is_sampled_and_stands_for_its_area() {
         for n in 1..12_usize {

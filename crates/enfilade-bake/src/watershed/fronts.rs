@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{DVec3, Plane, Sets};
 
+use crate::structure::Opening;
 use crate::voxel::{BitVolume, Grid};
 
 /// The faces through which two cells touch: voxel index × 4 + axis, the face being the one between
@@ -12,22 +13,16 @@ pub(super) type Faces = Vec<u64>;
 
 /// A connected or coplanar group of faces between two cells.
 #[derive(Clone, Debug)]
-pub struct Opening {
-    /// Mean plane; the normal points from the lesser to the greater label.
-    pub plane: Plane,
-    /// Mean of the face centers. [Units: wu]
-    pub center: DVec3,
-    /// Length of the vector area, or the silhouette where the faces wrap around. [Units: wu²]
-    pub area: f64,
-    /// Share of the faces that lie in a closure.
-    pub closed: f64,
+pub(crate) struct Front {
+    /// What they fill; its plane's normal points from the lesser to the greater label.
+    pub(crate) opening: Opening,
     /// The faces.
-    pub faces: Faces,
+    pub(crate) faces: Faces,
 }
 
 /// Center of a face. [Units: wu]
 #[must_use]
-pub fn face_center(grid: &Grid, face: u64) -> DVec3 {
+pub(crate) fn face_center(grid: &Grid, face: u64) -> DVec3 {
     let axis = (face % 4) as usize;
     let [i, j, k] = grid.coords((face / 4) as usize);
     let mut p = grid.center(i, j, k);
@@ -37,59 +32,69 @@ pub fn face_center(grid: &Grid, face: u64) -> DVec3 {
 
 /// Whether one of a face's two voxels is in a set.
 #[must_use]
-pub fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
+pub(crate) fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
     let [nx, ny, _] = grid.dims;
     let (index, axis) = ((face / 4) as usize, (face % 4) as usize);
     voxels.get_index(index) || voxels.get_index(index + [1, nx, nx * ny][axis])
 }
 
-/// Splits the faces between two cells into openings, largest first.
+/// Splits the faces between two cells into fronts, one for each opening, largest first.
 ///
 /// Faces that touch (or nearly: within two voxels) belong together; groups that share a plane are
 /// one opening too, because a column in the middle of a wide opening does not make two doors of it.
 /// `is_lesser` tells whether a voxel index lies in the cell with the lesser label.
 #[must_use]
-pub fn group_faces(
+pub(crate) fn group_faces(
     grid: &Grid,
     faces: &[u64],
     is_lesser: &dyn Fn(usize) -> bool,
     closures: Option<&BitVolume>,
-) -> Vec<Opening> {
+) -> Vec<Front> {
     let mut patches = connected_patches(grid, faces)
         .into_iter()
-        .map(|faces| opening_of(grid, faces, is_lesser, closures))
+        .map(|faces| front_of(grid, faces, is_lesser, closures))
         .collect::<Vec<_>>();
-    patches.sort_by(|p, q| q.area.total_cmp(&p.area).then(p.faces[0].cmp(&q.faces[0])));
-    let mut groups: Vec<Vec<Opening>> = Vec::new();
+    patches.sort_by(|p, q| {
+        q.opening
+            .area
+            .total_cmp(&p.opening.area)
+            .then(p.faces[0].cmp(&q.faces[0]))
+    });
+    let mut groups: Vec<Vec<Front>> = Vec::new();
     for patch in patches {
         let home = groups.iter_mut().find(|g| {
-            let lead = &g[0];
-            lead.plane.normal.dot(patch.plane.normal) > 0.9
-                && lead.plane.signed_distance(patch.center).abs() < 0.5
+            let lead = &g[0].opening;
+            lead.plane.normal.dot(patch.opening.plane.normal) > 0.9
+                && lead.plane.signed_distance(patch.opening.center).abs() < 0.5
         });
         match home {
             Some(group) => group.push(patch),
             None => groups.push(vec![patch]),
         }
     }
-    let mut openings: Vec<Opening> = groups
+    let mut fronts: Vec<Front> = groups
         .into_iter()
         .map(|mut g| {
             if g.len() == 1 {
                 return g.swap_remove(0);
             }
-            let faces = g.into_iter().flat_map(|o| o.faces).collect();
-            opening_of(grid, faces, is_lesser, closures)
+            let faces = g.into_iter().flat_map(|f| f.faces).collect();
+            front_of(grid, faces, is_lesser, closures)
         })
         .collect();
-    openings.sort_by(|p, q| q.area.total_cmp(&p.area).then(p.faces[0].cmp(&q.faces[0])));
-    openings
+    fronts.sort_by(|p, q| {
+        q.opening
+            .area
+            .total_cmp(&p.opening.area)
+            .then(p.faces[0].cmp(&q.faces[0]))
+    });
+    fronts
 }
 
 /// Faces grouped by nearness: two faces are linked when their voxels are at most one step apart
 /// along each axis. Each group ascending, groups by their first face.
 #[must_use]
-pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
+pub(crate) fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     let [nx, ny, _] = grid.dims;
     let mut sorted = faces.to_vec();
     sorted.sort_unstable();
@@ -130,12 +135,12 @@ pub fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
 
 /// What a set of faces says about the opening they fill.
 #[must_use]
-pub fn opening_of(
+pub(crate) fn front_of(
     grid: &Grid,
     faces: Faces,
     is_lesser: &dyn Fn(usize) -> bool,
     closures: Option<&BitVolume>,
-) -> Opening {
+) -> Front {
     let [nx, ny, _] = grid.dims;
     let unit = grid.voxel * grid.voxel;
     let (mut vector, mut center, mut closed) = (DVec3::ZERO, DVec3::ZERO, 0_usize);
@@ -182,11 +187,13 @@ pub fn opening_of(
     } else {
         (vector.normalize(), vector.length())
     };
-    Opening {
-        plane: Plane::through(center, normal),
-        center,
-        area: area * unit,
-        closed: closed as f64 / total,
+    Front {
+        opening: Opening {
+            plane: Plane::through(center, normal),
+            center,
+            area: area * unit,
+            closed: closed as f64 / total,
+        },
         faces,
     }
 }
@@ -199,7 +206,7 @@ const CORNER_SHARE: f64 = 0.2;
 ///
 /// A front askew to the grid is made of steps, and flat across no axis. `O(n log n)` in faces.
 #[must_use]
-pub fn without_corners(grid: &Grid, faces: Faces) -> Vec<Faces> {
+pub(crate) fn without_corners(grid: &Grid, faces: Faces) -> Vec<Faces> {
     let mut per_axis: [Faces; 3] = Default::default();
     for &f in &faces {
         per_axis[(f % 4) as usize].push(f);

@@ -22,23 +22,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Sets};
+use enfilade_geom::{Aabb, Bvh, DVec3, Sets};
 use rayon::prelude::*;
 
 use crate::voxel::{Grid, Labels};
 
-use super::regions::{OUTDOORS, Regions};
+use super::regions::Regions;
+use crate::structure::{BACKS, OUTDOORS, is_crevice, rays_from};
 
-/// Regions in which no ball of this radius fits are dropped when most rays see backs. [Units: wu]
-const NARROW: f64 = 0.5;
 /// Points that ask around in each region.
 const POINTS: usize = 32;
 /// From inside matter this share of the rays leave it: all but those that slip through a crack or
 /// along an edge.
 const LEAVING: f64 = 0.9;
-/// … and most see a back first: from a room sunk into ground that no one has dug out all rays leave
-/// the ground in the end, but its walls show their fronts.
-const BACKS: f64 = 0.6;
 /// Surfaces are trusted where known air sees at most this share of backs, and turned where it sees at
 /// most this share of fronts: half of what surfaces that face anywhere show.
 const ASTRAY: f64 = 0.25;
@@ -53,21 +49,21 @@ const ALL_THERE_IS: f64 = 0.9;
 
 /// What is no room.
 #[derive(Clone, Debug, Default)]
-pub struct Matter {
+pub(crate) struct Matter {
     /// Regions, ascending: solid matter, and closed-off spaces in which no ball of the least radius
     /// fits (bays between rafters, gaps in the construction). What of the latter leaks into a room is
     /// part of that room after all: the cell complex sees to it.
-    pub regions: Vec<u32>,
+    pub(crate) regions: Vec<u32>,
     /// What was decided in doubt, one sentence each.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Whether surfaces show their fronts to air and their backs to matter.
-    pub fronts_face_air: bool,
+    pub(crate) fronts_face_air: bool,
 }
 
 /// Finds the regions that are no rooms; `min_radius` is that of the largest ball that fits into a
 /// room at least.
 #[must_use]
-pub fn find_matter(
+pub(crate) fn find_matter(
     grid: &Grid,
     labels: &Labels,
     regions: &Regions,
@@ -108,7 +104,7 @@ pub fn find_matter(
             .fold(0.0, f64::max)
             * grid.voxel;
         let view = view(&group);
-        if widest < min_radius || (view.backs() > BACKS && widest < NARROW) {
+        if is_crevice(widest, min_radius, view.backs()) {
             narrow.extend(group);
         } else if facing.is_matter(&view) {
             doubtful.push(group);
@@ -400,34 +396,4 @@ fn sample_points(
         *k += 1;
     }
     points
-}
-
-/// Along the axes and the diagonals of each point.
-fn rays_from(points: &[DVec3]) -> impl Iterator<Item = Ray> {
-    let steps = || (-1..=1).map(f64::from);
-    let directions: Vec<DVec3> = steps()
-        .flat_map(|x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z))))
-        .filter(|d| d.length_squared() == 1.0 || d.length_squared() == 3.0)
-        // Off the axes a little, so that rays do not run along edges.
-        .map(|d| d + DVec3::new(0.013, 0.007, -0.011))
-        .collect();
-    points.iter().flat_map(move |&origin| {
-        directions.clone().into_iter().map(move |direction| Ray {
-            origin,
-            direction,
-            t_max: f64::INFINITY,
-        })
-    })
-}
-
-/// Rays that meet a back, and rays that meet anything.
-pub(super) fn count_backs(bvh: &Bvh, points: &[DVec3]) -> (f64, f64) {
-    let (mut back, mut all) = (0.0, 0.0);
-    for ray in rays_from(points) {
-        if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
-            all += 1.0;
-            back += f64::from(u8::from(!hit.front));
-        }
-    }
-    (back, all)
 }

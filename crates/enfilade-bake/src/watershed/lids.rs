@@ -19,7 +19,7 @@ use enfilade_geom::{DVec3, Plane, Winding};
 
 use crate::voxel::{BitVolume, Grid};
 
-use super::fit::Screen;
+use crate::structure::Candidate;
 
 /// A column is a wall when this much of it is filled below its top. [Units: wu]
 const MIN_WALL: f64 = 1.8;
@@ -38,30 +38,30 @@ const MIN_AREA: f64 = 1.0;
 
 /// What is laid where walls just end. One voxel thick, each at its height; `None` when there is none.
 #[derive(Clone, Debug, Default)]
-pub struct Lids {
+pub(crate) struct Lids {
     /// Below the tops of walls.
-    pub lids: Option<BitVolume>,
+    pub(crate) lids: Option<BitVolume>,
     /// Above the feet of walls.
-    pub floors: Option<BitVolume>,
+    pub(crate) floors: Option<BitVolume>,
 }
 
 impl Lids {
-    /// The screen for an opening that lies in a lid or floor for the most part: level, around its faces.
+    /// The candidate portal for an opening that lies in a lid or floor for the most part: level, around its faces.
     #[must_use]
-    pub fn screen_of(&self, grid: &Grid, faces: &[u64], regions: [u32; 2]) -> Option<Screen> {
+    pub(crate) fn candidate_of(&self, grid: &Grid, faces: &[u64]) -> Option<Candidate> {
         // A third into the voxel from without: under all the tops that end in the row above, over all
         // the feet that end in the row below.
         let sheets = [(&self.lids, 1.0), (&self.floors, -1.0)];
         sheets.into_iter().find_map(|(voxels, side)| {
             let row = row_of(voxels.as_ref()?, grid, faces)?;
             let height = grid.center(0, row, 0).y + side * grid.voxel / 6.0;
-            Some(level_screen(grid, faces, regions, row, height))
+            Some(level_candidate(grid, faces, row, height))
         })
     }
 
     /// What was laid, in words.
     #[must_use]
-    pub fn notes(&self, grid: &Grid) -> Vec<String> {
+    pub(crate) fn notes(&self, grid: &Grid) -> Vec<String> {
         let note = |what: &str, ends: &str, voxels: &BitVolume| {
             let area = voxels.count() as f64 * grid.voxel * grid.voxel;
             format!(
@@ -90,7 +90,7 @@ fn row_of(voxels: &BitVolume, grid: &Grid, faces: &[u64]) -> Option<usize> {
     (most.len() * 10 >= faces.len() * 8).then_some(most[0])
 }
 
-fn level_screen(grid: &Grid, faces: &[u64], regions: [u32; 2], row: usize, height: f64) -> Screen {
+fn level_candidate(grid: &Grid, faces: &[u64], row: usize, height: f64) -> Candidate {
     let plane = Plane {
         normal: DVec3::Y,
         d: -height,
@@ -106,18 +106,15 @@ fn level_screen(grid: &Grid, faces: &[u64], regions: [u32; 2], row: usize, heigh
         })
         .collect();
     let winding = Winding::hull_in_plane(&plane, &corners);
-    Screen {
-        regions,
-        area: winding.area(),
+    Candidate {
         winding,
-        bounded: true,
         closed: 0.0,
     }
 }
 
 /// Lays the lids and floors of a scene whose structure fills `occupied`.
 #[must_use]
-pub fn find_lids(grid: &Grid, occupied: &BitVolume) -> Lids {
+pub(crate) fn find_lids(grid: &Grid, occupied: &BitVolume) -> Lids {
     Lids {
         lids: lids_of(grid, occupied),
         floors: lids_of(grid, &upside_down(occupied)).map(|v| upside_down(&v)),

@@ -22,9 +22,11 @@ use enfilade_geom::Sets;
 
 use crate::voxel::{BitVolume, Grid, Labels, distance};
 
+use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
-use super::regions::{Flooded, MergeSettings, OUTDOORS, Regions, contact_faces};
+use super::regions::Regions;
 use super::sections::section_ratio;
+use crate::structure::{MergeSettings, OUTDOORS};
 
 /// A limb opens to what is at least this many times as thick: its section is at most half of that.
 const THICKER: f64 = 2.0;
@@ -35,7 +37,7 @@ const STEP: f64 = 1.15;
 
 /// Makes rooms of the limbs of rooms, of what `flooded` was before it is cut. Half-widths from
 /// `settings.min_radius` on count; `shut` is what door leaves and panes fill.
-pub fn split_limbs(
+pub(crate) fn split_limbs(
     grid: &Grid,
     labels: &mut Labels,
     regions: &mut Regions,
@@ -131,12 +133,12 @@ fn join_limbs(
             continue;
         }
         let is_lesser = |i: usize| region_of(flooded.labels.get(i)) == a;
-        let openings = group_faces(flooded.grid, faces, &is_lesser, flooded.closures);
-        let Some(opening) = openings.first() else {
+        let fronts = group_faces(flooded.grid, faces, &is_lesser, flooded.closures);
+        let Some(front) = fronts.first() else {
             continue;
         };
-        if opening.closed < settings.closed_share
-            && section_ratio(flooded, settings, opening, [a, b], &region_of).0
+        if front.opening.closed < settings.closed_share
+            && section_ratio(flooded, settings, front, [a, b], &region_of).0
                 >= settings.wall_threshold
         {
             sets.join(a, b);

@@ -20,96 +20,29 @@
 //! Cost: one evaluation looks at a few ten thousand lattice points around an opening; their number
 //! grows with the basins, that is with the building. Errs towards too many cells.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::fronts::{Faces, Opening, group_faces, is_in};
+use super::flooded::{Flooded, contact_faces};
+use super::fronts::{Faces, group_faces, is_in};
 use super::sections::section_ratio;
-use crate::voxel::{BitVolume, Grid, Labels};
-
-/// Label of the space around the building in a flooded volume.
-pub const OUTDOORS: u32 = 1;
-
-/// How merging decides. All lengths in world units, all else without one.
-#[derive(Clone, Debug)]
-pub struct MergeSettings {
-    /// Two cells are one room when the opening between them reaches this share of what lies beside
-    /// it. [Limit: 0 to 1] Doors come out at 0.15–0.6, open plan at 0.9 and more.
-    pub threshold: f64,
-    /// The same where the opening lies in a wall: where, next to its rim, one cell is on one side and
-    /// the other on the other with something thin in between.
-    pub wall_threshold: f64,
-    /// Share of the rim that must be wall for that.
-    pub wall_rim: f64,
-    /// Weight of the radius ratio: radii are coarser than areas, so they get the benefit.
-    pub radius_gain: f64,
-    /// How far from the opening's plane cross-sections are looked for. [Units: wu]
-    pub reach: f64,
-    /// How far around the opening's rim cross-sections are counted. [Units: wu]
-    pub surround: f64,
-    /// What an opening to the outdoors counts, compared with one between rooms.
-    pub outdoor_gain: f64,
-    /// Share of an opening that a door leaf or pane must fill to close it.
-    pub closed_share: f64,
-    /// Radius of the largest ball that fits into a room at least. [Units: wu] What is narrower
-    /// everywhere is a crevice, and belongs to the room it opens to most.
-    pub min_radius: f64,
-    /// A cell with this share of its sides open is a bay of what it opens to. [Limit: 0 to 1] A square of columns a fifth as
-    /// thick as they stand apart is open by 0.8, a vestibule of 1.5 m with a doorway on each side by 0.5.
-    pub bay_share: f64,
-}
-
-impl Default for MergeSettings {
-    fn default() -> Self {
-        Self {
-            threshold: 0.7,
-            wall_threshold: 0.9,
-            wall_rim: 0.3,
-            radius_gain: 1.15,
-            reach: 0.6,
-            surround: 1.5,
-            outdoor_gain: 0.8,
-            closed_share: 0.6,
-            min_radius: 0.3,
-            bay_share: 0.7,
-        }
-    }
-}
+use crate::structure::{MergeSettings, Mergeable, OUTDOORS, Opening, Pair, join_rooms};
 
 /// Rooms as unions of basins.
 #[derive(Clone, Debug)]
-pub struct Regions {
+pub(crate) struct Regions {
     /// Room label of each basin label (index 0: solid). [`OUTDOORS`] stays itself.
-    pub region_of_basin: Vec<u32>,
-    /// Every merge in order: the two cells, and the ratio that joined them. The hierarchy of rooms.
-    pub merges: Vec<(u32, u32, f32)>,
+    pub(crate) region_of_basin: Vec<u32>,
     /// Faces between each pair of regions (lesser label first).
-    pub contacts: BTreeMap<(u32, u32), Faces>,
-    /// The ratio of each pair that was left apart.
-    pub ratios: BTreeMap<(u32, u32), f32>,
-}
-
-/// A flooded volume, as merging sees it.
-#[derive(Clone, Copy)]
-pub struct Flooded<'a> {
-    /// Place and size of the voxels.
-    pub grid: &'a Grid,
-    /// Basin of each voxel, 0 where solid.
-    pub labels: &'a Labels,
-    /// Greatest distance in each basin. [Units: vx]
-    pub peaks: &'a [f32],
-    /// Voxels that a door leaf or a pane fills.
-    pub closures: Option<&'a BitVolume>,
-    /// Heights at which basins were cut at slabs, ascending. [Units: wu]
-    pub slabs: &'a [f64],
+    pub(crate) contacts: BTreeMap<(u32, u32), Faces>,
 }
 
 /// Merges the basins of `flooded` into rooms. `saddles` holds the saddle distance of each pair of
 /// touching basins, lesser label first. [Units: vx]
 #[must_use]
-pub fn merge_basins(
+pub(crate) fn merge_basins(
     flooded: Flooded<'_>,
     saddles: &BTreeMap<(u32, u32), f32>,
     settings: &MergeSettings,
@@ -124,7 +57,6 @@ pub fn merge_basins(
         neighbors: vec![BTreeSet::new(); n],
         contacts: contact_faces(flooded.grid.dims, flooded.labels),
         saddles: saddles.clone(),
-        queue: BinaryHeap::new(),
         storeys_apart: true,
     };
     merger.peak[OUTDOORS as usize] = f32::INFINITY;
@@ -134,85 +66,13 @@ pub fn merge_basins(
     }
     // What lies under a wide hole in a slab is a room only together with what surrounds it: each
     // storey is put together first, and only then are openings between storeys weighed.
-    let mut merges = Vec::new();
     for storeys_apart in [true, false] {
         merger.storeys_apart = storeys_apart;
-        merger.weigh_all();
-        merger.run(&mut merges);
+        join_rooms(&mut merger);
     }
-    merger.absorb_crevices(&mut merges);
-    merger.absorb_bays(&mut merges);
-    merger.finish(merges)
-}
-
-/// Collects the faces between differently labelled voxels, by pair, in order of the voxels.
-pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
-    let [nx, ny, nz] = dims;
-    let layer = nx * ny;
-    let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..nz)
-        .into_par_iter()
-        .map(|z| {
-            let mut found: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
-            for y in 0..ny {
-                let row = z * layer + y * nx;
-                for x in 0..nx {
-                    let i = row + x;
-                    let a = labels.get(i);
-                    if a == 0 {
-                        continue;
-                    }
-                    let mut face = |inside: bool, step: usize, axis: u64| {
-                        if inside {
-                            let b = labels.get(i + step);
-                            if b != 0 && b != a {
-                                found
-                                    .entry((a.min(b), a.max(b)))
-                                    .or_default()
-                                    .push(i as u64 * 4 + axis);
-                            }
-                        }
-                    };
-                    face(x + 1 < nx, 1, 0);
-                    face(y + 1 < ny, nx, 1);
-                    face(z + 1 < nz, layer, 2);
-                }
-            }
-            found
-        })
-        .collect();
-    let mut all: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
-    for slab in per_slab {
-        for (pair, faces) in slab {
-            all.entry(pair).or_default().extend(faces);
-        }
-    }
-    all
-}
-
-/// A pair waiting to be merged; the least pinched comes first, ties by label.
-struct Candidate {
-    ratio: f64,
-    pair: (u32, u32),
-    versions: (u32, u32),
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Candidate {}
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.ratio
-            .total_cmp(&other.ratio)
-            .then_with(|| other.pair.cmp(&self.pair))
-    }
+    merger.absorb_crevices();
+    merger.absorb_bays();
+    merger.finish()
 }
 
 struct Merger<'a> {
@@ -225,7 +85,6 @@ struct Merger<'a> {
     neighbors: Vec<BTreeSet<u32>>,
     contacts: BTreeMap<(u32, u32), Faces>,
     saddles: BTreeMap<(u32, u32), f32>,
-    queue: BinaryHeap<Candidate>,
     /// Whether openings that lie in a slab count as shut for now.
     storeys_apart: bool,
 }
@@ -238,25 +97,6 @@ impl Merger<'_> {
         a
     }
 
-    fn push(&mut self, a: u32, b: u32, ratio: f64) {
-        if ratio >= 1.0 {
-            let versions = (self.version[a as usize], self.version[b as usize]);
-            self.queue.push(Candidate {
-                ratio,
-                pair: (a, b),
-                versions,
-            });
-        }
-    }
-
-    fn weigh_all(&mut self) {
-        let pairs: Vec<(u32, u32)> = self.contacts.keys().copied().collect();
-        let ratios: Vec<f64> = pairs.par_iter().map(|&(a, b)| self.ratio(a, b)).collect();
-        for (&(a, b), ratio) in pairs.iter().zip(ratios) {
-            self.push(a, b, ratio);
-        }
-    }
-
     fn lies_in_slab(&self, opening: &Opening) -> bool {
         opening.plane.normal.y.abs() > 0.9
             && self
@@ -266,24 +106,8 @@ impl Merger<'_> {
                 .any(|h| (h - opening.center.y).abs() < 0.2)
     }
 
-    fn run(&mut self, merges: &mut Vec<(u32, u32, f32)>) {
-        while let Some(top) = self.queue.pop() {
-            let (a, b) = top.pair;
-            if !self.contacts.contains_key(&(a, b)) {
-                continue; // one of them was merged away; the survivor's pair has its own entry
-            }
-            if top.versions != (self.version[a as usize], self.version[b as usize]) {
-                let ratio = self.ratio(a, b);
-                self.push(a, b, ratio);
-                continue;
-            }
-            merges.push((a, b, top.ratio as f32));
-            self.merge(a, b);
-        }
-    }
-
     /// Joins cells too narrow to be a room to the neighbor they share the largest open front with.
-    fn absorb_crevices(&mut self, merges: &mut Vec<(u32, u32, f32)>) {
+    fn absorb_crevices(&mut self) {
         // A voxel center next to a wall is already one voxel away from it.
         let limit = self.settings.min_radius / self.flooded.grid.voxel + 0.5;
         let mut narrow: Vec<u32> = (OUTDOORS + 1..self.parent.len() as u32)
@@ -308,18 +132,16 @@ impl Merger<'_> {
                 .map(|&n| (open_faces(n), Reverse(n)))
                 .max();
             if let Some((_, Reverse(n))) = home {
-                merges.push((c.min(n), c.max(n), 1.0));
-                self.merge(c.min(n), c.max(n));
+                self.join((c.min(n), c.max(n)));
             }
         }
-        self.queue.clear();
     }
 
     /// Joins cells whose sides are hardly walled to the neighbor that they open to most, least walled first: bays between
     /// the columns of a hall.
     ///
     /// One look at all voxels, and one at all pairs for each cell so joined.
-    fn absorb_bays(&mut self, merges: &mut Vec<(u32, u32, f32)>) {
+    fn absorb_bays(&mut self) {
         let mut sides = self.side_faces();
         let is_upright = |f: &&u64| **f % 4 != 1;
         let n_open = |merger: &Self, pair: (u32, u32)| {
@@ -343,15 +165,14 @@ impl Merger<'_> {
             let order = |a: &(f64, Reverse<u32>, u32), b: &(f64, Reverse<u32>, u32)| {
                 a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
             };
-            let Some((share, Reverse(bay), home)) = bays.max_by(order) else {
+            let Some((_, Reverse(bay), home)) = bays.max_by(order) else {
                 break;
             };
             let pair = (bay.min(home), bay.max(home));
             let shared = self.contacts[&pair].iter().filter(is_upright).count();
             // The sides of the outdoors are not counted, nor asked for.
             let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared);
-            merges.push((pair.0, pair.1, share as f32));
-            self.merge(pair.0, pair.1);
+            self.join(pair);
             let whole = self.find(bay);
             sides[whole as usize] = rest;
             for &n in &self.neighbors[whole as usize] {
@@ -359,7 +180,6 @@ impl Merger<'_> {
                 open.insert(pair, n_open(self, pair));
             }
         }
-        self.queue.clear();
     }
 
     /// The faces that no door leaf or pane fills.
@@ -407,8 +227,76 @@ impl Merger<'_> {
         (0..nz).into_par_iter().map(count).reduce(zero, add)
     }
 
-    /// Joins two cells. The one with more neighbors survives, except that outdoors always does.
-    fn merge(&mut self, a: u32, b: u32) {
+    fn finish(self) -> Regions {
+        let region_of_basin: Vec<u32> = (0..self.parent.len() as u32)
+            .map(|a| if a == 0 { 0 } else { self.find(a) })
+            .collect();
+        let mut contacts = self.contacts;
+        for faces in contacts.values_mut() {
+            faces.sort_unstable();
+        }
+        Regions {
+            region_of_basin,
+            contacts,
+        }
+    }
+}
+
+impl Mergeable for Merger<'_> {
+    fn pairs(&self) -> Vec<Pair> {
+        self.contacts.keys().copied().collect()
+    }
+
+    fn is_pair(&self, pair: Pair) -> bool {
+        self.contacts.contains_key(&pair)
+    }
+
+    fn ages(&self, (a, b): Pair) -> [u32; 2] {
+        [a, b].map(|c| self.version[c as usize])
+    }
+
+    fn openness(&self, (a, b): Pair) -> f64 {
+        let Some(faces) = self.contacts.get(&(a, b)) else {
+            return 0.0;
+        };
+        let smaller_peak = self.peak[a as usize].min(self.peak[b as usize]);
+        // Pairs made by a cut have no saddle: their radii say nothing, the sections decide.
+        let saddle = self.saddles.get(&(a, b)).copied().unwrap_or(f32::INFINITY);
+        let radius = self.settings.radius_gain * f64::from(saddle / smaller_peak.max(1e-6));
+        let low = radius
+            * if a == OUTDOORS {
+                self.settings.outdoor_gain
+            } else {
+                1.0
+            }
+            / self.settings.threshold;
+        if low < 1.0 {
+            return low;
+        }
+        let side = |i: usize| self.find(self.flooded.labels.get(i)) == a;
+        let fronts = group_faces(self.flooded.grid, faces, &side, self.flooded.closures);
+        // The two largest are enough: a third opening between the same two is smaller still.
+        fronts
+            .iter()
+            .take(2)
+            .map(|front| {
+                let apart = self.storeys_apart && self.lies_in_slab(&front.opening);
+                if apart || front.opening.closed >= self.settings.closed_share {
+                    return 0.0;
+                }
+                let cell_of = |label| self.find(label);
+                let (mut ratio, wall) =
+                    section_ratio(self.flooded, self.settings, front, [a, b], &cell_of);
+                if a == OUTDOORS {
+                    ratio *= self.settings.outdoor_gain;
+                }
+                self.settings.openness(ratio, wall).min(low)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// The one with more neighbors survives, except that outdoors always does.
+    fn join(&mut self, (a, b): Pair) -> Vec<Pair> {
         let pair = (a.min(b), a.max(b));
         let n = |c: u32| self.neighbors[c as usize].len();
         let (a, b) = if a != OUTDOORS && (b == OUTDOORS || n(b) > n(a)) {
@@ -444,76 +332,6 @@ impl Merger<'_> {
             self.neighbors[a as usize].insert(c);
             changed.push(new);
         }
-        // Pairs whose opening changed are weighed again at once. The others only compare with a cell
-        // that grew, which can but lower their ratio: they are weighed again when their turn comes.
-        let ratios: Vec<f64> = changed.par_iter().map(|&(p, q)| self.ratio(p, q)).collect();
-        for (&(p, q), ratio) in changed.iter().zip(ratios) {
-            self.push(p, q, ratio);
-        }
-    }
-
-    fn finish(self, merges: Vec<(u32, u32, f32)>) -> Regions {
-        let region_of_basin: Vec<u32> = (0..self.parent.len() as u32)
-            .map(|a| if a == 0 { 0 } else { self.find(a) })
-            .collect();
-        let pairs: Vec<(u32, u32)> = self.contacts.keys().copied().collect();
-        let ratios = pairs
-            .par_iter()
-            .map(|&(a, b)| ((a, b), self.ratio(a, b) as f32))
-            .collect();
-        let mut contacts = self.contacts;
-        for faces in contacts.values_mut() {
-            faces.sort_unstable();
-        }
-        Regions {
-            region_of_basin,
-            merges,
-            contacts,
-            ratios,
-        }
-    }
-
-    /// How much of what lies beside the opening between `a` and `b` it leaves open.
-    fn ratio(&self, a: u32, b: u32) -> f64 {
-        let Some(faces) = self.contacts.get(&(a, b)) else {
-            return 0.0;
-        };
-        let smaller_peak = self.peak[a as usize].min(self.peak[b as usize]);
-        // Pairs made by a cut have no saddle: their radii say nothing, the sections decide.
-        let saddle = self.saddles.get(&(a, b)).copied().unwrap_or(f32::INFINITY);
-        let radius = self.settings.radius_gain * f64::from(saddle / smaller_peak.max(1e-6));
-        let low = radius
-            * if a == OUTDOORS {
-                self.settings.outdoor_gain
-            } else {
-                1.0
-            }
-            / self.settings.threshold;
-        if low < 1.0 {
-            return low;
-        }
-        let side = |i: usize| self.find(self.flooded.labels.get(i)) == a;
-        let openings = group_faces(self.flooded.grid, faces, &side, self.flooded.closures);
-        // The two largest are enough: a third opening between the same two is smaller still.
-        openings
-            .iter()
-            .take(2)
-            .map(|o| {
-                let apart = self.storeys_apart && self.lies_in_slab(o);
-                if apart || o.closed >= self.settings.closed_share {
-                    return 0.0;
-                }
-                let cell_of = |label| self.find(label);
-                let (mut ratio, wall) =
-                    section_ratio(self.flooded, self.settings, o, [a, b], &cell_of);
-                if a == OUTDOORS {
-                    ratio *= self.settings.outdoor_gain;
-                }
-                let wall = (wall / self.settings.wall_rim).min(1.0);
-                let bar = self.settings.threshold
-                    + (self.settings.wall_threshold - self.settings.threshold) * wall;
-                (ratio / bar).min(low)
-            })
-            .fold(0.0, f64::max)
+        changed
     }
 }

@@ -22,7 +22,7 @@ const MIN_SHARE: f64 = 0.8;
 
 /// Triangles that cap the open rims of at least `min_area` wu². The order of the input has no say.
 #[must_use]
-pub fn rim_caps(triangles: &[Triangle], min_area: f64) -> Vec<Triangle> {
+pub(crate) fn rim_caps(triangles: &[Triangle], min_area: f64) -> Vec<Triangle> {
     let rims = Rims::of(triangles);
     let mut caps = Vec::new();
     for rim in rims.loops() {

@@ -3,24 +3,26 @@
 
 use enfilade_geom::DVec3;
 
-use super::fronts::{Opening, face_center};
-use super::regions::{Flooded, MergeSettings, OUTDOORS};
+use super::flooded::Flooded;
+use super::fronts::{Front, face_center};
+use crate::structure::{MergeSettings, OUTDOORS, connected_count, rim_share};
 
 /// Share of a front that leaves must hold for it to stand between them.
 const LEAVES: f64 = 0.2;
 /// An opening lies elsewhere than the front of the flood where it is narrower by this.
 const PINCHED: f64 = 0.9;
 
-/// Area of `opening`, between the cells of `pair`, ÷ the smaller of their largest cross-sections
+/// Area of the opening of `front`, between the cells of `pair`, ÷ the smaller of their largest cross-sections
 /// beside it; and the share of its rim that is wall. `cell_of` tells the cell of a basin.
 pub(super) fn section_ratio(
     flooded: Flooded<'_>,
     settings: &MergeSettings,
-    opening: &Opening,
+    front: &Front,
     [a, b]: [u32; 2],
     cell_of: &impl Fn(u32) -> u32,
 ) -> (f64, f64) {
-    let slices = Slices::beside(flooded, settings, opening, cell_of);
+    let opening = &front.opening;
+    let slices = Slices::beside(flooded, settings, front, cell_of);
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
     let (mut in_a, mut in_b) = (slices.nowhere(), slices.nowhere());
@@ -95,17 +97,17 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
     fn beside(
         flooded: Flooded<'a>,
         settings: &MergeSettings,
-        opening: &Opening,
+        front: &Front,
         cell_of: &'a F,
     ) -> Self {
-        let grid = flooded.grid;
+        let (grid, opening) = (flooded.grid, &front.opening);
         let (u, v) = opening.plane.basis();
         let in_plane = |f: u64| {
             let p = face_center(grid, f) - opening.center;
             [u.dot(p), v.dot(p)]
         };
         let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for &f in &opening.faces {
+        for &f in &front.faces {
             for (k, t) in in_plane(f).into_iter().enumerate() {
                 lo[k] = lo[k].min(t);
                 hi[k] = hi[k].max(t);
@@ -117,7 +119,7 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             (((hi[k] - lo[k] + 2.0 * settings.surround) / step).ceil() as usize).max(1) + 1
         });
         let mut seeds = vec![false; side[0] * side[1]];
-        for &f in &opening.faces {
+        for &f in &front.faces {
             let [x, y] = in_plane(f);
             let at = [x - start[0], y - start[1]].map(|t| (t / step).round() as usize);
             seeds[at[0].min(side[0] - 1) + at[1].min(side[1] - 1) * side[0]] = true;
@@ -164,57 +166,4 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             }
         }
     }
-}
-
-/// Share of the rim of `mask` (what lies within two steps of it) where `is_wall` holds.
-pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
-    let (mut rim, mut wall) = (0_usize, 0_usize);
-    for j in 0..side[1] {
-        for i in 0..side[0] {
-            let k = j * side[0] + i;
-            let near = |k: usize, n: usize| k.saturating_sub(2)..(k + 3).min(n);
-            if mask[k] || !near(j, side[1]).any(|y| near(i, side[0]).any(|x| mask[y * side[0] + x]))
-            {
-                continue;
-            }
-            rim += 1;
-            wall += usize::from(is_wall(k));
-        }
-    }
-    wall as f64 / rim.max(1) as f64
-}
-
-/// Points of `inside` (a lattice `side` wide and high) that hang together with a seed. Uses up
-/// `inside`. What lies behind a wall beside the opening is no part of the section at the opening.
-pub(crate) fn connected_count(
-    inside: &mut [bool],
-    side: [usize; 2],
-    seeds: &[bool],
-    stack: &mut Vec<usize>,
-    mut visit_point: impl FnMut(usize),
-) -> usize {
-    let mut count = 0;
-    for start in 0..inside.len() {
-        if !(seeds[start] && inside[start]) {
-            continue;
-        }
-        inside[start] = false;
-        stack.push(start);
-        while let Some(k) = stack.pop() {
-            count += 1;
-            visit_point(k);
-            let (i, j) = (k % side[0], k / side[0]);
-            let mut visit = |exists: bool, next: usize| {
-                if exists && inside[next] {
-                    inside[next] = false;
-                    stack.push(next);
-                }
-            };
-            visit(i > 0, k.wrapping_sub(1));
-            visit(i + 1 < side[0], k + 1);
-            visit(j > 0, k.wrapping_sub(side[0]));
-            visit(j + 1 < side[1], k + side[0]);
-        }
-    }
-    count
 }

@@ -7,67 +7,19 @@
 //! goes through the middle of a tall room, the opening is as large as the room, and both halves
 //! become one again.
 //!
-//! Cost: linear in triangles and voxels.
+//! Cost: linear in voxels.
 
-use enfilade_geom::{Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
+use crate::structure::OUTDOORS;
 use crate::voxel::{Grid, Labels};
 
-use super::regions::OUTDOORS;
-
-/// A level counts when its surfaces cover this share of the scene's plan.
-const MIN_SHARE: f64 = 0.08;
-/// The two faces of one slab lie no further apart than this. [Units: wu]
-const MAX_SLAB: f64 = 0.5;
 /// A part of a basin smaller than this is not worth a cut. [Units: wu³]
 const MIN_VOLUME: f64 = 0.3;
 
-/// Heights (+Y) of the middles of slabs, ascending. [Units: wu]
-#[must_use]
-pub fn slab_heights(triangles: &[Triangle]) -> Vec<f64> {
-    let mut levels: Vec<(f64, f64)> = Vec::new(); // height, area
-    let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for t in triangles {
-        for p in t {
-            for (k, v) in [p.x, p.z].into_iter().enumerate() {
-                lo[k] = lo[k].min(v);
-                hi[k] = hi[k].max(v);
-            }
-        }
-        let n = triangle_area_normal(t);
-        if n.y.abs() > 0.98 * n.length() && n.y != 0.0 {
-            levels.push(((t[0].y + t[1].y + t[2].y) / 3.0, n.y.abs() * 0.5));
-        }
-    }
-    let plan = (hi[0] - lo[0]).max(0.0) * (hi[1] - lo[1]).max(0.0);
-    levels.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    // Surfaces within 3 cm are one level.
-    let mut merged: Vec<(f64, f64)> = Vec::new();
-    for (y, area) in levels {
-        match merged.last_mut() {
-            Some(last) if y - last.0 < 0.03 => last.1 += area,
-            _ => merged.push((y, area)),
-        }
-    }
-    merged.retain(|l| l.1 >= MIN_SHARE * plan);
-    // The largest level first: it and the largest other one close by are the two faces of a slab;
-    // sills, lintels, treads and finishes next to them are not slabs of their own.
-    merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
-    let mut heights = Vec::new();
-    while let Some(&(y, _)) = merged.first() {
-        let other = merged[1..].iter().find(|l| (l.0 - y).abs() < MAX_SLAB);
-        let (lo, hi) = other.map_or((y, y), |l| (y.min(l.0), y.max(l.0)));
-        heights.push((lo + hi) * 0.5);
-        merged.retain(|l| l.0 < lo - MAX_SLAB || l.0 > hi + MAX_SLAB);
-    }
-    heights.sort_by(f64::total_cmp);
-    heights
-}
-
 /// Gives the parts of each basin above and below the `heights` labels of their own. Returns the
 /// basin that each new label was cut from; new labels follow the `n_labels` that there are.
-pub fn cut_at_slabs(
+pub(crate) fn cut_at_slabs(
     grid: &Grid,
     labels: &mut Labels,
     n_labels: usize,

@@ -10,7 +10,7 @@
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
-use super::hollow::count_backs;
+use crate::structure::count_backs;
 
 /// Voids are lower than this. [Units: wu] From there on they are rooms of their own.
 const MAX_HEIGHT: f64 = 0.5;
@@ -25,7 +25,7 @@ const MAX_SAMPLES: usize = 64;
 ///
 /// `region_at` tells the region of a point, 0 where there is none.
 #[must_use]
-pub fn shallow_voids(
+pub(crate) fn shallow_voids(
     triangles: &[Triangle],
     bvh: &Bvh,
     region_at: &(dyn Fn(DVec3) -> u32 + Sync),

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use enfilade::bake::BakeConfig;
 use enfilade::bake::delaunay::{Choices, DelaunayConfig, Weight};
 use enfilade::geom::DVec3;
 
@@ -40,9 +39,8 @@ fn parse_stop(text: &str) -> Result<f64, String> {
 }
 
 impl DelaunayOptions {
-    pub(crate) fn resolve(&self, common: &BakeConfig) -> anyhow::Result<DelaunayConfig> {
+    pub(crate) fn resolve(&self) -> anyhow::Result<DelaunayConfig> {
         Ok(DelaunayConfig {
-            common: common.clone(),
             weight: match self.weight {
                 WeightName::ScaleFree => Weight::ScaleFree,
                 WeightName::Aspect => Weight::Aspect,

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
-use enfilade::bake::{BakeConfig, SmallestHole};
+use enfilade::bake::{BakeConfig, Method, SmallestHole};
+use enfilade::geom::scene::Scene;
 use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{ImportOptions, RepairOptions, RoleRules, Up};
 
@@ -60,8 +61,8 @@ pub(crate) struct BakeOptions {
     #[command(flatten)]
     pub(super) scene: SceneOptions,
     /// How cells are found.
-    #[arg(long, value_enum, default_value_t = Method::Auto)]
-    pub(super) method: Method,
+    #[arg(long, value_enum, default_value_t = MethodName::Auto)]
+    method: MethodName,
     #[command(flatten)]
     pub(crate) delaunay: super::delaunay::DelaunayOptions,
     /// Where to write the way out of a map that leaks, as lines of `x y z` in meters.
@@ -115,7 +116,7 @@ enum Switch {
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-pub(super) enum Method {
+enum MethodName {
     /// The partition where all structure is made of brushes, the watershed for everything else; tetrahedra where it finds one
     /// cell or none in a curved surface that is closed but for its ends, which may have branches.
     Auto,
@@ -212,49 +213,54 @@ impl ConfigFile {
     }
 }
 
-/// What the partition is told, resolved.
-fn resolve_bsp(
-    options: &BakeOptions,
-    table: BspTable,
-    common: &BakeConfig,
-) -> anyhow::Result<BspConfig> {
-    let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
-        let normal = DVec3::new(nx, ny, nz).try_normalize();
-        let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
-        Ok(Plane::through(DVec3::new(x, y, z), normal))
-    };
+/// Cells of fewer triangles are merged with a neighbor if nothing else is said: the merging threshold
+/// of Lefebvre & Hornus 2003, table 2.
+const MERGE_BELOW: f64 = 50.0;
+
+/// Bounds on what cells cost.
+fn resolve_costs(options: &BakeOptions, table: &BspTable) -> anyhow::Result<SimplifySettings> {
     let max_cost = options
         .max_cost
         .map(f64::from)
-        .or(table.max_cost.map(|v| v.0));
-    let simplify = SimplifySettings {
+        .or(table.max_cost.as_ref().map(|v| v.0));
+    let costs = SimplifySettings {
         min_cost: options
             .min_cost
             .map(f64::from)
-            .or(table.min_cost.map(|v| v.0))
+            .or(table.min_cost.as_ref().map(|v| v.0))
             .unwrap_or_else(|| max_cost.unwrap_or(MERGE_BELOW).min(MERGE_BELOW)),
         max_cost,
         outdoors: options.split_outdoors || table.split_outdoors == Some(true),
         max_cells: table.max_cells,
         max_portals: table.max_portals,
         cost: CostModel {
-            triangle: table.triangle_cost.map_or(1.0, |v| v.0),
-            area: table.area_cost.map_or(0.0, |v| v.0),
-            detail: table.detail_cost.map_or(1.0, |v| v.0),
+            triangle: table.triangle_cost.as_ref().map_or(1.0, |v| v.0),
+            area: table.area_cost.as_ref().map_or(0.0, |v| v.0),
+            detail: table.detail_cost.as_ref().map_or(1.0, |v| v.0),
             materials: table
                 .material_costs
-                .into_iter()
-                .map(|(k, v)| (k, v.0))
+                .iter()
+                .map(|(k, v)| (k.clone(), v.0))
                 .collect(),
         },
         ..SimplifySettings::default()
     };
-    if let Some(max) = simplify.max_cost.filter(|m| *m < simplify.min_cost) {
+    if let Some(max) = costs.max_cost.filter(|m| *m < costs.min_cost) {
         anyhow::bail!(
             "max_cost {max} is below min_cost {}; no cell can be within both",
-            simplify.min_cost
+            costs.min_cost
         );
     }
+    Ok(costs)
+}
+
+/// What only the partition is told.
+fn resolve_bsp(table: BspTable) -> anyhow::Result<BspConfig> {
+    let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
+        let normal = DVec3::new(nx, ny, nz).try_normalize();
+        let normal = normal.context("a plane of [bsp] has no normal: give x, y, z, nx, ny, nz")?;
+        Ok(Plane::through(DVec3::new(x, y, z), normal))
+    };
     Ok(BspConfig {
         heuristic: match table.heuristic {
             None => Heuristic::Default,
@@ -279,39 +285,33 @@ fn resolve_bsp(
                 })
                 .collect(),
         },
-        simplify,
         rooms: match table.rooms {
             None => Rooms::Auto,
             Some(true) => Rooms::Always,
             Some(false) => Rooms::Never,
         },
-        merge: common.merge.clone(),
-        smallest_hole: common.smallest_hole,
     })
 }
-
-/// Cells of fewer triangles are merged with a neighbor if nothing else is said: the merging threshold
-/// of Lefebvre & Hornus 2003, table 2.
-const MERGE_BELOW: f64 = 50.0;
 
 /// Everything that a bake is told, resolved.
 pub(crate) struct Resolved {
     pub(crate) import: ImportOptions,
-    pub(crate) watershed: BakeConfig,
-    pub(crate) bsp: BspConfig,
+    pub(crate) config: BakeConfig,
     /// Nothing was said of what cells are merged below: that is for levels of brushes alone.
     merges_brushes_only: bool,
 }
 
 impl Resolved {
-    /// Bounds on what cells cost where they are rooms. A room of a building has few triangles; the shape of its openings says
-    /// that it is one.
-    pub(crate) fn costs_of_rooms(&self) -> SimplifySettings {
-        let mut costs = self.bsp.simplify.clone();
-        if self.merges_brushes_only {
-            costs.min_cost = 0.0;
+    /// The settings for a scene. A room of a building has few triangles, and the shape of its openings says that it is one:
+    /// small cells are merged by default only where cells are those of a partition of brushes.
+    pub(crate) fn config_for(&self, scene: &Scene) -> BakeConfig {
+        let mut config = self.config.clone();
+        let is_of_brushes =
+            !scene.solids.is_empty() && matches!(config.method, Method::Auto | Method::Bsp);
+        if self.merges_brushes_only && !is_of_brushes {
+            config.costs.min_cost = 0.0;
         }
-        costs
+        config
     }
 }
 
@@ -349,11 +349,20 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
             *field = value;
         }
     }
+    config.method = match options.method {
+        MethodName::Auto => Method::Auto,
+        MethodName::Watershed => Method::Watershed,
+        MethodName::Bsp => Method::Bsp,
+        MethodName::Delaunay => Method::Delaunay,
+    };
+    config.costs = resolve_costs(options, &file.bsp)?;
+    config.delaunay = options.delaunay.resolve()?;
+    let merges_brushes_only = options.min_cost.is_none() && file.bsp.min_cost.is_none();
+    config.bsp = resolve_bsp(file.bsp)?;
     Ok(Resolved {
         import: import_options,
-        merges_brushes_only: options.min_cost.is_none() && file.bsp.min_cost.is_none(),
-        bsp: resolve_bsp(options, file.bsp, &config)?,
-        watershed: config,
+        config,
+        merges_brushes_only,
     })
 }
 

@@ -33,7 +33,7 @@ const MAX_PLAN: f64 = 40.0;
 
 /// Which triangles belong to stairs.
 #[must_use]
-pub fn find_stairs(sources: &[TriangleSource], triangles: &[Triangle]) -> Vec<bool> {
+pub(crate) fn find_stairs(sources: &[TriangleSource], triangles: &[Triangle]) -> Vec<bool> {
     let mut is_stair = vec![false; triangles.len()];
     let mut start = 0;
     while start < sources.len() {

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use enfilade::geom::scene::{Role, Scene};
-use enfilade::geom::{DVec3, Sets, triangle_area_normal};
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{DVec3, Sets, triangle_area_normal};
 
 /// Larger scenes are left to the watershed, which takes seconds where tetrahedra take minutes.
 const MAX_TRIANGLES: usize = 200_000;

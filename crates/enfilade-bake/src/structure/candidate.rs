@@ -1,4 +1,4 @@
-//! Screens: from where two floods meet to a plane in the real opening.
+//! Candidate portals: from where two cells meet to a plane in the real opening.
 //!
 //! Haumont et al. 2003, §4.3 place a portal from the distance map (the geodesic between the two
 //! regions) or from the silhouette of the opening seen from one side, and take the smaller. We take
@@ -7,31 +7,34 @@
 //! Each candidate is judged by its *free cross-section*: the part of the plane that can be reached
 //! from the front without meeting a triangle, measured on the triangles themselves, not on voxels.
 //!
-//! The result is a [`Screen`]: a convex polygon that covers that cross-section and reaches a little
+//! The result is a [`Candidate`]: a convex polygon that covers that cross-section and reaches a little
 //! into the walls. How much of it is really open, and between which cells, the cell complex decides.
 //!
 //! Cost: a few dozen sections an opening, each linear in the triangles near it. Numerically harmless:
-//! a section is a picture of fixed resolution; errors make a screen a few centimeters too large.
+//! a section is a picture of fixed resolution; errors make a candidate a few centimeters too large.
 
-use enfilade_geom::{Aabb, DVec3, Plane, Triangle, Winding, triangle_area_normal};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
 
-use crate::voxel::Grid;
-
-use super::fronts::{Opening, face_center};
+/// An opening between two cells, as a builder knows it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Opening {
+    /// Mean plane.
+    pub(crate) plane: Plane,
+    /// Mean of its points. [Units: wu]
+    pub(crate) center: DVec3,
+    /// Length of the vector area, or the projected area where it wraps around something. [Units: wu²]
+    pub(crate) area: f64,
+    /// Share that door leaves and panes fill.
+    pub(crate) closed: f64,
+}
 
 /// A candidate portal: a convex polygon across an opening, a bit larger than the opening.
 #[derive(Clone, Debug)]
-pub struct Screen {
-    /// The regions it parts.
-    pub regions: [u32; 2],
-    /// Its polygon, counter-clockwise seen from the second region.
-    pub winding: Winding,
-    /// Free cross-section in its plane. [Units: wu²]
-    pub area: f64,
-    /// Whether the cross-section is closed by triangles all around.
-    pub bounded: bool,
+pub(crate) struct Candidate {
+    /// Its polygon.
+    pub(crate) winding: Winding,
     /// Share of the opening that a door leaf or a pane fills.
-    pub closed: f64,
+    pub(crate) closed: f64,
 }
 
 /// Most lattice points along one side of a section's picture.
@@ -43,38 +46,20 @@ const MARGIN: f64 = 0.7;
 /// How far from the front's mean plane a candidate may lie. [Units: wu]
 const OFFSET: f64 = 0.6;
 
-/// Fits a screen to an opening. `near` lists the structural triangles that touch a box.
+/// Fits a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, of which `bvh` is.
 #[must_use]
-pub fn fit_screen(
-    grid: &Grid,
-    opening: &Opening,
-    regions: [u32; 2],
-    triangles: &[Triangle],
-    near: &dyn Fn(&Aabb) -> Vec<u32>,
-) -> Screen {
-    let centers: Vec<DVec3> = opening
-        .faces
-        .iter()
-        .map(|&f| face_center(grid, f))
-        .collect();
-    fit_screen_at(&centers, grid.voxel, opening, regions, triangles, near)
-}
-
-/// Fits a screen to an opening for which points `spacing` apart stand; its faces are not asked.
-#[must_use]
-pub fn fit_screen_at(
+pub(crate) fn fit_candidate(
     centers: &[DVec3],
     spacing: f64,
     opening: &Opening,
-    regions: [u32; 2],
     triangles: &[Triangle],
-    near: &dyn Fn(&Aabb) -> Vec<u32>,
-) -> Screen {
+    bvh: &Bvh,
+) -> Candidate {
     let bounds = Aabb::of_points(centers).expanded(OFFSET + MARGIN);
-    let around: Vec<Triangle> = near(&bounds)
-        .iter()
-        .map(|&t| triangles[t as usize])
-        .collect();
+    let mut near = Vec::new();
+    bvh.for_each_in_box(&bounds, |t| near.push(t));
+    near.sort_unstable();
+    let around: Vec<Triangle> = near.iter().map(|&t| triangles[t as usize]).collect();
     let mut best: Option<Section> = None;
     // Wall planes come first; others are asked only when no wall closes the opening.
     for normals in candidate_normals(opening, &around) {
@@ -94,11 +79,8 @@ pub fn fit_screen_at(
         }
     }
     let section = best.unwrap_or_else(|| free_section(&opening.plane, centers, &around, spacing));
-    Screen {
-        regions,
+    Candidate {
         winding: section.winding(),
-        area: section.area,
-        bounded: section.bounded,
         closed: opening.closed,
     }
 }
@@ -179,12 +161,7 @@ fn candidate_planes(opening: &Opening, normal: DVec3, around: &[Triangle]) -> Ve
 /// What of a plane can be reached from the front without meeting a triangle.
 struct Section {
     plane: Plane,
-    /// Lattice origin, directions and spacing.
-    origin: DVec3,
-    u: DVec3,
-    v: DVec3,
-    step: f64,
-    side: [usize; 2],
+    picture: Picture,
     open: Vec<bool>,
     area: f64,
     bounded: bool,
@@ -204,8 +181,15 @@ impl Section {
     /// Convex hull of the open lattice cells, grown into the walls.
     fn winding(&self) -> Winding {
         let mut corners = Vec::new();
-        let [nu, nv] = self.side;
-        let grow = self.step * 1.5 + 0.01;
+        let Picture {
+            origin,
+            u,
+            v,
+            step,
+            side,
+        } = self.picture;
+        let [nu, nv] = side;
+        let grow = step * 1.5 + 0.01;
         for j in 0..nv {
             let row = &self.open[j * nu..(j + 1) * nu];
             let (Some(first), Some(last)) =
@@ -216,9 +200,9 @@ impl Section {
             for (i, sign) in [(first as f64, -1.0), (last as f64 + 1.0, 1.0)] {
                 for (dj, up) in [(0.0, -1.0), (1.0, 1.0)] {
                     corners.push(
-                        self.origin
-                            + self.u * (i * self.step + sign * grow)
-                            + self.v * ((j as f64 + dj) * self.step + up * grow),
+                        origin
+                            + u * (i * step + sign * grow)
+                            + v * ((j as f64 + dj) * step + up * grow),
                     );
                 }
             }
@@ -228,109 +212,160 @@ impl Section {
 }
 
 fn free_section(plane: &Plane, centers: &[DVec3], around: &[Triangle], voxel: f64) -> Section {
-    let (u, v) = plane.basis();
-    let base = plane.project(centers[0]);
-    let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-    let mut offset = 0.0;
-    for &c in centers {
-        for (k, t) in [u.dot(c - base), v.dot(c - base)].into_iter().enumerate() {
-            lo[k] = lo[k].min(t);
-            hi[k] = hi[k].max(t);
-        }
-        offset += plane.signed_distance(c);
-    }
-    offset /= centers.len() as f64;
-    let margin = MARGIN + voxel;
-    let extent = (hi[0] - lo[0]).max(hi[1] - lo[1]) + 2.0 * margin;
-    let step = (extent / MAX_SIDE as f64).max(FINEST);
-    let side = [0, 1].map(|k| (((hi[k] - lo[k] + 2.0 * margin) / step).ceil() as usize).max(1));
-    let origin = base + u * (lo[0] - margin) + v * (lo[1] - margin);
-    let mut blocked = vec![false; side[0] * side[1]];
-    let to_lattice = |p: DVec3| [u.dot(p - origin) / step, v.dot(p - origin) / step];
-    for t in around {
-        let d = t.map(|p| plane.signed_distance(p));
-        if d.iter().all(|d| d.abs() < 1e-3) {
-            fill_triangle(&mut blocked, side, t.map(to_lattice));
-        } else if d.iter().any(|&d| d <= 0.0) && d.iter().any(|&d| d >= 0.0) {
-            let mut ends: [Option<DVec3>; 2] = [None, None];
-            for i in 0..3 {
-                let j = (i + 1) % 3;
-                if (d[i] < 0.0) != (d[j] < 0.0) {
-                    let cut = t[i] + (t[j] - t[i]) * (d[i] / (d[i] - d[j]));
-                    let slot = usize::from(ends[0].is_some());
-                    ends[slot] = Some(cut);
-                }
-            }
-            if let [Some(p), Some(q)] = ends {
-                draw_segment(&mut blocked, side, to_lattice(p), to_lattice(q));
-            }
-        }
-    }
+    let picture = Picture::around(plane, centers, MARGIN + voxel);
+    let blocked = picture.blocked(plane, around);
+    let (pieces, found) = picture.pieces(&blocked, centers);
     // The piece that most of the front projects onto.
-    let mut piece = vec![0_u32; blocked.len()];
-    let mut hits: Vec<(usize, usize, bool)> = Vec::new(); // seeds, cells, touches the border
-    let mut stack = Vec::new();
-    for &c in centers {
-        let [x, y] = to_lattice(c);
-        let (i, j) = (
-            (x.max(0.0) as usize).min(side[0] - 1),
-            (y.max(0.0) as usize).min(side[1] - 1),
-        );
-        let at = j * side[0] + i;
-        if blocked[at] {
-            continue;
-        }
-        if piece[at] == 0 {
-            hits.push((0, 0, false));
-            let id = hits.len() as u32;
-            piece[at] = id;
-            stack.push(at);
-            let (mut cells, mut border) = (0, false);
-            while let Some(k) = stack.pop() {
-                cells += 1;
-                let (i, j) = (k % side[0], k / side[0]);
-                border |= i == 0 || j == 0 || i + 1 == side[0] || j + 1 == side[1];
-                let mut visit = |inside: bool, next: usize| {
-                    if inside && !blocked[next] && piece[next] == 0 {
-                        piece[next] = id;
-                        stack.push(next);
-                    }
-                };
-                visit(i > 0, k.wrapping_sub(1));
-                visit(i + 1 < side[0], k + 1);
-                visit(j > 0, k.wrapping_sub(side[0]));
-                visit(j + 1 < side[1], k + side[0]);
-            }
-            hits.last_mut().expect("pushed above").1 = cells;
-            hits.last_mut().expect("pushed above").2 = border;
-        }
-        hits[piece[at] as usize - 1].0 += 1;
-    }
-    let main = (0..hits.len()).max_by_key(|&i| (hits[i].0, usize::MAX - i));
+    let main = (0..found.len()).max_by_key(|&i| (found[i].n_hits, usize::MAX - i));
     let (open, area, bounded) = match main {
         Some(i) => {
-            let open = piece.iter().map(|&p| p as usize == i + 1).collect();
+            let main = &found[i];
             // A plane that most of the front misses is no plane of this opening.
-            let share = hits[i].0 as f64 / centers.len() as f64;
+            let share = main.n_hits as f64 / centers.len() as f64;
             (
-                open,
-                hits[i].1 as f64 * step * step,
-                !hits[i].2 && share > 0.5,
+                pieces.iter().map(|&p| p as usize == i + 1).collect(),
+                main.n_cells as f64 * picture.step * picture.step,
+                !main.meets_border && share > 0.5,
             )
         }
         None => (blocked.iter().map(|b| !b).collect(), f64::MAX / 1e6, false),
     };
+    let offset: f64 = centers.iter().map(|&c| plane.signed_distance(c)).sum();
     Section {
         plane: *plane,
-        origin,
-        u,
-        v,
-        step,
-        side,
+        picture,
         open,
         area,
         bounded,
-        offset,
+        offset: offset / centers.len() as f64,
+    }
+}
+
+/// A lattice of cells in a plane around an opening.
+#[derive(Clone, Copy)]
+struct Picture {
+    origin: DVec3,
+    u: DVec3,
+    v: DVec3,
+    step: f64,
+    side: [usize; 2],
+}
+
+/// Cells of a picture that hang together.
+struct Piece {
+    /// Points of the opening that lie in it.
+    n_hits: usize,
+    n_cells: usize,
+    meets_border: bool,
+}
+
+impl Picture {
+    fn around(plane: &Plane, centers: &[DVec3], margin: f64) -> Self {
+        let (u, v) = plane.basis();
+        let base = plane.project(centers[0]);
+        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for &c in centers {
+            for (k, t) in [u.dot(c - base), v.dot(c - base)].into_iter().enumerate() {
+                lo[k] = lo[k].min(t);
+                hi[k] = hi[k].max(t);
+            }
+        }
+        let extent = (hi[0] - lo[0]).max(hi[1] - lo[1]) + 2.0 * margin;
+        let step = (extent / MAX_SIDE as f64).max(FINEST);
+        Self {
+            origin: base + u * (lo[0] - margin) + v * (lo[1] - margin),
+            u,
+            v,
+            step,
+            side: [0, 1].map(|k| (((hi[k] - lo[k] + 2.0 * margin) / step).ceil() as usize).max(1)),
+        }
+    }
+
+    fn place(&self, p: DVec3) -> [f64; 2] {
+        [self.u, self.v].map(|d| d.dot(p - self.origin) / self.step)
+    }
+
+    /// The cells that triangles lie in or cross.
+    fn blocked(&self, plane: &Plane, around: &[Triangle]) -> Vec<bool> {
+        let mut blocked = vec![false; self.side[0] * self.side[1]];
+        for t in around {
+            let d = t.map(|p| plane.signed_distance(p));
+            if d.iter().all(|d| d.abs() < 1e-3) {
+                fill_triangle(&mut blocked, self.side, t.map(|p| self.place(p)));
+            } else if let Some([p, q]) = crossing(t, d) {
+                draw_segment(&mut blocked, self.side, self.place(p), self.place(q));
+            }
+        }
+        blocked
+    }
+
+    /// The pieces of the open cells that points lie in: of each cell the number of its piece from 1 on, 0 where there is
+    /// none, and the pieces.
+    fn pieces(&self, blocked: &[bool], points: &[DVec3]) -> (Vec<u32>, Vec<Piece>) {
+        let mut piece_of = vec![0_u32; blocked.len()];
+        let mut pieces: Vec<Piece> = Vec::new();
+        for &p in points {
+            let place = self.place(p);
+            let [i, j] = [0, 1].map(|k| (place[k].max(0.0) as usize).min(self.side[k] - 1));
+            let at = j * self.side[0] + i;
+            if blocked[at] {
+                continue;
+            }
+            if piece_of[at] == 0 {
+                let id = pieces.len() as u32 + 1;
+                pieces.push(self.fill(at, id, blocked, &mut piece_of));
+            }
+            pieces[piece_of[at] as usize - 1].n_hits += 1;
+        }
+        (piece_of, pieces)
+    }
+
+    /// Marks the open cells that hang together with `start`.
+    fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> Piece {
+        let side = self.side;
+        let (mut n_cells, mut meets_border) = (0, false);
+        piece_of[start] = id;
+        let mut stack = vec![start];
+        while let Some(k) = stack.pop() {
+            n_cells += 1;
+            let (i, j) = (k % side[0], k / side[0]);
+            meets_border |= i == 0 || j == 0 || i + 1 == side[0] || j + 1 == side[1];
+            let mut visit = |inside: bool, next: usize| {
+                if inside && !blocked[next] && piece_of[next] == 0 {
+                    piece_of[next] = id;
+                    stack.push(next);
+                }
+            };
+            visit(i > 0, k.wrapping_sub(1));
+            visit(i + 1 < side[0], k + 1);
+            visit(j > 0, k.wrapping_sub(side[0]));
+            visit(j + 1 < side[1], k + side[0]);
+        }
+        Piece {
+            n_hits: 0,
+            n_cells,
+            meets_border,
+        }
+    }
+}
+
+/// Where a triangle crosses a plane, given the distances `d` of its vertices from it.
+fn crossing(t: &Triangle, d: [f64; 3]) -> Option<[DVec3; 2]> {
+    if !(d.iter().any(|&d| d <= 0.0) && d.iter().any(|&d| d >= 0.0)) {
+        return None;
+    }
+    let mut ends: [Option<DVec3>; 2] = [None, None];
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        if (d[i] < 0.0) != (d[j] < 0.0) {
+            let cut = t[i] + (t[j] - t[i]) * (d[i] / (d[i] - d[j]));
+            let slot = usize::from(ends[0].is_some());
+            ends[slot] = Some(cut);
+        }
+    }
+    match ends {
+        [Some(p), Some(q)] => Some([p, q]),
+        _ => None,
     }
 }
 

@@ -10,8 +10,6 @@
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
 
-use crate::voxel::{BitVolume, Labels};
-
 /// Flat means thinner than this. [Units: wu] A door with its frame and handles is about 0.3.
 const MAX_THICKNESS: f64 = 0.4;
 /// A closure is at least this long and this wide. [Units: wu]
@@ -29,17 +27,9 @@ const MIN_HELD: f64 = 0.7;
 /// Samples along each side of a plate's rim.
 const RIM_SAMPLES: usize = 8;
 
-/// Triangles of the detail objects that may close an opening: flat, and no leaves that stand open.
-///
-/// `walls` are the structural triangles, in the scene's frame.
-#[must_use]
-pub fn closure_triangles(scene: &Scene, walls: &Bvh) -> Vec<Triangle> {
-    without_open_leaves(plates(scene), walls).concat()
-}
-
 /// The detail objects that are flat enough to close an opening, each by its triangles.
 #[must_use]
-pub fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
+pub(crate) fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
     let mut out = Vec::new();
     let mut object: Vec<Triangle> = Vec::new();
     let mut current = None;
@@ -69,7 +59,7 @@ pub fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
 ///
 /// Eight queries of box trees for each side of a plate.
 #[must_use]
-pub fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Vec<Vec<Triangle>> {
+pub(crate) fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Vec<Vec<Triangle>> {
     let owner: Vec<usize> = (0..plates.len())
         .flat_map(|i| std::iter::repeat_n(i, plates[i].len()))
         .collect();
@@ -185,76 +175,6 @@ fn thin_direction(triangles: &[Triangle]) -> DVec3 {
         .iter()
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(DVec3::Y, |c| c.0)
-}
-
-/// Labels the voxels that only closures fill: they were walls to the flood but are air. The basins
-/// on both sides grow into them at the same pace and meet in the middle of the leaf or pane.
-pub fn flood_closures(dims: [usize; 3], labels: &mut Labels, occupied: &BitVolume) {
-    match labels {
-        Labels::U16(v) => grow(dims, v, occupied),
-        Labels::U32(v) => grow(dims, v, occupied),
-    }
-}
-
-fn grow<T: Copy + Default + PartialEq>(dims: [usize; 3], labels: &mut [T], occupied: &BitVolume) {
-    let [nx, ny, nz] = dims;
-    let layer = nx * ny;
-    let each_neighbor = |i: usize, visit: &mut dyn FnMut(usize)| {
-        let (x, y, z) = (i % nx, i / nx % ny, i / layer);
-        for (exists, next) in [
-            (x > 0, i.wrapping_sub(1)),
-            (x + 1 < nx, i + 1),
-            (y > 0, i.wrapping_sub(nx)),
-            (y + 1 < ny, i + nx),
-            (z > 0, i.wrapping_sub(layer)),
-            (z + 1 < nz, i + layer),
-        ] {
-            if exists {
-                visit(next);
-            }
-        }
-    };
-    let solid = T::default();
-    // First round: air voxels without a label that touch a labelled one, in index order.
-    let mut front: Vec<(usize, T)> = Vec::new();
-    for i in 0..labels.len() {
-        if labels[i] == solid && !occupied.get_index(i) {
-            let mut first = None;
-            each_neighbor(i, &mut |j| {
-                if first.is_none() && labels[j] != solid {
-                    first = Some(labels[j]);
-                }
-            });
-            if let Some(l) = first {
-                front.push((i, l));
-            }
-        }
-    }
-    while !front.is_empty() {
-        for &(i, l) in &front {
-            labels[i] = l;
-        }
-        let mut next: Vec<(usize, T)> = Vec::new();
-        for &(i, l) in &front {
-            each_neighbor(i, &mut |j| {
-                if labels[j] == solid && !occupied.get_index(j) {
-                    next.push((j, l));
-                }
-            });
-        }
-        next.sort_by_key(|e| e.0);
-        next.dedup_by_key(|e| e.0);
-        front = next;
-    }
-}
-
-/// World box of triangles; empty for none.
-#[must_use]
-pub fn bounds_of(triangles: &[Triangle]) -> Aabb {
-    triangles
-        .iter()
-        .flatten()
-        .fold(Aabb::EMPTY, |b, &p| b.including(p))
 }
 
 #[cfg(test)]

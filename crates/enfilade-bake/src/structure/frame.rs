@@ -20,20 +20,20 @@ const MIN_GAIN: f64 = 1.25;
 
 /// A turn about the vertical axis, from the scene to the grid and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub(crate) struct Frame {
     cos: f64,
     sin: f64,
 }
 
 impl Frame {
     /// The frame of the scene itself.
-    pub const SCENE: Self = Self { cos: 1.0, sin: 0.0 };
+    pub(crate) const SCENE: Self = Self { cos: 1.0, sin: 0.0 };
 
     /// The frame along most of the walls; the scene's own unless another is clearly better.
     ///
     /// The order of the triangles has no say. Linear in them.
     #[must_use]
-    pub fn of(triangles: &[Triangle]) -> Self {
+    pub(crate) fn of(triangles: &[Triangle]) -> Self {
         // For each degree of the quarter circle the sum of normals, in whole numbers: sums of those
         // do not depend on the order.
         let mut sums = [[0_i128; 3]; 90];
@@ -79,19 +79,19 @@ impl Frame {
 
     /// Whether it is the scene's own.
     #[must_use]
-    pub fn is_scene(&self) -> bool {
-        *self == Self::SCENE
+    pub(crate) fn is_scene(self) -> bool {
+        self == Self::SCENE
     }
 
     /// How far the grid is turned, from x toward z. [Units: degrees]
     #[must_use]
-    pub fn degrees(&self) -> f64 {
+    pub(crate) fn degrees(self) -> f64 {
         self.sin.atan2(self.cos).to_degrees()
     }
 
     /// A point or direction of the scene, in the grid.
     #[must_use]
-    pub fn to_grid(&self, p: DVec3) -> DVec3 {
+    pub(crate) fn to_grid(self, p: DVec3) -> DVec3 {
         DVec3::new(
             self.cos * p.x + self.sin * p.z,
             p.y,
@@ -101,7 +101,7 @@ impl Frame {
 
     /// A point or direction of the grid, in the scene.
     #[must_use]
-    pub fn to_scene(&self, p: DVec3) -> DVec3 {
+    pub(crate) fn to_scene(self, p: DVec3) -> DVec3 {
         DVec3::new(
             self.cos * p.x - self.sin * p.z,
             p.y,
@@ -111,7 +111,7 @@ impl Frame {
 
     /// Triangles of the scene, in the grid.
     #[must_use]
-    pub fn triangles_to_grid<'a>(&self, triangles: &'a [Triangle]) -> Cow<'a, [Triangle]> {
+    pub(crate) fn triangles_to_grid<'a>(self, triangles: &'a [Triangle]) -> Cow<'a, [Triangle]> {
         if self.is_scene() {
             return Cow::Borrowed(triangles);
         }
@@ -121,7 +121,7 @@ impl Frame {
 
     /// A polygon of the grid, in the scene.
     #[must_use]
-    pub fn winding_to_scene(&self, winding: &Winding) -> Winding {
+    pub(crate) fn winding_to_scene(self, winding: &Winding) -> Winding {
         let mut out = winding.clone();
         if !self.is_scene() {
             out.points.iter_mut().for_each(|p| *p = self.to_scene(*p));
@@ -131,7 +131,7 @@ impl Frame {
 
     /// The box, along the scene's axes, around a box of the grid.
     #[must_use]
-    pub fn aabb_to_scene(&self, bounds: &Aabb) -> Aabb {
+    pub(crate) fn aabb_to_scene(self, bounds: &Aabb) -> Aabb {
         if self.is_scene() {
             return *bounds;
         }

@@ -1,0 +1,117 @@
+//! The flow of the Delaunay builder: structure → tetrahedra → cells → rooms → candidate portals and votes.
+
+use enfilade_geom::Aabb;
+use enfilade_geom::scene::Scene;
+
+use super::config::DelaunayConfig;
+use super::decimate::default_stop;
+use super::rooms::find_rooms;
+use super::session::Session;
+use super::space::box_points;
+use crate::bound::keep_costs;
+use crate::complex::{LabelSettings, Vote};
+use crate::proposal::Proposal;
+use crate::realize::realize;
+use crate::structure::{OUTDOORS, Structure};
+use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Resolution, Stage};
+
+/// Air around the scene that the cell complex knows. [Units: wu]
+const AROUND: f64 = 1.0;
+
+/// Votes for the outdoors between two boxes, with nothing between them. Tetrahedra there reach far beyond the outer box,
+/// and so do their middles.
+fn votes_around(inner: &Aabb, outer: &Aabb) -> impl Iterator<Item = Vote> {
+    let [volume, less] = [outer, inner].map(|b| b.size().element_product());
+    let middle = Aabb::new((inner.min + outer.min) * 0.5, (inner.max + outer.max) * 0.5);
+    let points = box_points(&middle);
+    let weight = ((volume - less) / points.len() as f64) as f32;
+    points.into_iter().map(move |point| Vote {
+        point,
+        label: OUTDOORS,
+        weight,
+    })
+}
+
+/// Finds rooms by tetrahedra.
+///
+/// About `O(n log n)` in the points that stand for the surfaces, and in triangles.
+///
+/// # Errors
+/// When a setting or coordinate is out of limits, or the caller cancels.
+pub(crate) fn propose(
+    structure: &Structure<'_>,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Proposal, BakeError> {
+    let session = Session::of(structure, config, context)?;
+    propose_of(
+        structure,
+        &session,
+        session.decimation.stop,
+        config,
+        context,
+    )
+}
+
+/// Makes a world of the rooms that are left after the first `n_steps` of a session's decimation.
+///
+/// # Errors
+/// When the caller cancels.
+pub fn bake_session(
+    scene: &Scene,
+    session: &Session,
+    n_steps: usize,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    let structure = Method::Delaunay.structure_of(scene)?;
+    let proposal = propose_of(&structure, session, n_steps, config, context)?;
+    let mut baked = realize(structure, Method::Delaunay, proposal, config, context)?;
+    keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
+    Ok(baked)
+}
+
+fn propose_of(
+    structure: &Structure<'_>,
+    session: &Session,
+    n_steps: usize,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Proposal, BakeError> {
+    context.begin(Stage::Candidates)?;
+    let rooms = find_rooms(
+        session,
+        &session.decimation.after(n_steps),
+        config.merge.min_radius,
+    );
+    let bounds = structure.bounds();
+    let around = bounds.expanded(AROUND);
+    let mut votes = rooms.votes;
+    votes.extend(votes_around(&bounds, &around));
+    let space = &session.space;
+    let counts = vec![
+        ("tetrahedra", space.delaunay.n_finite as f64),
+        ("finest", space.finest),
+        ("passed_over", space.n_passed_over as f64),
+        ("steps", n_steps as f64),
+        ("screens", rooms.candidates.len() as f64),
+    ];
+    let DelaunayConfig { weight, stop, .. } = &config.delaunay;
+    let stop = stop.unwrap_or_else(|| default_stop(*weight));
+    let mut settings = config.watershed_settings();
+    settings.insert("weight".to_owned(), format!("{weight:?}"));
+    settings.insert("stop".to_owned(), stop.to_string());
+    Ok(Proposal {
+        candidates: rooms.candidates,
+        label: LabelSettings {
+            keeps_closed: false,
+            ..LabelSettings::default()
+        },
+        counts,
+        settings,
+        resolution: Resolution::Balls {
+            radius: space.finest,
+        },
+        ..Proposal::new(around, votes)
+    })
+}

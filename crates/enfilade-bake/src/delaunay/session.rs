@@ -1,0 +1,127 @@
+//! The state of decimation, which a bake goes through at once and a person step by step.
+
+use enfilade_geom::scene::Scene;
+use enfilade_geom::{Bvh, Triangle};
+
+use super::branches::find_branches;
+use super::decimate::{
+    Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together, parted,
+};
+use super::space::{Space, divide};
+use super::standing::count_rooms;
+use crate::structure::{Structure, in_own_order};
+use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
+
+/// The state of decimation, for a person to look at and to overrule.
+pub struct Session {
+    /// The tetrahedra and the ways between them.
+    pub space: Space,
+    /// Cells before the first step.
+    pub cells: Cells,
+    /// The steps.
+    pub decimation: Decimation,
+    /// Structural triangles that bound rooms: all but stairs.
+    pub(super) walls: Vec<Triangle>,
+    /// Of the walls.
+    pub(super) bvh: Bvh,
+    pub(super) closures: Vec<Triangle>,
+    pub(super) stairs: Bvh,
+}
+
+impl Session {
+    /// Divides the air of a scene and decimates. `config` is that of a bake by [`Method::Delaunay`].
+    ///
+    /// # Errors
+    /// When there is nothing structural, a coordinate is out of limits, or the caller cancels.
+    pub fn begin(
+        scene: &Scene,
+        config: &BakeConfig,
+        context: &BakeContext<'_>,
+    ) -> Result<Self, BakeError> {
+        context.begin_method(Method::Delaunay, "asked for")?;
+        Self::of(&Method::Delaunay.structure_of(scene)?, config, context)
+    }
+
+    pub(super) fn of(
+        structure: &Structure<'_>,
+        config: &BakeConfig,
+        context: &BakeContext<'_>,
+    ) -> Result<Self, BakeError> {
+        context.begin(Stage::Tetrahedra)?;
+        config.check_opening()?;
+        // The result shall not depend on how a file lists triangles.
+        let walls = in_own_order(&structure.walls);
+        let bvh = Bvh::build(&walls);
+        let closures = in_own_order(&structure.blockers(&bvh));
+        let space = divide(&walls, &closures, &bvh, config.min_opening)?;
+        context.begin(Stage::Decimation)?;
+        let cells = with_branches(
+            &space,
+            flow_together(&space),
+            config.merge.min_radius,
+            &walls,
+            &bvh,
+        );
+        let mut session = Self {
+            space,
+            cells,
+            decimation: Decimation {
+                n_cells: 0,
+                steps: Vec::new(),
+                stop: 0,
+            },
+            walls,
+            bvh,
+            closures,
+            stairs: Bvh::build(&structure.stairs),
+        };
+        session.decimate(config);
+        Ok(session)
+    }
+
+    /// How many rooms are left after the first `n_steps`, which is how many cells indoors [`bake_session`] makes of them,
+    /// and how many cells besides: crevices, and the insides of walls, which are dropped.
+    ///
+    /// `O(n log n)` in the parts of the space; a fraction of a second.
+    #[must_use]
+    pub fn count_rooms(&self, n_steps: usize, config: &BakeConfig) -> [usize; 2] {
+        count_rooms(
+            &self.space,
+            &self.cells,
+            &self.decimation.after(n_steps),
+            &self.bvh,
+            config.merge.min_radius,
+        )
+    }
+
+    /// Decimates anew, after other choices or with another weight or stop. Takes milliseconds.
+    pub fn decimate(&mut self, config: &BakeConfig) {
+        let own = &config.delaunay;
+        let stop = own.stop.unwrap_or_else(|| default_stop(own.weight));
+        let least = config.merge.min_radius;
+        self.decimation = decimate(&self.cells, own.weight, stop, least, &own.choices);
+    }
+}
+
+/// Cells that end where branches leave the rooms that a decimation without choices comes to.
+fn with_branches(
+    space: &Space,
+    cells: Cells,
+    min_radius: f64,
+    walls: &[Triangle],
+    bvh: &Bvh,
+) -> Cells {
+    let weight = Weight::ScaleFree;
+    let stop = default_stop(weight);
+    let rooms = decimate(&cells, weight, stop, min_radius, &Choices::default());
+    let room_of_cell = rooms.after(rooms.stop);
+    let room = |&c: &u32| room_of_cell[c as usize];
+    let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
+    let branches = find_branches(space, &room_of_part, walls, bvh);
+    if branches.is_empty() {
+        cells
+    } else {
+        let branches = branches.without_leftovers(space, &cells.cell_of_part);
+        parted(space, &cells, &branches)
+    }
+}

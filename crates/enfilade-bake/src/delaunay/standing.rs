@@ -1,0 +1,211 @@
+//! The rooms that a decimation leaves standing, and which of its cells are none.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use enfilade_geom::{Bvh, DVec3};
+use rayon::prelude::*;
+
+use super::decimate::{Cells, OUTDOOR_CELL};
+use super::space::Space;
+use crate::structure::{count_backs, is_crevice};
+
+/// Points of a region that ask around whether it is a room.
+const POINTS: usize = 32;
+/// The rooms that decimation left, and what of it is none.
+pub(super) struct Standing {
+    /// Room of each cell, the void in the outdoors.
+    pub(super) room_of_cell: Vec<u32>,
+    /// Openings between two rooms: links that touch.
+    pub(super) patches: Vec<((u32, u32), Vec<u32>)>,
+    /// Rooms that are the insides of walls and solids.
+    pub(super) hollow: BTreeSet<u32>,
+}
+
+impl Standing {
+    pub(super) fn of(
+        space: &Space,
+        cells: &Cells,
+        room_of_cell: &[u32],
+        bvh: &Bvh,
+        min_radius: f64,
+    ) -> Self {
+        let room_of_cell = void_joined(space, cells, room_of_cell, bvh);
+        let mut between: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+        for (&(a, b), portal) in &cells.portals {
+            let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
+            if a != b {
+                // Pieces of an opening that tetrahedra cut off are missed by nobody.
+                let wide = |l: &&u32| !space.is_crack(&space.links[**l as usize]);
+                between
+                    .entry((a.min(b), a.max(b)))
+                    .or_default()
+                    .extend(portal.links.iter().filter(wide));
+            }
+        }
+        let patches: Vec<((u32, u32), Vec<u32>)> = between
+            .into_iter()
+            .flat_map(|(pair, links)| {
+                connected(space, &links)
+                    .into_iter()
+                    .map(move |patch| (pair, patch))
+            })
+            .collect();
+        let hollow = hollow_rooms(space, cells, &room_of_cell, &patches, bvh, min_radius);
+        Self {
+            room_of_cell,
+            patches,
+            hollow,
+        }
+    }
+}
+
+/// How many rooms a decimation left, and how many cells besides: crevices, and the insides of walls.
+pub(super) fn count_rooms(
+    space: &Space,
+    cells: &Cells,
+    room_of_cell: &[u32],
+    bvh: &Bvh,
+    min_radius: f64,
+) -> [usize; 2] {
+    let standing = Standing::of(space, cells, room_of_cell, bvh, min_radius);
+    let mut all: BTreeSet<u32> = standing.room_of_cell.into_iter().collect();
+    all.remove(&OUTDOOR_CELL);
+    let n_hollow = all.intersection(&standing.hollow).count();
+    [all.len() - n_hollow, n_hollow]
+}
+
+/// Rooms with the void joined to the outdoors. Where the outdoors sees backs, the model has insides
+/// only, and whatever else sees backs is part of the same void.
+fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) -> Vec<u32> {
+    let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (t, &c) in cells.cell_of_part.iter().enumerate() {
+        members
+            .entry(room_of_cell[c as usize])
+            .or_default()
+            .push(t as u32);
+    }
+    let void: BTreeSet<u32> = members
+        .into_par_iter()
+        .filter_map(|(room, mut tets)| {
+            (share_of_backs(space, bvh, &mut tets) > 0.6).then_some(room)
+        })
+        .collect();
+    let room = |&r: &u32| {
+        if void.contains(&OUTDOOR_CELL) && void.contains(&r) {
+            OUTDOOR_CELL
+        } else {
+            r
+        }
+    };
+    room_of_cell.iter().map(room).collect()
+}
+
+/// Groups of links whose facets share corners.
+pub(super) fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
+    let facet = |l: u32| space.vertices_about(&space.links[l as usize]);
+    let mut by_corner: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (i, &l) in links.iter().enumerate() {
+        for v in facet(l) {
+            by_corner.entry(v).or_default().push(i);
+        }
+    }
+    let mut taken = vec![false; links.len()];
+    let mut out = Vec::new();
+    for first in 0..links.len() {
+        if taken[first] {
+            continue;
+        }
+        taken[first] = true;
+        let mut patch = vec![first];
+        let mut next = 0;
+        while next < patch.len() {
+            for v in facet(links[patch[next]]) {
+                for &i in &by_corner[&v] {
+                    if !taken[i] {
+                        taken[i] = true;
+                        patch.push(i);
+                    }
+                }
+            }
+            next += 1;
+        }
+        patch.sort_unstable();
+        out.push(patch.into_iter().map(|i| links[i]).collect());
+    }
+    out
+}
+
+/// Rooms that are none: the insides of walls and solids, which nothing can get into and from which
+/// one sees the backs of surfaces. The rule is the watershed's (`structure/backs.rs`).
+fn hollow_rooms(
+    space: &Space,
+    cells: &Cells,
+    room_of_cell: &[u32],
+    patches: &[((u32, u32), Vec<u32>)],
+    bvh: &Bvh,
+    min_radius: f64,
+) -> BTreeSet<u32> {
+    let mut group: BTreeMap<u32, u32> = room_of_cell.iter().map(|&r| (r, r)).collect();
+    fn root(group: &BTreeMap<u32, u32>, mut r: u32) -> u32 {
+        while group[&r] != r {
+            r = group[&r];
+        }
+        r
+    }
+    for ((a, b), _) in patches {
+        let (a, b) = (root(&group, *a), root(&group, *b));
+        group.insert(a.max(b), a.min(b));
+    }
+    let group_of: BTreeMap<u32, u32> = group.keys().map(|&r| (r, root(&group, r))).collect();
+    let group_at = |t: usize| group_of[&room_of_cell[cells.cell_of_part[t] as usize]];
+    let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let mut radius: BTreeMap<u32, f64> = BTreeMap::new();
+    for t in 0..space.middles.len() {
+        let g = group_at(t);
+        members.entry(g).or_default().push(t as u32);
+        let r = radius.entry(g).or_insert(0.0);
+        *r = r.max(space.radii[t]);
+    }
+    let share = |tets: &mut Vec<u32>| share_of_backs(space, bvh, tets);
+    let (mut hollow, mut doubtful) = (BTreeSet::new(), Vec::new());
+    let outdoor_group = group_of[&OUTDOOR_CELL];
+    let mut outdoors = members.remove(&outdoor_group).unwrap_or_default();
+    let trusted = share(&mut outdoors) < 0.1;
+    let mut any_room = group_of
+        .iter()
+        .any(|(&r, &g)| g == outdoor_group && r != OUTDOOR_CELL);
+    for (g, mut tets) in members {
+        let widest = radius[&g];
+        let back = share(&mut tets);
+        if is_crevice(widest, min_radius, back) {
+            hollow.insert(g);
+        } else if back > 0.9 && trusted {
+            doubtful.push(g);
+        } else {
+            any_room = true;
+        }
+    }
+    // A closed shell of a building, with nothing modelled inside, is a building and not a boulder.
+    if any_room {
+        hollow.extend(doubtful);
+    }
+    group_of
+        .into_iter()
+        .filter(|(_, g)| hollow.contains(g))
+        .map(|(r, _)| r)
+        .collect()
+}
+
+/// Of the rays from the largest of some tetrahedra, the share that meets backs.
+fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32]) -> f64 {
+    // The largest speak for a region: those at its surface are many and see little.
+    tets.sort_by(|&a, &b| {
+        space.volumes[b as usize]
+            .total_cmp(&space.volumes[a as usize])
+            .then(a.cmp(&b))
+    });
+    let largest = tets.iter().take(POINTS);
+    let points: Vec<DVec3> = largest.map(|&t| space.middles[t as usize]).collect();
+    let (back, all) = count_backs(bvh, &points);
+    if all == 0.0 { 0.0 } else { back / all }
+}

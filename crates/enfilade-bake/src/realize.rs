@@ -1,0 +1,169 @@
+//! From a proposal to a world: space cut into convex cells, exactly; cells by votes; portals where cells are open to each
+//! other; geometry to the cells that see it. The same for all builders.
+
+use enfilade_cpg::{Provenance, Statistics, World};
+use enfilade_geom::Triangle;
+use enfilade_geom::scene::Role;
+
+use crate::assemble::{Cut, assemble};
+use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex};
+use crate::join::{VOID, join_unparted, join_voids};
+use crate::proposal::Proposal;
+use crate::structure::Structure;
+use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Stage};
+
+/// Makes a world of what a method proposes.
+///
+/// # Errors
+/// When the caller cancels.
+pub(crate) fn realize(
+    structure: Structure<'_>,
+    method: Method,
+    mut proposal: Proposal,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    let structure = structure.into_scene();
+    context.begin(Stage::Complex)?;
+    let candidates = proposal.candidates.iter();
+    let complex = build_complex(&ComplexInput {
+        triangles: &structure.triangles,
+        screens: &candidates.map(|c| c.winding.clone()).collect::<Vec<_>>(),
+        bounds: proposal.bounds,
+        gap: config.smallest_hole.gap(),
+        has_seals: config.smallest_hole.has_seals(),
+    });
+    context.begin(Stage::Partition)?;
+    let partition = part(&complex, &mut proposal);
+    proposal.counts.push(("leaves", complex.n_leaves() as f64));
+    proposal.votes = Vec::new();
+    let outward = complex.opening_tolerance();
+    drop(complex);
+
+    context.begin(Stage::Geometry)?;
+    let leaks = partition.leaks.clone();
+    let cut = Cut {
+        scene: structure.scene,
+        sources: &structure.sources,
+        triangles: &structure.triangles,
+        bvh: &structure.bvh,
+        partition,
+        candidates: &proposal.candidates,
+        outward,
+        closed_share: config.merge.closed_share,
+    };
+    let world = world_of(&cut, method, &proposal);
+    context.end_stage();
+    Ok(BakeOutput {
+        world,
+        method,
+        resolution: proposal.resolution,
+        times: context.times(),
+        leaks,
+        notes: proposal.notes,
+    })
+}
+
+/// Divides the leaves of the complex among cells.
+fn part(complex: &Complex, proposal: &mut Proposal) -> Partition {
+    let Proposal {
+        votes,
+        voids,
+        label,
+        joins_unparted,
+        ..
+    } = proposal;
+    let mut partition = complex.partition(votes, label);
+    while *joins_unparted && join_unparted(&partition, votes, voids) {
+        partition = complex.partition(votes, label);
+    }
+    // Voids that rays found above ceilings and no room's votes reached.
+    let unreached: Vec<Vote> = std::mem::take(voids)
+        .into_iter()
+        .filter(|(p, _)| partition.locator.locate(*p).is_none())
+        .map(|(point, region)| Vote {
+            point,
+            label: VOID | region,
+            weight: 1e-3,
+        })
+        .collect();
+    if unreached.is_empty() {
+        return partition;
+    }
+    let n = votes.len();
+    votes.extend(unreached);
+    partition = complex.partition(votes, label);
+    // What opens to something is a cavity of the construction, not a void: left as it was.
+    let opens = portalled_cells(&partition);
+    let mut rest = votes.split_off(n);
+    let n_voids = rest.len();
+    rest.retain(|v| {
+        let cell = partition.locator.locate(v.point);
+        cell.is_none_or(|c| !opens[c.0 as usize])
+    });
+    let is_final = rest.len() == n_voids;
+    votes.extend(rest);
+    if !is_final {
+        partition = complex.partition(votes, label);
+    }
+    join_voids(&mut partition);
+    partition
+}
+
+/// Which cells have a portal.
+fn portalled_cells(partition: &Partition) -> Vec<bool> {
+    let mut opens = vec![false; partition.label_of_cell.len()];
+    for p in &partition.portals {
+        p.cells.iter().for_each(|&c| opens[c as usize] = true);
+    }
+    opens
+}
+
+/// Hands out the geometry, and says how the world came to be.
+fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
+    let n_detail = cut.scene.triangle_sources(Role::Detail).count();
+    let seals = &cut.partition.seals;
+    let common = [
+        ("input_triangles", (cut.sources.len() + n_detail) as f64),
+        ("structural_triangles", cut.sources.len() as f64),
+        ("leaks", cut.partition.leaks.len() as f64),
+        ("seals", seals.len() as f64),
+        ("seal_area", seals.iter().map(|s| s.outline.area()).sum()),
+    ];
+    let counts = common.iter().chain(&proposal.counts);
+    let provenance = Provenance {
+        generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
+        method: method.name().to_owned(),
+        input_hash: input_hash(cut.triangles, &proposal.settings),
+        settings: proposal.settings.clone(),
+    };
+    let statistics = Statistics {
+        counts: counts.map(|&(k, v)| (k.to_owned(), v)).collect(),
+    };
+    assemble(cut, provenance, statistics)
+}
+
+/// FNV-1a over the triangles and settings, as 16 hexadecimal digits.
+fn input_hash(
+    triangles: &[Triangle],
+    settings: &std::collections::BTreeMap<String, String>,
+) -> String {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut add = |bytes: &[u8]| {
+        for &b in bytes {
+            hash = (hash ^ u64::from(b)).wrapping_mul(0x100_0000_01b3);
+        }
+    };
+    for p in triangles.iter().flatten() {
+        for v in p.as_vec3().to_array() {
+            add(&v.to_le_bytes());
+        }
+    }
+    for (k, v) in settings {
+        add(k.as_bytes());
+        add(&[0]);
+        add(v.as_bytes());
+        add(&[0]);
+    }
+    format!("{hash:016x}")
+}

@@ -1,0 +1,68 @@
+//! What the simplifier is asked for.
+
+use std::collections::BTreeMap;
+
+use super::cost::CostModel;
+
+/// How portals are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Metric {
+    /// Triangles that sampled views draw more without the portal.
+    #[default]
+    ExpectedTriangles,
+    /// Volume that sees the portal times the difference of its cells' costs (Lefebvre & Hornus 2003).
+    VisibleVolume,
+}
+
+/// Settings of the simplifier.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SimplifySettings {
+    /// Cheaper cells are merged with neighbors, where that keeps the upper bound. What reaches through
+    /// several cells counts in each in part: no portal between them hides it.
+    pub min_cost: f64,
+    /// No merge makes a cell that costs more; [`keep_bounds`](crate::bound::keep_bounds) cuts those that do.
+    pub max_cost: Option<f64>,
+    /// Whether the outdoors is cut, too, where it costs more.
+    pub outdoors: bool,
+    /// Cells are merged until there are no more than this, where that keeps the upper bound.
+    pub max_cells: Option<usize>,
+    /// Cells are merged until there are no more portals than this, where that keeps the upper bound.
+    pub max_portals: Option<usize>,
+    /// How portals are compared.
+    pub metric: Metric,
+    /// What drawing costs.
+    pub cost: CostModel,
+}
+
+impl SimplifySettings {
+    /// Every setting by name, as text, for the provenance of the file.
+    #[must_use]
+    pub fn to_settings(&self) -> BTreeMap<String, String> {
+        let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
+        let mut out: BTreeMap<String, String> = [
+            ("simplify.min_cost", self.min_cost.to_string()),
+            ("simplify.max_cost", number(self.max_cost)),
+            (
+                "simplify.max_cells",
+                number(self.max_cells.map(|n| n as f64)),
+            ),
+            (
+                "simplify.max_portals",
+                number(self.max_portals.map(|n| n as f64)),
+            ),
+            ("simplify.metric", format!("{:?}", self.metric)),
+            ("cost.triangle", self.cost.triangle.to_string()),
+            ("cost.area", self.cost.area.to_string()),
+            ("cost.detail", self.cost.detail.to_string()),
+        ]
+        .map(|(k, v)| (k.to_owned(), v))
+        .into();
+        if self.outdoors {
+            out.insert("simplify.outdoors".to_owned(), "true".to_owned());
+        }
+        for (name, weight) in &self.cost.materials {
+            out.insert(format!("cost.material.{name}"), weight.to_string());
+        }
+        out
+    }
+}

@@ -1,0 +1,29 @@
+//! What is there: the structure of a scene, as all builders see it before any of them looks for rooms.
+//!
+//! | question | file |
+//! | --- | --- |
+//! | which triangles bound rooms, which are stairs, along which axes | `of`, `stairs`, `frame` |
+//! | what closes openings: door leaves and panes | `blockers` |
+//! | where storeys end | `slabs` |
+//! | which side of a surface is matter | `backs` |
+//! | where cells are one room | `pinch`, `lattice` |
+//! | which plane an opening lies in | `candidate` |
+
+mod backs;
+mod blockers;
+mod candidate;
+mod frame;
+mod lattice;
+mod of;
+mod pinch;
+mod slabs;
+mod stairs;
+
+pub(crate) use backs::{BACKS, count_backs, is_crevice, is_inside, rays_from};
+pub(crate) use blockers::plates;
+pub(crate) use candidate::{Candidate, Opening, fit_candidate};
+pub(crate) use frame::Frame;
+pub(crate) use lattice::{connected_count, rim_share};
+pub(crate) use of::{OUTDOORS, Stairs, Structure, bounds_of, in_own_order, structural_triangles};
+pub use pinch::MergeSettings;
+pub(crate) use pinch::{Mergeable, Pair, join_rooms};

@@ -1,0 +1,167 @@
+//! The structural triangles of a scene, sorted by what they are.
+
+use enfilade_geom::scene::{Role, Scene, TriangleSource};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
+
+use super::blockers::{plates, without_open_leaves};
+use super::frame::Frame;
+use super::slabs::slab_heights;
+use super::stairs::find_stairs;
+use crate::BakeError;
+
+/// Label of the space around the building.
+pub(crate) const OUTDOORS: u32 = 1;
+
+/// Whether stairs are told from walls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stairs {
+    /// They stand in rooms and bound none.
+    Apart,
+    /// All structure bounds rooms: brushes say by their class what is detail.
+    AreWalls,
+}
+
+/// The structure of a scene.
+///
+/// `walls`, `stairs` and `bvh` are in the frame, all else is where the scene has it.
+pub(crate) struct Structure<'a> {
+    pub(crate) scene: &'a Scene,
+    /// Where each triangle comes from.
+    pub(crate) sources: Vec<TriangleSource>,
+    /// All structural triangles that have an area.
+    pub(crate) triangles: Vec<Triangle>,
+    /// The axes along which most walls run.
+    pub(crate) frame: Frame,
+    /// What bounds rooms.
+    pub(crate) walls: Vec<Triangle>,
+    /// Number of each wall among the triangles.
+    pub(crate) wall_numbers: Vec<u32>,
+    pub(crate) stairs: Vec<Triangle>,
+    /// Of all structural triangles.
+    pub(crate) bvh: Bvh,
+}
+
+impl<'a> Structure<'a> {
+    /// `frame` chooses the axes from the structural triangles.
+    ///
+    /// `O(n log n)` in triangles.
+    ///
+    /// # Errors
+    /// When nothing is structural.
+    pub(crate) fn of(
+        scene: &'a Scene,
+        frame: impl FnOnce(&[Triangle]) -> Frame,
+        stairs: Stairs,
+    ) -> Result<Self, BakeError> {
+        let (sources, triangles) = structural_triangles(scene);
+        if triangles.is_empty() {
+            return Err(BakeError::NothingStructural {
+                n_objects: scene.objects.len(),
+            });
+        }
+        let frame = frame(&triangles);
+        let framed = frame.triangles_to_grid(&triangles);
+        let mut is_stair = match stairs {
+            Stairs::Apart => find_stairs(&sources, &framed),
+            Stairs::AreWalls => vec![false; framed.len()],
+        };
+        // What is nothing but stairs has no rooms that they could stand in.
+        if is_stair.iter().all(|&s| s) {
+            is_stair.fill(false);
+        }
+        let numbers = |stairs: bool| -> Vec<u32> {
+            let all = (0..framed.len() as u32).zip(&is_stair);
+            all.filter(|t| *t.1 == stairs).map(|t| t.0).collect()
+        };
+        let at = |numbers: &[u32]| numbers.iter().map(|&t| framed[t as usize]).collect();
+        let wall_numbers = numbers(false);
+        Ok(Self {
+            walls: at(&wall_numbers),
+            stairs: at(&numbers(true)),
+            bvh: Bvh::build(&framed),
+            frame,
+            wall_numbers,
+            scene,
+            sources,
+            triangles,
+        })
+    }
+
+    /// The box around everything structural, in the frame.
+    pub(crate) fn bounds(&self) -> Aabb {
+        bounds_of(&self.walls).union(bounds_of(&self.stairs))
+    }
+
+    /// Heights at which storeys end, ascending. [Units: wu]
+    pub(crate) fn slabs(&self) -> Vec<f64> {
+        slab_heights(&self.walls)
+    }
+
+    /// Triangles of the detail objects that may close an opening, in the frame: door leaves that are shut, panes. `surfaces`
+    /// are what holds their rims.
+    pub(crate) fn blockers(&self, surfaces: &Bvh) -> Vec<Triangle> {
+        let plates = plates(self.scene);
+        let framed = plates
+            .iter()
+            .map(|p| self.frame.triangles_to_grid(p).into_owned());
+        without_open_leaves(framed.collect(), surfaces).concat()
+    }
+
+    /// Forgets what is in the frame: what a builder found is put where the scene has it.
+    pub(crate) fn into_scene(self) -> Self {
+        let bvh = if self.frame.is_scene() {
+            self.bvh
+        } else {
+            drop(self.bvh);
+            Bvh::build(&self.triangles)
+        };
+        Self {
+            frame: Frame::SCENE,
+            walls: Vec::new(),
+            wall_numbers: Vec::new(),
+            stairs: Vec::new(),
+            bvh,
+            ..self
+        }
+    }
+}
+
+/// Structural triangles that have an area, with where they came from.
+pub(crate) fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<Triangle>) {
+    scene
+        .triangle_sources(Role::Structural)
+        .map(|s| (s, scene.world_triangle(s)))
+        .filter(|(_, t)| {
+            t.iter().all(|p| p.is_finite()) && triangle_area_normal(t).length_squared() > 0.0
+        })
+        .unzip()
+}
+
+/// Box around triangles; empty for none.
+pub(crate) fn bounds_of(triangles: &[Triangle]) -> Aabb {
+    triangles
+        .iter()
+        .flatten()
+        .fold(Aabb::EMPTY, |b, &p| b.including(p))
+}
+
+/// The triangles in an order of their own, each from its least corner on, for builders whose result would
+/// depend on how a file lists them.
+pub(crate) fn in_own_order(triangles: &[Triangle]) -> Vec<Triangle> {
+    let order = |a: &DVec3, b: &DVec3| {
+        let by = |k: usize| a[k].total_cmp(&b[k]);
+        by(0).then_with(|| by(1)).then_with(|| by(2))
+    };
+    let mut out: Vec<Triangle> = triangles
+        .iter()
+        .map(|t| {
+            let least = (0..3).min_by(|&i, &j| order(&t[i], &t[j])).unwrap_or(0);
+            [t[least], t[(least + 1) % 3], t[(least + 2) % 3]]
+        })
+        .collect();
+    out.sort_unstable_by(|a, b| {
+        let by = |k: usize| order(&a[k], &b[k]);
+        by(0).then_with(|| by(1)).then_with(|| by(2))
+    });
+    out
+}

@@ -1,0 +1,140 @@
+//! Where rooms end: at openings that are a *pinch*, narrower than what lies on either side of them.
+//!
+//! One rule and one loop for all builders that merge cells into rooms. They differ in how they look an opening and the
+//! sections of space beside it up: in voxels, or in a tree.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use rayon::prelude::*;
+
+/// How merging decides. All lengths in world units, all else without one.
+#[derive(Clone, Debug)]
+pub struct MergeSettings {
+    /// Two cells are one room when the opening between them reaches this share of what lies beside
+    /// it. [Limit: 0 to 1] Doors come out at 0.15–0.6, open plan at 0.9 and more.
+    pub threshold: f64,
+    /// The same where the opening lies in a wall: where, next to its rim, one cell is on one side and
+    /// the other on the other with something thin in between.
+    pub wall_threshold: f64,
+    /// Share of the rim that must be wall for that.
+    pub wall_rim: f64,
+    /// Weight of the radius ratio: radii are coarser than areas, so they get the benefit.
+    pub radius_gain: f64,
+    /// How far from the opening's plane cross-sections are looked for. [Units: wu]
+    pub reach: f64,
+    /// How far around the opening's rim cross-sections are counted. [Units: wu]
+    pub surround: f64,
+    /// What an opening to the outdoors counts, compared with one between rooms.
+    pub outdoor_gain: f64,
+    /// Share of an opening that a door leaf or pane must fill to close it.
+    pub closed_share: f64,
+    /// Radius of the largest ball that fits into a room at least. [Units: wu] What is narrower
+    /// everywhere is a crevice, and belongs to the room it opens to most.
+    pub min_radius: f64,
+    /// A cell with this share of its sides open is a bay of what it opens to. [Limit: 0 to 1] A square of columns a fifth as
+    /// thick as they stand apart is open by 0.8, a vestibule of 1.5 m with a doorway on each side by 0.5.
+    pub bay_share: f64,
+}
+
+impl Default for MergeSettings {
+    fn default() -> Self {
+        Self {
+            threshold: 0.7,
+            wall_threshold: 0.9,
+            wall_rim: 0.3,
+            radius_gain: 1.15,
+            reach: 0.6,
+            surround: 1.5,
+            outdoor_gain: 0.8,
+            closed_share: 0.6,
+            min_radius: 0.3,
+            bay_share: 0.7,
+        }
+    }
+}
+
+impl MergeSettings {
+    /// How open the way through an opening is; from 1 on, the two cells are one room. `ratio` is the opening's area ÷ the
+    /// smaller of the sections of space beside it, `wall` the share of its rim that is wall.
+    pub(crate) fn openness(&self, ratio: f64, wall: f64) -> f64 {
+        let wall = (wall / self.wall_rim).min(1.0);
+        ratio / (self.threshold + (self.wall_threshold - self.threshold) * wall)
+    }
+}
+
+/// Two cells that touch.
+pub(crate) type Pair = (u32, u32);
+
+/// Cells that may be joined across the openings between them.
+pub(crate) trait Mergeable: Sync {
+    /// All pairs of cells with an opening between them.
+    fn pairs(&self) -> Vec<Pair>;
+    /// Whether there still is an opening between the two.
+    fn is_pair(&self, pair: Pair) -> bool;
+    /// How open the openings between the two are: see [`MergeSettings::openness`].
+    fn openness(&self, pair: Pair) -> f64;
+    /// How often each of the two was joined with others.
+    fn ages(&self, pair: Pair) -> [u32; 2];
+    /// Joins the two; returns the pairs whose openings have changed.
+    fn join(&mut self, pair: Pair) -> Vec<Pair>;
+}
+
+/// A pair that waits to be joined; the most open comes first, ties by number.
+struct Waiting {
+    openness: f64,
+    pair: Pair,
+    ages: [u32; 2],
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Waiting {}
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.openness
+            .total_cmp(&other.openness)
+            .then_with(|| other.pair.cmp(&self.pair))
+            .then_with(|| other.ages.cmp(&self.ages))
+    }
+}
+
+/// Joins cells across openings that are no pinch, the most open first, until only pinches are left.
+///
+/// Pairs whose opening a join changes are weighed again at once. The others compare with a cell that grew, which can but
+/// lower their openness: they are weighed again when their turn comes.
+pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
+    let mut queue: BinaryHeap<Waiting> = weighed(cells, &cells.pairs()).into();
+    while let Some(top) = queue.pop() {
+        if !cells.is_pair(top.pair) {
+            continue; // one of them was joined to a third; that pair has its own entry
+        }
+        if cells.ages(top.pair) != top.ages {
+            queue.extend(weighed(cells, &[top.pair]));
+            continue;
+        }
+        let changed = cells.join(top.pair);
+        queue.extend(weighed(cells, &changed));
+    }
+}
+
+/// Those of some pairs that are one room.
+fn weighed<M: Mergeable>(cells: &M, pairs: &[Pair]) -> Vec<Waiting> {
+    let weigh = |&pair: &Pair| {
+        let openness = cells.openness(pair);
+        (openness >= 1.0).then(|| Waiting {
+            openness,
+            pair,
+            ages: cells.ages(pair),
+        })
+    };
+    pairs.par_iter().filter_map(weigh).collect()
+}

@@ -1,0 +1,54 @@
+//! Heights at which storeys end: the middles of slabs.
+//!
+//! A slab shows as two large level surfaces close above each other. Builders keep storeys apart there.
+//!
+//! Cost: linear in triangles.
+
+use enfilade_geom::{Triangle, triangle_area_normal};
+
+/// A level counts when its surfaces cover this share of the scene's plan.
+const MIN_SHARE: f64 = 0.08;
+/// The two faces of one slab lie no further apart than this. [Units: wu]
+const MAX_SLAB: f64 = 0.5;
+
+/// Heights (+Y) of the middles of slabs, ascending. [Units: wu]
+#[must_use]
+pub(crate) fn slab_heights(triangles: &[Triangle]) -> Vec<f64> {
+    let mut levels: Vec<(f64, f64)> = Vec::new(); // height, area
+    let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
+    for t in triangles {
+        for p in t {
+            for (k, v) in [p.x, p.z].into_iter().enumerate() {
+                lo[k] = lo[k].min(v);
+                hi[k] = hi[k].max(v);
+            }
+        }
+        let n = triangle_area_normal(t);
+        if n.y.abs() > 0.98 * n.length() && n.y != 0.0 {
+            levels.push(((t[0].y + t[1].y + t[2].y) / 3.0, n.y.abs() * 0.5));
+        }
+    }
+    let plan = (hi[0] - lo[0]).max(0.0) * (hi[1] - lo[1]).max(0.0);
+    levels.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    // Surfaces within 3 cm are one level.
+    let mut merged: Vec<(f64, f64)> = Vec::new();
+    for (y, area) in levels {
+        match merged.last_mut() {
+            Some(last) if y - last.0 < 0.03 => last.1 += area,
+            _ => merged.push((y, area)),
+        }
+    }
+    merged.retain(|l| l.1 >= MIN_SHARE * plan);
+    // The largest level first: it and the largest other one close by are the two faces of a slab;
+    // sills, lintels, treads and finishes next to them are not slabs of their own.
+    merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
+    let mut heights = Vec::new();
+    while let Some(&(y, _)) = merged.first() {
+        let other = merged[1..].iter().find(|l| (l.0 - y).abs() < MAX_SLAB);
+        let (lo, hi) = other.map_or((y, y), |l| (y.min(l.0), y.max(l.0)));
+        heights.push((lo + hi) * 0.5);
+        merged.retain(|l| l.0 < lo - MAX_SLAB || l.0 > hi + MAX_SLAB);
+    }
+    heights.sort_by(f64::total_cmp);
+    heights
+}

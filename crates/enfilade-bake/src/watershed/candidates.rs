@@ -1,0 +1,57 @@
+//! A candidate portal in each opening between two regions.
+
+use enfilade_geom::{Bvh, DVec3, Triangle};
+use rayon::prelude::*;
+
+use super::fronts::{Faces, connected_patches, face_center, front_of, is_in, without_corners};
+use super::lids::Lids;
+use super::regions::Regions;
+use crate::structure::{Candidate, fit_candidate};
+use crate::voxel::{BitVolume, Grid, Labels};
+
+/// Openings smaller than this many voxel faces are left to the complex, which finds them as cracks.
+const MIN_FACES: usize = 4;
+
+/// Fits a candidate to each opening, among `walls`; `closures` are the voxels that door leaves and panes fill, and
+/// `closed_share` is how much of a front that must be for a pane to be parted at its corners.
+pub(super) fn fit_candidates(
+    grid: &Grid,
+    labels: &Labels,
+    regions: &Regions,
+    closures: &BitVolume,
+    lids: &Lids,
+    walls: &[Triangle],
+    closed_share: f64,
+) -> Vec<Candidate> {
+    let bvh = Bvh::build(walls);
+    let is_shut = |faces: &[u64]| {
+        let n = faces.iter().filter(|&&f| is_in(grid, closures, f)).count();
+        n as f64 >= closed_share * faces.len() as f64
+    };
+    let patches = |faces: &[u64]| -> Vec<Faces> {
+        let whole = connected_patches(grid, faces).into_iter();
+        let parts = whole.flat_map(|patch| {
+            if is_shut(&patch) {
+                without_corners(grid, patch)
+            } else {
+                vec![patch]
+            }
+        });
+        parts.filter(|patch| patch.len() >= MIN_FACES).collect()
+    };
+    let openings: Vec<([u32; 2], Faces)> = regions
+        .contacts
+        .iter()
+        .flat_map(|(&(a, b), faces)| patches(faces).into_iter().map(move |patch| ([a, b], patch)))
+        .collect();
+    let candidate = |(pair, faces): ([u32; 2], Faces)| {
+        if let Some(lid) = lids.candidate_of(grid, &faces) {
+            return lid;
+        }
+        let is_lesser = |i: usize| regions.region_of_basin[labels.get(i) as usize] == pair[0];
+        let front = front_of(grid, faces, &is_lesser, Some(closures));
+        let centers: Vec<DVec3> = front.faces.iter().map(|&f| face_center(grid, f)).collect();
+        fit_candidate(&centers, grid.voxel, &front.opening, walls, &bvh)
+    };
+    openings.into_par_iter().map(candidate).collect()
+}

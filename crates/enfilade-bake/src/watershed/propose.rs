@@ -1,0 +1,219 @@
+//! The flow of the watershed builder: structure → voxels → basins → rooms → candidate portals and votes.
+
+use std::collections::BTreeMap;
+
+use super::candidates::fit_candidates;
+use super::flooded::Flooded;
+use super::hollow::find_matter;
+use super::lids::{Lids, find_lids};
+use super::limbs::split_limbs;
+use super::refill::flood_closures;
+use super::regions::{Regions, merge_basins};
+use super::rims::rim_caps;
+use super::slabs::cut_at_slabs;
+use super::voids::shallow_voids;
+use super::votes::{Ballots, inside_of};
+use crate::proposal::Proposal;
+use crate::structure::Structure;
+use crate::voxel::{
+    BitVolume, Grid, Labels, WatershedOptions, border, distance_squared, voxelize, watershed,
+};
+use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
+
+/// Finds rooms by a flood of the distance field.
+///
+/// Time is linear in voxels and about linear in triangles; memory about 3 bytes a voxel plus the scene.
+///
+/// # Errors
+/// When a setting is out of limits, the scene is too large for the budget of voxels, or the caller cancels.
+pub(crate) fn propose(
+    structure: &Structure<'_>,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Proposal, BakeError> {
+    let grid = config.grid(&structure.bounds())?;
+    context.begin(Stage::Voxelize)?;
+    let solid = Solid::of(structure, &grid, config);
+    let mut notes = solid.lids.notes(&grid);
+    context.begin(Stage::Distance)?;
+    let distances = solid.distances();
+    context.begin(Stage::Flood)?;
+    let mut basins = Basins::flood(&grid, distances, config);
+    basins.refill(&grid, &solid.occupied);
+    let slabs = structure.slabs();
+    basins.cut(&grid, &slabs);
+    let n_occupied = solid.occupied.count();
+    let Solid {
+        shut,
+        closures,
+        lids,
+        ..
+    } = solid;
+
+    context.begin(Stage::Rooms)?;
+    let mut regions = basins.merge(&grid, &shut, &slabs, config);
+    split_limbs(
+        &grid,
+        &mut basins.labels,
+        &mut regions,
+        &mut basins.peaks,
+        &shut,
+        &config.merge,
+    );
+    drop(shut);
+    let Basins { labels, peaks, .. } = basins;
+    let matter = find_matter(
+        &grid,
+        &labels,
+        &regions,
+        &peaks,
+        &structure.bvh,
+        config.merge.min_radius,
+    );
+    notes.extend(matter.notes);
+
+    context.begin(Stage::Candidates)?;
+    let mut candidates = fit_candidates(
+        &grid,
+        &labels,
+        &regions,
+        &closures,
+        &lids,
+        &structure.walls,
+        config.merge.closed_share,
+    );
+    drop((closures, lids));
+    let stairs = inside_of(&structure.stairs, &grid, &structure.bvh);
+    let ballots = Ballots::cast(&grid, &labels, &regions, &matter.regions, &stairs);
+    drop(stairs);
+    let mut voids = Vec::new();
+    if matter.fronts_face_air {
+        voids = shallow_voids(&structure.walls, &structure.bvh, &|p| {
+            grid.voxel_at(p).map_or(0, |[x, y, z]| {
+                regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
+            })
+        });
+    }
+    drop(labels);
+    // From here on all is where the scene has it.
+    let frame = &structure.frame;
+    for candidate in &mut candidates {
+        candidate.winding = frame.winding_to_scene(&candidate.winding);
+    }
+    for (p, _) in &mut voids {
+        *p = frame.to_scene(*p);
+    }
+    let counts = vec![
+        ("voxel_size", grid.voxel),
+        ("grid_turn_degrees", frame.degrees()),
+        ("voxels", grid.n_voxels() as f64),
+        ("occupied_voxels", n_occupied as f64),
+        ("basins", basins.n_basins as f64),
+        ("screens", candidates.len() as f64),
+    ];
+    Ok(Proposal {
+        candidates,
+        voids,
+        counts,
+        notes,
+        settings: config.watershed_settings(),
+        resolution: Resolution::Voxels {
+            edge: grid.voxel,
+            dims: grid.dims,
+        },
+        ..Proposal::new(
+            frame.aabb_to_scene(&grid.aabb()),
+            ballots.count(&grid, frame),
+        )
+    })
+}
+
+/// Voxels that are no air, or closed for the flood.
+struct Solid {
+    occupied: BitVolume,
+    /// Those that door leaves and panes fill.
+    closures: BitVolume,
+    lids: Lids,
+    /// Closures, lids, and caps of open tubes.
+    shut: BitVolume,
+}
+
+impl Solid {
+    fn of(structure: &Structure<'_>, grid: &Grid, config: &BakeConfig) -> Self {
+        let occupied = voxelize(grid, &structure.walls);
+        let closures = voxelize(grid, &structure.blockers(&structure.bvh));
+        // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
+        let lids = find_lids(grid, &occupied);
+        let mut shut = voxelize(
+            grid,
+            &rim_caps(&structure.walls, config.min_opening.powi(2)),
+        );
+        shut.union_with(&closures);
+        for voxels in lids.lids.iter().chain(&lids.floors) {
+            shut.union_with(voxels);
+        }
+        Self {
+            occupied,
+            closures,
+            lids,
+            shut,
+        }
+    }
+
+    /// How far every voxel of air is from a surface, squared; door leaves count as surfaces here.
+    fn distances(&self) -> Vec<u16> {
+        let mut blocked = self.occupied.clone();
+        blocked.union_with(&self.shut);
+        distance_squared(&blocked)
+    }
+}
+
+/// What the flood found.
+struct Basins {
+    labels: Labels,
+    /// Greatest distance in each basin, by label. [Units: vx]
+    peaks: Vec<f32>,
+    saddles: BTreeMap<(u32, u32), f32>,
+    n_basins: usize,
+}
+
+impl Basins {
+    fn flood(grid: &Grid, distances: Vec<u16>, config: &BakeConfig) -> Self {
+        let options = WatershedOptions {
+            h: config.noise / grid.voxel,
+            outdoors: Some(border(grid.dims)), // which the padding keeps empty
+        };
+        let flood = watershed(grid.dims, distances, options);
+        let peaks = flood.basins.iter().map(|b| b.peak as f32);
+        let saddles = flood.saddles.iter();
+        Self {
+            peaks: std::iter::once(0.0).chain(peaks).collect(),
+            saddles: saddles.map(|s| ((s.a, s.b), s.distance as f32)).collect(),
+            n_basins: flood.basins.len(),
+            labels: flood.labels,
+        }
+    }
+
+    /// Gives the air that closures fill to the basins beside it.
+    fn refill(&mut self, grid: &Grid, occupied: &BitVolume) {
+        flood_closures(grid.dims, &mut self.labels, occupied);
+    }
+
+    /// Cuts basins where a slab ends a storey.
+    fn cut(&mut self, grid: &Grid, slabs: &[f64]) {
+        for parent in cut_at_slabs(grid, &mut self.labels, self.peaks.len(), slabs) {
+            self.peaks.push(self.peaks[parent as usize]);
+        }
+    }
+
+    fn merge(&self, grid: &Grid, shut: &BitVolume, slabs: &[f64], config: &BakeConfig) -> Regions {
+        let flooded = Flooded {
+            grid,
+            labels: &self.labels,
+            peaks: &self.peaks,
+            closures: Some(shut),
+            slabs,
+        };
+        merge_basins(flooded, &self.saddles, &config.merge)
+    }
+}

@@ -1,0 +1,168 @@
+//! Votes: voxels that say which region a point belongs to.
+
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use rayon::prelude::*;
+
+use super::regions::Regions;
+use crate::complex::Vote;
+use crate::structure::{Frame, bounds_of};
+use crate::voxel::{BitVolume, Grid, Labels, voxelize};
+
+/// At most about this many voxels vote.
+const MAX_VOTES: usize = 1_000_000;
+/// Voxels this close to where two regions meet do not vote: a candidate may lie on either
+/// side of them. [Units: wu]
+const UNSURE: f64 = 0.35;
+
+/// Votes as they are cast: as small as can be, for they are many, and the labels are still there.
+pub(super) struct Ballots {
+    /// Voxels along each edge of a block.
+    block: usize,
+    /// Blocks along each axis.
+    dims: [usize; 3],
+    /// Region that each block votes for; 0 is none.
+    region: Vec<u32>,
+    /// Which voxel of the block it is that votes: 17³ of them at most, with 2³² voxels in all.
+    voter: Vec<u16>,
+}
+
+impl Ballots {
+    /// One voxel of each block of `block`³ speaks for its region.
+    pub(super) fn cast(
+        grid: &Grid,
+        labels: &Labels,
+        regions: &Regions,
+        hollow: &[u32],
+        solid: &BitVolume,
+    ) -> Self {
+        let mut unsure = BitVolume::new(grid.dims);
+        let reach = (UNSURE / grid.voxel).ceil() as usize;
+        for faces in regions.contacts.values() {
+            let mut last = u64::MAX;
+            for &face in faces {
+                if face / 4 == last {
+                    continue;
+                }
+                last = face / 4;
+                let at = grid.coords(last as usize);
+                let range =
+                    |k: usize| at[k].saturating_sub(reach)..(at[k] + reach + 1).min(grid.dims[k]);
+                for z in range(2) {
+                    for y in range(1) {
+                        for x in range(0) {
+                            unsure.set(x, y, z, true);
+                        }
+                    }
+                }
+            }
+        }
+        let mut block = 1;
+        while grid.n_voxels() / (block * block * block) > MAX_VOTES {
+            block += 1;
+        }
+        let dims = grid.dims.map(|n| n.div_ceil(block));
+        let n_blocks = dims.iter().product();
+        let mut ballots = Self {
+            block,
+            dims,
+            region: vec![0; n_blocks],
+            voter: vec![0; n_blocks],
+        };
+        let region_of = |[x, y, z]: [usize; 3]| {
+            let region = regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize];
+            let votes = region != 0
+                && !unsure.get(x, y, z)
+                && !solid.get(x, y, z)
+                && hollow.binary_search(&region).is_err();
+            votes.then_some(region)
+        };
+        ballots
+            .region
+            .par_iter_mut()
+            .zip(&mut ballots.voter)
+            .enumerate()
+            .with_min_len(4096)
+            .for_each(|(b, (region, voter))| {
+                let [bx, by, bz] = [b % dims[0], b / dims[0] % dims[1], b / (dims[0] * dims[1])];
+                let found = (0..block * block * block).find_map(|k| {
+                    let at = voter_at([bx, by, bz], block, k);
+                    let is_inside = (0..3).all(|axis| at[axis] < grid.dims[axis]);
+                    is_inside.then(|| region_of(at)).flatten().map(|of| (k, of))
+                });
+                if let Some((k, of)) = found {
+                    (*voter, *region) = (k as u16, of);
+                }
+            });
+        ballots
+    }
+
+    pub(super) fn count(self, grid: &Grid, frame: &Frame) -> Vec<Vote> {
+        let weight = (grid.voxel * self.block as f64).powi(3) as f32;
+        let [nx, ny, _] = self.dims;
+        // One after the other into a list of the right size: in parallel they would be there twice.
+        let n = self.region.iter().filter(|&&region| region != 0).count();
+        let mut votes = Vec::with_capacity(n);
+        for (b, (label, k)) in self.region.into_iter().zip(self.voter).enumerate() {
+            if label == 0 {
+                continue;
+            }
+            let at = [b % nx, b / nx % ny, b / (nx * ny)];
+            let [x, y, z] = voter_at(at, self.block, usize::from(k));
+            votes.push(Vote {
+                point: frame.to_scene(grid.center(x, y, z)),
+                label,
+                weight,
+            });
+        }
+        votes
+    }
+}
+
+/// Voxel number `k` of a block, along x first.
+fn voter_at(of: [usize; 3], block: usize, k: usize) -> [usize; 3] {
+    let within = [k % block, k / block % block, k / (block * block)];
+    [0, 1, 2].map(|axis| of[axis] * block + within[axis])
+}
+
+/// Voxels that stairs fill: those that they touch, and those between where rays up and down meet back
+/// faces.
+pub(super) fn inside_of(stairs: &[Triangle], grid: &Grid, bvh: &Bvh) -> BitVolume {
+    let mut filled = voxelize(grid, stairs);
+    let bounds = bounds_of(stairs);
+    let (Some(lo), Some(hi)) = (grid.voxel_at(bounds.min), grid.voxel_at(bounds.max)) else {
+        return filled;
+    };
+    let up_and_down = [
+        DVec3::new(0.013, 1.0, 0.007),
+        DVec3::new(-0.007, -1.0, 0.013),
+    ];
+    let inner: Vec<[usize; 3]> = (lo[2]..=hi[2])
+        .into_par_iter()
+        .flat_map_iter(|z| {
+            let filled = &filled;
+            (lo[1]..=hi[1]).flat_map(move |y| {
+                (lo[0]..=hi[0])
+                    .filter(move |&x| !filled.get(x, y, z))
+                    .filter_map(move |x| {
+                        let origin = grid.center(x, y, z);
+                        let meets_back = |direction: DVec3| {
+                            let ray = Ray {
+                                origin,
+                                direction,
+                                t_max: f64::INFINITY,
+                            };
+                            bvh.closest_hit(&ray, |_| false).is_some_and(|h| !h.front)
+                        };
+                        up_and_down
+                            .iter()
+                            .all(|&d| meets_back(d))
+                            .then_some([x, y, z])
+                    })
+            })
+        })
+        .collect();
+    for [x, y, z] in inner {
+        filled.set(x, y, z, true);
+    }
+    filled
+}
