@@ -16,14 +16,6 @@ const KNOWN: [[&str; 2]; 11] = [
         "crates/enfilade-bake/src/bsp/tree.rs",
     ],
     [
-        "crates/enfilade-bake/src/complex/cut.rs",
-        "crates/enfilade-bake/src/complex/label.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/complex/partition.rs",
-        "crates/enfilade-bake/src/complex/seen.rs",
-    ],
-    [
         "crates/enfilade-bake/src/delaunay/bake.rs",
         "crates/enfilade-bake/src/delaunay/rooms.rs",
     ],
@@ -44,12 +36,20 @@ const KNOWN: [[&str; 2]; 11] = [
         "crates/enfilade-bake/src/simplify/mod.rs",
     ],
     [
-        "crates/enfilade-bake/src/voxel/watershed.rs",
-        "crates/enfilade-bake/src/voxel/watershed/flood.rs",
-    ],
-    [
         "crates/enfilade-bake/src/watershed/regions.rs",
         "crates/enfilade-bake/src/watershed/sections.rs",
+    ],
+    [
+        "crates/enfilade-complex/src/cut.rs",
+        "crates/enfilade-complex/src/label.rs",
+    ],
+    [
+        "crates/enfilade-complex/src/partition.rs",
+        "crates/enfilade-complex/src/seen.rs",
+    ],
+    [
+        "crates/enfilade-voxel/src/watershed.rs",
+        "crates/enfilade-voxel/src/watershed/flood.rs",
     ],
 ];
 

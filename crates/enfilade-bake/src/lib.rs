@@ -7,7 +7,7 @@
 mod assemble;
 pub mod bound;
 pub mod bsp;
-pub mod complex;
+pub use enfilade_complex as complex;
 mod config;
 mod context;
 pub mod delaunay;
@@ -17,7 +17,7 @@ mod join;
 pub mod leak;
 pub mod pipeline;
 pub mod simplify;
-pub mod voxel;
+pub use enfilade_voxel as voxel;
 pub mod watershed;
 
 pub use config::{BakeConfig, SmallestHole};

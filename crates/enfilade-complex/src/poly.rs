@@ -7,14 +7,14 @@ use enfilade_geom::{Aabb, DVec3, Plane};
 use smallvec::SmallVec;
 
 /// A convex planar polygon; which way it turns depends on where it came from.
-pub(crate) type Poly = SmallVec<[DVec3; 6]>;
+pub type Poly = SmallVec<[DVec3; 6]>;
 
 /// Where a polygon lies about a plane.
 #[expect(
     clippy::large_enum_variant,
     reason = "lives for a match; a box would allocate a million times"
 )]
-pub(crate) enum Sides {
+pub enum Sides {
     /// In the plane, within the tolerance.
     On,
     /// Wholly on the positive side.
@@ -26,7 +26,7 @@ pub(crate) enum Sides {
 }
 
 /// Splits a polygon; corners within `eps` of the plane belong to both parts unmoved.
-pub(crate) fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
+pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
     let n = points.len();
     let dist: SmallVec<[f64; 12]> = points.iter().map(|&p| plane.signed_distance(p)).collect();
     let (mut any_front, mut any_back) = (false, false);
@@ -66,7 +66,7 @@ pub(crate) fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
 }
 
 /// The part on the positive side; `None` when no area is left.
-pub(crate) fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
+pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
     match split(points, plane, eps) {
         Sides::Front => Some(points.into()),
         Sides::Both(front, _) => Some(front),
@@ -75,7 +75,7 @@ pub(crate) fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
 }
 
 /// The part in a box; `None` when no area is left. A polygon in a face of the box counts as in it.
-pub(crate) fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
+pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
     let b = Aabb::of_points(points);
     let mut poly: Poly = points.into();
     for axis in 0..3 {
@@ -104,7 +104,7 @@ pub(crate) fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<P
 }
 
 /// The section of a plane with a box, counter-clockwise seen from the positive side.
-pub(crate) fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
+pub fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
     for axis in 0..3 {
         if plane.normal[axis].abs() == 1.0 {
             let at = -plane.d * plane.normal[axis];
@@ -145,7 +145,7 @@ pub(crate) fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<P
 }
 
 /// Twice the area times the unit normal.
-pub(crate) fn area_normal(points: &[DVec3]) -> DVec3 {
+pub fn area_normal(points: &[DVec3]) -> DVec3 {
     let Some(&o) = points.first() else {
         return DVec3::ZERO;
     };
@@ -153,14 +153,14 @@ pub(crate) fn area_normal(points: &[DVec3]) -> DVec3 {
 }
 
 /// Area. [Units: wu²]
-pub(crate) fn area(points: &[DVec3]) -> f64 {
+pub fn area(points: &[DVec3]) -> f64 {
     area_normal(points).length() * 0.5
 }
 
 /// Least distance between two parallel lines that hold the polygon between them. [Units: wu]
 ///
 /// For a convex polygon one of the two lines holds an edge, so trying all edges finds it.
-pub(crate) fn width(points: &[DVec3]) -> f64 {
+pub fn width(points: &[DVec3]) -> f64 {
     let normal = area_normal(points).normalize_or_zero();
     let mut least = f64::INFINITY;
     for (i, &a) in points.iter().enumerate() {
@@ -181,7 +181,7 @@ pub(crate) fn width(points: &[DVec3]) -> f64 {
 /// `normal`: appends what lies outside to `outside` and returns what lies inside.
 ///
 /// Where less than `min_width` lies inside, `poly` is kept whole as outside.
-pub(crate) fn cut_out(
+pub fn cut_out(
     poly: &[DVec3],
     cover: &[DVec3],
     normal: DVec3,

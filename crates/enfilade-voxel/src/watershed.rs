@@ -9,7 +9,7 @@
 //! the deeper one on the spot. Once the flood is `h` below a peak that basin stays for good, so
 //! every contact that is recorded is one between two basins of the answer.
 //!
-//! **Levels** are distances in steps of 1/64 voxel ([`levels_per_voxel`]), rounded down. As
+//! **Levels** are distances in steps of 1/64 voxel, rounded down. As
 //! consecutive squares of distances below 32 voxels lie further apart than that, only wider
 //! spaces lose any order at all.
 //!
@@ -51,7 +51,7 @@ pub enum Labels {
 
 impl Labels {
     /// Makes sure that labels below `n` can be set.
-    pub(crate) fn make_room_for(&mut self, n: usize) {
+    pub fn make_room_for(&mut self, n: usize) {
         if n > usize::from(u16::MAX) + 1
             && let Self::U16(v) = self
         {
@@ -60,7 +60,7 @@ impl Labels {
     }
 
     /// Labels the voxel at `index`; see [`Self::make_room_for`].
-    pub(crate) fn set(&mut self, index: usize, label: u32) {
+    pub fn set(&mut self, index: usize, label: u32) {
         match self {
             Self::U16(v) => v[index] = label as u16,
             Self::U32(v) => v[index] = label,
@@ -133,12 +133,6 @@ pub struct Watershed {
     pub basins: Vec<Basin>,
     /// Touching pairs, by distance from great to small, then by labels.
     pub saddles: Vec<Saddle>,
-}
-
-/// Levels that a voxel of distance is divided into.
-#[must_use]
-pub const fn levels_per_voxel() -> u32 {
-    STEPS
 }
 
 /// Floods a field of squared distances from deep to shallow.

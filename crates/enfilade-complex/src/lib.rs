@@ -36,14 +36,14 @@
 //! opens wedges along shallow creases; seams close them (`surface`), all but a few hair-fine ones.
 
 mod cut;
-pub(crate) mod divide;
+pub mod divide;
 mod facet;
 mod graph;
 mod label;
 mod partition;
 mod pieces;
-pub(crate) mod poly;
-pub(crate) mod region;
+pub mod poly;
+pub mod region;
 mod seen;
 mod surface;
 mod thin;
@@ -206,25 +206,10 @@ impl Complex {
         self.tree.n_leaves as usize
     }
 
-    /// Number of openings between two leaves.
-    #[must_use]
-    pub fn n_open_facets(&self) -> usize {
-        self.graph.facets.len()
-    }
-
     /// The leaf that holds `p`; `None` outside the box. Points in a plane belong to its front.
     #[must_use]
     pub fn leaf_of(&self, p: DVec3) -> Option<u32> {
         self.tree.bounds.contains(p).then(|| self.tree.leaf_of(p))
-    }
-
-    /// Volume of a leaf. [Units: wu³]
-    ///
-    /// # Panics
-    /// When there is no such leaf.
-    #[must_use]
-    pub fn leaf_volume(&self, leaf: u32) -> f64 {
-        self.graph.volumes[leaf as usize]
     }
 
     fn clearance(&self) -> Clearance<'_> {

@@ -19,12 +19,8 @@ mod widest;
 
 pub use components::{Components, Connectivity, components, flood};
 pub use edt::{distance, distance_squared};
-pub use enclosure::enclosure;
-pub(crate) use enclosure::{ENCLOSED, ascend, deepest_enclosed};
+pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use grid::{BitVolume, Grid};
 pub use voxelize::voxelize;
-pub use watershed::{
-    Basin, Labels, Saddle, Watershed, WatershedOptions, levels_per_voxel, mark_dams, watershed,
-};
-pub(crate) use widest::border;
-pub use widest::{WidestPath, widest_path};
+pub use watershed::{Basin, Labels, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
+pub use widest::{WidestPath, border, widest_path};

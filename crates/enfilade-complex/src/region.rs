@@ -6,17 +6,18 @@ use super::poly::{self, Poly, Sides};
 
 /// A region's measures.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
+pub struct Shape {
     /// Mean of its corners.
-    pub(crate) middle: DVec3,
-    pub(crate) volume: f64,
+    pub middle: DVec3,
+    /// [Units: wu³]
+    pub volume: f64,
 }
 
 /// A convex region by its faces, each with the plane that looks inwards.
-pub(crate) type Region = Vec<(Plane, Poly)>;
+pub type Region = Vec<(Plane, Poly)>;
 
 /// A box as a region.
-pub(crate) fn whole(b: &Aabb, eps: f64) -> Region {
+pub fn whole(b: &Aabb, eps: f64) -> Region {
     let mut region = Region::new();
     for n in [DVec3::X, DVec3::Y, DVec3::Z] {
         for plane in [Plane::through(b.min, n), Plane::through(b.max, -n)] {
@@ -29,7 +30,7 @@ pub(crate) fn whole(b: &Aabb, eps: f64) -> Region {
 }
 
 /// The parts before and behind a plane.
-pub(crate) fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
+pub fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
     let mut sides = [Region::new(), Region::new()];
     if let Some(mut cap) = poly::section_of_box(plane, bounds, eps) {
         let is_there = region
@@ -64,7 +65,7 @@ pub(crate) fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> 
 }
 
 /// Measures of a region.
-pub(crate) fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
+pub fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
     let corners = || region.iter().flat_map(|(_, points)| points.iter().copied());
     let n = corners().count();
     if region.len() < 4 {

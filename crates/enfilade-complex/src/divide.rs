@@ -17,16 +17,16 @@ use super::partition::{self, Partition};
 use super::{Complex, poly};
 
 /// The cell of [`Complex::divided`] before the screen's plane.
-pub(crate) const FRONT: u32 = 0;
+pub const FRONT: u32 = 0;
 /// The cell of [`Complex::divided`] behind it.
-pub(crate) const BACK: u32 = 1;
+pub const BACK: u32 = 1;
 
 /// What cuts a cell.
-pub(crate) struct Cutter<'a> {
+pub struct Cutter<'a> {
     /// The screens up to this number are the cutter's.
-    pub(crate) n_screens: u32,
+    pub n_screens: u32,
     /// How far a point lies before all of them; less than 0 behind. [Units: wu]
-    pub(crate) distance: &'a dyn Fn(DVec3) -> f64,
+    pub distance: &'a dyn Fn(DVec3) -> f64,
 }
 
 impl Cutter<'_> {
@@ -42,7 +42,7 @@ impl Cutter<'_> {
 
 /// Why a screen does not part a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Undivided {
+pub enum Undivided {
     /// No opening of the screen has the cell on both sides.
     Aside,
     /// Both sides reach the border of the box, behind which all is one cell.
@@ -63,7 +63,7 @@ impl Complex {
     /// Parts what `is_ours` holds of by the cutter's screens.
     ///
     /// The partition has two cells, [`FRONT`] and [`BACK`]; all else counts as solid. Linear in leaves and openings.
-    pub(crate) fn divided(
+    pub fn divided(
         &self,
         cutter: &Cutter<'_>,
         is_ours: impl Fn(DVec3) -> bool,

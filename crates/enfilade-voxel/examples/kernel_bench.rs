@@ -11,11 +11,11 @@
 
 use std::time::Instant;
 
-use enfilade_bake::voxel::{
+use enfilade_geom::{DVec3, Triangle};
+use enfilade_voxel::{
     BitVolume, Connectivity, Grid, WatershedOptions, components, distance, distance_squared, flood,
     mark_dams, voxelize, watershed,
 };
-use enfilade_geom::{DVec3, Triangle};
 
 /// User and system time of this process so far. [Units: s]
 #[cfg(unix)]

@@ -43,7 +43,7 @@ pub fn enclosure([nx, ny, _]: [usize; 3], distances: &[u16]) -> Vec<u8> {
 }
 
 /// Air that is enclosed on four sides is a passage, on five a room without a wall or roof.
-pub(crate) const ENCLOSED: std::ops::RangeInclusive<u8> = 4..=6;
+pub const ENCLOSED: std::ops::RangeInclusive<u8> = 4..=6;
 /// Air that is enclosed on more sides is preferred unless it is smaller than this share.
 const SHARE: f64 = 0.5;
 
@@ -53,7 +53,7 @@ const SHARE: f64 = 0.5;
 ///
 /// Air enclosed on five or six sides is preferred to larger air that is less enclosed, if it has half its volume. Linear
 /// in voxels; takes three bits a voxel, and 8 bytes for each voxel of the front. [Units of `least_depth`: vx²]
-pub(crate) fn deepest_enclosed(
+pub fn deepest_enclosed(
     dims: [usize; 3],
     distances: &[u16],
     enclosure: &[u8],
@@ -150,7 +150,7 @@ const PINCH: f64 = 0.6;
 /// ends where the next is narrower than [`PINCH`] of the deepest so far. Of voxels as deep, the one that it comes to first.
 ///
 /// `O(n log n)` in the voxels flooded. Takes a bit a voxel, and 16 bytes for each voxel of the front.
-pub(crate) fn ascend(dims: [usize; 3], distances: &[u16], enclosure: &[u8], start: usize) -> usize {
+pub fn ascend(dims: [usize; 3], distances: &[u16], enclosure: &[u8], start: usize) -> usize {
     let mut seen = BitVolume::new(dims);
     let mut front = BinaryHeap::from([(distances[start], Reverse(start))]);
     let mut best = start;
@@ -190,7 +190,7 @@ fn neighbors(dims: [usize; 3], of: usize) -> impl Iterator<Item = [usize; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::distance_squared;
+    use crate::distance_squared;
 
     const N: [usize; 3] = [40, 20, 30];
 

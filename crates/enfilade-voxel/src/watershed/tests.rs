@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use super::queue::{BATCH, NONE, Queue, Shape};
 use super::*;
-use crate::voxel::distance_squared;
+use crate::distance_squared;
 use proptest::prelude::*;
 
 fn plain_neighbors(dims: [usize; 3], v: usize) -> impl Iterator<Item = usize> {

@@ -153,13 +153,13 @@ impl BitVolume {
 
     /// Words that one row along x takes.
     #[must_use]
-    pub fn row_words(&self) -> usize {
+    pub(crate) fn row_words(&self) -> usize {
         self.dims[0].div_ceil(64)
     }
 
     /// All words, rows in order of y, then z; bit `i % 64` of word `i / 64` of a row is voxel `i`.
     #[must_use]
-    pub fn words(&self) -> &[u64] {
+    pub(crate) fn words(&self) -> &[u64] {
         &self.words
     }
 
@@ -176,7 +176,7 @@ impl BitVolume {
     }
 
     /// Sets one row: bits past its end must be 0.
-    pub(crate) fn set_row(&mut self, row: usize, words: &[u64]) {
+    pub fn set_row(&mut self, row: usize, words: &[u64]) {
         let n = self.row_words();
         self.words_mut()[row * n..][..n].copy_from_slice(words);
     }
@@ -274,18 +274,6 @@ impl BitVolume {
             .iter_mut()
             .zip(&other.words)
             .for_each(|(a, b)| *a |= b);
-    }
-
-    /// Keeps only what `other` has set too.
-    ///
-    /// # Panics
-    /// When the boxes differ in size.
-    pub fn intersect_with(&mut self, other: &Self) {
-        assert_eq!(self.dims, other.dims, "boxes of one size");
-        self.words
-            .iter_mut()
-            .zip(&other.words)
-            .for_each(|(a, b)| *a &= b);
     }
 }
 

@@ -124,7 +124,7 @@ fn is_clear_line(dims: [usize; 3], distances: &[u16], ends: [usize; 2], least: u
 }
 
 /// The outermost layer of voxels.
-pub(crate) fn border(dims: [usize; 3]) -> BitVolume {
+pub fn border(dims: [usize; 3]) -> BitVolume {
     BitVolume::from_fn(dims, |i| is_border(dims, coords(dims, i)))
 }
 
@@ -268,7 +268,7 @@ fn way_to(end: usize, came_by: &[u8], offset: &impl Fn([isize; 3]) -> isize) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::distance_squared;
+    use crate::distance_squared;
     use proptest::prelude::*;
 
     /// Greatest level at which a plain flood gets from `start` to the edge, tried level by level.
