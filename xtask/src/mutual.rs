@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs that are still there, to be parted by who works on them next; none may be added.
-const KNOWN: [[&str; 2]; 11] = [
+const KNOWN: [[&str; 2]; 8] = [
     [
         "crates/enfilade-bake/src/bsp/mod.rs",
         "crates/enfilade-bake/src/bsp/portals.rs",
@@ -38,18 +38,6 @@ const KNOWN: [[&str; 2]; 11] = [
     [
         "crates/enfilade-bake/src/watershed/regions.rs",
         "crates/enfilade-bake/src/watershed/sections.rs",
-    ],
-    [
-        "crates/enfilade-complex/src/cut.rs",
-        "crates/enfilade-complex/src/label.rs",
-    ],
-    [
-        "crates/enfilade-complex/src/partition.rs",
-        "crates/enfilade-complex/src/seen.rs",
-    ],
-    [
-        "crates/enfilade-voxel/src/watershed.rs",
-        "crates/enfilade-voxel/src/watershed/flood.rs",
     ],
 ];
 

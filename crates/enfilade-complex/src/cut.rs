@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, HashMap, VecDeque};
 use enfilade_geom::Sets;
 
 use super::graph::{LeafGraph, NO_SCREEN};
-use super::label::{LeafCells, SOLID, Tally};
+use super::leaf_cells::{LeafCells, SOLID, Tally};
 
 /// What a piece of a border costs besides its area. [Units: wu²]
 const PER_FACET: f64 = 0.002;
@@ -71,7 +71,7 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
             cells.cell_of_leaf[leaf as usize] = to;
         }
     }
-    drop_empty(graph, cells);
+    cells.drop_empty(&graph.volumes);
 }
 
 /// Gives chips of a cell that hang together with nothing else of it, and are less than `min_volume`, to the cell
@@ -137,7 +137,7 @@ pub(super) fn absorb_chips(graph: &LeafGraph, cells: &mut LeafCells, min_volume:
             cells.cell_of_leaf[leaf as usize] = cell;
         }
     }
-    drop_empty(graph, cells);
+    cells.drop_empty(&graph.volumes);
 }
 
 /// Cells of less are what rounding leaves between surfaces that all but touch: no room, however small, and too thin for
@@ -193,34 +193,7 @@ pub(super) fn dissolve_slivers(graph: &LeafGraph, cells: &mut LeafCells) {
             *c = SOLID;
         }
     }
-    drop_empty(graph, cells);
-}
-
-/// Numbers the cells anew without those that lost every leaf, and sums their volumes.
-fn drop_empty(graph: &LeafGraph, cells: &mut LeafCells) {
-    let n = cells.label_of_cell.len();
-    let mut volumes = vec![0.0; n];
-    let mut is_kept = vec![false; n];
-    for (leaf, &cell) in cells.cell_of_leaf.iter().enumerate() {
-        if cell != SOLID {
-            volumes[cell as usize] += graph.volumes[leaf];
-            is_kept[cell as usize] = true;
-        }
-    }
-    let mut number = vec![SOLID; n];
-    let kept: Vec<usize> = (0..n).filter(|&c| is_kept[c]).collect();
-    for (new, &old) in kept.iter().enumerate() {
-        number[old] = new as u32;
-    }
-    for cell in cells.cell_of_leaf.iter_mut().filter(|c| **c != SOLID) {
-        *cell = number[*cell as usize];
-    }
-    cells.volumes = kept.iter().map(|&c| volumes[c]).collect();
-    cells.label_of_cell = kept.iter().map(|&c| cells.label_of_cell[c]).collect();
-    cells.outside = cells
-        .outside
-        .map(|c| number[c as usize])
-        .filter(|&c| c != SOLID);
+    cells.drop_empty(&graph.volumes);
 }
 
 /// Open facets by leaf, for leaves of cells that leak.

@@ -12,7 +12,7 @@ use enfilade_geom::{DVec3, Sets, Winding};
 
 use super::facet::{Cover, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{box_faces, sides_of_border};
-use super::label::{LeafCells, SOLID};
+use super::leaf_cells::{LeafCells, SOLID};
 use super::partition::{self, Partition};
 use super::{Complex, poly};
 

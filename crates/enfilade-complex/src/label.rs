@@ -21,25 +21,8 @@ use rayon::prelude::*;
 
 use super::cut::{absorb_chips, dissolve_slivers, move_borders};
 use super::graph::{LeafGraph, NO_SCREEN};
+use super::leaf_cells::{LeafCells, SOLID, Tally};
 use super::{LabelSettings, Vote};
-
-/// The label of leaves in no cell.
-pub(super) const SOLID: u32 = u32::MAX;
-
-/// Leaves by cell.
-pub(super) struct LeafCells {
-    /// Cell of each leaf, or [`SOLID`].
-    pub(super) cell_of_leaf: Vec<u32>,
-    /// The vote label of each cell.
-    pub(super) label_of_cell: Vec<u32>,
-    /// Volume of each cell.
-    pub(super) volumes: Vec<f64>,
-    /// The cell with most leaves at the border of the box by volume, if any touches it.
-    pub(super) outside: Option<u32>,
-}
-
-/// Votes of one leaf or component for one label.
-pub(super) type Tally = BTreeMap<(u32, u32), f64>;
 
 fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
     let mut out = Tally::new();

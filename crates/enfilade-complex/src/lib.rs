@@ -14,7 +14,7 @@
 //! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., notes after §3.0.2 |
 //! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
 //! | borders without a screen, made small | `cut` | minimum cuts, Boykov, Veksler & Zabih 2001 |
-//! | portals, what each cell sees, the locator | `partition` | ours |
+//! | portals, what each cell sees, the locator | `partition`, `pieces`, `seen`, `tagged` | ours |
 //! | later: one cell cut in two by a new portal | `divide` | ours |
 //!
 //! Where it departs from Lefebvre & Hornus: their cells are grown by choosing among separators that
@@ -40,12 +40,14 @@ pub mod divide;
 mod facet;
 mod graph;
 mod label;
+mod leaf_cells;
 mod partition;
 mod pieces;
 pub mod poly;
 pub mod region;
 mod seen;
 mod surface;
+mod tagged;
 mod thin;
 mod tree;
 
@@ -56,7 +58,8 @@ use graph::{Clearance, LeafGraph};
 use surface::{NO_PLANE, Source, Surface, SurfaceSet, Tolerance};
 use tree::Tree;
 
-pub use partition::{Leak, Partition, PartitionPortal, Seal, TriangleCells};
+pub use partition::{Leak, Partition, PartitionPortal, Seal};
+pub use seen::TriangleCells;
 
 /// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
 pub const CRACK_WIDTH: f64 = 0.05;

@@ -3,18 +3,17 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use enfilade_cpg::{CellId, Locator, LocatorNode, PortalKind};
+use enfilade_cpg::{Locator, PortalKind};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
-use super::label::{LeafCells, SOLID};
+use super::leaf_cells::{LeafCells, SOLID};
 use super::pieces::{self, Opening, Piece, Rules};
+use super::seen::{self, TriangleCells};
 use super::surface::{NO_PLANE, Source};
-use super::tree::{Tree, leaf_index};
-use super::{CRACK_WIDTH, Complex, poly, seen};
-
-pub use super::seen::TriangleCells;
+use super::tagged::{MIXED, TaggedTree};
+use super::{CRACK_WIDTH, Complex, poly};
 
 /// Cells and portals, exactly.
 #[derive(Clone, Debug)]
@@ -89,83 +88,6 @@ pub struct Leak {
     pub width: f64,
     /// Area of the opening. [Units: wu²]
     pub area: f64,
-}
-
-/// The tag of a subtree whose leaves are not all in one cell.
-pub(super) const MIXED: u32 = u32::MAX - 1;
-
-/// The tree with the cell of each subtree that has but one.
-pub(super) struct TaggedTree<'a> {
-    pub(super) tree: &'a Tree,
-    cell_of_leaf: &'a [u32],
-    tags: Vec<u32>,
-}
-
-impl<'a> TaggedTree<'a> {
-    fn new(tree: &'a Tree, cell_of_leaf: &'a [u32]) -> Self {
-        let mut tagged = Self {
-            tree,
-            cell_of_leaf,
-            tags: vec![MIXED; tree.nodes.len()],
-        };
-        // Children come after their parents.
-        for i in (0..tree.nodes.len()).rev() {
-            let [f, b] = tree.nodes[i].children.map(|c| tagged.tag(c));
-            tagged.tags[i] = if f == b { f } else { MIXED };
-        }
-        tagged
-    }
-
-    /// The cell of everything below, [`SOLID`], or [`MIXED`].
-    pub(super) fn tag(&self, child: i32) -> u32 {
-        if child >= 0 {
-            self.tags[child as usize]
-        } else {
-            self.cell_of_leaf[leaf_index(child) as usize]
-        }
-    }
-
-    fn locator(&self, outside: Option<u32>) -> Locator {
-        let mut locator = Locator {
-            bounds: self.tree.bounds,
-            outside: outside.map(CellId),
-            ..Locator::default()
-        };
-        let mut plane_ids = BTreeMap::new();
-        locator.root = self.add_to_locator(self.tree.root, &mut locator, &mut plane_ids);
-        locator
-    }
-
-    fn add_to_locator(
-        &self,
-        child: i32,
-        locator: &mut Locator,
-        plane_ids: &mut BTreeMap<u32, u32>,
-    ) -> i32 {
-        match self.tag(child) {
-            MIXED => {}
-            SOLID => return Locator::leaf(None),
-            cell => return Locator::leaf(Some(CellId(cell))),
-        }
-        let node = self.tree.nodes[child as usize];
-        let plane = *plane_ids.entry(node.plane).or_insert_with(|| {
-            let p = self.tree.planes[node.plane as usize];
-            locator
-                .planes
-                .push([p.normal.x, p.normal.y, p.normal.z, p.d]);
-            locator.planes.len() as u32 - 1
-        });
-        let at = locator.nodes.len();
-        locator.nodes.push(LocatorNode {
-            plane,
-            children: [0; 2],
-        });
-        let children = node
-            .children
-            .map(|c| self.add_to_locator(c, locator, plane_ids));
-        locator.nodes[at].children = children;
-        at as i32
-    }
 }
 
 struct Sink<'a> {

@@ -13,7 +13,7 @@ use enfilade_geom::{DVec2, DVec3, Plane, Sets, Winding};
 use rayon::prelude::*;
 
 use super::CRACK_WIDTH;
-use super::label::SOLID;
+use super::leaf_cells::SOLID;
 use super::poly::Poly;
 
 /// Pieces of one plane this near to each other are one portal. [Units: wu]

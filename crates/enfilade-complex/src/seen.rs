@@ -6,10 +6,10 @@ use enfilade_geom::{DVec3, Plane};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::label::SOLID;
-use super::partition::{MIXED, TaggedTree};
+use super::leaf_cells::SOLID;
 use super::poly::{self, Sides};
 use super::surface::{NO_PLANE, PARALLEL, Source, Surface, SurfaceSet, Tolerance};
+use super::tagged::{MIXED, TaggedTree};
 
 /// The cells that see each triangle, its front and its back apart, each list ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

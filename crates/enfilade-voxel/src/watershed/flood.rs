@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::super::grid::BitVolume;
+use super::basins::{Basin, Labels, STEPS, Saddle, Watershed};
 use super::queue::{BATCH, NONE, Queue, Shape};
-use super::{Basin, Labels, STEPS, Saddle, Watershed};
 
 /// A word of the volume: a level, or a basin's number once reached.
 ///
