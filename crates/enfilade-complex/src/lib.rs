@@ -171,8 +171,7 @@ pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
     if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
         bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     }
-    let extent = bounds.min.abs().max(bounds.max.abs()).max_element();
-    let tolerance = Tolerance::for_extent(extent);
+    let tolerance = Tolerance::for_extent(bounds.extent());
     let set = surface::gather(surfaces, &bounds, &tolerance);
     let visitor = |tree| Visitor {
         tree,

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, plane_tolerance};
 use rayon::prelude::*;
 
 use super::poly::{self, Poly};
@@ -58,11 +58,8 @@ const SHALLOW: f64 = 0.35;
 
 impl Tolerance {
     /// For coordinates up to `extent` from the origin.
-    ///
-    /// Corners are `f32`: half a unit in the last place is `6e-8 * extent`, and a plane through
-    /// three such corners strays a few times that over its own triangle's neighborhood.
     pub(super) fn for_extent(extent: f64) -> Self {
-        let plane = (4e-7 * extent).max(2e-6);
+        let plane = plane_tolerance(extent);
         // f64 noise is 1e-15 of the extent; the planes that meet differ by more than plane / size,
         // so cut corners are good to about 1e-9 of the extent.
         let cut = (1e-10 * extent).max(1e-9);

@@ -11,6 +11,7 @@ pub mod ray;
 pub mod scene;
 mod sets;
 pub mod solid;
+mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
@@ -20,6 +21,7 @@ pub use plane::Plane;
 pub use ray::{Hit, Ray};
 pub use sets::Sets;
 pub use solid::{BoxTree, ConvexSolid, SolidError};
+pub use tolerance::{plane_tolerance, world_tolerance};
 pub use winding::Winding;
 
 /// A triangle in world space. [Units: wu]
