@@ -8,13 +8,13 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 
-use enfilade_geom::{DVec3, Sets, Winding};
+use enfilade_geom::{DVec3, Sets, Winding, poly};
 
+use super::Complex;
 use super::facet::{Cover, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{box_faces, sides_of_border};
 use super::leaf_cells::{LeafCells, SOLID};
 use super::partition::{self, Partition};
-use super::{Complex, poly};
 
 /// The cell of [`Complex::divided`] before the screen's plane.
 pub const FRONT: u32 = 0;
@@ -63,6 +63,9 @@ impl Complex {
     /// Parts what `is_ours` holds of by the cutter's screens.
     ///
     /// The partition has two cells, [`FRONT`] and [`BACK`]; all else counts as solid. Linear in leaves and openings.
+    ///
+    /// # Errors
+    /// When the screens do not part it in two.
     pub fn divided(
         &self,
         cutter: &Cutter<'_>,

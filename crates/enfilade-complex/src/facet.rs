@@ -5,10 +5,10 @@
 //! visit: the first visit keeps a few numbers a facet, the second makes the polygons again where
 //! two cells meet.
 
+use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane};
 use smallvec::SmallVec;
 
-use super::poly::{self, Poly, Sides};
 use super::surface::{MIN_AREA, Source, Surface, Tolerance, projected};
 use super::tree::{Tree, leaf_index};
 

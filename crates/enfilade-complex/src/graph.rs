@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
+use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, Bvh, DVec3};
 
 use smallvec::SmallVec;
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
-use super::poly::{self, Poly, Sides};
 use super::tree::{Tree, leaf_index};
 
 /// Openings up to so many gaps wide are cracks, with the default gap as wide as [`CRACK_WIDTH`](super::CRACK_WIDTH).

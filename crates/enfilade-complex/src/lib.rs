@@ -9,7 +9,7 @@
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
-//! | surfaces share one list of planes, by id | `surface` | Lefebvre & Hornus 2003, notes after §3.0.2 |
+//! | surfaces share one list of planes, by id | `planes`, `surface` | Lefebvre & Hornus 2003, notes after §3.0.2 |
 //! | a tree of planes, leaves convex | `tree` | ibid., §2 step 1, under boxes as the notes suggest |
 //! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., notes after §3.0.2 |
 //! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
@@ -43,7 +43,7 @@ mod label;
 mod leaf_cells;
 mod partition;
 mod pieces;
-pub mod poly;
+pub mod planes;
 pub mod region;
 mod seen;
 mod surface;
@@ -58,6 +58,8 @@ use graph::{Clearance, LeafGraph};
 use surface::{NO_PLANE, Source, Surface, SurfaceSet, Tolerance};
 use tree::Tree;
 
+/// The polygons of the complex.
+pub use enfilade_geom::poly;
 pub use partition::{Leak, Partition, PartitionPortal, Seal};
 pub use seen::TriangleCells;
 

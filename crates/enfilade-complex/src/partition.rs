@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use enfilade_cpg::{Locator, PortalKind};
-use enfilade_geom::{Aabb, DVec3, Plane, Winding};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding, poly};
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
@@ -13,7 +13,7 @@ use super::pieces::{self, Opening, Piece, Rules};
 use super::seen::{self, TriangleCells};
 use super::surface::{NO_PLANE, Source};
 use super::tagged::{MIXED, TaggedTree};
-use super::{CRACK_WIDTH, Complex, poly};
+use super::{CRACK_WIDTH, Complex};
 
 /// Cells and portals, exactly.
 #[derive(Clone, Debug)]

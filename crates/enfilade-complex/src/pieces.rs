@@ -9,12 +9,12 @@
 
 use std::collections::BTreeMap;
 
+use enfilade_geom::poly::Poly;
 use enfilade_geom::{DVec2, DVec3, Plane, Sets, Winding};
 use rayon::prelude::*;
 
 use super::CRACK_WIDTH;
 use super::leaf_cells::SOLID;
-use super::poly::Poly;
 
 /// Pieces of one plane this near to each other are one portal. [Units: wu]
 const TOGETHER: f64 = 0.01;

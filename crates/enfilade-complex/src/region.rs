@@ -1,8 +1,7 @@
 //! Convex regions by their faces: a box, cut by planes.
 
+use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane};
-
-use super::poly::{self, Poly, Sides};
 
 /// A region's measures.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +16,7 @@ pub struct Shape {
 pub type Region = Vec<(Plane, Poly)>;
 
 /// A box as a region.
+#[must_use]
 pub fn whole(b: &Aabb, eps: f64) -> Region {
     let mut region = Region::new();
     for n in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -30,6 +30,7 @@ pub fn whole(b: &Aabb, eps: f64) -> Region {
 }
 
 /// The parts before and behind a plane.
+#[must_use]
 pub fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
     let mut sides = [Region::new(), Region::new()];
     if let Some(mut cap) = poly::section_of_box(plane, bounds, eps) {
@@ -65,6 +66,7 @@ pub fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region
 }
 
 /// Measures of a region.
+#[must_use]
 pub fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
     let corners = || region.iter().flat_map(|(_, points)| points.iter().copied());
     let n = corners().count();

@@ -2,12 +2,12 @@
 //!
 //! **Errs to "seen":** where a triangle lies nearly in a plane of the tree, both sides see it.
 
+use enfilade_geom::poly::{self, Sides};
 use enfilade_geom::{DVec3, Plane};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::leaf_cells::SOLID;
-use super::poly::{self, Sides};
 use super::surface::{NO_PLANE, PARALLEL, Source, Surface, SurfaceSet, Tolerance};
 use super::tagged::{MIXED, TaggedTree};
 

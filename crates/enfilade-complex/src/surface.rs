@@ -1,11 +1,12 @@
 //! Surfaces (triangles and screens) and the one list of planes that they share.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
+use enfilade_geom::poly::{self, Poly};
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, plane_tolerance};
 use rayon::prelude::*;
 
-use super::poly::{self, Poly};
+use super::planes::{PlaneList, faces_ahead};
 
 /// What a surface is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -121,21 +122,15 @@ fn own_plane(points: &[DVec3]) -> Option<Plane> {
             });
         }
     }
-    // An odd direction: the largest component would tie on every 45 degree wall.
-    let n = if n.dot(DVec3::new(1.0, 0.618_034, 0.324_718)) < 0.0 {
-        -n
-    } else {
-        n
-    };
+    let n = if faces_ahead(n) { n } else { -n };
     let mean = points.iter().sum::<DVec3>() / points.len() as f64;
     Some(Plane::through(mean, n))
 }
 
 /// Gives every surface its plane: one that exists and holds all its corners, or a new one.
 ///
-/// Planes are looked up by rounded normal and offset, both neighbors tried where the value is
-/// near a step. A pair missed by that (tiny triangle, far from the origin) still meets in the tree,
-/// where a surface that lies in a splitter within tolerance is taken to be in it.
+/// A pair of surfaces in one plane that [`PlaneList`] misses still meets in the tree, where a surface
+/// that lies in a splitter within tolerance is taken to be in it.
 pub(super) fn gather(
     mut surfaces: Vec<Surface>,
     bounds: &Aabb,
@@ -144,81 +139,24 @@ pub(super) fn gather(
     canonical_order(&mut surfaces);
     let mut planes = PlaneList::new(bounds.center(), tolerance.plane);
     for s in &mut surfaces {
-        s.plane = planes.plane_of(&s.points);
+        s.plane = plane_of(&s.points, &mut planes, tolerance);
     }
-    for mut seam in seams(&surfaces, &planes.planes, tolerance) {
-        seam.plane = planes.plane_of(&seam.points);
+    for mut seam in seams(&surfaces, planes.planes(), tolerance) {
+        seam.plane = plane_of(&seam.points, &mut planes, tolerance);
         surfaces.push(seam);
     }
     SurfaceSet {
         surfaces,
-        planes: planes.planes,
+        planes: planes.into_planes(),
     }
 }
 
-/// The planes so far, found again by rounded normal and offset.
-struct PlaneList {
-    planes: Vec<Plane>,
-    buckets: HashMap<[i32; 4], Vec<u32>>,
-    center: DVec3,
-    /// What lies this near to a plane lies in it.
-    tolerance: f64,
-}
-
-impl PlaneList {
-    fn new(center: DVec3, tolerance: f64) -> Self {
-        Self {
-            planes: Vec::new(),
-            buckets: HashMap::new(),
-            center,
-            tolerance,
-        }
+/// The plane in the list of a polygon; [`NO_PLANE`] where it is too thin to have one.
+fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> u32 {
+    if poly::width(points) < tolerance.plane {
+        return NO_PLANE;
     }
-
-    /// The plane that holds all corners best, a new one if there is none.
-    fn plane_of(&mut self, points: &[DVec3]) -> u32 {
-        if poly::width(points) < self.tolerance {
-            return NO_PLANE;
-        }
-        let Some(plane) = own_plane(points) else {
-            return NO_PLANE;
-        };
-        let at = [
-            plane.normal.x * 256.0,
-            plane.normal.y * 256.0,
-            plane.normal.z * 256.0,
-            plane.signed_distance(self.center) * 100.0,
-        ];
-        let mut best: Option<(f64, u32)> = None;
-        for choice in 0..16u32 {
-            let key: [i32; 4] = std::array::from_fn(|i| {
-                let low = (at[i] - 0.5).floor() as i32;
-                low + (choice >> i & 1) as i32
-            });
-            for &id in self.buckets.get(&key).into_iter().flatten() {
-                let p = &self.planes[id as usize];
-                let stray = points
-                    .iter()
-                    .map(|&q| p.signed_distance(q).abs())
-                    .fold(0.0, f64::max);
-                if stray <= self.tolerance && best.is_none_or(|b| (stray, id) < b) {
-                    best = Some((stray, id));
-                }
-            }
-        }
-        match best {
-            Some((_, id)) => id,
-            None => {
-                let id = self.planes.len() as u32;
-                self.planes.push(plane);
-                self.buckets
-                    .entry(at.map(|x| x.floor() as i32))
-                    .or_default()
-                    .push(id);
-                id
-            }
-        }
-    }
+    own_plane(points).map_or(NO_PLANE, |plane| planes.find_or_add(&plane, points))
 }
 
 /// Seams along the edges that come apart as their triangles move into planes.

@@ -18,10 +18,10 @@
 
 use std::ops::Range;
 
+use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane};
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Region, Visitor};
-use super::poly::{self, Poly, Sides};
 use super::surface::Tolerance;
 use super::tree::{Node, Tree, leaf_index};
 

@@ -7,9 +7,9 @@
 //! what makes the number of leaves near-linear. A box side is put on a large axis-aligned surface
 //! where there is one, as that surface then needs no split of its own.
 
+use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane};
 
-use super::poly::{self, Poly, Sides};
 use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
 /// A box with this many fragments or fewer is split by their own planes.

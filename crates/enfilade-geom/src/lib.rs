@@ -7,6 +7,7 @@
 mod aabb;
 mod bvh;
 mod plane;
+pub mod poly;
 pub mod ray;
 pub mod scene;
 mod sets;

@@ -53,6 +53,7 @@ const SHARE: f64 = 0.5;
 ///
 /// Air enclosed on five or six sides is preferred to larger air that is less enclosed, if it has half its volume. Linear
 /// in voxels; takes three bits a voxel, and 8 bytes for each voxel of the front. [Units of `least_depth`: vx²]
+#[must_use]
 pub fn deepest_enclosed(
     dims: [usize; 3],
     distances: &[u16],
@@ -147,9 +148,10 @@ fn middle_of(dims: [usize; 3], voxels: &[usize]) -> Option<usize> {
 const PINCH: f64 = 0.6;
 
 /// A deepest voxel of the air around a free one: a flood through voxels no less enclosed than there takes the deepest first, and
-/// ends where the next is narrower than [`PINCH`] of the deepest so far. Of voxels as deep, the one that it comes to first.
+/// ends where the next is narrower than `PINCH` of the deepest so far. Of voxels as deep, the one that it comes to first.
 ///
 /// `O(n log n)` in the voxels flooded. Takes a bit a voxel, and 16 bytes for each voxel of the front.
+#[must_use]
 pub fn ascend(dims: [usize; 3], distances: &[u16], enclosure: &[u8], start: usize) -> usize {
     let mut seen = BitVolume::new(dims);
     let mut front = BinaryHeap::from([(distances[start], Reverse(start))]);

@@ -124,6 +124,7 @@ fn is_clear_line(dims: [usize; 3], distances: &[u16], ends: [usize; 2], least: u
 }
 
 /// The outermost layer of voxels.
+#[must_use]
 pub fn border(dims: [usize; 3]) -> BitVolume {
     BitVolume::from_fn(dims, |i| is_border(dims, coords(dims, i)))
 }

@@ -1,10 +1,11 @@
 //! Small convex polygons without heap allocation: split, measure, subtract.
 //!
-//! The complex makes tens of millions of them, nearly all with three to six corners, so they live
-//! inline; [`enfilade_geom::Winding`] is what leaves this module.
+//! Builders make tens of millions of them, nearly all with three to six corners, so they live inline.
+//! [`Winding`](crate::Winding) is what is kept of them.
 
-use enfilade_geom::{Aabb, DVec3, Plane};
 use smallvec::SmallVec;
+
+use crate::{Aabb, DVec3, Plane};
 
 /// A convex planar polygon; which way it turns depends on where it came from.
 pub type Poly = SmallVec<[DVec3; 6]>;
@@ -26,6 +27,7 @@ pub enum Sides {
 }
 
 /// Splits a polygon; corners within `eps` of the plane belong to both parts unmoved.
+#[must_use]
 pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
     let n = points.len();
     let dist: SmallVec<[f64; 12]> = points.iter().map(|&p| plane.signed_distance(p)).collect();
@@ -66,6 +68,7 @@ pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
 }
 
 /// The part on the positive side; `None` when no area is left.
+#[must_use]
 pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
     match split(points, plane, eps) {
         Sides::Front => Some(points.into()),
@@ -75,6 +78,7 @@ pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
 }
 
 /// The part in a box; `None` when no area is left. A polygon in a face of the box counts as in it.
+#[must_use]
 pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
     let b = Aabb::of_points(points);
     let mut poly: Poly = points.into();
@@ -104,6 +108,7 @@ pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
 }
 
 /// The section of a plane with a box, counter-clockwise seen from the positive side.
+#[must_use]
 pub fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
     for axis in 0..3 {
         if plane.normal[axis].abs() == 1.0 {
@@ -144,7 +149,8 @@ pub fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
     clip_to_box(&square, bounds, eps)
 }
 
-/// Twice the area times the unit normal.
+/// Twice the area times the unit normal (Newell's sum, about the first corner).
+#[must_use]
 pub fn area_normal(points: &[DVec3]) -> DVec3 {
     let Some(&o) = points.first() else {
         return DVec3::ZERO;
@@ -153,6 +159,7 @@ pub fn area_normal(points: &[DVec3]) -> DVec3 {
 }
 
 /// Area. [Units: wu²]
+#[must_use]
 pub fn area(points: &[DVec3]) -> f64 {
     area_normal(points).length() * 0.5
 }
@@ -160,6 +167,7 @@ pub fn area(points: &[DVec3]) -> f64 {
 /// Least distance between two parallel lines that hold the polygon between them. [Units: wu]
 ///
 /// For a convex polygon one of the two lines holds an edge, so trying all edges finds it.
+#[must_use]
 pub fn width(points: &[DVec3]) -> f64 {
     let normal = area_normal(points).normalize_or_zero();
     let mut least = f64::INFINITY;
