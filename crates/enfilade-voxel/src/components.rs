@@ -4,6 +4,7 @@
 //! the rows before it (He, Chao and Suzuki, "A Run-Based Two-Scan Labeling Algorithm", 2008, in
 //! three dimensions). The least run of a component is its root, so labels come out in scan order.
 
+use enfilade_geom::Sets;
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, for_runs, set_bits};
@@ -151,43 +152,43 @@ fn connected_runs(set: &BitVolume, connectivity: Connectivity) -> Runs {
         for_runs(set.row(row), |from, to| runs.push(Run { from, to }));
         rows.push(u32::try_from(runs.len()).expect("fewer than 2^32 runs"));
     }
-    let mut root: Vec<u32> = (0..runs.len() as u32).collect();
+    let mut sets = Sets::new(runs.len());
     let span = |row: usize| rows[row] as usize..rows[row + 1] as usize;
     for row in 0..ny * nz {
         let y = row % ny;
         match connectivity {
             Connectivity::Faces6 => {
                 if y > 0 {
-                    join(&runs, &mut root, span(row - 1), span(row), 0);
+                    join(&runs, &mut sets, span(row - 1), span(row), 0);
                 }
                 if row >= ny {
-                    join(&runs, &mut root, span(row - ny), span(row), 0);
+                    join(&runs, &mut sets, span(row - ny), span(row), 0);
                 }
             }
             Connectivity::Corners26 => {
                 if y > 0 {
-                    join(&runs, &mut root, span(row - 1), span(row), 1);
+                    join(&runs, &mut sets, span(row - 1), span(row), 1);
                 }
                 if row >= ny {
                     let below = row - ny;
                     for other in below - usize::from(y > 0)..=below + usize::from(y + 1 < ny) {
-                        join(&runs, &mut root, span(other), span(row), 1);
+                        join(&runs, &mut sets, span(other), span(row), 1);
                     }
                 }
             }
         }
     }
-    // Roots precede their runs, so one ascending pass flattens the trees.
-    for at in 0..root.len() {
-        root[at] = root[root[at] as usize];
+    Runs {
+        runs,
+        rows,
+        root: sets.into_least(),
     }
-    Runs { runs, rows, root }
 }
 
 /// Joins the runs of two rows that overlap when each is widened by `reach`.
 fn join(
     runs: &[Run],
-    root: &mut [u32],
+    sets: &mut Sets,
     before: std::ops::Range<usize>,
     here: std::ops::Range<usize>,
     reach: u32,
@@ -200,7 +201,7 @@ fn join(
         } else if q.to + reach <= p.from {
             b += 1;
         } else {
-            union(root, a as u32, b as u32);
+            sets.join(a as u32, b as u32);
             // The one that ends first touches nothing further on: the next run of the other row
             // leaves a gap of a voxel at least.
             if p.to < q.to {
@@ -210,21 +211,6 @@ fn join(
             }
         }
     }
-}
-
-fn find(root: &mut [u32], mut at: u32) -> u32 {
-    while root[at as usize] != at {
-        let up = root[root[at as usize] as usize];
-        root[at as usize] = up;
-        at = up;
-    }
-    at
-}
-
-fn union(root: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(root, a), find(root, b));
-    let (low, high) = (a.min(b), a.max(b));
-    root[high as usize] = low;
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use enfilade_geom::Sets;
 use rayon::prelude::*;
 
 use super::super::grid::BitVolume;
@@ -76,8 +77,8 @@ pub(super) struct Flood<W> {
     queue: Queue,
     /// Basin by number; number 0 is the outdoors or unused.
     pools: Vec<Pool>,
-    /// The basin that each has joined, or itself.
-    joined: Vec<u32>,
+    /// Basins that have joined; numbers are given deepest first, so that the least of a set is the deepest.
+    joined: Sets,
     contacts: BTreeMap<(u32, u32), Contact>,
 }
 
@@ -97,7 +98,7 @@ impl<W: Word> Flood<W> {
                 peak: u32::MAX,
                 voxel: 0,
             }],
-            joined: vec![0],
+            joined: Sets::new(1),
             contacts: BTreeMap::new(),
         }
     }
@@ -145,12 +146,11 @@ impl<W: Word> Flood<W> {
                             return false;
                         }
                     }
-                    let number = self.pools.len() as u32;
+                    let number = self.joined.add();
                     self.pools.push(Pool {
                         peak: self.level,
                         voxel,
                     });
-                    self.joined.push(number);
                     self.words[voxel as usize] = W::of(W::REACHED | number);
                     self.queue.push(self.level, voxel);
                     self.drain();
@@ -195,7 +195,9 @@ impl<W: Word> Flood<W> {
 
     #[inline(always)]
     fn spread(&mut self, voxel: u32) {
-        let mut number = self.find(self.words[voxel as usize].get() & W::NUMBER);
+        let mut number = self
+            .joined
+            .find(self.words[voxel as usize].get() & W::NUMBER);
         self.words[voxel as usize] = W::of(W::REACHED | W::DONE | number);
         for q in self.shape.neighbors(voxel) {
             if q == NONE {
@@ -214,31 +216,18 @@ impl<W: Word> Flood<W> {
         }
     }
 
-    fn find(&mut self, mut number: u32) -> u32 {
-        while self.joined[number as usize] != number {
-            let up = self.joined[self.joined[number as usize] as usize];
-            self.joined[number as usize] = up;
-            number = up;
-        }
-        number
-    }
-
     /// Two basins touch at `voxel`: merges them or notes it. Returns what `number` is now.
     #[cold]
     fn touch(&mut self, number: u32, other: u32, voxel: u32) -> u32 {
-        let other = self.find(other);
+        let other = self.joined.find(other);
         if other == number {
             return number;
         }
-        let rank = |n: u32| (self.pools[n as usize].peak, std::cmp::Reverse(n));
-        let (deep, shallow) = if rank(number) > rank(other) {
-            (number, other)
-        } else {
-            (other, number)
-        };
+        // Numbers were given deepest first, of equal ones the first, and keep that order.
+        let (deep, shallow) = (number.min(other), number.max(other));
+        debug_assert!(self.pools[deep as usize].peak >= self.pools[shallow as usize].peak);
         if self.pools[shallow as usize].peak - self.level < self.h {
-            self.joined[shallow as usize] = deep;
-            return deep;
+            return self.joined.join(deep, shallow);
         }
         let level = self.level;
         self.contacts
@@ -257,13 +246,13 @@ impl<W: Word> Flood<W> {
         let mut fresh = vec![0u32; self.pools.len()];
         let mut kept = Vec::new();
         for (n, pool) in self.pools.iter().enumerate() {
-            if self.joined[n] as usize == n {
+            if self.joined.find(n as u32) as usize == n {
                 fresh[n] = kept.len() as u32;
                 kept.push(*pool);
             }
         }
         for n in 0..self.pools.len() as u32 {
-            let root = self.find(n);
+            let root = self.joined.find(n);
             fresh[n as usize] = fresh[root as usize];
         }
         self.words.par_chunks_mut(1 << 14).for_each(|part| {
@@ -274,7 +263,7 @@ impl<W: Word> Flood<W> {
                 }
             }
         });
-        self.joined = (0..kept.len() as u32).collect();
+        self.joined = Sets::new(kept.len());
         self.pools = kept;
         // Numbers keep their order, so pairs keep theirs.
         self.contacts = std::mem::take(&mut self.contacts)
@@ -360,7 +349,7 @@ where
         let mut label = vec![0u32; self.pools.len()];
         let mut basins = Vec::new();
         for (n, pool) in self.pools.iter().enumerate() {
-            if self.joined[n] as usize != n || (n == 0 && !outdoors) {
+            if self.joined.find(n as u32) as usize != n || (n == 0 && !outdoors) {
                 continue;
             }
             let peak = if n == 0 {
@@ -376,7 +365,7 @@ where
             label[n] = basins.len() as u32;
         }
         for n in 0..label.len() {
-            let root = self.find(n as u32);
+            let root = self.joined.find(n as u32);
             label[n] = label[root as usize];
         }
         let mut saddles: Vec<Saddle> = self
