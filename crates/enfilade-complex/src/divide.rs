@@ -52,7 +52,7 @@ pub enum Undivided {
 }
 
 /// An opening between two leaves.
-struct Opening {
+struct LeafOpening {
     leaves: [u32; 2],
     screen: Option<u32>,
     area: f64,
@@ -73,7 +73,7 @@ impl Complex {
     ) -> Result<Partition, Undivided> {
         let (openings, middles) = self.openings();
         let ours: Vec<bool> = middles.iter().map(|m| m.is_some_and(&is_ours)).collect();
-        let is_inner = |o: &&Opening| o.leaves.iter().all(|&l| ours[l as usize]);
+        let is_inner = |o: &&LeafOpening| o.leaves.iter().all(|&l| ours[l as usize]);
         let mut sets = Sets::new(ours.len());
         for o in openings.iter().filter(is_inner) {
             if o.screen.is_none() {
@@ -150,7 +150,7 @@ impl Complex {
     /// Where the shortest way within a part, from one side of the cutter to the other, passes between them.
     fn way_around(
         cutter: &Cutter<'_>,
-        openings: &[Opening],
+        openings: &[LeafOpening],
         ours: &[bool],
         middles: &[Option<DVec3>],
         sets: &mut Sets,
@@ -211,14 +211,14 @@ impl Complex {
 
     /// The openings of all leaves, and a point well inside each leaf; none for those that rounding
     /// has left without a corner.
-    fn openings(&self) -> (Vec<Opening>, Vec<Option<DVec3>>) {
+    fn openings(&self) -> (Vec<LeafOpening>, Vec<Option<DVec3>>) {
         let visitor = Visitor {
             tree: &self.tree,
             surfaces: &self.set.surfaces,
             tolerance: self.tolerance,
         };
         let n = self.tree.n_leaves as usize;
-        let mut sink = Sink {
+        let mut sink = OpeningSink {
             visitor: &visitor,
             first_leaf: 0,
             openings: Vec::new(),
@@ -234,21 +234,21 @@ impl Complex {
                 &mut |leaf, piece| sink.count(leaf, piece),
             );
         }
-        let Sink { openings, sums, .. } = sink;
+        let OpeningSink { openings, sums, .. } = sink;
         let middle = |(sum, n): (DVec3, f64)| (n > 0.0).then(|| sum / n);
         (openings, sums.into_iter().map(middle).collect())
     }
 }
 
-struct Sink<'a> {
+struct OpeningSink<'a> {
     visitor: &'a Visitor<'a>,
     first_leaf: u32,
-    openings: Vec<Opening>,
+    openings: Vec<LeafOpening>,
     /// Sum and number of corners, of the leaves from `first_leaf` on.
     sums: Vec<(DVec3, f64)>,
 }
 
-impl Sink<'_> {
+impl OpeningSink<'_> {
     fn count(&mut self, leaf: u32, points: &[DVec3]) {
         let sum = &mut self.sums[(leaf - self.first_leaf) as usize];
         sum.0 += points.iter().sum::<DVec3>();
@@ -256,7 +256,7 @@ impl Sink<'_> {
     }
 }
 
-impl FacetSink for Sink<'_> {
+impl FacetSink for OpeningSink<'_> {
     fn take(&mut self, facet: &RawFacet<'_>) {
         facet
             .leaves
@@ -270,7 +270,7 @@ impl FacetSink for Sink<'_> {
                 let outline = Winding::new(cover.points.to_vec());
                 cover.screen.is_some() && outline.contains_in_plane(at, 0.0)
             };
-            self.openings.push(Opening {
+            self.openings.push(LeafOpening {
                 leaves: facet.leaves,
                 screen: screen.or_else(|| facet.covers.iter().find(is_on)?.screen),
                 area: poly::area(&piece),

@@ -64,12 +64,12 @@ pub(super) struct Visitor<'a> {
 
 /// A node's region: a box, cut by the oblique planes above the node, facing inwards.
 #[derive(Clone)]
-pub(super) struct Region {
+pub(super) struct CutBox {
     pub(super) bounds: Aabb,
     pub(super) cuts: SmallVec<[Plane; 16]>,
 }
 
-impl Region {
+impl CutBox {
     /// Its parts on the positive and on the negative side of a plane.
     pub(super) fn split(&self, plane: &Plane) -> [Self; 2] {
         let (mut front, mut back) = (self.clone(), self.clone());
@@ -90,14 +90,14 @@ impl Region {
 impl Visitor<'_> {
     /// Hands every facet of the tree to `sink`. Time is the number of facets times the depth.
     pub(super) fn visit<S: FacetSink + Sync>(&self, sink: &mut S) {
-        let region = Region {
+        let region = CutBox {
             bounds: self.tree.bounds,
             cuts: SmallVec::new(),
         };
         self.visit_node(self.tree.root, &region, sink);
     }
 
-    fn visit_node<S: FacetSink + Sync>(&self, child: i32, region: &Region, sink: &mut S) {
+    fn visit_node<S: FacetSink + Sync>(&self, child: i32, region: &CutBox, sink: &mut S) {
         if child < 0 || !sink.wants_subtree(child) {
             return;
         }
@@ -147,7 +147,7 @@ impl Visitor<'_> {
         self.push_down(node.plane, &points, &covers, [f, b], sink);
     }
 
-    fn section(&self, plane: &Plane, region: &Region) -> Option<Poly> {
+    fn section(&self, plane: &Plane, region: &CutBox) -> Option<Poly> {
         let mut points = poly::section_of_box(plane, &region.bounds, self.tolerance.cut)?;
         for cut in &region.cuts {
             points = poly::clip(&points, cut, self.tolerance.cut)?;

@@ -54,7 +54,7 @@ impl LeafGraph {
     pub(super) fn of(visitor: &Visitor<'_>, clearance: &Clearance<'_>) -> Self {
         let tree = visitor.tree;
         let origin = tree.bounds.center();
-        let mut sink = Sink {
+        let mut sink = LeafSink {
             visitor,
             clearance,
             origin,
@@ -64,7 +64,7 @@ impl LeafGraph {
             faces: vec![0.0; tree.n_leaves as usize],
         };
         visitor.visit(&mut sink);
-        let Sink {
+        let LeafSink {
             facets,
             mut volumes,
             faces,
@@ -213,7 +213,7 @@ pub(super) fn sides_of_border(
     }
 }
 
-struct Sink<'a> {
+struct LeafSink<'a> {
     visitor: &'a Visitor<'a>,
     clearance: &'a Clearance<'a>,
     origin: DVec3,
@@ -225,7 +225,7 @@ struct Sink<'a> {
     faces: Vec<f32>,
 }
 
-impl FacetSink for Sink<'_> {
+impl FacetSink for LeafSink<'_> {
     fn take(&mut self, facet: &RawFacet<'_>) {
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let cone = cone_volume(facet.points, normal, self.origin);

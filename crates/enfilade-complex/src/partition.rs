@@ -11,7 +11,7 @@ use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
 use super::leaf_cells::{LeafCells, SOLID};
 use super::pieces::{self, Opening, Piece, Rules};
 use super::seen::{self, TriangleCells};
-use super::surface::{NO_PLANE, Source};
+use super::surface::{NO_PLANE, Source, Surface};
 use super::tagged::{MIXED, TaggedTree};
 use super::{CRACK_WIDTH, Complex};
 
@@ -90,7 +90,7 @@ pub struct Leak {
     pub area: f64,
 }
 
-struct Sink<'a> {
+struct PieceSink<'a> {
     tagged: &'a TaggedTree<'a>,
     visitor: &'a Visitor<'a>,
     has_seals: bool,
@@ -102,7 +102,7 @@ struct Sink<'a> {
     boxes: BTreeMap<u32, Aabb>,
 }
 
-impl Sink<'_> {
+impl PieceSink<'_> {
     fn grow_box(&mut self, cell: u32, points: &[DVec3]) {
         if cell != SOLID {
             let b = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
@@ -111,7 +111,7 @@ impl Sink<'_> {
     }
 }
 
-impl FacetSink for Sink<'_> {
+impl FacetSink for PieceSink<'_> {
     fn wants_subtree(&self, child: i32) -> bool {
         self.tagged.tag(child) == MIXED
     }
@@ -182,101 +182,24 @@ impl FacetSink for Sink<'_> {
 
 /// Makes the partition that a labelling stands for.
 pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
-    let tree = &complex.tree;
-    let tagged = TaggedTree::new(tree, &cells.cell_of_leaf);
-    let visitor = Visitor {
-        tree,
-        surfaces: &complex.set.surfaces,
-        tolerance: complex.tolerance,
-    };
-    let mut plane_of_screen: Vec<u32> = Vec::new();
-    for surface in &complex.set.surfaces {
-        if let Source::Screen(id) = surface.source {
-            let n = plane_of_screen.len().max(id as usize + 1);
-            plane_of_screen.resize(n, NO_PLANE);
-            plane_of_screen[id as usize] = surface.plane;
-        }
-    }
-    let mut sink = Sink {
-        tagged: &tagged,
-        visitor: &visitor,
-        has_seals: complex.has_seals,
-        plane_of_screen: &plane_of_screen,
-        graph: &complex.graph,
-        clearance: complex.clearance(),
-        pieces: Vec::new(),
-        boxes: BTreeMap::new(),
-    };
-    visitor.visit(&mut sink);
-    for (face, _) in box_faces(&tree.bounds) {
-        sides_of_border(
-            tree,
-            tree.root,
-            &face,
-            complex.tolerance.cut,
-            &mut |leaf, piece| {
-                sink.grow_box(cells.cell_of_leaf[leaf as usize], piece);
-            },
-        );
-    }
-    let Sink { pieces, boxes, .. } = sink;
+    let tagged = TaggedTree::new(&complex.tree, &cells.cell_of_leaf);
+    let (pieces, boxes) = gather_pieces(complex, &tagged);
     let rules = Rules {
-        planes: &tree.planes,
+        planes: &complex.tree.planes,
         hole: complex.graph.hole,
         has_seals: complex.has_seals,
     };
     let (gaps, openings): (Vec<Opening>, Vec<Opening>) = pieces::group(pieces, &rules)
         .into_iter()
         .partition(|o| o.is_seal);
-    let is_wide = |s: &Seal| poly::width(&s.outline.points) >= complex.tolerance.width;
+    let least_width = complex.tolerance.width;
+    let is_wide = |s: &Seal| poly::width(&s.outline.points) >= least_width;
     let seals = gaps.into_iter().flat_map(seals_of).filter(is_wide);
     let seals = seals.collect();
     let (portals, hairlines): (Vec<_>, Vec<_>) = openings
         .into_iter()
-        .map(
-            |Opening {
-                 cells,
-                 plane,
-                 outline,
-                 pieces,
-                 screen,
-                 area,
-                 width,
-                 ..
-             }| {
-                let is_leak = screen.is_none();
-                let kind = if is_leak && width < CRACK_WIDTH {
-                    PortalKind::Crack
-                } else {
-                    PortalKind::Open
-                };
-                PartitionPortal {
-                    cells,
-                    plane,
-                    outline,
-                    pieces,
-                    screen,
-                    area,
-                    width,
-                    kind,
-                    is_leak,
-                }
-            },
-        )
-        .partition(|p: &PartitionPortal| p.width >= complex.tolerance.width);
-    let leaks = portals
-        .iter()
-        .enumerate()
-        .filter(|(_, p)| p.is_leak)
-        .map(|(i, p)| Leak {
-            portal: i as u32,
-            cells: p.cells,
-            // Pieces come largest first.
-            position: p.pieces.first().map_or(DVec3::ZERO, Winding::centroid),
-            width: p.width,
-            area: p.area,
-        })
-        .collect();
+        .map(portal_of)
+        .partition(|p| p.width >= least_width);
     let aabbs = (0..cells.volumes.len() as u32)
         .map(|c| boxes.get(&c).copied().unwrap_or(Aabb::EMPTY))
         .collect();
@@ -292,13 +215,93 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         volumes: cells.volumes,
         aabbs,
         outside: cells.outside,
+        leaks: leaks_of(&portals),
         portals,
         hairlines,
         seals,
-        leaks,
         triangle_cells,
         locator,
     }
+}
+
+/// The open pieces between leaves of different cells, and the box of each cell.
+fn gather_pieces(complex: &Complex, tagged: &TaggedTree<'_>) -> (Vec<Piece>, BTreeMap<u32, Aabb>) {
+    let tree = &complex.tree;
+    let visitor = Visitor {
+        tree,
+        surfaces: &complex.set.surfaces,
+        tolerance: complex.tolerance,
+    };
+    let plane_of_screen = planes_of_screens(&complex.set.surfaces);
+    let mut sink = PieceSink {
+        tagged,
+        visitor: &visitor,
+        has_seals: complex.has_seals,
+        plane_of_screen: &plane_of_screen,
+        graph: &complex.graph,
+        clearance: complex.clearance(),
+        pieces: Vec::new(),
+        boxes: BTreeMap::new(),
+    };
+    visitor.visit(&mut sink);
+    for (face, _) in box_faces(&tree.bounds) {
+        sides_of_border(
+            tree,
+            tree.root,
+            &face,
+            complex.tolerance.cut,
+            &mut |leaf, piece| sink.grow_box(tagged.cell_of_leaf[leaf as usize], piece),
+        );
+    }
+    (sink.pieces, sink.boxes)
+}
+
+/// The plane of each screen's surface, by the screen's index.
+fn planes_of_screens(surfaces: &[Surface]) -> Vec<u32> {
+    let mut out: Vec<u32> = Vec::new();
+    for surface in surfaces {
+        if let Source::Screen(id) = surface.source {
+            let n = out.len().max(id as usize + 1);
+            out.resize(n, NO_PLANE);
+            out[id as usize] = surface.plane;
+        }
+    }
+    out
+}
+
+/// An opening that is no gap, as a portal.
+fn portal_of(opening: Opening) -> PartitionPortal {
+    let is_leak = opening.screen.is_none();
+    PartitionPortal {
+        cells: opening.cells,
+        plane: opening.plane,
+        outline: opening.outline,
+        pieces: opening.pieces,
+        screen: opening.screen,
+        area: opening.area,
+        width: opening.width,
+        kind: if is_leak && opening.width < CRACK_WIDTH {
+            PortalKind::Crack
+        } else {
+            PortalKind::Open
+        },
+        is_leak,
+    }
+}
+
+/// Where the portals are that lie on no screen.
+fn leaks_of(portals: &[PartitionPortal]) -> Vec<Leak> {
+    let leaks = (0..).zip(portals).filter(|(_, p)| p.is_leak);
+    leaks
+        .map(|(portal, p)| Leak {
+            portal,
+            cells: p.cells,
+            // Pieces come largest first.
+            position: p.pieces.first().map_or(DVec3::ZERO, Winding::centroid),
+            width: p.width,
+            area: p.area,
+        })
+        .collect()
 }
 
 /// A seal for each piece of a gap.

@@ -21,7 +21,7 @@ use std::ops::Range;
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane};
 
-use super::facet::{FacetSink, OpenPieces, RawFacet, Region, Visitor};
+use super::facet::{CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::surface::Tolerance;
 use super::tree::{Node, Tree, leaf_index};
 
@@ -54,7 +54,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     // Stable: the order of the tree stays.
     edges.sort_by_key(|e| e.leaf);
     let tree = visitor.tree;
-    let mut cutter = Cutter {
+    let mut cutter = LeafCutter {
         tree,
         edges: &edges,
         gap,
@@ -64,8 +64,8 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
         on_plane: Vec::with_capacity(tree.on_plane.len()),
         n_leaves: 0,
     };
-    let root = cutter.copy(tree.root, &Region::all(tree.bounds));
-    let Cutter {
+    let root = cutter.copy(tree.root, &CutBox::all(tree.bounds));
+    let LeafCutter {
         planes,
         nodes,
         on_plane,
@@ -149,7 +149,7 @@ fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
     })
 }
 
-struct Cutter<'a> {
+struct LeafCutter<'a> {
     tree: &'a Tree,
     edges: &'a [Edge],
     /// Leaves are cut where they are thinner. [Units: wu]
@@ -161,14 +161,14 @@ struct Cutter<'a> {
     n_leaves: u32,
 }
 
-impl Cutter<'_> {
+impl LeafCutter<'_> {
     fn edges_of(&self, leaves: Range<u32>) -> &[Edge] {
         let at = |leaf: u32| self.edges.partition_point(|e| e.leaf < leaf);
         &self.edges[at(leaves.start)..at(leaves.end)]
     }
 
     /// Copies a subtree, cutting its leaves; the new root of it.
-    fn copy(&mut self, child: i32, region: &Region) -> i32 {
+    fn copy(&mut self, child: i32, region: &CutBox) -> i32 {
         if child < 0 {
             let strips = self.strips(leaf_index(child), region);
             return self.split(strips);
@@ -202,7 +202,7 @@ impl Cutter<'_> {
     }
 
     /// The strips that are to cut a leaf.
-    fn strips(&mut self, leaf: u32, region: &Region) -> Vec<Strip> {
+    fn strips(&mut self, leaf: u32, region: &CutBox) -> Vec<Strip> {
         let mut found: Vec<(f64, Plane, Poly)> = self
             .edges_of(leaf..leaf + 1)
             .iter()
@@ -265,7 +265,7 @@ impl Cutter<'_> {
     }
 }
 
-impl Region {
+impl CutBox {
     fn all(bounds: Aabb) -> Self {
         Self {
             bounds,
