@@ -5,7 +5,7 @@ Each case runs ours and the peer by turns, each call in a process of its own, so
 else the machine does hits both. What counts is the ratio of the medians of user CPU time (all
 threads, system time apart); a time by itself says little.
 
-  cargo build --release -p enfilade-bake --example kernel_bench
+  cargo build --release -p enfilade-voxel --example kernel_bench
   scripts/bench_kernels.py --bench target/release/examples/kernel_bench --data DIR [--peers DIR]
 
 DIR of --data holds STEM.npy (a byte a voxel, [z][y][x], 1 for air), STEM.labels.npy (the room of
@@ -257,7 +257,7 @@ def main():
     if importlib.util.find_spec("numpy") is None:
         sys.exit("numpy is needed to read the inputs: pip install numpy")
     if not os.path.exists(args.bench):
-        sys.exit(f"no {args.bench}; build it: cargo build --release -p enfilade-bake --example kernel_bench")
+        sys.exit(f"no {args.bench}; build it: cargo build --release -p enfilade-voxel --example kernel_bench")
     wanted = [n for n in CASES if any(o.strip() in n for o in args.only.split(","))]
     with tempfile.TemporaryDirectory() as args.scratch:
         rows = [row for name in wanted if (row := compare(args, name))]

@@ -43,7 +43,7 @@ pub(crate) fn measure(args: &[String]) -> ExitCode {
 fn kernels(peers: &Path) -> anyhow::Result<()> {
     run_to_end(&mut RELEASE.cargo(
         "build",
-        &["-p", "enfilade-bake", "--example", "kernel_bench"],
+        &["-p", "enfilade-voxel", "--example", "kernel_bench"],
     ))?;
     let data = target_dir().join("kernel-bench");
     std::fs::create_dir_all(&data)?;

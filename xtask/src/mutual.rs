@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs that are still there, to be parted by who works on them next; none may be added.
-const KNOWN: [[&str; 2]; 8] = [
+const KNOWN: [[&str; 2]; 5] = [
     [
         "crates/enfilade-bake/src/bsp/mod.rs",
         "crates/enfilade-bake/src/bsp/portals.rs",
@@ -14,14 +14,6 @@ const KNOWN: [[&str; 2]; 8] = [
     [
         "crates/enfilade-bake/src/bsp/mod.rs",
         "crates/enfilade-bake/src/bsp/tree.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/complex/cut.rs",
-        "crates/enfilade-bake/src/complex/label.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/complex/partition.rs",
-        "crates/enfilade-bake/src/complex/seen.rs",
     ],
     [
         "crates/enfilade-bake/src/delaunay/branches.rs",
@@ -34,10 +26,6 @@ const KNOWN: [[&str; 2]; 8] = [
     [
         "crates/enfilade-bake/src/delaunay/refine.rs",
         "crates/enfilade-bake/src/delaunay/space.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/voxel/watershed.rs",
-        "crates/enfilade-bake/src/voxel/watershed/flood.rs",
     ],
 ];
 

@@ -27,7 +27,7 @@ const PRINT: &[&str] = &["println!", "eprintln!", "print!(", "eprint!("];
 /// Readers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 14] = [
+const FENCES: [Fence; 16] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -47,8 +47,25 @@ const FENCES: [Fence; 14] = [
         words: &["std::thread"],
     },
     Fence {
-        name: "enfilade-bake",
+        name: "enfilade-voxel",
+        siblings: &["enfilade-geom"],
+        not: FORMATS,
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
+        name: "enfilade-complex",
         siblings: &["enfilade-geom", "enfilade-cpg"],
+        not: FORMATS,
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
+        name: "enfilade-bake",
+        siblings: &[
+            "enfilade-geom",
+            "enfilade-cpg",
+            "enfilade-voxel",
+            "enfilade-complex",
+        ],
         not: FORMATS,
         words: &["std::fs", "std::thread"],
     },

@@ -16,7 +16,7 @@ mod assemble;
 mod bake;
 pub mod bound;
 pub mod bsp;
-pub mod complex;
+pub use enfilade_complex as complex;
 mod config;
 mod context;
 pub mod delaunay;
@@ -32,7 +32,7 @@ pub mod simplify;
 mod stage;
 mod structure;
 mod vessel;
-pub mod voxel;
+pub use enfilade_voxel as voxel;
 pub mod watershed;
 
 pub use bake::bake;

@@ -7,10 +7,12 @@
 mod aabb;
 mod bvh;
 mod plane;
+pub mod poly;
 pub mod ray;
 pub mod scene;
 mod sets;
 pub mod solid;
+mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
@@ -20,6 +22,7 @@ pub use plane::Plane;
 pub use ray::{Hit, Ray};
 pub use sets::Sets;
 pub use solid::{BoxTree, ConvexSolid, SolidError};
+pub use tolerance::{plane_tolerance, world_tolerance};
 pub use winding::Winding;
 
 /// A triangle in world space. [Units: wu]

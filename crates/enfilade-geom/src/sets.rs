@@ -33,11 +33,33 @@ impl Sets {
         self.0.is_empty()
     }
 
+    /// Adds a set of one more member; gives its number, which follows those of all others.
+    ///
+    /// # Panics
+    ///
+    /// If there are as many members as `u32` counts.
+    pub fn add(&mut self) -> u32 {
+        let x = u32::try_from(self.0.len()).expect("more members than 32 bits number");
+        self.0.push(x);
+        x
+    }
+
+    /// For each member the least of its set, in one pass.
+    #[must_use]
+    pub fn into_least(mut self) -> Vec<u32> {
+        // None points to a greater member, so all before are done.
+        for x in 0..self.0.len() {
+            self.0[x] = self.0[self.0[x] as usize];
+        }
+        self.0
+    }
+
     /// The least member of the set of `x`.
     ///
     /// # Panics
     ///
     /// If `x` is no member.
+    #[inline]
     pub fn find(&mut self, mut x: u32) -> u32 {
         while self.0[x as usize] != x {
             self.0[x as usize] = self.0[self.0[x as usize] as usize];
@@ -51,6 +73,7 @@ impl Sets {
     /// # Panics
     ///
     /// If one of the two is no member.
+    #[inline]
     pub fn join(&mut self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.find(a), self.find(b));
         let (low, high) = (a.min(b), a.max(b));
@@ -69,7 +92,9 @@ mod tests {
         fn members_are_together_as_labels_written_over_say(
             n in 1_usize..40, joins in prop::collection::vec((0_u32..40, 0_u32..40), 0..60),
         ) {
-            let mut sets = Sets::new(n);
+            // The last member comes later than the rest.
+            let mut sets = Sets::new(n - 1);
+            prop_assert_eq!(sets.add() as usize, n - 1);
             let mut label: Vec<u32> = (0..n as u32).collect();
             for (a, b) in joins.into_iter().map(|(a, b)| (a % n as u32, b % n as u32)) {
                 let (p, q) = (label[a as usize], label[b as usize]);
@@ -79,6 +104,7 @@ mod tests {
             for x in 0..n as u32 {
                 prop_assert_eq!(sets.find(x), label[x as usize]);
             }
+            prop_assert_eq!(sets.into_least(), label);
         }
     }
 }

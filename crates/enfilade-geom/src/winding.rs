@@ -1,5 +1,6 @@
 //! Windings: convex planar polygons.
 
+use crate::poly::{self, Poly, Sides};
 use crate::{Aabb, DVec3, Plane};
 
 /// A convex planar polygon, counter-clockwise seen from its plane's positive side.
@@ -44,19 +45,13 @@ impl Winding {
     /// Twice the area times the unit normal (Newell's sum, about the first corner).
     #[must_use]
     pub fn area_normal(&self) -> DVec3 {
-        let Some(&o) = self.points.first() else {
-            return DVec3::ZERO;
-        };
-        self.points
-            .windows(2)
-            .map(|e| (e[0] - o).cross(e[1] - o))
-            .sum()
+        poly::area_normal(&self.points)
     }
 
     /// Area. [Units: wu²]
     #[must_use]
     pub fn area(&self) -> f64 {
-        self.area_normal().length() * 0.5
+        poly::area(&self.points)
     }
 
     /// Centroid of the area; the mean of the corners when there is none.
@@ -111,46 +106,14 @@ impl Winding {
     /// plane altogether is given to neither side.
     #[must_use]
     pub fn split(&self, plane: &Plane, eps: f64) -> (Option<Self>, Option<Self>) {
-        let n = self.points.len();
-        let dist: Vec<f64> = self
-            .points
-            .iter()
-            .map(|&p| plane.signed_distance(p))
-            .collect();
-        let (mut any_front, mut any_back) = (false, false);
-        for &d in &dist {
-            any_front |= d > eps;
-            any_back |= d < -eps;
+        let whole = || Some(self.clone());
+        let part = |points: Poly| Some(Self::new(points.into_vec()));
+        match poly::split(&self.points, plane, eps) {
+            Sides::On => (None, None),
+            Sides::Front => (whole(), None),
+            Sides::Back => (None, whole()),
+            Sides::Both(front, back) => (part(front), part(back)),
         }
-        match (any_front, any_back) {
-            (false, false) => return (None, None),
-            (true, false) => return (Some(self.clone()), None),
-            (false, true) => return (None, Some(self.clone())),
-            (true, true) => {}
-        }
-        let (mut front, mut back) = (Vec::with_capacity(n + 2), Vec::with_capacity(n + 2));
-        for i in 0..n {
-            let j = if i + 1 == n { 0 } else { i + 1 };
-            let (p, q, dp, dq) = (self.points[i], self.points[j], dist[i], dist[j]);
-            if dp >= -eps {
-                front.push(p);
-            }
-            if dp <= eps {
-                back.push(p);
-            }
-            if (dp > eps && dq < -eps) || (dp < -eps && dq > eps) {
-                // Always cut from the front corner, so that both directions of a shared edge round alike.
-                let (a, b, da, db) = if dp > 0.0 {
-                    (p, q, dp, dq)
-                } else {
-                    (q, p, dq, dp)
-                };
-                let cut = a + (b - a) * (da / (da - db));
-                front.push(cut);
-                back.push(cut);
-            }
-        }
-        (Some(Self::new(front)), Some(Self::new(back)))
     }
 
     /// Whether `p`, a point of the polygon's plane, lies in it, edges included, with `eps` to spare.

@@ -1,7 +1,7 @@
 //! What is made once from a world, to be asked many times.
 
 use enfilade_cpg::{CellId, Locator, Portal, PortalId, World};
-use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
+use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding, world_tolerance};
 
 use crate::boxes::{BoxTrees, Boxed, Root};
 use crate::chunks::{Chunk, chunks_of};
@@ -167,7 +167,7 @@ impl Sight {
         extent = extent.max(portals.extent);
         // What a builder may snap and a file may round, of outline and wall each; `enfilade-verify`
         // judges by the same measure.
-        let tolerance = (2.0 * (4e-7 * extent).max(2e-5)).max(portals.off_plane);
+        let tolerance = (2.0 * world_tolerance(extent)).max(portals.off_plane);
         let (first_exit, mut exits) = portals.by_cell(n_cells);
         let (mut first_group, mut groups) = (vec![0], Vec::new());
         for c in 0..n_cells {

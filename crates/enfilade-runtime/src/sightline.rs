@@ -13,7 +13,7 @@
 
 use enfilade_cpg::{CellId, Locator, World};
 use enfilade_geom::ray::hit_triangle;
-use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle};
+use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle, world_tolerance};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
 use crate::details::Details;
@@ -102,14 +102,9 @@ impl Sightlines {
             }
         }
         let whole = Bvh::build(&triangles);
-        let bounds = whole.bounds();
-        let extent = if bounds.is_empty() {
-            0.0
-        } else {
-            bounds.min.abs().max(bounds.max.abs()).max_element()
-        };
+        let extent = whole.bounds().extent();
         // As for `Sight`: twice what a builder may snap.
-        let near = 2.0 * (4e-7 * extent).max(2e-5);
+        let near = 2.0 * world_tolerance(extent);
         let mut openings = Vec::new();
         let mut opening_boxes: Vec<Vec<u32>> = vec![Vec::new(); by_cell.len()];
         for (i, portal) in world.graph.portals.iter().enumerate() {

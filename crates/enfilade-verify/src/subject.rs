@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use enfilade_cpg::{CellId, Locator, PortalId, World};
 use enfilade_geom::ray::{segment_distance_squared, segment_to_edges_distance};
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle, world_tolerance};
 
 use crate::options::VerifyOptions;
 use crate::rng::Rng;
@@ -20,10 +20,7 @@ const TRIES: usize = 24;
 /// which a builder may snap planes and an `f32` file may round. [Units: wu]
 #[must_use]
 pub fn tolerance(bounds: &Aabb) -> f64 {
-    if bounds.is_empty() {
-        return 2e-5;
-    }
-    (4e-7 * bounds.min.abs().max(bounds.max.abs()).max_element()).max(2e-5)
+    world_tolerance(bounds.extent())
 }
 
 /// All structural triangles of a world with the batch of each, in order of batch and index.

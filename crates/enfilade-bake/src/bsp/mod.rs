@@ -40,7 +40,7 @@ mod shape;
 mod surfaces;
 mod tree;
 
-use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding};
+use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Triangle, Winding, plane_tolerance};
 
 pub use config::{BspConfig, Rooms};
 pub use guide::Guide;
@@ -78,10 +78,10 @@ pub(crate) struct Tolerance {
 impl Tolerance {
     /// For corners that are `f32` numbers of this size.
     fn for_bounds(bounds: &Aabb) -> Self {
-        let extent = bounds.min.abs().max(bounds.max.abs()).max_element();
-        // The same measure as in the cell complex, where it is explained; twice it, since a brush's
-        // exact plane and its rounded corners may stray to either side.
-        let plane = (8e-7 * extent).max(4e-6);
+        let extent = bounds.extent();
+        // Twice the measure of the cell complex, since a brush's exact plane and its rounded corners may stray to
+        // either side.
+        let plane = 2.0 * plane_tolerance(extent);
         Self {
             plane,
             cut: (1e-9 * extent).max(1e-8),

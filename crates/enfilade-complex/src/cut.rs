@@ -1,0 +1,547 @@
+//! Borders put where they are smallest.
+//!
+//! Growing leaves together along their widest openings finds *a* border between two cells that leak
+//! into each other, but one made of whatever planes the tree has there: over a flight of stairs that
+//! can be a hundred small portals. Here each such border is moved to the minimum of
+//!
+//! > open area that lies on no screen + [`PER_FACET`] for each piece + [`VOTE`] × volume of votes overruled
+//!
+//! by a minimum cut (Boykov, Veksler & Zabih 2001 move labels in the same way; the flow is Dinic's
+//! 1970) among the leaves around the border. Screens cost next to nothing, so a border that can be
+//! moved into its screen is.
+//!
+//! Time: `O(V²E)` at worst and near-linear in practice for each pair of cells that leak; at most
+//! [`MAX_LEAVES`] leaves take part. Capacities are whole numbers, so no rounding can loop.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+
+use enfilade_geom::Sets;
+
+use super::graph::{LeafGraph, NO_SCREEN};
+use super::leaf_cells::{LeafCells, SOLID, Tally};
+
+/// What a piece of a border costs besides its area. [Units: wu²]
+const PER_FACET: f64 = 0.002;
+/// What it costs to overrule votes. [Units: 1/wu]
+const VOTE: f64 = 0.5;
+/// What a screen costs, per area: so little that it is only a tie-breaker.
+const SCREEN: f64 = 0.01;
+/// Borders that leak less than this stay as they are. [Units: wu²]
+const MIN_LEAK: f64 = 0.01;
+/// Most leaves that take part in one cut.
+const MAX_LEAVES: usize = 20_000;
+/// Capacities are counted in this. [Units: wu²]
+const UNIT: f64 = 1e-7;
+const INFINITE: u64 = 1 << 60;
+
+/// Moves the borders between cells that leak into each other.
+pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tally) {
+    let votes = |leaf: u32, cell: u32| {
+        let label = cells.label_of_cell[cell as usize];
+        tally.get(&(leaf, label)).copied().unwrap_or(0.0)
+    };
+    let mut leaks: BTreeMap<[u32; 2], (f64, Vec<u32>)> = BTreeMap::new();
+    for (i, f) in graph.facets.iter().enumerate() {
+        let [a, b] = f.leaves.map(|l| cells.cell_of_leaf[l as usize]);
+        if f.screen == NO_SCREEN && !f.is_narrow && a != b && a != SOLID && b != SOLID {
+            let (area, facets) = leaks.entry([a.min(b), a.max(b)]).or_default();
+            *area += f64::from(f.area);
+            facets.push(i as u32);
+        }
+    }
+    leaks.retain(|_, (area, facets)| *area >= MIN_LEAK && facets.len() > 1);
+    if leaks.is_empty() {
+        return;
+    }
+    let adjacency = Adjacency::of(graph, &cells.cell_of_leaf, &leaks);
+    let mut moves: Vec<(u32, u32)> = Vec::new();
+    for (pair, (_, facets)) in &leaks {
+        // Earlier moves may have changed whose leaf it is.
+        for (leaf, to) in cut(
+            graph,
+            &cells.cell_of_leaf,
+            &adjacency,
+            *pair,
+            facets,
+            &votes,
+        ) {
+            moves.push((leaf, to));
+        }
+        for (leaf, to) in moves.drain(..) {
+            cells.cell_of_leaf[leaf as usize] = to;
+        }
+    }
+    cells.drop_empty(&graph.volumes);
+}
+
+/// Gives chips of a cell that hang together with nothing else of it, and are less than `min_volume`, to the cell
+/// that they open to most. [Units: wu³]
+///
+/// Borders that moved can cut a chip off, and a chip has portals all around. O(leaves + facets).
+pub(super) fn absorb_chips(graph: &LeafGraph, cells: &mut LeafCells, min_volume: f64) {
+    let n = cells.cell_of_leaf.len();
+    let mut sets = Sets::new(n);
+    for f in &graph.facets {
+        let [a, b] = f.leaves;
+        let cell = cells.cell_of_leaf[a as usize];
+        if cell != SOLID && cell == cells.cell_of_leaf[b as usize] {
+            sets.join(a, b);
+        }
+    }
+    let mut volume = vec![0.0; n];
+    for leaf in 0..n as u32 {
+        volume[sets.find(leaf) as usize] += graph.volumes[leaf as usize];
+    }
+    let mut largest: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    for leaf in (0..n as u32).filter(|&l| cells.cell_of_leaf[l as usize] != SOLID) {
+        let root = sets.find(leaf);
+        let part = (volume[root as usize], root);
+        let best = largest
+            .entry(cells.cell_of_leaf[leaf as usize])
+            .or_insert(part);
+        // Equal volumes: the least leaf.
+        if part.0 > best.0 || part.0 == best.0 && root < best.1 {
+            *best = part;
+        }
+    }
+    let mut opens_to: BTreeMap<u32, BTreeMap<u32, f64>> = BTreeMap::new();
+    for f in &graph.facets {
+        let [a, b] = f.leaves;
+        for (chip, other) in [(a, b), (b, a)] {
+            let [cell, to] = [chip, other].map(|l| cells.cell_of_leaf[l as usize]);
+            let root = sets.find(chip);
+            if cell != to
+                && cell != SOLID
+                && to != SOLID
+                && largest[&cell].1 != root
+                && volume[root as usize] < min_volume
+            {
+                *opens_to.entry(root).or_default().entry(to).or_default() += f64::from(f.area);
+            }
+        }
+    }
+    if opens_to.is_empty() {
+        return;
+    }
+    let to: BTreeMap<u32, u32> = opens_to
+        .into_iter()
+        .filter_map(|(root, areas)| {
+            let most = areas
+                .into_iter()
+                .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+            Some((root, most.0))
+        })
+        .collect();
+    for leaf in 0..n as u32 {
+        if let Some(&cell) = to.get(&sets.find(leaf)) {
+            cells.cell_of_leaf[leaf as usize] = cell;
+        }
+    }
+    cells.drop_empty(&graph.volumes);
+}
+
+/// Cells of less are what rounding leaves between surfaces that all but touch: no room, however small, and too thin for
+/// a portal. [Units: wu³]
+const SLIVER: f64 = 1e-4;
+
+/// Gives the leaves of slivers to the cells that they open to most; those that open to none are solid.
+///
+/// O(leaves + facets), but for chains of slivers.
+pub(super) fn dissolve_slivers(graph: &LeafGraph, cells: &mut LeafCells) {
+    let is_sliver: Vec<bool> = (0..)
+        .zip(&cells.volumes)
+        .map(|(c, &volume)| volume < SLIVER && cells.outside != Some(c))
+        .collect();
+    if !is_sliver.contains(&true) {
+        return;
+    }
+    let is_in = |c: u32| c != SOLID && is_sliver[c as usize];
+    let mut around: BTreeMap<u32, Vec<(u32, f64)>> = BTreeMap::new();
+    for f in &graph.facets {
+        let [a, b] = f.leaves;
+        for (leaf, other) in [(a, b), (b, a)] {
+            if is_in(cells.cell_of_leaf[leaf as usize]) {
+                let facets = around.entry(leaf).or_default();
+                facets.push((other, f64::from(f.area)));
+            }
+        }
+    }
+    loop {
+        let n = around.len();
+        around.retain(|&leaf, facets| {
+            let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+            for &(other, area) in facets.iter() {
+                let c = cells.cell_of_leaf[other as usize];
+                if c != SOLID && !is_in(c) {
+                    *areas.entry(c).or_default() += area;
+                }
+            }
+            let most = areas
+                .into_iter()
+                .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            if let Some((to, _)) = most {
+                cells.cell_of_leaf[leaf as usize] = to;
+            }
+            most.is_none()
+        });
+        if around.len() == n {
+            break;
+        }
+    }
+    for c in &mut cells.cell_of_leaf {
+        if is_in(*c) {
+            *c = SOLID;
+        }
+    }
+    cells.drop_empty(&graph.volumes);
+}
+
+/// Open facets by leaf, for leaves of cells that leak.
+struct Adjacency {
+    start: Vec<u32>,
+    facets: Vec<u32>,
+}
+
+impl Adjacency {
+    fn of(
+        graph: &LeafGraph,
+        cell_of_leaf: &[u32],
+        leaks: &BTreeMap<[u32; 2], (f64, Vec<u32>)>,
+    ) -> Self {
+        let n_cells = cell_of_leaf.iter().filter(|&&c| c != SOLID).max();
+        let mut takes_part = vec![false; n_cells.map_or(0, |&c| c as usize + 1)];
+        for c in leaks.keys().flatten() {
+            takes_part[*c as usize] = true;
+        }
+        let is_in = |leaf: u32| {
+            let c = cell_of_leaf[leaf as usize];
+            c != SOLID && takes_part[c as usize]
+        };
+        let mut start = vec![0_u32; cell_of_leaf.len() + 1];
+        for f in &graph.facets {
+            for l in f.leaves.into_iter().filter(|&l| is_in(l)) {
+                start[l as usize + 1] += 1;
+            }
+        }
+        for i in 1..start.len() {
+            start[i] += start[i - 1];
+        }
+        let mut at = start.clone();
+        let mut facets = vec![0_u32; start.last().map_or(0, |&n| n as usize)];
+        for (i, f) in graph.facets.iter().enumerate() {
+            for l in f.leaves.into_iter().filter(|&l| is_in(l)) {
+                facets[at[l as usize] as usize] = i as u32;
+                at[l as usize] += 1;
+            }
+        }
+        Self { start, facets }
+    }
+
+    fn of_leaf(&self, leaf: u32) -> &[u32] {
+        let [from, to] = [0, 1].map(|k| self.start[leaf as usize + k] as usize);
+        &self.facets[from..to]
+    }
+}
+
+/// The leaves that change sides, with the cell they go to.
+fn cut(
+    graph: &LeafGraph,
+    cell_of_leaf: &[u32],
+    adjacency: &Adjacency,
+    pair: [u32; 2],
+    border: &[u32],
+    votes: &impl Fn(u32, u32) -> f64,
+) -> Vec<(u32, u32)> {
+    let cell = |leaf: u32| cell_of_leaf[leaf as usize];
+    let is_ours = |leaf: u32| pair.contains(&cell(leaf));
+    // The leaves around the border, nearest first.
+    let mut node_of: HashMap<u32, u32> = HashMap::new();
+    let mut leaves: Vec<u32> = Vec::new();
+    let mut take = |leaf: u32, leaves: &mut Vec<u32>| {
+        if is_ours(leaf) && leaves.len() < MAX_LEAVES && !node_of.contains_key(&leaf) {
+            node_of.insert(leaf, leaves.len() as u32);
+            leaves.push(leaf);
+        }
+    };
+    for &f in border {
+        for l in graph.facets[f as usize].leaves {
+            take(l, &mut leaves);
+        }
+    }
+    let mut at = 0;
+    while at < leaves.len() {
+        for &f in adjacency.of_leaf(leaves[at]) {
+            for l in graph.facets[f as usize].leaves {
+                take(l, &mut leaves);
+            }
+        }
+        at += 1;
+    }
+    let units = |cost: f64| (cost / UNIT).round() as u64;
+    let n = leaves.len();
+    let (source, sink) = (n, n + 1);
+    let mut flow = Flow::new(n + 2);
+    let mut before = 0;
+    for (i, &leaf) in leaves.iter().enumerate() {
+        let [mut to_a, mut to_b] = pair.map(|c| units(VOTE * votes(leaf, c)));
+        let mut add = |c: u32, cost: u64| {
+            if c == pair[0] {
+                to_a = to_a.saturating_add(cost).min(INFINITE);
+            } else {
+                to_b = to_b.saturating_add(cost).min(INFINITE);
+            }
+        };
+        for &f in adjacency.of_leaf(leaf) {
+            let f = &graph.facets[f as usize];
+            let other = if f.leaves[0] == leaf {
+                f.leaves[1]
+            } else {
+                f.leaves[0]
+            };
+            let cost = units(if f.screen == NO_SCREEN {
+                // A gap makes no portal: a border of many is better than one that shows.
+                let each = if f.is_gap { 0.0 } else { PER_FACET };
+                f64::from(f.area) + each
+            } else {
+                f64::from(f.area) * SCREEN
+            });
+            match node_of.get(&other) {
+                Some(&j) if (j as usize) > i => {
+                    flow.add(i, j as usize, cost, cost);
+                    if cell(leaf) != cell(other) {
+                        before += cost;
+                    }
+                }
+                Some(_) => {}
+                // What lies beyond keeps its side.
+                None if is_ours(other) => add(cell(other), cost),
+                // To a third cell the border stays a border on either side.
+                None => {}
+            }
+        }
+        before += if cell(leaf) == pair[0] { to_b } else { to_a };
+        flow.add(source, i, to_a, 0);
+        flow.add(i, sink, to_b, 0);
+    }
+    let after = flow.run(source, sink);
+    if after >= before {
+        return Vec::new();
+    }
+    let is_a = flow.reached();
+    let moved: Vec<(u32, u32)> = leaves
+        .iter()
+        .enumerate()
+        .map(|(i, &leaf)| (leaf, if is_a[i] { pair[0] } else { pair[1] }))
+        .filter(|&(leaf, to)| cell(leaf) != to)
+        .collect();
+    moved
+}
+
+struct Arc {
+    to: u32,
+    capacity: u64,
+}
+
+/// Dinic's maximum flow. Arc `i ^ 1` is the reverse of arc `i`.
+struct Flow {
+    arcs: Vec<Arc>,
+    of_node: Vec<Vec<u32>>,
+    level: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl Flow {
+    fn new(n: usize) -> Self {
+        Self {
+            arcs: Vec::new(),
+            of_node: vec![Vec::new(); n],
+            level: vec![0; n],
+            next: vec![0; n],
+        }
+    }
+
+    fn add(&mut self, a: usize, b: usize, forward: u64, backward: u64) {
+        if forward == 0 && backward == 0 {
+            return;
+        }
+        let i = self.arcs.len() as u32;
+        self.arcs.push(Arc {
+            to: b as u32,
+            capacity: forward,
+        });
+        self.arcs.push(Arc {
+            to: a as u32,
+            capacity: backward,
+        });
+        self.of_node[a].push(i);
+        self.of_node[b].push(i + 1);
+    }
+
+    fn run(&mut self, source: usize, sink: usize) -> u64 {
+        let mut total = 0_u64;
+        while self.find_levels(source, sink) {
+            self.next.fill(0);
+            loop {
+                let pushed = self.push(source, sink);
+                if pushed == 0 {
+                    break;
+                }
+                total = total.saturating_add(pushed);
+            }
+        }
+        total
+    }
+
+    fn find_levels(&mut self, source: usize, sink: usize) -> bool {
+        self.level.fill(u32::MAX);
+        self.level[source] = 0;
+        let mut queue = VecDeque::from([source as u32]);
+        while let Some(v) = queue.pop_front() {
+            for &i in &self.of_node[v as usize] {
+                let arc = &self.arcs[i as usize];
+                if arc.capacity > 0 && self.level[arc.to as usize] == u32::MAX {
+                    self.level[arc.to as usize] = self.level[v as usize] + 1;
+                    queue.push_back(arc.to);
+                }
+            }
+        }
+        self.level[sink] != u32::MAX
+    }
+
+    /// Pushes along one shortest path; without recursion, as paths may be long.
+    fn push(&mut self, source: usize, sink: usize) -> u64 {
+        let mut path: Vec<u32> = Vec::new();
+        let mut v = source;
+        loop {
+            if v == sink {
+                let least = path.iter().map(|&i| self.arcs[i as usize].capacity).min();
+                let least = least.unwrap_or(0);
+                for &i in &path {
+                    self.arcs[i as usize].capacity -= least;
+                    self.arcs[i as usize ^ 1].capacity += least;
+                }
+                return least;
+            }
+            let step = loop {
+                let Some(&i) = self.of_node[v].get(self.next[v] as usize) else {
+                    break None;
+                };
+                let arc = &self.arcs[i as usize];
+                if arc.capacity > 0 && self.level[arc.to as usize] == self.level[v] + 1 {
+                    break Some(i);
+                }
+                self.next[v] += 1;
+            };
+            match step {
+                Some(i) => {
+                    path.push(i);
+                    v = self.arcs[i as usize].to as usize;
+                }
+                None => {
+                    let Some(i) = path.pop() else {
+                        return 0;
+                    };
+                    v = self.arcs[i as usize ^ 1].to as usize;
+                    self.next[v] += 1;
+                }
+            }
+        }
+    }
+
+    /// What the source still reaches once no more can be pushed.
+    fn reached(&self) -> Vec<bool> {
+        self.level.iter().map(|&l| l != u32::MAX).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::graph::OpenFacet;
+    use super::*;
+
+    /// Every cut of a small graph, tried one by one.
+    fn least_cut(n: usize, arcs: &[(usize, usize, u64, u64)]) -> u64 {
+        (0..1_u32 << (n - 2))
+            .map(|inner| {
+                let is_source_side = |v: usize| match v {
+                    0 => true,
+                    1 => false,
+                    v => inner >> (v - 2) & 1 == 1,
+                };
+                arcs.iter()
+                    .map(
+                        |&(a, b, f, r)| match (is_source_side(a), is_source_side(b)) {
+                            (true, false) => f,
+                            (false, true) => r,
+                            _ => 0,
+                        },
+                    )
+                    .sum()
+            })
+            .min()
+            .unwrap()
+    }
+
+    #[test]
+    fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
+        // Rooms 0 and 2; cell 1 is made of three slivers: beside both rooms, behind that, and closed.
+        let facet = |a, b, area| OpenFacet {
+            leaves: [a, b],
+            width: area,
+            area,
+            screen: NO_SCREEN,
+            is_narrow: false,
+            is_gap: false,
+        };
+        let mut graph = LeafGraph {
+            facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],
+            volumes: vec![5.0, 1e-6, 5.0, 1e-6, 1e-6],
+            at_border: vec![false; 5],
+            faces: vec![1.0; 5],
+            hole: 0.01,
+            rounding: 1e-5,
+        };
+        let cells = || LeafCells {
+            cell_of_leaf: vec![0, 1, 2, 1, 1],
+            label_of_cell: vec![7, 8, 9],
+            volumes: vec![5.0, 3e-6, 5.0],
+            outside: Some(2),
+        };
+        let mut found = cells();
+        dissolve_slivers(&graph, &mut found);
+        assert_eq!(found.cell_of_leaf, [0, 1, 1, SOLID, 1]);
+        assert_eq!(found.label_of_cell, [7, 9]);
+        assert_eq!(found.volumes, [5.0, 5.0 + 2e-6]);
+        assert_eq!(found.outside, Some(1));
+        // A closet of a liter is a cell.
+        graph.volumes[1] = 1e-3;
+        let mut found = cells();
+        found.volumes[1] = 1e-3 + 2e-6;
+        dissolve_slivers(&graph, &mut found);
+        assert_eq!(found.cell_of_leaf, cells().cell_of_leaf);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn the_flow_equals_the_least_cut(
+            arcs in proptest::collection::vec((0_usize..8, 0_usize..8, 0_u64..50, 0_u64..50), 0..24)
+        ) {
+            let arcs: Vec<_> = arcs.into_iter().filter(|a| a.0 != a.1).collect();
+            let mut flow = Flow::new(8);
+            for &(a, b, f, r) in &arcs {
+                flow.add(a, b, f, r);
+            }
+            proptest::prop_assert_eq!(flow.run(0, 1), least_cut(8, &arcs));
+            let side = flow.reached();
+            let cut: u64 = arcs
+                .iter()
+                .map(|&(a, b, f, r)| match (side[a], side[b]) {
+                    (true, false) => f,
+                    (false, true) => r,
+                    _ => 0,
+                })
+                .sum();
+            proptest::prop_assert_eq!(cut, least_cut(8, &arcs));
+        }
+    }
+}

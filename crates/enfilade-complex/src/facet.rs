@@ -1,0 +1,303 @@
+//! The facets between leaves: every node's plane polygon, pushed down both subtrees.
+//!
+//! This is how portals of a BSP are made (Lefebvre & Hornus 2003, in the notes on BSP construction
+//! that follow §3.0.2: clip the plane by its parents, split it by its children). No polygon outlives its
+//! visit: the first visit keeps a few numbers a facet, the second makes the polygons again where
+//! two cells meet.
+
+use enfilade_geom::poly::{self, Poly, Sides};
+use enfilade_geom::{Aabb, DVec3, Plane};
+use smallvec::SmallVec;
+
+use super::surface::{MIN_AREA, Source, Surface, Tolerance, projected};
+use super::tree::{Tree, leaf_index};
+
+/// Subtrees of more leaves are visited in parallel.
+const PARALLEL_LEAVES: u32 = 2048;
+
+/// The part of a surface that may cover a facet, in the facet's plane.
+#[derive(Clone)]
+pub(super) struct Cover {
+    /// Screen, or `None` for a structural triangle.
+    pub(super) screen: Option<u32>,
+    /// Where it is, counter-clockwise about the plane's normal.
+    pub(super) points: Poly,
+    bounds: Aabb,
+}
+
+/// One polygon between two leaves, nothing subtracted yet.
+pub(super) struct RawFacet<'a> {
+    /// The node's plane, an index into [`Tree::planes`].
+    pub(super) plane: u32,
+    /// Leaves on the positive and on the negative side.
+    pub(super) leaves: [u32; 2],
+    /// Counter-clockwise seen from the positive side.
+    pub(super) points: &'a [DVec3],
+    /// Surfaces in the plane that come near it.
+    pub(super) covers: &'a [Cover],
+}
+
+/// What is done with the facets. Forked and joined along the tree, never along threads.
+pub(super) trait FacetSink: Send + Sized {
+    /// Whether facets within this subtree matter.
+    fn wants_subtree(&self, _child: i32) -> bool {
+        true
+    }
+    /// Whether facets between two subtrees matter.
+    fn wants_pair(&self, _front: i32, _back: i32) -> bool {
+        true
+    }
+    /// Takes a facet.
+    fn take(&mut self, facet: &RawFacet<'_>);
+    /// A sink for one subtree.
+    fn fork(&self, leaves: std::ops::Range<u32>) -> Self;
+    /// Takes over what the forks of both subtrees, front then back, gathered.
+    fn join(&mut self, front: Self, back: Self);
+}
+
+/// Everything that a visit needs.
+pub(super) struct Visitor<'a> {
+    pub(super) tree: &'a Tree,
+    pub(super) surfaces: &'a [Surface],
+    pub(super) tolerance: Tolerance,
+}
+
+/// A node's region: a box, cut by the oblique planes above the node, facing inwards.
+#[derive(Clone)]
+pub(super) struct CutBox {
+    pub(super) bounds: Aabb,
+    pub(super) cuts: SmallVec<[Plane; 16]>,
+}
+
+impl CutBox {
+    /// Its parts on the positive and on the negative side of a plane.
+    pub(super) fn split(&self, plane: &Plane) -> [Self; 2] {
+        let (mut front, mut back) = (self.clone(), self.clone());
+        match (0..3).find(|&a| plane.normal[a] == 1.0) {
+            Some(axis) => {
+                front.bounds.min[axis] = front.bounds.min[axis].max(-plane.d);
+                back.bounds.max[axis] = back.bounds.max[axis].min(-plane.d);
+            }
+            None => {
+                front.cuts.push(*plane);
+                back.cuts.push(plane.flipped());
+            }
+        }
+        [front, back]
+    }
+}
+
+impl Visitor<'_> {
+    /// Hands every facet of the tree to `sink`. Time is the number of facets times the depth.
+    pub(super) fn visit<S: FacetSink + Sync>(&self, sink: &mut S) {
+        let region = CutBox {
+            bounds: self.tree.bounds,
+            cuts: SmallVec::new(),
+        };
+        self.visit_node(self.tree.root, &region, sink);
+    }
+
+    fn visit_node<S: FacetSink + Sync>(&self, child: i32, region: &CutBox, sink: &mut S) {
+        if child < 0 || !sink.wants_subtree(child) {
+            return;
+        }
+        let node = self.tree.nodes[child as usize];
+        let plane = self.tree.planes[node.plane as usize];
+        let [front, back] = region.split(&plane);
+        let [f, b] = node.children;
+        let leaves = self.tree.leaf_range(child);
+        if leaves.len() as u32 > PARALLEL_LEAVES {
+            let mut f_sink = sink.fork(self.tree.leaf_range(f));
+            let mut b_sink = sink.fork(self.tree.leaf_range(b));
+            rayon::join(
+                || self.visit_node(f, &front, &mut f_sink),
+                || self.visit_node(b, &back, &mut b_sink),
+            );
+            sink.join(f_sink, b_sink);
+        } else {
+            self.visit_node(f, &front, sink);
+            self.visit_node(b, &back, sink);
+        }
+        if !sink.wants_pair(f, b) {
+            return;
+        }
+        let Some(points) = self.section(&plane, region) else {
+            return;
+        };
+        let reach = Aabb::of_points(&points).expanded(self.tolerance.plane);
+        let covers: Vec<Cover> = self
+            .tree
+            .surfaces_on(child as usize)
+            .iter()
+            .filter_map(|&s| {
+                let surface = &self.surfaces[s as usize];
+                let points = projected(&surface.points, &plane);
+                let bounds = Aabb::of_points(&points);
+                let screen = match surface.source {
+                    Source::Screen(id) => Some(id),
+                    Source::Triangle(_) | Source::Seam => None,
+                };
+                bounds.overlaps(&reach).then_some(Cover {
+                    screen,
+                    points,
+                    bounds,
+                })
+            })
+            .collect();
+        self.push_down(node.plane, &points, &covers, [f, b], sink);
+    }
+
+    fn section(&self, plane: &Plane, region: &CutBox) -> Option<Poly> {
+        let mut points = poly::section_of_box(plane, &region.bounds, self.tolerance.cut)?;
+        for cut in &region.cuts {
+            points = poly::clip(&points, cut, self.tolerance.cut)?;
+        }
+        Some(points)
+    }
+
+    fn push_down<S: FacetSink>(
+        &self,
+        plane: u32,
+        points: &[DVec3],
+        covers: &[Cover],
+        children: [i32; 2],
+        sink: &mut S,
+    ) {
+        if !sink.wants_pair(children[0], children[1]) {
+            return;
+        }
+        let Some(at) = (0..2).find(|&i| children[i] >= 0) else {
+            sink.take(&RawFacet {
+                plane,
+                leaves: children.map(leaf_index),
+                points,
+                covers,
+            });
+            return;
+        };
+        let node = &self.tree.nodes[children[at] as usize];
+        let cut = &self.tree.planes[node.plane as usize];
+        let with = |child: usize| {
+            let mut next = children;
+            next[at] = node.children[child];
+            next
+        };
+        match poly::split(points, cut, self.tolerance.cut) {
+            Sides::Front => self.push_down(plane, points, covers, with(0), sink),
+            Sides::Back => self.push_down(plane, points, covers, with(1), sink),
+            Sides::On => {
+                // In the node's plane but for rounding: what little there is decides.
+                let sum: f64 = points.iter().map(|&p| cut.signed_distance(p)).sum();
+                self.push_down(plane, points, covers, with(usize::from(sum < 0.0)), sink);
+            }
+            Sides::Both(f, b) => {
+                for (child, part) in [(0, f), (1, b)] {
+                    let near = self.near(&part, covers);
+                    self.push_down(plane, &part, &near, with(child), sink);
+                }
+            }
+        }
+    }
+
+    /// The covers that come near a part of the facet.
+    fn near(&self, part: &[DVec3], covers: &[Cover]) -> Vec<Cover> {
+        if covers.is_empty() {
+            return Vec::new();
+        }
+        let reach = Aabb::of_points(part).expanded(self.tolerance.plane);
+        covers
+            .iter()
+            .filter(|c| c.bounds.overlaps(&reach))
+            .cloned()
+            .collect()
+    }
+}
+
+/// What is open of a facet.
+#[derive(Default)]
+pub(super) struct OpenPieces {
+    /// Convex pieces, with the screen that each lies on.
+    pub(super) pieces: Vec<(Poly, Option<u32>)>,
+}
+
+impl OpenPieces {
+    /// Subtracts the structural covers and divides the rest by the screens.
+    ///
+    /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], are closed.
+    pub(super) fn of(facet: &RawFacet<'_>, normal: DVec3, tolerance: &Tolerance) -> Self {
+        // Beside a triangle that was moved into its plane, a gap may be nothing but that move; away
+        // from triangles a sliver is as open as any facet, and closing it would part a cell.
+        let is_bare = facet.covers.iter().all(|c| c.screen.is_some());
+        let (min_area, min_width) = if is_bare {
+            (0.0, 2.0 * tolerance.cut)
+        } else {
+            (MIN_AREA, tolerance.width)
+        };
+        let open = |p: &Poly| poly::area(p) >= min_area && poly::width(p) >= min_width;
+        let mut rest: Vec<Poly> = vec![facet.points.into()];
+        rest.retain(open);
+        for cover in facet.covers.iter().filter(|c| c.screen.is_none()) {
+            let mut outside = Vec::with_capacity(rest.len() + 2);
+            for p in &rest {
+                poly::cut_out(p, &cover.points, normal, tolerance.cut, 0.0, &mut outside);
+            }
+            outside.retain(open);
+            rest = outside;
+            if rest.is_empty() {
+                break;
+            }
+        }
+        let mut pieces = Vec::new();
+        for cover in facet.covers.iter().filter(|c| c.screen.is_some()) {
+            let mut outside = Vec::with_capacity(rest.len());
+            for p in &rest {
+                let width = tolerance.width;
+                let inside =
+                    poly::cut_out(p, &cover.points, normal, tolerance.cut, width, &mut outside);
+                pieces.extend(inside.filter(open).map(|p| (p, cover.screen)));
+            }
+            outside.retain(open);
+            rest = outside;
+        }
+        pieces.extend(rest.into_iter().map(|p| (p, None)));
+        Self { pieces }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Open pieces of a facet in z = 0, 1 m long and a fourth of the tolerance wide.
+    fn pieces_of_sliver(covers: &[Cover]) -> usize {
+        let tolerance = Tolerance::for_extent(10.0);
+        let w = 0.25 * tolerance.width;
+        let points = [
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::new(1.0, w, 0.0),
+            DVec3::new(0.0, w, 0.0),
+        ];
+        let facet = RawFacet {
+            plane: 0,
+            leaves: [0, 1],
+            points: &points,
+            covers,
+        };
+        OpenPieces::of(&facet, DVec3::Z, &tolerance).pieces.len()
+    }
+
+    #[test]
+    fn a_sliver_is_open_unless_it_lies_beside_a_triangle() {
+        assert_eq!(pieces_of_sliver(&[]), 1);
+        let points = Poly::from_slice(&[DVec3::ZERO, DVec3::NEG_Y, DVec3::X]);
+        let bounds = Aabb::of_points(&points);
+        let beside = |screen| Cover {
+            screen,
+            points: points.clone(),
+            bounds,
+        };
+        assert_eq!(pieces_of_sliver(&[beside(None)]), 0);
+        assert_eq!(pieces_of_sliver(&[beside(Some(0))]), 1);
+    }
+}

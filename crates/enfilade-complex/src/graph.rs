@@ -1,0 +1,299 @@
+//! The first visit: which leaves are open to each other, how widely, and how large they are.
+
+use std::ops::Range;
+
+use enfilade_geom::poly::{self, Poly, Sides};
+use enfilade_geom::{Aabb, Bvh, DVec3};
+
+use smallvec::SmallVec;
+
+use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
+use super::tree::{Tree, leaf_index};
+
+/// Openings up to so many gaps wide are cracks, with the default gap as wide as [`CRACK_WIDTH`](super::CRACK_WIDTH).
+const CRACK_GAPS: f64 = 5.0;
+
+/// No screen.
+pub(super) const NO_SCREEN: u32 = u32::MAX;
+
+/// An opening between two leaves, on one screen or on none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct OpenFacet {
+    /// Leaves on the positive and on the negative side of its plane.
+    pub(super) leaves: [u32; 2],
+    /// Width of its widest piece.
+    pub(super) width: f32,
+    /// Area of all its pieces.
+    pub(super) area: f32,
+    /// The screen that it lies on, or [`NO_SCREEN`].
+    pub(super) screen: u32,
+    /// No piece of it is wider than a crack.
+    pub(super) is_narrow: bool,
+    /// No piece of it lets a ball of the smallest hole pass: it may be sealed.
+    pub(super) is_gap: bool,
+}
+
+/// What the first visit finds out.
+pub(super) struct LeafGraph {
+    /// Openings, in the order of the tree.
+    pub(super) facets: Vec<OpenFacet>,
+    /// Volume of each leaf.
+    pub(super) volumes: Vec<f64>,
+    /// Area of the largest face of each leaf; volume by that is a leaf's thickness within a factor of three.
+    pub(super) faces: Vec<f32>,
+    /// Whether each leaf touches the border of the box.
+    pub(super) at_border: Vec<bool>,
+    /// Openings through which no ball of this diameter passes are narrow. [Units: wu]
+    pub(super) hole: f64,
+    /// Openings narrower than this may be steps between surfaces that were put into planes. [Units: wu]
+    pub(super) rounding: f64,
+}
+
+impl LeafGraph {
+    /// Visits the whole tree.
+    pub(super) fn of(visitor: &Visitor<'_>, clearance: &Clearance<'_>) -> Self {
+        let tree = visitor.tree;
+        let origin = tree.bounds.center();
+        let mut sink = LeafSink {
+            visitor,
+            clearance,
+            origin,
+            first_leaf: 0,
+            facets: Vec::new(),
+            volumes: vec![0.0; tree.n_leaves as usize],
+            faces: vec![0.0; tree.n_leaves as usize],
+        };
+        visitor.visit(&mut sink);
+        let LeafSink {
+            facets,
+            mut volumes,
+            faces,
+            ..
+        } = sink;
+        let mut at_border = vec![false; tree.n_leaves as usize];
+        for (face, outward) in box_faces(&tree.bounds) {
+            sides_of_border(
+                tree,
+                tree.root,
+                &face,
+                visitor.tolerance.cut,
+                &mut |leaf, piece| {
+                    at_border[leaf as usize] = true;
+                    volumes[leaf as usize] += cone_volume(piece, outward, origin);
+                },
+            );
+        }
+        // Degenerate leaves come out as noise about zero.
+        for v in &mut volumes {
+            *v = v.max(0.0);
+        }
+        let mut graph = Self {
+            facets,
+            volumes,
+            faces,
+            at_border,
+            hole: clearance.hole,
+            rounding: visitor.tolerance.width,
+        };
+        for i in 0..graph.facets.len() {
+            let mut f = graph.facets[i];
+            let width = f64::from(f.width);
+            f.is_gap |= graph.is_rim(f.leaves, width, graph.hole);
+            f.is_narrow |= f.is_gap || graph.is_rim(f.leaves, width, CRACK_GAPS * graph.hole);
+            graph.facets[i] = f;
+        }
+        graph
+    }
+
+    /// Whether an opening of this width, narrower than `limit`, is at the rim of a leaf thinner than that, or no wider than
+    /// a rounding. Nothing that has room passes there: it passes through the wide faces of the leaf.
+    pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64, limit: f64) -> bool {
+        let is_thin = |&l: &u32| self.is_thinner(l, limit);
+        width < limit && (width < self.rounding || leaves.iter().any(is_thin))
+    }
+
+    /// Whether no ball of the smallest hole fits into a leaf, but for a factor of three.
+    pub(super) fn is_thin(&self, leaf: u32) -> bool {
+        self.is_thinner(leaf, self.hole)
+    }
+
+    fn is_thinner(&self, leaf: u32, limit: f64) -> bool {
+        self.volumes[leaf as usize] < limit * f64::from(self.faces[leaf as usize])
+    }
+}
+
+/// How much room there is around openings.
+#[derive(Clone, Copy)]
+pub(super) struct Clearance<'a> {
+    /// The structural triangles.
+    pub(super) bvh: &'a Bvh,
+    /// Diameter of the smallest hole. [Units: wu]
+    pub(super) hole: f64,
+}
+
+impl Clearance<'_> {
+    /// Whether an opening, a convex polygon, lets no ball of the smallest hole pass: no point of it is farther than
+    /// half the hole's width from matter.
+    ///
+    /// Sampled at its middle, its corners, the middles of its edges and half way. The width of the polygon says nothing:
+    /// cuts of the tree make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes
+    /// there are wide ones.
+    /// One query of the triangles in the open, at most `4n + 1` in a gap.
+    pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
+        self.is_narrower(points, self.hole, true)
+    }
+
+    /// Whether an opening lets no ball of so large a diameter pass; by its middle alone where the rest does not count.
+    fn is_narrower(&self, points: &[DVec3], diameter: f64, is_whole: bool) -> bool {
+        if diameter <= 0.0 {
+            return false;
+        }
+        let reach = 0.5 * diameter;
+        let n = points.len();
+        let middle = points.iter().sum::<DVec3>() / n as f64;
+        let between = (0..n).map(|i| points[i].midpoint(points[(i + 1) % n]));
+        // Corners are where matter is: a tenth of the way to the middle tells more.
+        let inner = points.iter().copied().chain(between);
+        let inner = inner.flat_map(|p| [0.1, 0.5].map(|t| p.lerp(middle, t)));
+        let inner = inner.filter(|_| is_whole);
+        // Distances change no faster than places do, so near a point that is known to be close no other is asked.
+        let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
+        std::iter::once(middle).chain(inner).all(|p| {
+            if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
+                return true;
+            }
+            let distance = self.bvh.any_within(p, reach);
+            known.extend(distance.map(|d| (p, reach - d)));
+            distance.is_some()
+        })
+    }
+}
+
+/// Signed volume of the cone from `origin` over a polygon: what divergence sums up.
+fn cone_volume(points: &[DVec3], normal: DVec3, origin: DVec3) -> f64 {
+    poly::area(points) * normal.dot(points[0] - origin) / 3.0
+}
+
+/// The six faces of a box with their outward normals.
+pub(super) fn box_faces(b: &Aabb) -> [(Poly, DVec3); 6] {
+    std::array::from_fn(|i| {
+        let (axis, high) = (i % 3, i >= 3);
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let face = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(pu, pv)| {
+            let mut p = if high { b.max } else { b.min };
+            p[u] = [b.min[u], b.max[u]][pu];
+            p[v] = [b.min[v], b.max[v]][pv];
+            p
+        });
+        let mut normal = DVec3::ZERO;
+        normal[axis] = if high { 1.0 } else { -1.0 };
+        (Poly::from_slice(&face), normal)
+    })
+}
+
+/// Pushes a polygon down the tree and hands out its piece of every leaf.
+pub(super) fn sides_of_border(
+    tree: &Tree,
+    child: i32,
+    points: &[DVec3],
+    eps: f64,
+    take: &mut impl FnMut(u32, &[DVec3]),
+) {
+    if child < 0 {
+        return take(leaf_index(child), points);
+    }
+    let node = &tree.nodes[child as usize];
+    match poly::split(points, &tree.planes[node.plane as usize], eps) {
+        Sides::Front | Sides::On => sides_of_border(tree, node.children[0], points, eps, take),
+        Sides::Back => sides_of_border(tree, node.children[1], points, eps, take),
+        Sides::Both(f, b) => {
+            sides_of_border(tree, node.children[0], &f, eps, take);
+            sides_of_border(tree, node.children[1], &b, eps, take);
+        }
+    }
+}
+
+struct LeafSink<'a> {
+    visitor: &'a Visitor<'a>,
+    clearance: &'a Clearance<'a>,
+    origin: DVec3,
+    first_leaf: u32,
+    facets: Vec<OpenFacet>,
+    /// Of the leaves from `first_leaf` on.
+    volumes: Vec<f64>,
+    /// Likewise.
+    faces: Vec<f32>,
+}
+
+impl FacetSink for LeafSink<'_> {
+    fn take(&mut self, facet: &RawFacet<'_>) {
+        let normal = self.visitor.tree.planes[facet.plane as usize].normal;
+        let cone = cone_volume(facet.points, normal, self.origin);
+        let [front, back] = facet.leaves.map(|l| (l - self.first_leaf) as usize);
+        self.volumes[front] -= cone;
+        self.volumes[back] += cone;
+        let face = poly::area(facet.points) as f32;
+        for leaf in [front, back] {
+            self.faces[leaf] = self.faces[leaf].max(face);
+        }
+        let first = self.facets.len();
+        for (piece, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+            let screen = screen.unwrap_or(NO_SCREEN);
+            let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
+            let is_narrower = |diameter: f64| {
+                let is_whole = f64::from(width) >= diameter;
+                self.clearance.is_narrower(&piece, diameter, is_whole)
+            };
+            let hole = self.clearance.hole;
+            let is_gap = is_narrower(hole);
+            let is_narrow = is_gap || is_narrower(CRACK_GAPS * hole);
+            match self.facets[first..].iter_mut().find(|f| f.screen == screen) {
+                Some(f) => {
+                    f.width = f.width.max(width);
+                    f.area += area;
+                    f.is_narrow &= is_narrow;
+                    f.is_gap &= is_gap;
+                }
+                None => {
+                    self.facets.push(OpenFacet {
+                        leaves: facet.leaves,
+                        width,
+                        area,
+                        screen,
+                        is_narrow,
+                        is_gap,
+                    });
+                }
+            }
+        }
+    }
+
+    fn fork(&self, leaves: Range<u32>) -> Self {
+        Self {
+            visitor: self.visitor,
+            clearance: self.clearance,
+            origin: self.origin,
+            first_leaf: leaves.start,
+            facets: Vec::new(),
+            volumes: vec![0.0; leaves.len()],
+            faces: vec![0.0; leaves.len()],
+        }
+    }
+
+    fn join(&mut self, front: Self, back: Self) {
+        for part in [front, back] {
+            if self.facets.is_empty() {
+                self.facets = part.facets;
+            } else {
+                self.facets.extend_from_slice(&part.facets);
+            }
+            let at = (part.first_leaf - self.first_leaf) as usize;
+            for (sum, v) in self.volumes[at..].iter_mut().zip(&part.volumes) {
+                *sum += v;
+            }
+            for (most, v) in self.faces[at..].iter_mut().zip(&part.faces) {
+                *most = most.max(*v);
+            }
+        }
+    }
+}

@@ -1,0 +1,436 @@
+//! From votes to cells: which leaves make up which cell.
+//!
+//! 1. Leaves open to each other other than through screens and gaps form components. A gap is an opening through
+//!    which no ball of the smallest hole passes. Where rooms run into each other so, cracks are left out as well, which
+//!    are a few times as wide.
+//! 2. A component in which one label rules belongs to it. One with several strong labels has a
+//!    leak: it is grown together along its openings, widest first, unless that would join two
+//!    labels (Kruskal's forest), so that cells meet at the narrowest places.
+//! 3. Parts of one label that open to each other are one again, screen or not.
+//! 4. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
+//!    most, through a screen if need be. What opens nowhere but through gaps and nobody votes for is matter.
+//! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the largest gaps to, matter included.
+//!
+//! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use enfilade_geom::Sets;
+use rayon::prelude::*;
+
+use super::cut::{absorb_chips, dissolve_slivers, move_borders};
+use super::graph::{LeafGraph, NO_SCREEN};
+use super::leaf_cells::{LeafCells, SOLID, Tally};
+use super::{LabelSettings, Vote};
+
+fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
+    let mut out = Tally::new();
+    for (&(leaf, label), &w) in tally {
+        *out.entry((key(leaf), label)).or_default() += w;
+    }
+    out
+}
+
+/// A maximal set of leaves that is to be one cell, or part of one.
+struct Group {
+    /// Its least leaf. Merging names a group by what that was at first, so that a large one need not tell all its
+    /// neighbors of each that it takes in.
+    root: u32,
+    label: Option<u32>,
+    /// It is a cell whatever happens around it.
+    keeps: bool,
+    volume: f64,
+    /// Open area to other groups.
+    neighbors: BTreeMap<u32, f64>,
+    /// How much of that lies on no screen.
+    leak: f64,
+}
+
+/// Divides the leaves among cells. `leaf_of` locates votes.
+pub(super) fn label_leaves(
+    graph: &LeafGraph,
+    votes: &[Vote],
+    settings: &LabelSettings,
+    has_seals: bool,
+    leaf_of: impl Fn(&Vote) -> Option<u32> + Sync + Send,
+) -> LeafCells {
+    let n_leaves = graph.volumes.len();
+    let mut tally = Tally::new();
+    // Located in parallel, counted in order, so that sums round alike on any number of threads.
+    let leaves: Vec<Option<u32>> = votes.par_iter().with_min_len(1024).map(leaf_of).collect();
+    for (vote, leaf) in votes.iter().zip(leaves) {
+        if let Some(leaf) = leaf
+            && vote.label != SOLID
+        {
+            *tally.entry((leaf, vote.label)).or_default() += f64::from(vote.weight);
+        }
+    }
+    let mut component_of = components(graph, |_| false);
+    let mut strong = strong_labels(graph, &tally, &component_of, settings);
+    let has_leak =
+        |strong: &BTreeMap<u32, Vec<u32>>, c: u32| strong.get(&c).is_some_and(|s| s.len() > 1);
+    if strong.keys().any(|&c| has_leak(&strong, c)) {
+        // Rooms that run into each other: perhaps through nothing but cracks.
+        let leaked: Vec<bool> = component_of.iter().map(|&c| has_leak(&strong, c)).collect();
+        component_of = components(graph, |leaf| leaked[leaf as usize]);
+        strong = strong_labels(graph, &tally, &component_of, settings);
+    }
+
+    // Leaves of components with several strong labels are grown together; all others at once.
+    let mut sets = Sets::new(n_leaves);
+    let mut label_of_set: Vec<u32> = vec![SOLID; n_leaves];
+    let leaked = |leaf: u32| {
+        strong
+            .get(&component_of[leaf as usize])
+            .is_some_and(|s| s.len() > 1)
+    };
+    for leaf in 0..n_leaves as u32 {
+        if !leaked(leaf) {
+            sets.join(component_of[leaf as usize], leaf);
+        }
+    }
+    for (&component, labels) in &strong {
+        if let [label] = labels[..] {
+            label_of_set[component as usize] = label;
+        }
+    }
+    let mut best_of_leaf: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    for (&(leaf, label), &w) in &tally {
+        let labels = strong
+            .get(&component_of[leaf as usize])
+            .map_or(&[][..], Vec::as_slice);
+        if labels.len() > 1 && labels.contains(&label) {
+            let best = best_of_leaf.entry(leaf).or_insert((w, label));
+            if w > best.0 {
+                *best = (w, label);
+            }
+        }
+    }
+    for (&leaf, &(_, label)) in &best_of_leaf {
+        label_of_set[leaf as usize] = label;
+    }
+    grow_together(graph, &mut sets, &mut label_of_set, &component_of, leaked);
+
+    rejoin(graph, &mut sets, &mut label_of_set);
+
+    let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
+    let groups = give_away_crumbs(graph, &mut sets, groups, has_seals);
+    let mut cells = number_cells(graph, &mut sets, &groups);
+    move_borders(graph, &mut cells, &tally);
+    absorb_chips(graph, &mut cells, settings.min_volume);
+    dissolve_slivers(graph, &mut cells);
+    keep_border_outside(graph, &mut cells);
+    cells
+}
+
+/// Gives leaves at the border that came to other cells back to the outside.
+fn keep_border_outside(graph: &LeafGraph, cells: &mut LeafCells) {
+    let Some(outside) = cells.outside else { return };
+    for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
+        let cell = std::mem::replace(&mut cells.cell_of_leaf[leaf], outside);
+        if cell != outside {
+            if cell != SOLID {
+                cells.volumes[cell as usize] -= graph.volumes[leaf];
+            }
+            cells.volumes[outside as usize] += graph.volumes[leaf];
+        }
+    }
+}
+
+/// The component of each leaf: what hangs together other than through screens, gaps and, where `parts_cracks` says so of
+/// a leaf, cracks.
+fn components(graph: &LeafGraph, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
+    let n_leaves = graph.volumes.len() as u32;
+    let mut sets = Sets::new(n_leaves as usize);
+    for f in &graph.facets {
+        let is_crack = f.is_narrow && parts_cracks(f.leaves[0]);
+        if f.screen == NO_SCREEN && !f.is_gap && !is_crack {
+            sets.join(f.leaves[0], f.leaves[1]);
+        }
+    }
+    (0..n_leaves).map(|l| sets.find(l)).collect()
+}
+
+/// The labels that stand for a region in each component; components without any are left out.
+fn strong_labels(
+    graph: &LeafGraph,
+    tally: &Tally,
+    component_of: &[u32],
+    settings: &LabelSettings,
+) -> BTreeMap<u32, Vec<u32>> {
+    let mut volume: BTreeMap<u32, f64> = BTreeMap::new();
+    for (leaf, &c) in component_of.iter().enumerate() {
+        *volume.entry(c).or_default() += graph.volumes[leaf];
+    }
+    let by_component = tally_by(tally, |leaf| component_of[leaf as usize]);
+    let (mut of_label, mut of_component) =
+        (BTreeMap::<u32, f64>::new(), BTreeMap::<u32, f64>::new());
+    for (&(c, label), &w) in &by_component {
+        *of_label.entry(label).or_default() += w;
+        *of_component.entry(c).or_default() += w;
+    }
+    let mut strong: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (&(c, label), &w) in &by_component {
+        // A share of the label, not of the component: a toilet that leaks into a hall is a small
+        // part of both together, yet all of the toilet.
+        let main = w >= settings.strong_share * of_label[&label];
+        let rules = w >= (1.0 - settings.dominance) * of_component[&c]
+            && of_component[&c] >= 0.25 * volume[&c];
+        if main || rules {
+            strong.entry(c).or_default().push(label);
+        }
+    }
+    strong
+}
+
+/// Kruskal's forest over the openings of leaked components, two labels never in one tree.
+fn grow_together(
+    graph: &LeafGraph,
+    sets: &mut Sets,
+    label_of_set: &mut [u32],
+    component_of: &[u32],
+    leaked: impl Fn(u32) -> bool,
+) {
+    let mut order: Vec<u32> = (0..graph.facets.len() as u32)
+        .filter(|&i| {
+            let f = &graph.facets[i as usize];
+            let [a, b] = f.leaves.map(|l| component_of[l as usize]);
+            f.screen == NO_SCREEN && !f.is_gap && a == b && leaked(f.leaves[0])
+        })
+        .collect();
+    order.sort_by(|&a, &b| {
+        graph.facets[b as usize]
+            .width
+            .total_cmp(&graph.facets[a as usize].width)
+            .then(a.cmp(&b))
+    });
+    for i in order {
+        let [a, b] = graph.facets[i as usize].leaves.map(|l| sets.find(l));
+        let (la, lb) = (label_of_set[a as usize], label_of_set[b as usize]);
+        if a != b && (la == lb || la == SOLID || lb == SOLID) {
+            label_of_set[sets.join(a, b) as usize] = la.min(lb);
+        }
+    }
+}
+
+/// Joins parts of one region that only a screen parts: a screen reaches beyond its opening, and two
+/// screens of one opening have a slice of a room between them.
+fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
+    for f in &graph.facets {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        let label = label_of_set[a as usize];
+        if a != b && label != SOLID && label == label_of_set[b as usize] {
+            label_of_set[sets.join(a, b) as usize] = label;
+        }
+    }
+}
+
+/// The sets that have a label, or an opening to another set that is no gap: by their least leaves.
+fn open_sets(graph: &LeafGraph, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
+    let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != SOLID).collect();
+    for f in graph.facets.iter().filter(|f| !f.is_gap) {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        if a != b {
+            is_open[a as usize] = true;
+            is_open[b as usize] = true;
+        }
+    }
+    is_open
+}
+
+/// Lets groups without a label, and small doubles of a label, join their neighbors.
+fn merge_groups(
+    graph: &LeafGraph,
+    sets: &mut Sets,
+    label_of_set: &[u32],
+    settings: &LabelSettings,
+) -> BTreeMap<u32, Group> {
+    let is_open = open_sets(graph, sets, label_of_set);
+    let mut groups: BTreeMap<u32, Group> = BTreeMap::new();
+    for leaf in 0..graph.volumes.len() as u32 {
+        let set = sets.find(leaf);
+        if !is_open[set as usize] {
+            continue;
+        }
+        let label = label_of_set[set as usize];
+        let group = groups.entry(set).or_insert(Group {
+            root: set,
+            label: (label != SOLID).then_some(label),
+            keeps: false,
+            volume: 0.0,
+            neighbors: BTreeMap::new(),
+            leak: 0.0,
+        });
+        group.volume += graph.volumes[leaf as usize];
+    }
+    for f in graph.facets.iter().filter(|f| !f.is_gap) {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        if a != b {
+            for (from, to) in [(a, b), (b, a)] {
+                if let Some(group) = groups.get_mut(&from) {
+                    *group.neighbors.entry(to).or_default() += f64::from(f.area);
+                    if f.screen == NO_SCREEN {
+                        group.leak += f64::from(f.area);
+                    }
+                }
+            }
+        }
+    }
+    // The largest group of each label keeps it whatever its size.
+    let mut main: BTreeMap<u32, (f64, Reverse<u32>)> = BTreeMap::new();
+    for (&id, group) in &groups {
+        if let Some(label) = group.label {
+            let key = (group.volume, Reverse(id));
+            let best = main.entry(label).or_insert(key);
+            if key > *best {
+                *best = key;
+            }
+        }
+    }
+    for (&id, group) in &mut groups {
+        // A closet has a door, a shaft nothing; a hollow in furniture leaks all over.
+        let open: f64 = group.neighbors.values().sum();
+        let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * open;
+        let is_part = group.volume >= settings.min_volume
+            && (settings.keeps_closed || !group.neighbors.is_empty());
+        group.keeps = !is_cavity && group.label.is_some_and(|l| main[&l].1.0 == id || is_part);
+    }
+    // Smallest first; volumes are not negative, so their bits compare like the numbers.
+    let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), group.root, id));
+    let mut queue: BinaryHeap<Reverse<(u64, u32, u32)>> = groups
+        .iter()
+        .filter(|(_, group)| !group.keeps && !group.neighbors.is_empty())
+        .map(|(&id, group)| entry(id, group))
+        .collect();
+    while let Some(Reverse((bits, _, id))) = queue.pop() {
+        let is_current = |g: &&Group| !g.keeps && g.volume.to_bits() == bits;
+        let to = groups.get(&id).filter(is_current).and_then(|group| {
+            let root = |id: &u32| groups[id].root;
+            let by_area = |a: &(&u32, &f64), b: &(&u32, &f64)| {
+                a.1.total_cmp(b.1).then_with(|| root(b.0).cmp(&root(a.0)))
+            };
+            group.neighbors.iter().max_by(by_area)
+        });
+        let Some(to) = to.map(|(&to, _)| to) else {
+            continue;
+        };
+        let (Some(merged), Some(mut host)) = (groups.remove(&id), groups.remove(&to)) else {
+            continue;
+        };
+        host.root = sets.join(merged.root, host.root);
+        host.volume += merged.volume;
+        host.label = host.label.or(merged.label);
+        host.neighbors.remove(&id);
+        for (other, area) in merged.neighbors.into_iter().filter(|n| n.0 != to) {
+            *host.neighbors.entry(other).or_default() += area;
+            if let Some(n) = groups.get_mut(&other) {
+                let area = n.neighbors.remove(&id).unwrap_or(0.0);
+                *n.neighbors.entry(to).or_default() += area;
+            }
+        }
+        if !host.keeps {
+            queue.push(entry(to, &host));
+        }
+        groups.insert(to, host);
+    }
+    groups.into_values().map(|g| (g.root, g)).collect()
+}
+
+/// Gives crumbs, in which nothing has room, to what they have the largest gaps to; where gaps are not to be sealed,
+/// all that opens nowhere but through gaps.
+///
+/// Kruskal's forest over the gaps, largest first, never two in one tree that are cells or matter: little is left to be
+/// sealed. `O(F log F)` in gaps.
+fn give_away_crumbs(
+    graph: &LeafGraph,
+    sets: &mut Sets,
+    groups: BTreeMap<u32, Group>,
+    has_seals: bool,
+) -> BTreeMap<u32, Group> {
+    let n = graph.volumes.len();
+    let mut stays = vec![false; n];
+    for (&id, _) in groups.iter().filter(|g| g.1.keeps) {
+        stays[id as usize] = true;
+    }
+    if has_seals {
+        for leaf in (0..n as u32).filter(|&l| !graph.is_thin(l)) {
+            stays[sets.find(leaf) as usize] = true;
+        }
+    }
+    // Areas are not negative, so their bits compare like the numbers.
+    let gaps = graph.facets.iter().filter(|f| f.is_gap);
+    let mut gaps: Vec<(Reverse<u32>, [u32; 2])> = gaps
+        .map(|f| (Reverse(f.area.to_bits()), f.leaves))
+        .collect();
+    gaps.par_sort_unstable();
+    for (_, leaves) in gaps {
+        let [a, b] = leaves.map(|l| sets.find(l));
+        let [a_stays, b_stays] = [a, b].map(|s| stays[s as usize]);
+        if a != b && !(a_stays && b_stays) {
+            stays[sets.join(a, b) as usize] = a_stays || b_stays;
+        }
+    }
+    let mut out: BTreeMap<u32, Group> = BTreeMap::new();
+    for (_, mut group) in groups.into_iter().filter(|g| g.1.keeps) {
+        group.root = sets.find(group.root);
+        group.volume = 0.0;
+        out.insert(group.root, group);
+    }
+    for leaf in 0..n as u32 {
+        if let Some(group) = out.get_mut(&sets.find(leaf)) {
+            group.volume += graph.volumes[leaf as usize];
+        }
+    }
+    out
+}
+
+/// Numbers the groups that are cells by label, then by falling volume; the rest is solid.
+fn number_cells(graph: &LeafGraph, sets: &mut Sets, groups: &BTreeMap<u32, Group>) -> LeafCells {
+    let mut cells: Vec<(&u32, &Group)> = groups.iter().filter(|(_, g)| g.keeps).collect();
+    cells.sort_by(|a, b| {
+        a.1.label
+            .cmp(&b.1.label)
+            .then(b.1.volume.total_cmp(&a.1.volume))
+            .then(a.0.cmp(b.0))
+    });
+    // What reaches the border is open to all that lies beyond, and that is one cell.
+    let mut border: BTreeMap<u32, f64> = BTreeMap::new();
+    for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
+        *border.entry(sets.find(leaf as u32)).or_default() += graph.volumes[leaf];
+    }
+    let outer = (0..cells.len())
+        .filter_map(|i| Some((i, *border.get(cells[i].0)?)))
+        .filter(|(_, volume)| *volume > 0.0)
+        .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+        .map(|(i, _)| *cells[i].0);
+    let also_outer: Vec<(&u32, &Group)> = cells
+        .extract_if(.., |(id, _)| {
+            outer.is_some_and(|o| o != **id) && border.contains_key(id)
+        })
+        .collect();
+    let mut cell_of_set: BTreeMap<u32, u32> = cells
+        .iter()
+        .enumerate()
+        .map(|(i, (id, _))| (**id, i as u32))
+        .collect();
+    let outside = outer.map(|id| cell_of_set[&id]);
+    let mut volumes: Vec<f64> = cells.iter().map(|(_, g)| g.volume).collect();
+    if let Some(outside) = outside {
+        for (id, group) in also_outer {
+            cell_of_set.insert(*id, outside);
+            volumes[outside as usize] += group.volume;
+        }
+    }
+    LeafCells {
+        cell_of_leaf: (0..graph.volumes.len() as u32)
+            .map(|leaf| cell_of_set.get(&sets.find(leaf)).copied().unwrap_or(SOLID))
+            .collect(),
+        label_of_cell: cells
+            .iter()
+            .map(|(_, g)| g.label.unwrap_or(SOLID))
+            .collect(),
+        volumes,
+        outside,
+    }
+}

@@ -1,0 +1,50 @@
+//! Which cell each leaf belongs to, and what votes said about it.
+
+use std::collections::BTreeMap;
+
+/// The label of leaves in no cell.
+pub(super) const SOLID: u32 = u32::MAX;
+
+/// Leaves by cell.
+pub(super) struct LeafCells {
+    /// Cell of each leaf, or [`SOLID`].
+    pub(super) cell_of_leaf: Vec<u32>,
+    /// The vote label of each cell.
+    pub(super) label_of_cell: Vec<u32>,
+    /// Volume of each cell.
+    pub(super) volumes: Vec<f64>,
+    /// The cell with most leaves at the border of the box by volume, if any touches it.
+    pub(super) outside: Option<u32>,
+}
+
+/// Votes of one leaf or component for one label.
+pub(super) type Tally = BTreeMap<(u32, u32), f64>;
+
+impl LeafCells {
+    /// Numbers the cells anew without those that lost every leaf, and sums their volumes anew from those of the leaves.
+    pub(super) fn drop_empty(&mut self, volume_of_leaf: &[f64]) {
+        let n = self.label_of_cell.len();
+        let mut volumes = vec![0.0; n];
+        let mut is_kept = vec![false; n];
+        for (leaf, &cell) in self.cell_of_leaf.iter().enumerate() {
+            if cell != SOLID {
+                volumes[cell as usize] += volume_of_leaf[leaf];
+                is_kept[cell as usize] = true;
+            }
+        }
+        let mut number = vec![SOLID; n];
+        let kept: Vec<usize> = (0..n).filter(|&c| is_kept[c]).collect();
+        for (new, &old) in kept.iter().enumerate() {
+            number[old] = new as u32;
+        }
+        for cell in self.cell_of_leaf.iter_mut().filter(|c| **c != SOLID) {
+            *cell = number[*cell as usize];
+        }
+        self.volumes = kept.iter().map(|&c| volumes[c]).collect();
+        self.label_of_cell = kept.iter().map(|&c| self.label_of_cell[c]).collect();
+        self.outside = self
+            .outside
+            .map(|c| number[c as usize])
+            .filter(|&c| c != SOLID);
+    }
+}

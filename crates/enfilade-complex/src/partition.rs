@@ -1,0 +1,320 @@
+//! The second visit: cells, portals and locator from labelled leaves.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use enfilade_cpg::{Locator, PortalKind};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding, poly};
+
+use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
+use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
+use super::leaf_cells::{LeafCells, SOLID};
+use super::pieces::{self, Opening, Piece, Rules};
+use super::seen::{self, TriangleCells};
+use super::surface::{NO_PLANE, Source, Surface};
+use super::tagged::{MIXED, TaggedTree};
+use super::{CRACK_WIDTH, Complex};
+
+/// Cells and portals, exactly.
+#[derive(Clone, Debug)]
+pub struct Partition {
+    /// The vote label that each cell goes by; several cells may share one.
+    pub label_of_cell: Vec<u32>,
+    /// Volume of each cell. [Units: wu³]
+    pub volumes: Vec<f64>,
+    /// Box of each cell.
+    pub aabbs: Vec<Aabb>,
+    /// The cell that reaches the border of the box; no other does.
+    pub outside: Option<u32>,
+    /// All openings between different cells.
+    pub portals: Vec<PartitionPortal>,
+    /// Openings narrower than [`Complex::opening_tolerance`]: slivers between planes that nearly
+    /// coincide. Following sight lines to the last bit needs them; an `f32` file cannot hold them.
+    pub hairlines: Vec<PartitionPortal>,
+    /// Gaps that are closed: what a bake adds to the model's own surfaces.
+    pub seals: Vec<Seal>,
+    /// The portals that lie on no screen: where cells leak into each other.
+    pub leaks: Vec<Leak>,
+    /// The cells that see each triangle.
+    pub triangle_cells: TriangleCells,
+    /// Point to cell.
+    pub locator: Locator,
+}
+
+/// An opening between two cells, in one plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartitionPortal {
+    /// The two cells, ascending; the plane's normal points from the first to the second.
+    pub cells: [u32; 2],
+    /// Its plane.
+    pub plane: Plane,
+    /// Convex hull of the pieces, counter-clockwise seen from the second cell.
+    pub outline: Winding,
+    /// The opening itself, as disjoint convex polygons turning as the outline does.
+    pub pieces: Vec<Winding>,
+    /// The screen that it, or its largest part on any, lies on.
+    pub screen: Option<u32>,
+    /// Total area of the pieces. [Units: wu²]
+    pub area: f64,
+    /// Width of the widest piece. [Units: wu]
+    pub width: f64,
+    /// [`PortalKind::Open`], or [`PortalKind::Crack`] where narrow and on no screen.
+    pub kind: PortalKind,
+    /// It lies on no screen.
+    pub is_leak: bool,
+}
+
+/// A polygon that closes a gap, through which no ball of the smallest hole passes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seal {
+    /// The cells on its two sides, ascending; [`u32::MAX`] is matter.
+    pub cells: [u32; 2],
+    /// Its plane; the normal points from the first side to the second.
+    pub plane: Plane,
+    /// Convex, counter-clockwise seen from the second side.
+    pub outline: Winding,
+}
+
+/// A place where two cells meet though no screen is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leak {
+    /// Index into [`Partition::portals`].
+    pub portal: u32,
+    /// The two cells.
+    pub cells: [u32; 2],
+    /// Middle of the largest piece. [Units: wu]
+    pub position: DVec3,
+    /// Width of the widest piece. [Units: wu]
+    pub width: f64,
+    /// Area of the opening. [Units: wu²]
+    pub area: f64,
+}
+
+struct PieceSink<'a> {
+    tagged: &'a TaggedTree<'a>,
+    visitor: &'a Visitor<'a>,
+    has_seals: bool,
+    /// The plane of each screen's surface.
+    plane_of_screen: &'a [u32],
+    graph: &'a LeafGraph,
+    clearance: Clearance<'a>,
+    pieces: Vec<Piece>,
+    boxes: BTreeMap<u32, Aabb>,
+}
+
+impl PieceSink<'_> {
+    fn grow_box(&mut self, cell: u32, points: &[DVec3]) {
+        if cell != SOLID {
+            let b = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
+            *b = points.iter().fold(*b, |b, &p| b.including(p));
+        }
+    }
+}
+
+impl FacetSink for PieceSink<'_> {
+    fn wants_subtree(&self, child: i32) -> bool {
+        self.tagged.tag(child) == MIXED
+    }
+
+    fn wants_pair(&self, front: i32, back: i32) -> bool {
+        let tag = self.tagged.tag(front);
+        tag == MIXED || tag != self.tagged.tag(back)
+    }
+
+    fn take(&mut self, facet: &RawFacet<'_>) {
+        let cells = facet.leaves.map(|l| self.tagged.cell_of_leaf[l as usize]);
+        if cells[0] == cells[1] {
+            return;
+        }
+        // Where a cell reaches farthest, it borders on something else.
+        for cell in cells {
+            self.grow_box(cell, facet.points);
+        }
+        if !self.has_seals && cells.contains(&SOLID) {
+            return;
+        }
+        let normal = self.visitor.tree.planes[facet.plane as usize].normal;
+        let is_flipped = cells[0] < cells[1];
+        let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
+        for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+            let is_narrow = self.clearance.is_gap(&points);
+            let (width, hole) = (poly::width(&points), self.graph.hole);
+            let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, width, hole);
+            // Where surfaces lie within a tolerance of it, parts of a screen were put into their planes; a portal has one.
+            let own = screen.and_then(|s| self.plane_of_screen.get(s as usize).copied());
+            let plane = own.filter(|&p| p != NO_PLANE).unwrap_or(facet.plane);
+            let turns = self.visitor.tree.planes[plane as usize].normal.dot(normal) < 0.0;
+            self.pieces.push(Piece {
+                cells,
+                plane,
+                is_flipped: is_flipped != turns,
+                screen,
+                is_gap: is_narrow || is_rim,
+                is_rim,
+                points,
+            });
+        }
+    }
+
+    fn fork(&self, _: Range<u32>) -> Self {
+        Self {
+            tagged: self.tagged,
+            visitor: self.visitor,
+            has_seals: self.has_seals,
+            plane_of_screen: self.plane_of_screen,
+            graph: self.graph,
+            clearance: self.clearance,
+            pieces: Vec::new(),
+            boxes: BTreeMap::new(),
+        }
+    }
+
+    fn join(&mut self, front: Self, back: Self) {
+        for part in [front, back] {
+            self.pieces.extend(part.pieces);
+            for (cell, b) in part.boxes {
+                let sum = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
+                *sum = sum.union(b);
+            }
+        }
+    }
+}
+
+/// Makes the partition that a labelling stands for.
+pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
+    let tagged = TaggedTree::new(&complex.tree, &cells.cell_of_leaf);
+    let (pieces, boxes) = gather_pieces(complex, &tagged);
+    let rules = Rules {
+        planes: &complex.tree.planes,
+        hole: complex.graph.hole,
+        has_seals: complex.has_seals,
+    };
+    let (gaps, openings): (Vec<Opening>, Vec<Opening>) = pieces::group(pieces, &rules)
+        .into_iter()
+        .partition(|o| o.is_seal);
+    let least_width = complex.tolerance.width;
+    let is_wide = |s: &Seal| poly::width(&s.outline.points) >= least_width;
+    let seals = gaps.into_iter().flat_map(seals_of).filter(is_wide);
+    let seals = seals.collect();
+    let (portals, hairlines): (Vec<_>, Vec<_>) = openings
+        .into_iter()
+        .map(portal_of)
+        .partition(|p| p.width >= least_width);
+    let aabbs = (0..cells.volumes.len() as u32)
+        .map(|c| boxes.get(&c).copied().unwrap_or(Aabb::EMPTY))
+        .collect();
+    let locator = tagged.locator(cells.outside);
+    let triangle_cells = seen::cells_of_triangles(
+        &tagged,
+        &complex.set,
+        &complex.tolerance,
+        complex.n_triangles,
+    );
+    Partition {
+        label_of_cell: cells.label_of_cell,
+        volumes: cells.volumes,
+        aabbs,
+        outside: cells.outside,
+        leaks: leaks_of(&portals),
+        portals,
+        hairlines,
+        seals,
+        triangle_cells,
+        locator,
+    }
+}
+
+/// The open pieces between leaves of different cells, and the box of each cell.
+fn gather_pieces(complex: &Complex, tagged: &TaggedTree<'_>) -> (Vec<Piece>, BTreeMap<u32, Aabb>) {
+    let tree = &complex.tree;
+    let visitor = Visitor {
+        tree,
+        surfaces: &complex.set.surfaces,
+        tolerance: complex.tolerance,
+    };
+    let plane_of_screen = planes_of_screens(&complex.set.surfaces);
+    let mut sink = PieceSink {
+        tagged,
+        visitor: &visitor,
+        has_seals: complex.has_seals,
+        plane_of_screen: &plane_of_screen,
+        graph: &complex.graph,
+        clearance: complex.clearance(),
+        pieces: Vec::new(),
+        boxes: BTreeMap::new(),
+    };
+    visitor.visit(&mut sink);
+    for (face, _) in box_faces(&tree.bounds) {
+        sides_of_border(
+            tree,
+            tree.root,
+            &face,
+            complex.tolerance.cut,
+            &mut |leaf, piece| sink.grow_box(tagged.cell_of_leaf[leaf as usize], piece),
+        );
+    }
+    (sink.pieces, sink.boxes)
+}
+
+/// The plane of each screen's surface, by the screen's index.
+fn planes_of_screens(surfaces: &[Surface]) -> Vec<u32> {
+    let mut out: Vec<u32> = Vec::new();
+    for surface in surfaces {
+        if let Source::Screen(id) = surface.source {
+            let n = out.len().max(id as usize + 1);
+            out.resize(n, NO_PLANE);
+            out[id as usize] = surface.plane;
+        }
+    }
+    out
+}
+
+/// An opening that is no gap, as a portal.
+fn portal_of(opening: Opening) -> PartitionPortal {
+    let is_leak = opening.screen.is_none();
+    PartitionPortal {
+        cells: opening.cells,
+        plane: opening.plane,
+        outline: opening.outline,
+        pieces: opening.pieces,
+        screen: opening.screen,
+        area: opening.area,
+        width: opening.width,
+        kind: if is_leak && opening.width < CRACK_WIDTH {
+            PortalKind::Crack
+        } else {
+            PortalKind::Open
+        },
+        is_leak,
+    }
+}
+
+/// Where the portals are that lie on no screen.
+fn leaks_of(portals: &[PartitionPortal]) -> Vec<Leak> {
+    let leaks = (0..).zip(portals).filter(|(_, p)| p.is_leak);
+    leaks
+        .map(|(portal, p)| Leak {
+            portal,
+            cells: p.cells,
+            // Pieces come largest first.
+            position: p.pieces.first().map_or(DVec3::ZERO, Winding::centroid),
+            width: p.width,
+            area: p.area,
+        })
+        .collect()
+}
+
+/// A seal for each piece of a gap.
+fn seals_of(gap: Opening) -> impl Iterator<Item = Seal> {
+    let Opening {
+        cells,
+        plane,
+        pieces,
+        ..
+    } = gap;
+    pieces.into_iter().map(move |outline| Seal {
+        cells,
+        plane,
+        outline,
+    })
+}

@@ -1,0 +1,425 @@
+//! Open pieces to portals: grouped by plane and cells, merged where their union is convex.
+//!
+//! The tree cuts an opening wherever its planes happen to run; those cuts mean nothing and are
+//! taken back here.
+//!
+//! What lies beside a screen, and gaps, through which no ball of the smallest hole passes, belong to an opening only where
+//! they hardly widen its outline: the slit under a wall is no part of the door in it. All others are seals. Cracks, and gaps where
+//! nothing is sealed, are one portal a plane and pair of cells.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::poly::Poly;
+use enfilade_geom::{DVec2, DVec3, Plane, Sets, Winding};
+use rayon::prelude::*;
+
+use super::CRACK_WIDTH;
+use super::leaf_cells::SOLID;
+
+/// Pieces of one plane this near to each other are one portal. [Units: wu]
+const TOGETHER: f64 = 0.01;
+
+/// Corners this near to a line lie on it; the tree's own cuts are good to 1e-9. [Units: wu]
+const STRAIGHT: f64 = 1e-7;
+
+/// A convex opening between two leaves of different cells.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    /// Ascending.
+    pub(super) cells: [u32; 2],
+    /// Index of its plane.
+    pub(super) plane: u32,
+    /// The plane's normal points to the first cell, not to the second.
+    pub(super) is_flipped: bool,
+    /// The screen that it lies on.
+    pub(super) screen: Option<u32>,
+    /// It is a gap, see [`Clearance`](super::graph::Clearance).
+    pub(super) is_gap: bool,
+    /// A gap only because it is at the rim of a thin leaf: several together may be wider than a gap.
+    pub(super) is_rim: bool,
+    /// Counter-clockwise about the plane's normal.
+    pub(super) points: Poly,
+}
+
+/// The pieces of one portal.
+pub(super) struct Opening {
+    pub(super) cells: [u32; 2],
+    pub(super) plane: Plane,
+    pub(super) outline: Winding,
+    pub(super) pieces: Vec<Winding>,
+    pub(super) screen: Option<u32>,
+    pub(super) area: f64,
+    pub(super) width: f64,
+    /// A gap, to be sealed.
+    pub(super) is_seal: bool,
+}
+
+/// What openings are told by.
+pub(super) struct Rules<'a> {
+    pub(super) planes: &'a [Plane],
+    /// Diameter of the smallest hole. [Units: wu]
+    pub(super) hole: f64,
+    /// Whether gaps are closed by seals.
+    pub(super) has_seals: bool,
+}
+
+/// Groups pieces into openings, ordered by cells, then plane, then the order of the tree.
+pub(super) fn group(mut pieces: Vec<Piece>, rules: &Rules<'_>) -> Vec<Opening> {
+    // Stable: within a key, the order of the tree stays.
+    pieces.sort_by_key(|p| (p.cells, p.plane, p.is_flipped));
+    let groups: Vec<&[Piece]> = pieces
+        .chunk_by(|a, b| (a.cells, a.plane, a.is_flipped) == (b.cells, b.plane, b.is_flipped))
+        .collect();
+    groups
+        .into_par_iter()
+        .flat_map_iter(|g| openings_of(g, rules))
+        .collect()
+}
+
+/// A convex polygon in its plane's own coordinates, counter-clockwise.
+#[derive(Clone)]
+struct Flat {
+    points: Vec<DVec2>,
+    min: DVec2,
+    max: DVec2,
+    area: f64,
+}
+
+impl Flat {
+    fn new(points: Vec<DVec2>) -> Self {
+        let min = points.iter().fold(DVec2::INFINITY, |m, p| m.min(*p));
+        let max = points.iter().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
+        let area = (1..points.len().saturating_sub(1))
+            .map(|i| (points[i] - points[0]).perp_dot(points[i + 1] - points[0]))
+            .sum::<f64>()
+            * 0.5;
+        Self {
+            points,
+            min,
+            max,
+            area,
+        }
+    }
+
+    fn touches(&self, other: &Self, slack: f64) -> bool {
+        (self.min - slack).cmple(other.max).all() && other.min.cmple(self.max + slack).all()
+    }
+
+    /// Whether an edge of it has all of `other` farther than `slack` outside.
+    fn has_edge_apart(&self, other: &Self, slack: f64) -> bool {
+        (0..self.points.len()).any(|i| {
+            let (a, b) = (self.points[i], self.points[(i + 1) % self.points.len()]);
+            let Some(outward) = (a - b).perp().try_normalize() else {
+                return false;
+            };
+            other.points.iter().all(|&p| outward.dot(p - a) > slack)
+        })
+    }
+
+    fn is_near(&self, other: &Self) -> bool {
+        self.touches(other, TOGETHER)
+            && !self.has_edge_apart(other, TOGETHER)
+            && !other.has_edge_apart(self, TOGETHER)
+    }
+
+    /// Whether a point is inside, or at most `slack` outside of each edge.
+    fn is_within(&self, p: DVec2, slack: f64) -> bool {
+        let n = self.points.len();
+        (0..n).all(|i| {
+            let (a, b) = (self.points[i], self.points[(i + 1) % n]);
+            let inward = (b - a).perp().try_normalize();
+            inward.is_none_or(|inward| inward.dot(p - a) >= -slack)
+        })
+    }
+
+    fn width(&self) -> f64 {
+        let n = self.points.len();
+        (0..n)
+            .filter_map(|i| {
+                let (a, b) = (self.points[i], self.points[(i + 1) % n]);
+                let inward = (b - a).perp().try_normalize()?;
+                Some(
+                    self.points
+                        .iter()
+                        .map(|&p| inward.dot(p - a))
+                        .fold(0.0, f64::max),
+                )
+            })
+            .fold(f64::INFINITY, f64::min)
+            .min(1e9)
+    }
+}
+
+/// Convex hull, counter-clockwise; corners within [`STRAIGHT`] of a side are left out.
+fn hull(points: impl Iterator<Item = DVec2>) -> Flat {
+    let mut at: Vec<DVec2> = points.collect();
+    at.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    at.dedup();
+    let mut ring: Vec<DVec2> = Vec::with_capacity(at.len() + 1);
+    let mut half = |sequence: &mut dyn Iterator<Item = DVec2>| {
+        let base = ring.len();
+        for p in sequence {
+            while ring.len() >= base + 2 {
+                let (a, b) = (ring[ring.len() - 2], ring[ring.len() - 1]);
+                if (b - a).perp_dot(p - b) > 0.0 {
+                    break;
+                }
+                ring.pop();
+            }
+            ring.push(p);
+        }
+        ring.pop();
+    };
+    half(&mut at.iter().copied());
+    half(&mut at.iter().rev().copied());
+    // Only now the nearly straight corners, each against its neighbors that stay: dropping while
+    // the ring is wound could let many small turns add up.
+    let mut i = 0;
+    while ring.len() > 3 && i < ring.len() {
+        let n = ring.len();
+        let (a, b, c) = (ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n]);
+        let bulge = (b - a).perp_dot(c - b).abs();
+        if bulge <= STRAIGHT * (c - a).length() {
+            ring.remove(i);
+        } else {
+            i += 1;
+        }
+    }
+    Flat::new(ring)
+}
+
+/// The union of two disjoint convex polygons where it is convex too.
+fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
+    if !a.touches(b, STRAIGHT) {
+        return None;
+    }
+    let union = hull(a.points.iter().chain(&b.points).copied());
+    let size = (union.max - union.min).max_element();
+    (union.area - a.area - b.area <= STRAIGHT * size).then_some(union)
+}
+
+/// Merges until no two neighbors have a convex union. Candidates come from a sweep, each piece
+/// tried with the next few only, so that a crack in a thousand pieces stays affordable.
+fn merge_convex(mut flats: Vec<Flat>) -> Vec<Flat> {
+    const NEXT: usize = 48;
+    loop {
+        let before = flats.len();
+        for axis in 0..2 {
+            flats.sort_by(|a, b| {
+                let (p, q) = (a.min, b.min);
+                p[axis]
+                    .total_cmp(&q[axis])
+                    .then(p[1 - axis].total_cmp(&q[1 - axis]))
+            });
+            let mut gone = vec![false; flats.len()];
+            for i in 0..flats.len() {
+                if gone[i] {
+                    continue;
+                }
+                let mut j = i + 1;
+                while j < flats.len().min(i + NEXT) {
+                    if !gone[j]
+                        && let Some(union) = convex_union(&flats[i], &flats[j])
+                    {
+                        flats[i] = union;
+                        gone[j] = true;
+                        j = i;
+                    }
+                    j += 1;
+                }
+            }
+            let mut keep = gone.iter().map(|g| !g);
+            flats.retain(|_| keep.next().unwrap_or(true));
+        }
+        if flats.len() == before {
+            return flats;
+        }
+    }
+}
+
+/// How much more than its own area something may widen the outline of the opening beside it.
+const WIDENING: f64 = 2.0;
+
+/// Pieces of one plane, one pair of cells and one direction, in the plane's own coordinates.
+struct Sheet<'a> {
+    pieces: &'a [Piece],
+    flats: Vec<Flat>,
+    plane: Plane,
+    axes: (DVec3, DVec3),
+    origin: DVec3,
+}
+
+impl<'a> Sheet<'a> {
+    fn new(pieces: &'a [Piece], planes: &[Plane]) -> Self {
+        let own = planes[pieces[0].plane as usize];
+        let plane = if pieces[0].is_flipped {
+            own.flipped()
+        } else {
+            own
+        };
+        let (u, v) = plane.basis();
+        let origin = plane.project(pieces[0].points[0]);
+        let flat = |p: &DVec3| DVec2::new(u.dot(*p - origin), v.dot(*p - origin));
+        Self {
+            pieces,
+            flats: pieces
+                .iter()
+                .map(|piece| hull(piece.points.iter().map(flat)))
+                .collect(),
+            plane,
+            axes: (u, v),
+            origin,
+        }
+    }
+
+    fn winding(&self, flat: &Flat) -> Winding {
+        let (u, v) = self.axes;
+        let solid = |p: &DVec2| self.origin + u * p.x + v * p.y;
+        Winding::new(flat.points.iter().map(solid).collect())
+    }
+
+    fn hull_of(&self, members: &[usize]) -> Flat {
+        let points = members.iter().flat_map(|&i| &self.flats[i].points);
+        hull(points.copied())
+    }
+
+    /// Pieces near each other, those on one screen together wherever they are; ordered by their least members.
+    fn clusters(&self, among: &[usize]) -> Vec<Vec<usize>> {
+        let mut sets = Sets::new(self.flats.len());
+        let mut first_on_screen = BTreeMap::new();
+        for &i in among {
+            if let Some(screen) = self.pieces[i].screen {
+                let first = *first_on_screen.entry(screen).or_insert(i);
+                sets.join(first as u32, i as u32);
+            }
+        }
+        let mut order = among.to_vec();
+        let left = |i: usize| self.flats[i].min.x;
+        order.sort_by(|&a, &b| left(a).total_cmp(&left(b)).then(a.cmp(&b)));
+        for (k, &i) in order.iter().enumerate() {
+            for &j in &order[k + 1..] {
+                if left(j) > self.flats[i].max.x + TOGETHER {
+                    break;
+                }
+                let is_apart = sets.find(i as u32) != sets.find(j as u32);
+                if is_apart && self.flats[i].is_near(&self.flats[j]) {
+                    sets.join(i as u32, j as u32);
+                }
+            }
+        }
+        let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for &i in among {
+            members.entry(sets.find(i as u32)).or_default().push(i);
+        }
+        members.into_values().collect()
+    }
+
+    /// Gives each part to the opening beside it whose outline it widens least, if by no more than `widening` times its own
+    /// area or by less than the hole; the parts that are left.
+    fn adopt(
+        &self,
+        openings: &mut [Vec<usize>],
+        mut parts: Vec<Vec<usize>>,
+        widening: f64,
+        hole: f64,
+    ) -> Vec<Vec<usize>> {
+        let mut hulls: Vec<Flat> = openings.iter().map(|o| self.hull_of(o)).collect();
+        let area = |part: &[usize]| part.iter().map(|&i| self.flats[i].area).sum::<f64>();
+        parts.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a.cmp(b)));
+        parts.retain(|part| {
+            let own = self.hull_of(part);
+            let is_beside = |o: usize| {
+                let is_near =
+                    |&i: &usize| part.iter().any(|&j| self.flats[i].is_near(&self.flats[j]));
+                hulls[o].touches(&own, TOGETHER) && openings[o].iter().any(is_near)
+            };
+            let wider = (0..openings.len()).filter(|&o| is_beside(o)).map(|o| {
+                let points = hulls[o].points.iter().chain(&own.points);
+                (o, hull(points.copied()))
+            });
+            let least = wider.min_by(|a, b| {
+                let growth = |(o, hull): &(usize, Flat)| hull.area - hulls[*o].area;
+                growth(a).total_cmp(&growth(b)).then(a.0.cmp(&b.0))
+            });
+            let Some((o, wider)) = least else { return true };
+            let is_rim = own.points.iter().all(|&p| hulls[o].is_within(p, hole));
+            if is_rim || wider.area - hulls[o].area <= widening * area(part) {
+                openings[o].extend(part);
+                hulls[o] = wider;
+                return false;
+            }
+            true
+        });
+        parts
+    }
+
+    fn opening(&self, members: &[usize], is_seal: bool) -> Opening {
+        let mut on_screen = BTreeMap::new();
+        for &i in members {
+            if let Some(screen) = self.pieces[i].screen {
+                *on_screen.entry(screen).or_insert(0.0) += self.flats[i].area;
+            }
+        }
+        let screen = on_screen
+            .into_iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+            .map(|(screen, _)| screen);
+        // No seal is wider than a gap.
+        let (apart, together): (Vec<usize>, Vec<usize>) = members
+            .iter()
+            .partition(|&&i| is_seal && self.pieces[i].is_rim);
+        let flats = |of: Vec<usize>| of.into_iter().map(|i| self.flats[i].clone()).collect();
+        let mut merged = merge_convex(flats(together));
+        merged.extend::<Vec<Flat>>(flats(apart));
+        merged.sort_by(|a, b| b.area.total_cmp(&a.area));
+        Opening {
+            cells: self.pieces[0].cells,
+            plane: self.plane,
+            outline: self.winding(&self.hull_of(members)),
+            area: merged.iter().map(|f| f.area).sum(),
+            width: merged.iter().map(Flat::width).fold(0.0, f64::max),
+            pieces: merged.iter().map(|f| self.winding(f)).collect(),
+            screen,
+            is_seal,
+        }
+    }
+}
+
+/// The openings among pieces of one plane, one pair of cells and one direction.
+fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
+    let sheet = Sheet::new(group, rules.planes);
+    let all: Vec<usize> = (0..group.len()).collect();
+    // Whatever opens to matter is to be closed, but for what nothing could close.
+    if group[0].cells[1] == SOLID {
+        return vec![sheet.opening(&all, true)];
+    }
+    let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
+    // What lies on screens makes the openings; what is open beside them belongs to them or stands for itself.
+    let (foreseen, beside): (Vec<usize>, Vec<usize>) =
+        wide.into_iter().partition(|&i| group[i].screen.is_some());
+    let mut openings = sheet.clusters(&foreseen);
+    let beside = sheet.adopt(&mut openings, sheet.clusters(&beside), WIDENING, rules.hole);
+    openings.extend(beside);
+    let gaps = gaps.into_iter().map(|i| vec![i]).collect();
+    // A gap beside a door can be as large as the wall: the sliver between two triangles of it.
+    let gaps = sheet.adopt(&mut openings, gaps, 0.0, rules.hole);
+    let mut gaps = gaps.concat();
+    let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
+    for members in openings {
+        let opening = sheet.opening(&members, false);
+        if opening.screen.is_none() && opening.width < CRACK_WIDTH {
+            cracks.extend(members);
+        } else {
+            out.push(opening);
+        }
+    }
+    if !rules.has_seals {
+        cracks.append(&mut gaps);
+    }
+    for (members, is_seal) in [(cracks, false), (gaps, true)] {
+        if !members.is_empty() {
+            out.push(sheet.opening(&members, is_seal));
+        }
+    }
+    out
+}

@@ -1,0 +1,116 @@
+//! Surfaces that lie in one plane share it: a list of distinct planes.
+
+use std::collections::HashMap;
+
+use enfilade_geom::{DVec3, Plane};
+
+/// Distinct planes, found again by rounded normal and offset.
+///
+/// Both neighbors are tried where a value is near a step. A pair missed by that (tiny polygon, far from the center)
+/// makes two planes of one.
+pub struct PlaneList {
+    planes: Vec<Plane>,
+    buckets: HashMap<[i32; 4], Vec<u32>>,
+    /// Offsets are measured from here, so that they change little with the normal. [Units: wu]
+    center: DVec3,
+    /// What lies this near to a plane lies in it. [Units: wu]
+    tolerance: f64,
+}
+
+impl PlaneList {
+    /// No planes yet. `center` is the middle of what lies in them, and points up to `tolerance` from a plane lie in it.
+    /// [Units: wu]
+    #[must_use]
+    pub fn new(center: DVec3, tolerance: f64) -> Self {
+        Self {
+            planes: Vec::new(),
+            buckets: HashMap::new(),
+            center,
+            tolerance,
+        }
+    }
+
+    /// The planes, by id.
+    #[must_use]
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes
+    }
+
+    /// The planes, by id.
+    #[must_use]
+    pub fn into_planes(self) -> Vec<Plane> {
+        self.planes
+    }
+
+    /// Id of the plane that holds all of a polygon's corners best; where there is none, of `plane`, which is added.
+    ///
+    /// `plane` is the polygon's own, [`faces_ahead`] being true of its normal. Of planes that hold it as well, the first.
+    pub fn find_or_add(&mut self, plane: &Plane, points: &[DVec3]) -> u32 {
+        let at = [
+            plane.normal.x * 256.0,
+            plane.normal.y * 256.0,
+            plane.normal.z * 256.0,
+            plane.signed_distance(self.center) * 100.0,
+        ];
+        let mut best: Option<(f64, u32)> = None;
+        for choice in 0..16_u32 {
+            let key: [i32; 4] =
+                std::array::from_fn(|i| (at[i] - 0.5).floor() as i32 + (choice >> i & 1) as i32);
+            for &id in self.buckets.get(&key).into_iter().flatten() {
+                let p = &self.planes[id as usize];
+                let stray = points
+                    .iter()
+                    .map(|&q| p.signed_distance(q).abs())
+                    .fold(0.0, f64::max);
+                if stray <= self.tolerance && best.is_none_or(|b| (stray, id) < b) {
+                    best = Some((stray, id));
+                }
+            }
+        }
+        if let Some((_, id)) = best {
+            return id;
+        }
+        let id = self.planes.len() as u32;
+        self.planes.push(*plane);
+        let key = at.map(|x| x.floor() as i32);
+        self.buckets.entry(key).or_default().push(id);
+        id
+    }
+}
+
+/// Whether a normal is the one of the two of a plane that lists hold.
+///
+/// An odd direction decides: the largest component would tie on every 45 degree wall.
+#[must_use]
+pub fn faces_ahead(normal: DVec3) -> bool {
+    normal.dot(DVec3::new(1.0, 0.618_034, 0.324_718)) >= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn polygons_in_one_plane_share_it_whatever_the_rounding() {
+        let mut list = PlaneList::new(DVec3::ZERO, 1e-5);
+        let floor = |y: f64| {
+            let points = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(x, z)| DVec3::new(x, y, z));
+            (Plane::through(points[0], DVec3::Y), points)
+        };
+        let mut ids = Vec::new();
+        for y in [0.25, 0.25 + 9e-6, 0.26, 0.25 - 9e-6, 0.25 + 2e-5] {
+            let (plane, points) = floor(y);
+            ids.push(list.find_or_add(&plane, &points));
+        }
+        assert_eq!(ids, [0, 0, 1, 0, 2]);
+        assert_eq!(list.planes().len(), 3);
+    }
+
+    #[test]
+    fn of_two_opposite_normals_one_faces_ahead() {
+        let diagonal = DVec3::new(1.0, 0.0, -1.0).normalize();
+        for n in [DVec3::X, DVec3::NEG_Y, DVec3::Z, diagonal] {
+            assert_ne!(faces_ahead(n), faces_ahead(-n));
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Surfaces (triangles and screens) and the one list of planes that they share.
+
+use std::collections::HashSet;
+
+use enfilade_geom::poly::{self, Poly};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, plane_tolerance};
+use rayon::prelude::*;
+
+use super::planes::{PlaneList, faces_ahead};
+
+/// What a surface is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Source {
+    /// A structural triangle, by its index in the input.
+    Triangle(u32),
+    /// A screen, by its index in the input.
+    Screen(u32),
+    /// A seam, see [`seams`]: it blocks and is no part of the scene.
+    Seam,
+}
+
+/// A triangle or a screen.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    /// What it is.
+    pub(super) source: Source,
+    /// Index into the list of planes, or [`NO_PLANE`].
+    pub(super) plane: u32,
+    /// Corners as given.
+    pub(super) points: SurfacePoints,
+}
+
+/// Corners of a surface; triangles stay inline.
+pub(super) type SurfacePoints = smallvec::SmallVec<[DVec3; 3]>;
+
+/// The plane of a surface too thin to have one.
+pub(super) const NO_PLANE: u32 = u32::MAX;
+
+/// Tolerances of one complex. [Units: wu]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tolerance {
+    /// Surfaces this near to a plane lie in it.
+    pub(super) plane: f64,
+    /// Corners this near to a cutting plane are on it.
+    pub(super) cut: f64,
+    /// Openings narrower than this are closed.
+    pub(super) width: f64,
+}
+
+/// Openings of less area are closed. [Units: wu²]
+pub(super) const MIN_AREA: f64 = 1e-8;
+
+/// Planes whose normals differ by less than this (radians) may hold each other's surfaces.
+pub(super) const PARALLEL: f64 = 0.02;
+
+/// Sine of the largest angle at which edges come apart, see [`seams`]; beyond it, the wedges are
+/// hardly wider than what counts as closed.
+const SHALLOW: f64 = 0.35;
+
+impl Tolerance {
+    /// For coordinates up to `extent` from the origin.
+    pub(super) fn for_extent(extent: f64) -> Self {
+        let plane = plane_tolerance(extent);
+        // f64 noise is 1e-15 of the extent; the planes that meet differ by more than plane / size,
+        // so cut corners are good to about 1e-9 of the extent.
+        let cut = (1e-10 * extent).max(1e-9);
+        Self {
+            plane,
+            cut,
+            width: 2.0 * plane,
+        }
+    }
+}
+
+/// The plane list and who lies in it.
+pub(super) struct SurfaceSet {
+    /// Surfaces, largest first, then by coordinates: the same for any order of the input.
+    pub(super) surfaces: Vec<Surface>,
+    /// Distinct planes.
+    pub(super) planes: Vec<Plane>,
+}
+
+/// Orders by area, then coordinates, so that the input's order has no say.
+fn canonical_order(surfaces: &mut [Surface]) {
+    let key = |s: &Surface| (poly::area(&s.points), matches!(s.source, Source::Screen(_)));
+    surfaces.sort_by_cached_key(|s| {
+        let (area, screen) = key(s);
+        let mut corners: Vec<[u64; 3]> = s
+            .points
+            .iter()
+            .map(|p| p.to_array().map(ordered_bits))
+            .collect();
+        // Duplicates may start at different corners or turn the other way.
+        corners.sort_unstable();
+        let by_area = std::cmp::Reverse(ordered_bits(area));
+        (screen, by_area, corners, s.source)
+    });
+}
+
+/// Bits that compare like the number.
+fn ordered_bits(x: f64) -> u64 {
+    let bits = (x + 0.0).to_bits();
+    if bits >> 63 == 1 {
+        !bits
+    } else {
+        bits | (1 << 63)
+    }
+}
+
+/// The plane of a polygon, its normal's sign chosen by the normal alone.
+///
+/// Axis-aligned planes come out exact: the normal a unit axis, the offset a corner's coordinate.
+fn own_plane(points: &[DVec3]) -> Option<Plane> {
+    let n = poly::area_normal(points).try_normalize()?;
+    for axis in 0..3 {
+        if points.iter().all(|p| p[axis] == points[0][axis]) {
+            let mut normal = DVec3::ZERO;
+            normal[axis] = 1.0;
+            return Some(Plane {
+                normal,
+                d: -points[0][axis],
+            });
+        }
+    }
+    let n = if faces_ahead(n) { n } else { -n };
+    let mean = points.iter().sum::<DVec3>() / points.len() as f64;
+    Some(Plane::through(mean, n))
+}
+
+/// Gives every surface its plane: one that exists and holds all its corners, or a new one.
+///
+/// A pair of surfaces in one plane that [`PlaneList`] misses still meets in the tree, where a surface
+/// that lies in a splitter within tolerance is taken to be in it.
+pub(super) fn gather(
+    mut surfaces: Vec<Surface>,
+    bounds: &Aabb,
+    tolerance: &Tolerance,
+) -> SurfaceSet {
+    canonical_order(&mut surfaces);
+    let mut planes = PlaneList::new(bounds.center(), tolerance.plane);
+    for s in &mut surfaces {
+        s.plane = plane_of(&s.points, &mut planes, tolerance);
+    }
+    for mut seam in seams(&surfaces, planes.planes(), tolerance) {
+        seam.plane = plane_of(&seam.points, &mut planes, tolerance);
+        surfaces.push(seam);
+    }
+    SurfaceSet {
+        surfaces,
+        planes: planes.into_planes(),
+    }
+}
+
+/// The plane in the list of a polygon; [`NO_PLANE`] where it is too thin to have one.
+fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> u32 {
+    if poly::width(points) < tolerance.plane {
+        return NO_PLANE;
+    }
+    own_plane(points).map_or(NO_PLANE, |plane| planes.find_or_add(&plane, points))
+}
+
+/// Seams along the edges that come apart as their triangles move into planes.
+///
+/// A triangle's corners are moved by up to a tolerance into its plane. Where another triangle begins
+/// at an edge so moved, in a plane at a shallow angle, the two planes cross not at the edge but far
+/// beside it, and between them is a wedge: at the edge thinner than any opening, yet open to one side
+/// before it and to the other behind it. A strip across the edge, a little higher than the
+/// wedge, closes it where the scene is closed. One query of a box tree for each edge moved.
+fn seams(surfaces: &[Surface], planes: &[Plane], tolerance: &Tolerance) -> Vec<Surface> {
+    let flat: Vec<&Surface> = surfaces
+        .iter()
+        .filter(|s| s.plane != NO_PLANE && matches!(s.source, Source::Triangle(_)))
+        .collect();
+    let is_moved = |s: &Surface| {
+        let plane = &planes[s.plane as usize];
+        s.points
+            .iter()
+            .any(|&p| plane.signed_distance(p).abs() > tolerance.cut)
+    };
+    if !flat.iter().any(|s| is_moved(s)) {
+        return Vec::new();
+    }
+    let triangles: Vec<Triangle> = flat
+        .iter()
+        .map(|s| [s.points[0], s.points[1], s.points[2]])
+        .collect();
+    let bvh = Bvh::build(&triangles);
+    let seams: Vec<(EdgeKey, Surface)> = flat
+        .par_iter()
+        .with_min_len(64)
+        .filter(|s| is_moved(s))
+        .flat_map_iter(|s| {
+            let normal = planes[s.plane as usize].normal;
+            let bvh = &bvh;
+            let flat = &flat;
+            (0..3).filter_map(move |i| {
+                let (a, b) = (s.points[i], s.points[(i + 1) % 3]);
+                let reach = Aabb::of_points(&[a, b]).expanded(tolerance.width);
+                let mut is_apart = false;
+                bvh.for_each_in_box(&reach, |t| {
+                    let other = flat[t as usize];
+                    is_apart |= other.plane != s.plane
+                        && planes[other.plane as usize]
+                            .normal
+                            .cross(normal)
+                            .length_squared()
+                            < SHALLOW * SHALLOW
+                        && run_along(&other.points, a, b, tolerance.width);
+                });
+                is_apart.then(|| {
+                    let up = normal * (1.5 * tolerance.width);
+                    let seam = Surface {
+                        source: Source::Seam,
+                        plane: NO_PLANE,
+                        points: [a - up, b - up, b + up, a + up].into_iter().collect(),
+                    };
+                    (edge_key(a, b), seam)
+                })
+            })
+        })
+        .collect();
+    // Both triangles at an edge may want one. The order is that of the surfaces, whatever the threads.
+    let mut seen: HashSet<EdgeKey> = HashSet::new();
+    seams
+        .into_iter()
+        .filter(|(key, _)| seen.insert(*key))
+        .map(|(_, seam)| seam)
+        .collect()
+}
+
+/// Whether a polygon has an edge on the segment from `a` to `b`, at least in part.
+fn run_along(points: &[DVec3], a: DVec3, b: DVec3, width: f64) -> bool {
+    let length = a.distance(b);
+    let along = (b - a) / length;
+    let mut last: Option<f64> = None;
+    points.iter().chain(&points[..1]).any(|&p| {
+        let at = along.dot(p - a);
+        let is_on_line = (p - a - along * at).length() <= width;
+        let before = std::mem::replace(&mut last, is_on_line.then_some(at));
+        let (Some(from), true) = (before, is_on_line) else {
+            return false;
+        };
+        at.max(from).min(length) - at.min(from).max(0.0) > width
+    })
+}
+
+type EdgeKey = [[u64; 3]; 2];
+
+fn edge_key(a: DVec3, b: DVec3) -> EdgeKey {
+    let mut key = [a, b].map(|p| p.to_array().map(ordered_bits));
+    key.sort_unstable();
+    key
+}
+
+/// Whether a surface lies in the plane of id `plane_id`, all of it: were fragments moved one by one,
+/// they would come apart where their regions meet.
+pub(super) fn lies_in(
+    surface_plane: u32,
+    points: &[DVec3],
+    plane_id: u32,
+    planes: &[Plane],
+    tolerance: &Tolerance,
+) -> bool {
+    if surface_plane == plane_id {
+        return true;
+    }
+    let plane = &planes[plane_id as usize];
+    // Only near-parallel ones: the tip of a steep wall is near the floor, and must stay a wall.
+    planes[surface_plane as usize]
+        .normal
+        .cross(plane.normal)
+        .length_squared()
+        < PARALLEL * PARALLEL
+        && points
+            .iter()
+            .all(|&p| plane.signed_distance(p).abs() <= tolerance.plane)
+}
+
+/// Corners moved onto `plane`, counter-clockwise seen from its positive side.
+pub(super) fn projected(points: &[DVec3], plane: &Plane) -> Poly {
+    let mut poly: Poly = points.iter().map(|&p| plane.project(p)).collect();
+    if poly::area_normal(&poly).dot(plane.normal) < 0.0 {
+        poly.reverse();
+    }
+    poly
+}

@@ -1,0 +1,284 @@
+//! Thin leaves, cut where a face of them turns from closed to open.
+//!
+//! Two triangles of one wall that do not share their corners to the last bit lie in two planes A and B
+//! that are nearly parallel. Over the one triangle the order is room, A closed, sliver, B open, wall;
+//! over the other room, A open, sliver, B closed, wall: one convex leaf, a hair thick, is widely open
+//! to both sides, and no facet of it is narrow. A plane across the sliver, through the edge where A turns from
+//! closed to open, parts it into one leaf of the room and one of the wall, and the facet between
+//! these two is as narrow as the gap is, so that what closes a gap is as small as the gap. Which leaves belong together does
+//! not rest on these cuts, see [`Clearance`](super::graph::Clearance).
+//!
+//! **Which edges:** those between the closed and the open part of a facet at which the leaf behind the facet is thinner
+//! than a gap somewhere. Walls that end in the open are left alone, and so are edges shorter than a gap: what they leave
+//! uncut is no wider.
+//!
+//! **Complexity:** one visit of all facets, one clip for each such edge and side; `k` edges in one leaf make up
+//! to `k²` leaves of it, at most [`MAX_CUTS`] are made. **What can go wrong:** cuts within a rounding
+//! of each other leave columns narrower than what counts as open; these are crumbs, which the labelling gives away.
+
+use std::ops::Range;
+
+use enfilade_geom::poly::{self, Poly, Sides};
+use enfilade_geom::{Aabb, DVec3, Plane};
+
+use super::facet::{CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
+use super::surface::Tolerance;
+use super::tree::{Node, Tree, leaf_index};
+
+/// Most cuts through one leaf; the longest are made.
+const MAX_CUTS: usize = 256;
+
+/// Where a facet turns from closed to open, seen from one of its leaves.
+struct Edge {
+    leaf: u32,
+    from: DVec3,
+    to: DVec3,
+    /// Into the leaf, along the facet's normal.
+    inward: DVec3,
+}
+
+/// A strip across a leaf.
+struct Strip {
+    plane: u32,
+    points: Poly,
+}
+
+/// The tree with its thin leaves cut. The order of the surfaces has no say.
+pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
+    let mut sink = Edges {
+        visitor,
+        found: Vec::new(),
+    };
+    visitor.visit(&mut sink);
+    let mut edges = sink.found;
+    // Stable: the order of the tree stays.
+    edges.sort_by_key(|e| e.leaf);
+    let tree = visitor.tree;
+    let mut cutter = LeafCutter {
+        tree,
+        edges: &edges,
+        gap,
+        tolerance: visitor.tolerance,
+        planes: tree.planes.clone(),
+        nodes: Vec::with_capacity(tree.nodes.len()),
+        on_plane: Vec::with_capacity(tree.on_plane.len()),
+        n_leaves: 0,
+    };
+    let root = cutter.copy(tree.root, &CutBox::all(tree.bounds));
+    let LeafCutter {
+        planes,
+        nodes,
+        on_plane,
+        n_leaves,
+        ..
+    } = cutter;
+    Tree {
+        bounds: tree.bounds,
+        planes,
+        nodes,
+        on_plane,
+        root,
+        n_leaves,
+    }
+}
+
+/// Gathers the edges between the closed and the open parts of facets.
+struct Edges<'a> {
+    visitor: &'a Visitor<'a>,
+    found: Vec<Edge>,
+}
+
+impl FacetSink for Edges<'_> {
+    fn take(&mut self, facet: &RawFacet<'_>) {
+        if facet.covers.iter().all(|c| c.screen.is_some()) {
+            return;
+        }
+        let tolerance = &self.visitor.tolerance;
+        let normal = self.visitor.tree.planes[facet.plane as usize].normal;
+        let open = OpenPieces::of(facet, normal, tolerance);
+        for (i, (piece, _)) in open.pieces.iter().enumerate() {
+            for (k, &a) in piece.iter().enumerate() {
+                let b = piece[(k + 1) % piece.len()];
+                let Some(outward) = (b - a).cross(normal).try_normalize() else {
+                    continue;
+                };
+                let beyond = |t: f64| a.lerp(b, t) + outward * tolerance.width;
+                let is_open = |t: f64| {
+                    let others = open.pieces.iter().enumerate();
+                    others
+                        .filter(|(j, _)| *j != i)
+                        .any(|(_, (other, _))| is_within(other, normal, beyond(t)))
+                };
+                let samples = [1.0 / 6.0, 0.5, 5.0 / 6.0];
+                let is_inner = |&t: &f64| is_within(facet.points, normal, beyond(t)) && !is_open(t);
+                if (b - a).length() > tolerance.width && samples.iter().any(is_inner) {
+                    for (leaf, inward) in [(facet.leaves[0], normal), (facet.leaves[1], -normal)] {
+                        self.found.push(Edge {
+                            leaf,
+                            from: a,
+                            to: b,
+                            inward,
+                        });
+                    }
+                }
+            }
+        }
+    }
+
+    fn fork(&self, _: Range<u32>) -> Self {
+        Self {
+            visitor: self.visitor,
+            found: Vec::new(),
+        }
+    }
+
+    fn join(&mut self, front: Self, back: Self) {
+        self.found.extend(front.found);
+        self.found.extend(back.found);
+    }
+}
+
+/// Whether a point in the plane of a convex polygon, counter-clockwise about `normal`, is inside.
+fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
+    (0..points.len()).all(|i| {
+        let (a, b) = (points[i], points[(i + 1) % points.len()]);
+        normal
+            .cross(b - a)
+            .try_normalize()
+            .is_none_or(|inward| inward.dot(p - a) >= 0.0)
+    })
+}
+
+struct LeafCutter<'a> {
+    tree: &'a Tree,
+    edges: &'a [Edge],
+    /// Leaves are cut where they are thinner. [Units: wu]
+    gap: f64,
+    tolerance: Tolerance,
+    planes: Vec<Plane>,
+    nodes: Vec<Node>,
+    on_plane: Vec<u32>,
+    n_leaves: u32,
+}
+
+impl LeafCutter<'_> {
+    fn edges_of(&self, leaves: Range<u32>) -> &[Edge] {
+        let at = |leaf: u32| self.edges.partition_point(|e| e.leaf < leaf);
+        &self.edges[at(leaves.start)..at(leaves.end)]
+    }
+
+    /// Copies a subtree, cutting its leaves; the new root of it.
+    fn copy(&mut self, child: i32, region: &CutBox) -> i32 {
+        if child < 0 {
+            let strips = self.strips(leaf_index(child), region);
+            return self.split(strips);
+        }
+        let node = self.tree.nodes[child as usize];
+        let at = self.push(node.plane);
+        self.on_plane
+            .extend_from_slice(self.tree.surfaces_on(child as usize));
+        let is_cut = !self.edges_of(self.tree.leaf_range(child)).is_empty();
+        let children = if is_cut {
+            let [front, back] = region.split(&self.planes[node.plane as usize]);
+            [
+                self.copy(node.children[0], &front),
+                self.copy(node.children[1], &back),
+            ]
+        } else {
+            // Nothing below is cut, so no region is asked for.
+            node.children.map(|c| self.copy(c, region))
+        };
+        self.nodes[at].children = children;
+        at as i32
+    }
+
+    fn push(&mut self, plane: u32) -> usize {
+        self.nodes.push(Node {
+            plane,
+            on_start: self.on_plane.len() as u32,
+            children: [0; 2],
+        });
+        self.nodes.len() - 1
+    }
+
+    /// The strips that are to cut a leaf.
+    fn strips(&mut self, leaf: u32, region: &CutBox) -> Vec<Strip> {
+        let mut found: Vec<(f64, Plane, Poly)> = self
+            .edges_of(leaf..leaf + 1)
+            .iter()
+            .filter_map(|e| {
+                let depth = e.inward * self.gap;
+                let quad = [e.from, e.to, e.to + depth, e.from + depth];
+                let points = region.clip(&quad, self.tolerance.cut)?;
+                let length = e.from.distance(e.to);
+                // Whole strips are where the leaf is thick; the rest is for the corners of leaves.
+                let is_thin = poly::area(&points) < 0.99 * length * self.gap;
+                let normal = (e.to - e.from).cross(e.inward).try_normalize()?;
+                let is_there = poly::width(&points) > 2.0 * self.tolerance.cut;
+                let is_long = length > self.gap;
+                (is_thin && is_there && is_long)
+                    .then(|| (length, Plane::through(e.from, normal), points))
+            })
+            .collect();
+        // Longest first; what is alike comes from both sides of one edge.
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(MAX_CUTS);
+        found
+            .into_iter()
+            .map(|(_, plane, points)| {
+                self.planes.push(plane);
+                Strip {
+                    plane: self.planes.len() as u32 - 1,
+                    points,
+                }
+            })
+            .collect()
+    }
+
+    /// Splits a leaf by the planes of strips, each only where it lies.
+    fn split(&mut self, mut strips: Vec<Strip>) -> i32 {
+        if strips.is_empty() {
+            self.n_leaves += 1;
+            return -(self.n_leaves as i32);
+        }
+        let first = strips.remove(0);
+        let plane = self.planes[first.plane as usize];
+        let at = self.push(first.plane);
+        let mut sides = [Vec::new(), Vec::new()];
+        for s in strips {
+            match poly::split(&s.points, &plane, self.tolerance.plane) {
+                Sides::On => {}
+                Sides::Front => sides[0].push(s),
+                Sides::Back => sides[1].push(s),
+                Sides::Both(front, back) => {
+                    for (side, points) in sides.iter_mut().zip([front, back]) {
+                        let plane = s.plane;
+                        side.push(Strip { plane, points });
+                    }
+                }
+            }
+        }
+        let [front, back] = sides;
+        let children = [self.split(front), self.split(back)];
+        self.nodes[at].children = children;
+        at as i32
+    }
+}
+
+impl CutBox {
+    fn all(bounds: Aabb) -> Self {
+        Self {
+            bounds,
+            cuts: smallvec::SmallVec::new(),
+        }
+    }
+
+    /// The part of a polygon in it.
+    fn clip(&self, points: &[DVec3], eps: f64) -> Option<Poly> {
+        let mut points = poly::clip_to_box(points, &self.bounds, eps)?;
+        for cut in &self.cuts {
+            points = poly::clip(&points, cut, eps)?;
+        }
+        Some(points)
+    }
+}

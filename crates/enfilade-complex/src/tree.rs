@@ -1,0 +1,509 @@
+//! The plane tree: axis-aligned splits while a box holds many surfaces, then the planes of the
+//! surfaces themselves.
+//!
+//! The lower part is the BSP of Lefebvre & Hornus 2003 (§2, step 1), split by the surfaces' own
+//! planes; that one may begin with given planes, such as a grid's, is in their notes after §3.0.2.
+//! A pure autopartition lets every wall's plane cut the whole building; boxes first keep each plane local, which is
+//! what makes the number of leaves near-linear. A box side is put on a large axis-aligned surface
+//! where there is one, as that surface then needs no split of its own.
+
+use enfilade_geom::poly::{self, Poly, Sides};
+use enfilade_geom::{Aabb, DVec3, Plane};
+
+use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
+
+/// A box with this many fragments or fewer is split by their own planes.
+///
+/// Fewer makes more boxes, more makes planes cut more of each other.
+const MAX_BOX_FRAGMENTS: usize = 8;
+
+/// Boxes are not split below this edge length. [Units: wu]
+const MIN_BOX: f64 = 0.02;
+
+/// In boxes that cannot be split any more, fragments beyond this number stay in leaves uncut.
+///
+/// An uncut fragment does not block: cells grow together there, which keeps every promise.
+const MAX_BSP_FRAGMENTS: usize = 512;
+
+/// Subtrees with more fragments are built in parallel; a fixed number, so that the tree is the
+/// same for any number of threads.
+const PARALLEL_FRAGMENTS: usize = 1000;
+
+/// Splits of larger sets are chosen by this many of their fragments.
+const SAMPLE: usize = 1024;
+
+/// An inner node. Children: a node index (`>= 0`) or `-1 - leaf`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// Index into [`Tree::planes`].
+    pub(super) plane: u32,
+    /// Where its surfaces start in [`Tree::on_plane`]; they end where the next node's start.
+    pub(super) on_start: u32,
+    /// Positive and negative side.
+    pub(super) children: [i32; 2],
+}
+
+/// The plane tree. Nodes are in preorder, leaves numbered from left to right.
+pub(super) struct Tree {
+    /// What it covers.
+    pub(super) bounds: Aabb,
+    /// Planes of surfaces, then of box sides.
+    pub(super) planes: Vec<Plane>,
+    /// Inner nodes.
+    pub(super) nodes: Vec<Node>,
+    /// Surfaces that lie in a node's plane within the node's region.
+    pub(super) on_plane: Vec<u32>,
+    /// The root.
+    pub(super) root: i32,
+    /// Number of leaves.
+    pub(super) n_leaves: u32,
+}
+
+impl Tree {
+    /// The surfaces that lie in a node's plane.
+    pub(super) fn surfaces_on(&self, node: usize) -> &[u32] {
+        let end = self
+            .nodes
+            .get(node + 1)
+            .map_or(self.on_plane.len(), |n| n.on_start as usize);
+        &self.on_plane[self.nodes[node].on_start as usize..end]
+    }
+
+    /// The leaf that holds `p`; points in a plane count as in front.
+    pub(super) fn leaf_of(&self, p: DVec3) -> u32 {
+        let mut at = self.root;
+        while at >= 0 {
+            let node = &self.nodes[at as usize];
+            let n = &self.planes[node.plane as usize];
+            // The same expression as in the locator, so that both always agree.
+            let side = n.normal.x * p.x + n.normal.y * p.y + n.normal.z * p.z + n.d;
+            at = node.children[usize::from(side < 0.0)];
+        }
+        leaf_index(at)
+    }
+
+    /// First leaf below `child` and one past the last.
+    pub(super) fn leaf_range(&self, child: i32) -> std::ops::Range<u32> {
+        let end = |side: usize| {
+            let mut at = child;
+            while at >= 0 {
+                at = self.nodes[at as usize].children[side];
+            }
+            leaf_index(at)
+        };
+        end(0)..end(1) + 1
+    }
+}
+
+/// The leaf that a child value stands for.
+pub(super) fn leaf_index(child: i32) -> u32 {
+    (-1 - child) as u32
+}
+
+/// A piece of a surface in a box or in a region of it.
+struct Fragment {
+    surface: u32,
+    points: Poly,
+}
+
+/// A subtree under construction; box-side planes are numbered after the surfaces' planes.
+#[derive(Default)]
+struct Part {
+    nodes: Vec<Node>,
+    on_plane: Vec<u32>,
+    sides: Vec<(u8, f64)>,
+    n_leaves: u32,
+}
+
+impl Part {
+    fn leaf(&mut self) -> i32 {
+        self.n_leaves += 1;
+        -(self.n_leaves as i32)
+    }
+
+    /// Appends a part built on its own; returns what its root is here.
+    fn append(&mut self, part: &Part, root: i32, n_surface_planes: u32) -> i32 {
+        let (node0, on0) = (self.nodes.len() as i32, self.on_plane.len() as u32);
+        let (side0, leaf0) = (self.sides.len() as u32, self.n_leaves as i32);
+        let shifted = |child: i32| {
+            if child >= 0 {
+                child + node0
+            } else {
+                child - leaf0
+            }
+        };
+        self.nodes.extend(part.nodes.iter().map(|n| Node {
+            plane: if n.plane >= n_surface_planes {
+                n.plane + side0
+            } else {
+                n.plane
+            },
+            on_start: n.on_start + on0,
+            children: n.children.map(shifted),
+        }));
+        self.on_plane.extend_from_slice(&part.on_plane);
+        self.sides.extend_from_slice(&part.sides);
+        self.n_leaves += part.n_leaves;
+        shifted(root)
+    }
+}
+
+/// Builds the tree. Near-linear in fragments for scenes whose surfaces are spread out; a knot of
+/// `k` surfaces through one point makes up to `k²` leaves.
+pub(super) fn build(set: &SurfaceSet, bounds: Aabb, tolerance: &Tolerance) -> Tree {
+    let fragments: Vec<Fragment> = (0..set.surfaces.len() as u32)
+        .filter_map(|surface| {
+            let s = &set.surfaces[surface as usize];
+            if s.plane == NO_PLANE {
+                return None;
+            }
+            let points = poly::clip_to_box(&s.points, &bounds, tolerance.cut)?;
+            Some(Fragment { surface, points })
+        })
+        .collect();
+    let axis_of: Vec<Option<u8>> = set
+        .planes
+        .iter()
+        .map(|p| (0..3).find(|&a| p.normal[a] == 1.0).map(|a| a as u8))
+        .collect();
+    let builder = Builder {
+        set,
+        axis_of,
+        tolerance: *tolerance,
+    };
+    let mut part = Part::default();
+    let root = builder.split_box(fragments, bounds, &mut part);
+    let mut planes = set.planes.clone();
+    // Boxes beside each other are often split at the same place; one plane, one id.
+    let mut distinct: Vec<(u8, u64)> = part.sides.iter().map(|&(a, x)| (a, x.to_bits())).collect();
+    distinct.sort_unstable();
+    distinct.dedup();
+    let n_surface_planes = planes.len() as u32;
+    for node in &mut part.nodes {
+        if node.plane >= n_surface_planes {
+            let (axis, at) = part.sides[(node.plane - n_surface_planes) as usize];
+            let rank = distinct.partition_point(|&k| k < (axis, at.to_bits()));
+            node.plane = n_surface_planes + rank as u32;
+        }
+    }
+    planes.extend(distinct.iter().map(|&(axis, bits)| {
+        let mut normal = DVec3::ZERO;
+        normal[axis as usize] = 1.0;
+        Plane {
+            normal,
+            d: -f64::from_bits(bits),
+        }
+    }));
+    Tree {
+        bounds,
+        planes,
+        nodes: part.nodes,
+        on_plane: part.on_plane,
+        root,
+        n_leaves: part.n_leaves,
+    }
+}
+
+struct Builder<'a> {
+    set: &'a SurfaceSet,
+    axis_of: Vec<Option<u8>>,
+    tolerance: Tolerance,
+}
+
+/// How a box is to be split.
+struct BoxSplit {
+    axis: usize,
+    at: f64,
+    plane: Option<u32>,
+}
+
+impl Builder<'_> {
+    fn plane_of(&self, f: &Fragment) -> u32 {
+        self.set.surfaces[f.surface as usize].plane
+    }
+
+    fn split_box(&self, fragments: Vec<Fragment>, bounds: Aabb, out: &mut Part) -> i32 {
+        let n = fragments.len();
+        let split = if n > MAX_BOX_FRAGMENTS {
+            self.choose_box_split(&fragments, &bounds)
+        } else {
+            None
+        };
+        let Some(split) = split else {
+            return self.split_by_planes(fragments, out);
+        };
+        let n_surface_planes = self.set.planes.len() as u32;
+        let node = out.nodes.len();
+        let plane = split
+            .plane
+            .unwrap_or(n_surface_planes + out.sides.len() as u32);
+        if split.plane.is_none() {
+            out.sides.push((split.axis as u8, split.at));
+        }
+        out.nodes.push(Node {
+            plane,
+            on_start: out.on_plane.len() as u32,
+            children: [0; 2],
+        });
+        let mut normal = DVec3::ZERO;
+        normal[split.axis] = 1.0;
+        let cut = Plane {
+            normal,
+            d: -split.at,
+        };
+        let (front, back) = self.distribute(fragments, split.plane, &cut, &mut out.on_plane);
+        let (mut front_box, mut back_box) = (bounds, bounds);
+        front_box.min[split.axis] = split.at;
+        back_box.max[split.axis] = split.at;
+        let children = if n > PARALLEL_FRAGMENTS {
+            let build = |fragments, bounds| {
+                let mut part = Part::default();
+                let root = self.split_box(fragments, bounds, &mut part);
+                (part, root)
+            };
+            let ((f, f_root), (b, b_root)) =
+                rayon::join(|| build(front, front_box), || build(back, back_box));
+            let f_root = out.append(&f, f_root, n_surface_planes);
+            drop(f);
+            [f_root, out.append(&b, b_root, n_surface_planes)]
+        } else {
+            [
+                self.split_box(front, front_box, out),
+                self.split_box(back, back_box, out),
+            ]
+        };
+        out.nodes[node].children = children;
+        node as i32
+    }
+
+    /// Sorts fragments to the sides of a plane; those in it are noted in `on_plane`.
+    fn distribute(
+        &self,
+        fragments: Vec<Fragment>,
+        plane_id: Option<u32>,
+        cut: &Plane,
+        on_plane: &mut Vec<u32>,
+    ) -> (Vec<Fragment>, Vec<Fragment>) {
+        let on_start = on_plane.len();
+        let (mut front, mut back) = (Vec::new(), Vec::new());
+        for f in fragments {
+            let own = self.plane_of(&f);
+            if let Some(id) = plane_id
+                && lies_in(
+                    own,
+                    &self.set.surfaces[f.surface as usize].points,
+                    id,
+                    &self.set.planes,
+                    &self.tolerance,
+                )
+            {
+                on_plane.push(f.surface);
+                continue;
+            }
+            match poly::split(&f.points, cut, self.tolerance.cut) {
+                Sides::Front => front.push(f),
+                Sides::Back => back.push(f),
+                Sides::Both(a, b) => {
+                    front.push(Fragment {
+                        surface: f.surface,
+                        points: a,
+                    });
+                    back.push(Fragment {
+                        surface: f.surface,
+                        points: b,
+                    });
+                }
+                // Too small to tell: nothing of it is left.
+                Sides::On => {}
+            }
+        }
+        // A surface may arrive in several fragments where regions were cut before.
+        on_plane[on_start..].sort_unstable();
+        let mut kept = on_start;
+        for i in on_start..on_plane.len() {
+            if i == on_start || on_plane[i] != on_plane[kept - 1] {
+                on_plane[kept] = on_plane[i];
+                kept += 1;
+            }
+        }
+        on_plane.truncate(kept);
+        (front, back)
+    }
+
+    /// The split of least surface-area cost; `None` where the box had better not be split.
+    fn choose_box_split(&self, fragments: &[Fragment], bounds: &Aabb) -> Option<BoxSplit> {
+        let stride = fragments.len().div_ceil(SAMPLE);
+        let sample: Vec<&Fragment> = fragments.iter().step_by(stride).collect();
+        let boxes: Vec<Aabb> = sample.iter().map(|f| Aabb::of_points(&f.points)).collect();
+        let total = sample.len() as f64;
+        let size = bounds.size();
+        let mut best: Option<(f64, BoxSplit)> = None;
+        // Away from the corners of surfaces, lest a cut shaves off what is thinner than an epsilon.
+        let gap = 50.0 * self.tolerance.plane;
+        for axis in 0..3 {
+            if size[axis] < MIN_BOX {
+                continue;
+            }
+            let (lo, hi) = (bounds.min[axis], bounds.max[axis]);
+            let mut mins: Vec<f64> = boxes.iter().map(|b| b.min[axis]).collect();
+            let mut maxs: Vec<f64> = boxes.iter().map(|b| b.max[axis]).collect();
+            mins.sort_unstable_by(f64::total_cmp);
+            maxs.sort_unstable_by(f64::total_cmp);
+            let (u, v) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
+            let share = |extent: f64| 2.0 * (u * v + extent * (u + v));
+            let cost = |at: f64, slack: f64| {
+                let n_back = mins.partition_point(|&x| x < at - slack) as f64;
+                let n_front = total - maxs.partition_point(|&x| x <= at + slack) as f64;
+                (share(at - lo) * n_back + share(hi - at) * n_front) / share(hi - lo)
+            };
+            // The planes of axis-aligned surfaces; what covers much of the section comes first.
+            let mut flat: Vec<(f64, u32, f64)> = sample
+                .iter()
+                .filter(|f| self.axis_of[self.plane_of(f) as usize] == Some(axis as u8))
+                .map(|f| {
+                    let id = self.plane_of(f);
+                    (-self.set.planes[id as usize].d, id, poly::area(&f.points))
+                })
+                .filter(|&(at, ..)| at > lo + self.tolerance.cut && at < hi - self.tolerance.cut)
+                .collect();
+            flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for group in flat.chunk_by(|a, b| a.1 == b.1) {
+                let (at, id, _) = group[0];
+                let covered: f64 = group.iter().map(|g| g.2).sum::<f64>() * stride as f64;
+                let coverage = (covered / (u * v)).min(1.0);
+                let c = cost(at, self.tolerance.plane) * (1.0 - 0.3 * coverage);
+                if best.as_ref().is_none_or(|b| c < b.0) {
+                    best = Some((
+                        c,
+                        BoxSplit {
+                            axis,
+                            at,
+                            plane: Some(id),
+                        },
+                    ));
+                }
+            }
+            let mut ends: Vec<f64> = mins.iter().chain(&maxs).copied().collect();
+            ends.push(lo);
+            ends.push(hi);
+            ends.sort_unstable_by(f64::total_cmp);
+            let step = (ends.len() / 128).max(1);
+            for pair in ends.windows(2).step_by(step) {
+                let at = 0.5 * (pair[0] + pair[1]);
+                if pair[1] - pair[0] < 2.0 * gap
+                    || at - lo < MIN_BOX * 0.25
+                    || hi - at < MIN_BOX * 0.25
+                {
+                    continue;
+                }
+                let c = cost(at, 0.0);
+                if best.as_ref().is_none_or(|b| c < b.0) {
+                    best = Some((
+                        c,
+                        BoxSplit {
+                            axis,
+                            at,
+                            plane: None,
+                        },
+                    ));
+                }
+            }
+        }
+        let Some((cost, split)) = best else {
+            return self.halve(fragments.len(), bounds);
+        };
+        // A split that separates next to nothing only multiplies fragments.
+        let useful =
+            cost < 0.9 * total || (fragments.len() > 4 * MAX_BOX_FRAGMENTS && cost < 0.99 * total);
+        if useful {
+            Some(split)
+        } else {
+            self.halve(fragments.len(), bounds)
+        }
+    }
+
+    /// Middle of the longest side, for what is too dense for its own planes and cannot be split
+    /// well: costly, but it ends at [`MIN_BOX`].
+    fn halve(&self, n_fragments: usize, bounds: &Aabb) -> Option<BoxSplit> {
+        let size = bounds.size();
+        let axis = (0..3)
+            .max_by(|&a, &b| size[a].total_cmp(&size[b]))
+            .unwrap_or(0);
+        if n_fragments <= MAX_BSP_FRAGMENTS || size[axis] < MIN_BOX {
+            return None;
+        }
+        // Not the very middle: corners like to be there.
+        let at = bounds.min[axis] + 0.483_217 * size[axis];
+        Some(BoxSplit {
+            axis,
+            at,
+            plane: None,
+        })
+    }
+
+    /// Splits a convex region by the planes of what is in it.
+    fn split_by_planes(&self, fragments: Vec<Fragment>, out: &mut Part) -> i32 {
+        if fragments.is_empty() {
+            return out.leaf();
+        }
+        let fragments = bounded(fragments);
+        let plane = self.choose_plane(&fragments);
+        let node = out.nodes.len();
+        out.nodes.push(Node {
+            plane,
+            on_start: out.on_plane.len() as u32,
+            children: [0; 2],
+        });
+        let cut = self.set.planes[plane as usize];
+        let (front, back) = self.distribute(fragments, Some(plane), &cut, &mut out.on_plane);
+        let children = [
+            self.split_by_planes(front, out),
+            self.split_by_planes(back, out),
+        ];
+        out.nodes[node].children = children;
+        node as i32
+    }
+
+    /// The plane that splits least, then balances best, then covers most, then comes first.
+    fn choose_plane(&self, fragments: &[Fragment]) -> u32 {
+        let mut ids: Vec<u32> = fragments.iter().map(|f| self.plane_of(f)).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        // Ids are in order of falling area: the first few are the large surfaces.
+        ids.truncate(16);
+        let mut best: Option<(i64, u32)> = None;
+        for &id in &ids {
+            let plane = &self.set.planes[id as usize];
+            let (mut n_front, mut n_back, mut n_cut) = (0i64, 0i64, 0i64);
+            for f in fragments {
+                if self.plane_of(f) == id {
+                    continue;
+                }
+                let (mut front, mut back) = (false, false);
+                for &p in &f.points {
+                    let d = plane.signed_distance(p);
+                    front |= d > self.tolerance.plane;
+                    back |= d < -self.tolerance.plane;
+                }
+                n_cut += i64::from(front && back);
+                n_front += i64::from(front);
+                n_back += i64::from(back);
+            }
+            let score = 4 * n_cut + (n_front - n_back).abs();
+            if best.is_none_or(|b| (score, id) < b) {
+                best = Some((score, id));
+            }
+        }
+        best.map_or(0, |b| b.1)
+    }
+}
+
+/// Keeps the largest fragments of a knot; see [`MAX_BSP_FRAGMENTS`].
+fn bounded(mut fragments: Vec<Fragment>) -> Vec<Fragment> {
+    if fragments.len() > MAX_BSP_FRAGMENTS {
+        // Surfaces are numbered by falling area.
+        fragments.sort_by_key(|f| f.surface);
+        fragments.truncate(MAX_BSP_FRAGMENTS);
+    }
+    fragments
+}

@@ -1,0 +1,228 @@
+//! Small convex polygons without heap allocation: split, measure, subtract.
+//!
+//! Builders make tens of millions of them, nearly all with three to six corners, so they live inline.
+//! [`Winding`](crate::Winding) is what is kept of them.
+
+use smallvec::SmallVec;
+
+use crate::{Aabb, DVec3, Plane};
+
+/// A convex planar polygon; which way it turns depends on where it came from.
+pub type Poly = SmallVec<[DVec3; 6]>;
+
+/// Where a polygon lies about a plane.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives for a match; a box would allocate a million times"
+)]
+pub enum Sides {
+    /// In the plane, within the tolerance.
+    On,
+    /// Wholly on the positive side.
+    Front,
+    /// Wholly on the negative side.
+    Back,
+    /// Cut in two: the positive and the negative part.
+    Both(Poly, Poly),
+}
+
+/// Splits a polygon; corners within `eps` of the plane belong to both parts unmoved.
+#[must_use]
+pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
+    let n = points.len();
+    let dist: SmallVec<[f64; 12]> = points.iter().map(|&p| plane.signed_distance(p)).collect();
+    let (mut any_front, mut any_back) = (false, false);
+    for &d in &dist {
+        any_front |= d > eps;
+        any_back |= d < -eps;
+    }
+    match (any_front, any_back) {
+        (false, false) => return Sides::On,
+        (true, false) => return Sides::Front,
+        (false, true) => return Sides::Back,
+        (true, true) => {}
+    }
+    let (mut front, mut back) = (Poly::new(), Poly::new());
+    for i in 0..n {
+        let j = if i + 1 == n { 0 } else { i + 1 };
+        let (p, q, dp, dq) = (points[i], points[j], dist[i], dist[j]);
+        if dp >= -eps {
+            front.push(p);
+        }
+        if dp <= eps {
+            back.push(p);
+        }
+        if (dp > eps && dq < -eps) || (dp < -eps && dq > eps) {
+            // Always cut from the front corner, so that both directions of an edge round alike.
+            let (a, b, da, db) = if dp > 0.0 {
+                (p, q, dp, dq)
+            } else {
+                (q, p, dq, dp)
+            };
+            let cut = a + (b - a) * (da / (da - db));
+            front.push(cut);
+            back.push(cut);
+        }
+    }
+    Sides::Both(front, back)
+}
+
+/// The part on the positive side; `None` when no area is left.
+#[must_use]
+pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
+    match split(points, plane, eps) {
+        Sides::Front => Some(points.into()),
+        Sides::Both(front, _) => Some(front),
+        Sides::On | Sides::Back => None,
+    }
+}
+
+/// The part in a box; `None` when no area is left. A polygon in a face of the box counts as in it.
+#[must_use]
+pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
+    let b = Aabb::of_points(points);
+    let mut poly: Poly = points.into();
+    for axis in 0..3 {
+        for (limit, sign) in [(bounds.min[axis], 1.0), (bounds.max[axis], -1.0)] {
+            let reach = if sign > 0.0 {
+                b.min[axis] - limit
+            } else {
+                limit - b.max[axis]
+            };
+            if reach >= -eps {
+                continue;
+            }
+            let mut normal = DVec3::ZERO;
+            normal[axis] = sign;
+            poly = clip(
+                &poly,
+                &Plane {
+                    normal,
+                    d: -sign * limit,
+                },
+                eps,
+            )?;
+        }
+    }
+    Some(poly)
+}
+
+/// The section of a plane with a box, counter-clockwise seen from the positive side.
+#[must_use]
+pub fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
+    for axis in 0..3 {
+        if plane.normal[axis].abs() == 1.0 {
+            let at = -plane.d * plane.normal[axis];
+            if at < bounds.min[axis] + eps || at > bounds.max[axis] - eps {
+                return None;
+            }
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let corner = |pu: f64, pv: f64| {
+                let mut p = DVec3::ZERO;
+                p[axis] = at;
+                p[u] = pu;
+                p[v] = pv;
+                p
+            };
+            let (lo, hi) = (bounds.min, bounds.max);
+            let mut poly = Poly::from_slice(&[
+                corner(lo[u], lo[v]),
+                corner(hi[u], lo[v]),
+                corner(hi[u], hi[v]),
+                corner(lo[u], hi[v]),
+            ]);
+            if plane.normal[axis] < 0.0 {
+                poly.reverse();
+            }
+            return Some(poly);
+        }
+    }
+    let (u, v) = plane.basis();
+    let center = plane.project(bounds.center());
+    let reach = bounds.size().length() + 1.0;
+    let square = [
+        center - u * reach - v * reach,
+        center + u * reach - v * reach,
+        center + u * reach + v * reach,
+        center - u * reach + v * reach,
+    ];
+    clip_to_box(&square, bounds, eps)
+}
+
+/// Twice the area times the unit normal (Newell's sum, about the first corner).
+#[must_use]
+pub fn area_normal(points: &[DVec3]) -> DVec3 {
+    let Some(&o) = points.first() else {
+        return DVec3::ZERO;
+    };
+    points.windows(2).map(|e| (e[0] - o).cross(e[1] - o)).sum()
+}
+
+/// Area. [Units: wu²]
+#[must_use]
+pub fn area(points: &[DVec3]) -> f64 {
+    area_normal(points).length() * 0.5
+}
+
+/// Least distance between two parallel lines that hold the polygon between them. [Units: wu]
+///
+/// For a convex polygon one of the two lines holds an edge, so trying all edges finds it.
+#[must_use]
+pub fn width(points: &[DVec3]) -> f64 {
+    let normal = area_normal(points).normalize_or_zero();
+    let mut least = f64::INFINITY;
+    for (i, &a) in points.iter().enumerate() {
+        let b = points[if i + 1 == points.len() { 0 } else { i + 1 }];
+        let Some(inward) = normal.cross(b - a).try_normalize() else {
+            continue;
+        };
+        let reach = points
+            .iter()
+            .map(|&p| inward.dot(p - a))
+            .fold(0.0, f64::max);
+        least = least.min(reach);
+    }
+    if least.is_finite() { least } else { 0.0 }
+}
+
+/// Cuts `poly` by a convex `cover` in the same plane, which turns counter-clockwise about
+/// `normal`: appends what lies outside to `outside` and returns what lies inside.
+///
+/// Where less than `min_width` lies inside, `poly` is kept whole as outside.
+pub fn cut_out(
+    poly: &[DVec3],
+    cover: &[DVec3],
+    normal: DVec3,
+    eps: f64,
+    min_width: f64,
+    outside: &mut Vec<Poly>,
+) -> Option<Poly> {
+    let before = outside.len();
+    let boxes = (Aabb::of_points(poly), Aabb::of_points(cover));
+    let mut inside: Poly = poly.into();
+    let mut hit = boxes.0.expanded(eps).overlaps(&boxes.1);
+    for (i, &a) in cover.iter().enumerate() {
+        if !hit {
+            break;
+        }
+        let b = cover[if i + 1 == cover.len() { 0 } else { i + 1 }];
+        let Some(inward) = normal.cross(b - a).try_normalize() else {
+            continue;
+        };
+        match split(&inside, &Plane::through(a, inward), eps) {
+            Sides::Front => {}
+            Sides::Both(front, back) => {
+                outside.push(back);
+                inside = front;
+            }
+            Sides::Back | Sides::On => hit = false,
+        }
+    }
+    if hit && width(&inside) >= min_width {
+        return Some(inside);
+    }
+    // No overlap worth the name: keep the polygon in one piece instead of the shreds cut so far.
+    outside.truncate(before);
+    outside.push(poly.into());
+    None
+}

@@ -1,0 +1,26 @@
+//! Kernels on dense voxel grids: surface voxelization, exact distances, connected components, the
+//! watershed of the distance field and the widest path in it.
+//!
+//! **Layout, everywhere:** x runs fastest, then y, then z: voxel `(i, j, k)` of a box of
+//! `[nx, ny, nz]` voxels has the index `i + nx * (j + ny * k)`. Voxel `(i, j, k)` is the closed
+//! cube from `(i, j, k)` to `(i + 1, j + 1, k + 1)` in voxel coordinates; its center is at
+//! `+ 0.5`. Distances are between voxel centers, in voxel edges. [Units: vx]
+//!
+//! Every kernel gives the same answer for any number of threads, and uses the thread pool that it
+//! is called in ([`rayon::ThreadPool::install`]).
+
+mod components;
+mod edt;
+mod enclosure;
+mod grid;
+mod voxelize;
+mod watershed;
+mod widest;
+
+pub use components::{Components, Connectivity, components, flood};
+pub use edt::{distance, distance_squared};
+pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
+pub use grid::{BitVolume, Grid};
+pub use voxelize::voxelize;
+pub use watershed::{Basin, Labels, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
+pub use widest::{WidestPath, border, widest_path};

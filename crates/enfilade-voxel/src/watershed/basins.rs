@@ -1,0 +1,99 @@
+//! What a flood tells: the basin of each voxel, the basins, and where they touch.
+
+/// Levels to a voxel of distance.
+pub(super) const STEPS: u32 = 64;
+
+/// The basin of each voxel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Labels {
+    /// Up to 65,535 basins: 2 bytes a voxel.
+    U16(Vec<u16>),
+    /// More: 4 bytes a voxel.
+    U32(Vec<u32>),
+}
+
+impl Labels {
+    /// Makes sure that labels below `n` can be set.
+    pub fn make_room_for(&mut self, n: usize) {
+        if n > usize::from(u16::MAX) + 1
+            && let Self::U16(v) = self
+        {
+            *self = Self::U32(v.iter().map(|&l| l.into()).collect());
+        }
+    }
+
+    /// Labels the voxel at `index`; see [`Self::make_room_for`].
+    pub fn set(&mut self, index: usize, label: u32) {
+        match self {
+            Self::U16(v) => v[index] = label as u16,
+            Self::U32(v) => v[index] = label,
+        }
+    }
+
+    /// Label of the voxel at `index`; 0 when it is occupied.
+    #[must_use]
+    pub fn get(&self, index: usize) -> u32 {
+        match self {
+            Self::U16(v) => v[index].into(),
+            Self::U32(v) => v[index],
+        }
+    }
+
+    /// Voxels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U16(v) => v.len(),
+            Self::U32(v) => v.len(),
+        }
+    }
+
+    /// Whether there is no voxel.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// All labels in index order.
+    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.len()).map(|i| self.get(i))
+    }
+}
+
+/// A basin of the distance field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Basin {
+    /// Greatest distance in it, rounded down to 1/64; infinite outdoors. [Units: vx]
+    pub peak: f64,
+    /// Index of a voxel at that distance; outdoors, of its first voxel.
+    pub peak_voxel: usize,
+    /// Voxels in it.
+    pub n_voxels: u64,
+}
+
+/// Where two basins touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Saddle {
+    /// Label of the one basin; less than `b`.
+    pub a: u32,
+    /// Label of the other.
+    pub b: u32,
+    /// Greatest distance at which they touch, rounded down to 1/64. [Units: vx]
+    pub distance: f64,
+    /// Index of a voxel at that distance that has a neighbor in the other basin.
+    pub voxel: usize,
+    /// Voxel faces that they share.
+    pub n_faces: u64,
+}
+
+/// Basins of the distance field and how they touch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Watershed {
+    /// Basin of each voxel, 0 where occupied. Every basin except outdoors is 6-connected.
+    pub labels: Labels,
+    /// Basin with label `i + 1` at `i`: outdoors first if asked for, then deepest first, then by
+    /// index of the peak.
+    pub basins: Vec<Basin>,
+    /// Touching pairs, by distance from great to small, then by labels.
+    pub saddles: Vec<Saddle>,
+}

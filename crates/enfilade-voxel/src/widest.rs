@@ -1,0 +1,415 @@
+//! The widest path: from a voxel to the edge of the box, through air as wide as can be.
+//!
+//! The *bottleneck* of a path is its least distance to what is occupied; the widest path has the
+//! greatest bottleneck of all (Pollack, "The Maximum Capacity Through a Network", 1960). It is found
+//! as the watershed floods, from the deepest voxel of the front downwards (Meyer, "Topographic
+//! Distance and Watershed Lines", 1994, §4), with a bucket a level. Of all widest paths the shortest
+//! is taken: Dijkstra's algorithm with buckets (Dial, "Shortest-Path Forest with Topological
+//! Ordering", 1969) in the air that is at least as wide as the bottleneck.
+//!
+//! A step goes to one of 26 neighbors, and only where all voxels of the box around both are wide
+//! enough: a path never slips between two voxels that touch at an edge or a corner.
+
+use super::components::{Connectivity, flood};
+use super::grid::BitVolume;
+
+/// A path from a voxel to the edge of the box.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WidestPath {
+    /// Voxel indices from the start on; each is one of the 26 neighbors of the one before, the last
+    /// lies in the outermost layer.
+    pub voxels: Vec<usize>,
+    /// Which of them is the narrowest: behind it begins air wider than it that reaches the edge. On a
+    /// stretch that is narrowest all along, such as a passage, its far end.
+    pub narrowest: usize,
+    /// Squared distance there. [Units: vx²]
+    pub bottleneck: u16,
+}
+
+/// The widest path from `start` to the outermost layer of the box, and the shortest of those;
+/// `None` where occupied voxels close every way, or `start` is occupied.
+///
+/// `distances` are squared, as [`distance_squared`](super::distance_squared) gives them: 0 is
+/// occupied, and from 65,535 on (256 voxels) all air is as wide. [Units: vx²]
+///
+/// Time is linear in voxels and levels. Takes a byte and two bits a voxel, and 8 to 16 bytes for each voxel of
+/// the front. Equal input gives an equal path.
+///
+/// # Panics
+/// When `distances` has not one value a voxel, or `start` is not among them.
+#[must_use]
+pub fn widest_path(dims: [usize; 3], distances: &[u16], start: usize) -> Option<WidestPath> {
+    assert_eq!(
+        dims.iter().product::<usize>(),
+        distances.len(),
+        "one distance a voxel"
+    );
+    let bottleneck = bottleneck(dims, distances, start)?;
+    let voxels = shortest(dims, distances, start, bottleneck);
+    let beyond = flood(
+        &BitVolume::from_fn(dims, |i| distances[i] > bottleneck),
+        &border(dims),
+        Connectivity::Faces6,
+    );
+    // From the narrowest place on nothing is in the way any more. Where nothing is wider, it is the last.
+    let end = voxels.iter().position(|&v| beyond.get_index(v));
+    let narrow = |&i: &usize| distances[voxels[i]] == bottleneck;
+    let narrowest = (0..end.unwrap_or(voxels.len())).rev().find(narrow)?;
+    Some(WidestPath {
+        voxels,
+        narrowest,
+        bottleneck,
+    })
+}
+
+impl WidestPath {
+    /// Corners of a line along the path with few of them, as voxel indices: every voxel that it touches is as wide as the
+    /// bottleneck. The places of `keep` in [`Self::voxels`], ascending, remain corners.
+    ///
+    /// From each corner on to the last voxel before the first that is not in sight: time is at most that of the path's
+    /// length times the box's diagonal. `dims` and `distances` are those that the path was found in.
+    #[must_use]
+    pub fn corners(&self, dims: [usize; 3], distances: &[u16], keep: &[usize]) -> Vec<usize> {
+        let last = self.voxels.len() - 1;
+        let mut out = vec![self.voxels[0]];
+        let mut from = 0;
+        for i in 1..=last {
+            let is_in_sight = |to: usize| {
+                let ends = [self.voxels[from], self.voxels[to]];
+                is_clear_line(dims, distances, ends, self.bottleneck)
+            };
+            let is_kept = keep.contains(&i) || i == last;
+            if is_kept && is_in_sight(i) {
+                from = i;
+            } else if !is_in_sight(i) {
+                // A step is always in sight, so that the one before is beyond the corner.
+                out.push(self.voxels[i - 1]);
+                from = if is_kept { i } else { i - 1 };
+            }
+            if is_kept {
+                out.push(self.voxels[i]);
+            }
+        }
+        out
+    }
+}
+
+/// Whether all voxels are wide enough that the line between the middles of two touches.
+fn is_clear_line(dims: [usize; 3], distances: &[u16], ends: [usize; 2], least: u16) -> bool {
+    let strides = [1, dims[0] as isize, (dims[0] * dims[1]) as isize];
+    let [a, b] = ends.map(|i| coords(dims, i));
+    let span = [0, 1, 2].map(|k| b[k].abs_diff(a[k]));
+    let mut done = [0; 3];
+    let mut at = ends[0];
+    while done != span {
+        // Along an axis the line leaves its next voxel at (done + 1/2) / span of its length.
+        let is_first = |k: usize| {
+            done[k] < span[k]
+                && (0..3).all(|l| (2 * done[k] + 1) * span[l] <= (2 * done[l] + 1) * span[k])
+        };
+        let step = [0, 1, 2].map(|k| match (is_first(k), b[k] > a[k]) {
+            (false, _) => 0,
+            (true, true) => 1,
+            (true, false) => -1,
+        });
+        if !is_clear(distances, at, step, strides, least) {
+            return false;
+        }
+        for k in 0..3 {
+            done[k] += step[k].unsigned_abs();
+            at = at.wrapping_add_signed(step[k] * strides[k]);
+        }
+    }
+    true
+}
+
+/// The outermost layer of voxels.
+#[must_use]
+pub fn border(dims: [usize; 3]) -> BitVolume {
+    BitVolume::from_fn(dims, |i| is_border(dims, coords(dims, i)))
+}
+
+fn is_border(dims: [usize; 3], at: [usize; 3]) -> bool {
+    (0..3).any(|k| at[k] == 0 || at[k] + 1 == dims[k])
+}
+
+pub(super) fn coords([nx, ny, _]: [usize; 3], index: usize) -> [usize; 3] {
+    [index % nx, index / nx % ny, index / (nx * ny)]
+}
+
+/// Greatest squared distance at which air joins `start` to the outermost layer.
+fn bottleneck(dims: [usize; 3], distances: &[u16], start: usize) -> Option<u16> {
+    let mut seen = BitVolume::new(dims);
+    let mut mark = |at: [usize; 3]| {
+        let is_new = !seen.get(at[0], at[1], at[2]);
+        seen.set(at[0], at[1], at[2], true);
+        is_new
+    };
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    let mut level = distances[start];
+    let mut buckets: Vec<Vec<usize>> = vec![Vec::new(); usize::from(level) + 1];
+    buckets[usize::from(level)].push(start);
+    mark(coords(dims, start));
+    while level > 0 {
+        let Some(v) = buckets[usize::from(level)].pop() else {
+            level -= 1;
+            continue;
+        };
+        let at = coords(dims, v);
+        if is_border(dims, at) {
+            return Some(level);
+        }
+        for axis in 0..3 {
+            // Inside of the outermost layer there are neighbors on all sides.
+            for (next, beside) in [
+                (v - strides[axis], at[axis] - 1),
+                (v + strides[axis], at[axis] + 1),
+            ] {
+                let mut to = at;
+                to[axis] = beside;
+                if distances[next] > 0 && mark(to) {
+                    buckets[usize::from(level.min(distances[next]))].push(next);
+                }
+            }
+        }
+    }
+    None
+}
+
+/// Steps to the 26 neighbors with their lengths in tenths of a voxel, rounded.
+const STEPS: [([isize; 3], usize); 26] = {
+    const LENGTHS: [usize; 4] = [0, 10, 14, 17];
+    let mut out = [([0; 3], 0); 26];
+    let (mut n, mut k) = (0, 0);
+    while k < 27 {
+        let step = [
+            k as isize % 3 - 1,
+            k as isize / 3 % 3 - 1,
+            k as isize / 9 - 1,
+        ];
+        let moved = (step[0] != 0) as usize + (step[1] != 0) as usize + (step[2] != 0) as usize;
+        if moved > 0 {
+            out[n] = (step, LENGTHS[moved]);
+            n += 1;
+        }
+        k += 1;
+    }
+    out
+};
+/// Buckets that are in use at a time: one for each length up to the longest.
+const RING: usize = 18;
+/// How the start was come to, where others have the number of the step.
+const BEGIN: u8 = 26;
+const UNSEEN: u8 = u8::MAX;
+
+/// The shortest path from `start` to the outermost layer where nothing is below `least`.
+fn shortest(dims: [usize; 3], distances: &[u16], start: usize, least: u16) -> Vec<usize> {
+    let strides = [1, dims[0] as isize, (dims[0] * dims[1]) as isize];
+    let offset = |step: [isize; 3]| -> isize { (0..3).map(|k| step[k] * strides[k]).sum() };
+    let mut came_by = vec![UNSEEN; distances.len()];
+    let mut ring: [Vec<(usize, u8)>; RING] = std::array::from_fn(|_| Vec::new());
+    ring[0].push((start, BEGIN));
+    let (mut now, mut waiting) = (0, 1);
+    while waiting > 0 {
+        let Some((v, step)) = ring[now % RING].pop() else {
+            now += 1;
+            continue;
+        };
+        waiting -= 1;
+        if came_by[v] != UNSEEN {
+            continue;
+        }
+        came_by[v] = step;
+        let at = coords(dims, v);
+        if is_border(dims, at) {
+            return way_to(v, &came_by, &offset);
+        }
+        for (k, &(step, length)) in STEPS.iter().enumerate() {
+            let next = v.wrapping_add_signed(offset(step));
+            if came_by[next] == UNSEEN && is_clear(distances, v, step, strides, least) {
+                ring[(now + length) % RING].push((next, k as u8));
+                waiting += 1;
+            }
+        }
+    }
+    vec![start]
+}
+
+/// Whether all voxels of the box around both ends of a step are wide enough.
+fn is_clear(
+    distances: &[u16],
+    from: usize,
+    step: [isize; 3],
+    strides: [isize; 3],
+    least: u16,
+) -> bool {
+    (1..8).all(|corner: usize| {
+        let along = |k: usize| {
+            if corner >> k & 1 == 1 {
+                step[k] * strides[k]
+            } else {
+                0
+            }
+        };
+        distances[from.wrapping_add_signed(along(0) + along(1) + along(2))] >= least
+    })
+}
+
+fn way_to(end: usize, came_by: &[u8], offset: &impl Fn([isize; 3]) -> isize) -> Vec<usize> {
+    let mut out = vec![end];
+    let mut at = end;
+    while let Some(&(step, _)) = STEPS.get(usize::from(came_by[at])) {
+        at = at.wrapping_add_signed(-offset(step));
+        out.push(at);
+    }
+    out.reverse();
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::distance_squared;
+    use proptest::prelude::*;
+
+    /// Greatest level at which a plain flood gets from `start` to the edge, tried level by level.
+    fn oracle(dims: [usize; 3], distances: &[u16], start: usize) -> Option<u16> {
+        let gets_out = |level: u16| {
+            let mut is_wet = vec![false; distances.len()];
+            is_wet[start] = distances[start] >= level;
+            // Sweeps over everything until nothing changes.
+            loop {
+                let mut changed = false;
+                for z in 0..dims[2] {
+                    for y in 0..dims[1] {
+                        for x in 0..dims[0] {
+                            let i = x + dims[0] * (y + dims[1] * z);
+                            if !is_wet[i] {
+                                continue;
+                            }
+                            if x == 0 || y == 0 || z == 0 {
+                                return true;
+                            }
+                            if x + 1 == dims[0] || y + 1 == dims[1] || z + 1 == dims[2] {
+                                return true;
+                            }
+                            let [row, layer] = [dims[0], dims[0] * dims[1]];
+                            for j in [i - 1, i + 1, i - row, i + row, i - layer, i + layer] {
+                                if !is_wet[j] && distances[j] >= level {
+                                    is_wet[j] = true;
+                                    changed = true;
+                                }
+                            }
+                        }
+                    }
+                }
+                if !changed {
+                    return false;
+                }
+            }
+        };
+        (1..=distances[start]).rev().find(|&level| gets_out(level))
+    }
+
+    fn check(dims: [usize; 3], distances: &[u16], start: usize) {
+        let found = widest_path(dims, distances, start);
+        let expected = oracle(dims, distances, start);
+        assert_eq!(found.as_ref().map(|p| p.bottleneck), expected);
+        let Some(path) = found else { return };
+        assert_eq!(path.voxels[0], start);
+        let last = path.voxels[path.voxels.len() - 1];
+        assert!(is_border(dims, coords(dims, last)));
+        let least = path.voxels.iter().map(|&v| distances[v]).min();
+        assert_eq!(least, expected);
+        assert_eq!(Some(distances[path.voxels[path.narrowest]]), expected);
+        for pair in path.voxels.windows(2) {
+            let [a, b] = [coords(dims, pair[0]), coords(dims, pair[1])];
+            assert!((0..3).all(|k| a[k].abs_diff(b[k]) <= 1));
+            // The whole box around both is air.
+            for c in 0..8 {
+                let at = [0, 1, 2].map(|k| if c >> k & 1 == 1 { a[k] } else { b[k] });
+                let i = at[0] + dims[0] * (at[1] + dims[1] * at[2]);
+                assert!(Some(distances[i]) >= expected);
+            }
+        }
+        check_corners(dims, distances, &path);
+    }
+
+    fn check_corners(dims: [usize; 3], distances: &[u16], path: &WidestPath) {
+        let keep = [path.narrowest, path.voxels.len() / 2];
+        let corners = path.corners(dims, distances, &keep);
+        assert!(corners.len() <= path.voxels.len());
+        assert_eq!(corners[0], path.voxels[0]);
+        assert_eq!(corners.last(), path.voxels.last());
+        assert!(keep.iter().all(|&k| corners.contains(&path.voxels[k])));
+        for pair in corners.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|i| coords(dims, i).map(|c| c as f64));
+            for t in 0..=1000 {
+                let t = f64::from(t) / 1000.0;
+                let p = [0, 1, 2].map(|k| (a[k] + (b[k] - a[k]) * t).round() as usize);
+                let i = p[0] + dims[0] * (p[1] + dims[1] * p[2]);
+                assert!(distances[i] >= path.bottleneck, "{pair:?}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_bottleneck_is_that_of_the_widest_of_all_paths(
+            nx in 1usize..14, ny in 1usize..12, nz in 1usize..12,
+            filled in 0.0..0.5f64, seed in 1u64.., start in any::<usize>(),
+        ) {
+            let dims = [nx, ny, nz];
+            let n = nx * ny * nz;
+            let mut s = seed;
+            let mut random = || {
+                s ^= s << 13;
+                s ^= s >> 7;
+                s ^= s << 17;
+                (s >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            let bits: Vec<bool> = (0..n).map(|_| random() < filled).collect();
+            check(dims, &distance_squared(&BitVolume::from_fn(dims, |i| bits[i])), start % n);
+            // Any numbers will do for distances.
+            let numbers: Vec<u16> = (0..n).map(|_| (random() * 7.0) as u16).collect();
+            check(dims, &numbers, start % n);
+        }
+    }
+
+    #[test]
+    fn the_narrowest_place_is_the_far_end_of_the_narrowest_stretch() {
+        // A row of voxels: a room, a passage of three, a wider bay, the edge.
+        let row = [0, 9, 9, 4, 4, 4, 6, 5, 8];
+        let mut distances = vec![0; 9 * 9];
+        distances[36..45].copy_from_slice(&row);
+        let path = widest_path([9, 9, 1], &distances, 37).unwrap();
+        // One layer is all edge.
+        assert_eq!((path.voxels.len(), path.narrowest), (1, 0));
+        let mut deep = vec![0; 9 * 9 * 3];
+        deep[81..162].copy_from_slice(&distances);
+        let path = widest_path([9, 9, 3], &deep, 81 + 37).unwrap();
+        assert_eq!(path.voxels, (118..126).collect::<Vec<_>>());
+        assert_eq!((path.bottleneck, path.narrowest), (4, 4));
+    }
+
+    #[test]
+    fn of_two_ways_as_wide_the_shorter_is_taken() {
+        let dims = [41, 21, 21];
+        // A box of air, shut but for a hole near one end of each long side.
+        let inside = |i: usize| {
+            let [x, y, z] = coords(dims, i);
+            let is_wall = (5..36).contains(&x) && (5..16).contains(&y) && (5..16).contains(&z);
+            let is_room = (6..35).contains(&x) && (6..15).contains(&y) && (6..15).contains(&z);
+            let is_hole = [8, 30].iter().any(|&h| x.abs_diff(h) < 3) && z.abs_diff(10) < 3;
+            is_wall && !is_room && !(is_hole && y == 15)
+        };
+        let distances = distance_squared(&BitVolume::from_fn(dims, inside));
+        let at = |x: usize| x + dims[0] * (10 + dims[1] * 10);
+        for (start, hole) in [(12, 8), (27, 30)] {
+            let path = widest_path(dims, &distances, at(start)).unwrap();
+            let narrowest = coords(dims, path.voxels[path.narrowest]);
+            assert_eq!(narrowest, [hole, 15, 10], "from {start}");
+            assert_eq!(path.bottleneck, 9);
+        }
+    }
+}
