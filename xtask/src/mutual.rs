@@ -6,15 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs that are still there, to be parted by who works on them next; none may be added.
-const KNOWN: [[&str; 2]; 5] = [
-    [
-        "crates/enfilade-bake/src/bsp/mod.rs",
-        "crates/enfilade-bake/src/bsp/portals.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/bsp/mod.rs",
-        "crates/enfilade-bake/src/bsp/tree.rs",
-    ],
+const KNOWN: [[&str; 2]; 3] = [
     [
         "crates/enfilade-bake/src/delaunay/branches.rs",
         "crates/enfilade-bake/src/delaunay/branches/forks.rs",

@@ -15,9 +15,10 @@ use rayon::prelude::*;
 use crate::complex::poly::{self, Poly, Sides};
 use crate::structure::MergeSettings;
 
+use super::leaves::Bsp;
 use super::portals::{LeafPortal, leaf_portals};
 use super::tree::{Node, Tree, leaf_index};
-use super::{Bsp, rooms, separator};
+use super::{rooms, separator};
 
 /// Sections tried for each portal and surface that is there; buildings have 1 to 5 in all.
 const TRIALS: usize = 8;

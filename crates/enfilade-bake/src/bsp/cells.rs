@@ -2,7 +2,7 @@
 
 use enfilade_geom::Sets;
 
-use super::Bsp;
+use super::leaves::Bsp;
 use super::separator::Separator;
 
 /// No cell.

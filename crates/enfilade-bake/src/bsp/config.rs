@@ -1,7 +1,7 @@
 //! What only the binary space partition asks.
 
-use super::Heuristic;
 use super::guide::Guide;
+use super::tree::Heuristic;
 
 /// What only the binary space partition asks.
 #[derive(Clone, Debug, Default)]

@@ -11,8 +11,11 @@ use std::collections::BTreeMap;
 use enfilade_geom::{Aabb, BoxTree, Sets};
 
 use super::cells::{self, Cells, NO_CELL};
+use super::guide::Guide;
+use super::input::BspInput;
+use super::leaves::Bsp;
 use super::separator::{self, Separator};
-use super::{Bsp, BspInput, Guide, Heuristic};
+use super::tree::Heuristic;
 
 /// Share of a rim that lies in the two planes with most of it, from which on they are walls: that of a hexagon. A
 /// rectangle has half and more, an octagon a quarter.

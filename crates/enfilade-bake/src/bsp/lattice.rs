@@ -6,7 +6,7 @@ use enfilade_geom::DVec3;
 
 use crate::structure::{MergeSettings, connected_count, rim_share};
 
-use super::Bsp;
+use super::leaves::Bsp;
 use super::separator::Separator;
 use super::tree::leaf_index;
 

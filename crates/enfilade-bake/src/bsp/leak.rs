@@ -5,17 +5,12 @@ use std::collections::VecDeque;
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{ConvexSolid, DVec3};
 
+use super::guide::Guide;
+use super::input::BspInput;
+use super::leak_path::LeakPath;
+use super::leaves::Bsp;
 use super::tree::Content;
-use super::{Bsp, BspInput, Guide, Heuristic};
-
-/// A way through open space from something inside to the void.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LeakPath {
-    /// Which of the points inside it begins at.
-    pub from: usize,
-    /// Its corners, from that point to beyond the outermost surface. [Units: wu]
-    pub points: Vec<DVec3>,
-}
+use super::tree::Heuristic;
 
 pub(super) struct Reached {
     pub(super) is_reached: Vec<bool>,

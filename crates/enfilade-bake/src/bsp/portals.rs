@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::complex::poly::{self, Poly, Sides};
 
-use super::Tolerance;
+use super::tolerance::Tolerance;
 use super::tree::{Content, Fragment, Tree, leaf_index};
 
 /// A convex opening between two leaves.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, DVec3, Plane, Winding};
 
 use crate::complex::region::Shape;
@@ -13,9 +13,11 @@ use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 use super::cells::{self, Cells, NO_CELL};
 use super::config::{BspConfig, Rooms};
+use super::input::input_of;
 use super::inside::Soup;
+use super::leaves::Bsp;
 use super::rooms::{self, Evidence};
-use super::{Bsp, BspInput, arrange, guided, leak, separator, shape};
+use super::{arrange, guided, leak, separator, shape};
 
 /// Finds rooms by binary space partition and separators, for levels made of brushes and for clean architectural models.
 ///
@@ -160,7 +162,6 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
     let own = [
         ("bsp.heuristic", format!("{heuristic:?}").to_lowercase()),
         ("bsp.rooms", format!("{rooms:?}").to_lowercase()),
-        ("smallest_hole", config.smallest_hole.to_string()),
         ("bsp.grid", number(guide.grid)),
         ("bsp.tetrahedra", number(guide.tetrahedra)),
         ("bsp.planes", guide.planes.len().to_string()),
@@ -169,27 +170,6 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
     let mut out = config.costs.to_settings();
     out.extend(own.map(|(k, v)| (k.to_owned(), v)));
     out
-}
-
-/// Brushes where the whole structure is made of them, its triangles where not.
-pub(super) fn input_of<'a>(
-    scene: &'a Scene,
-    triangles: &'a [enfilade_geom::Triangle],
-    objects: &'a [u32],
-    inside: &'a [DVec3],
-) -> BspInput<'a> {
-    let is_brushes = !scene.solids.is_empty()
-        && scene
-            .objects
-            .iter()
-            .filter(|o| o.role == Role::Structural)
-            .all(|o| o.reason.starts_with("map: "));
-    BspInput {
-        triangles,
-        objects,
-        solids: if is_brushes { &scene.solids } else { &[] },
-        inside: if is_brushes { inside } else { &[] },
-    }
 }
 
 /// A candidate for each separator whose portals fill their hull, for each portal otherwise.

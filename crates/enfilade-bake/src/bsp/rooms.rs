@@ -19,9 +19,9 @@ use crate::complex::poly;
 use crate::complex::region::Shape;
 use crate::structure::{MergeSettings, Mergeable, Pair, join_rooms};
 
-use super::Bsp;
 use super::cells::{self, Cells, NO_CELL};
 use super::lattice::{Lattice, NONE};
+use super::leaves::Bsp;
 use super::separator::{self, Separator};
 use super::shape;
 

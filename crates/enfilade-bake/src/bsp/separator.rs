@@ -16,7 +16,7 @@ use smallvec::SmallVec;
 
 use crate::complex::poly;
 
-use super::Bsp;
+use super::leaves::Bsp;
 use super::tree::Fragment;
 
 /// Portals of one plane whose rim lies on solid surfaces.

@@ -4,7 +4,7 @@ use enfilade_geom::DVec3;
 
 use crate::complex::region::{Region, Shape, halves, shape_of, whole};
 
-use super::Tolerance;
+use super::tolerance::Tolerance;
 use super::tree::{Tree, leaf_index};
 
 /// Measures of all leaves; none for those that rounding has left without a volume.

@@ -7,8 +7,9 @@ use crate::complex::planes::{PlaneList, faces_ahead};
 use crate::complex::poly::{self, Poly};
 use crate::structure::in_own_order;
 
+use super::input::BspInput;
+use super::tolerance::Tolerance;
 use super::tree::Fragment;
-use super::{BspInput, Tolerance};
 
 /// What a tree is built from.
 pub(super) struct Gathered {

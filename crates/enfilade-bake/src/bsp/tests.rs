@@ -1,9 +1,11 @@
 use std::collections::BTreeSet;
 
 use enfilade_geom::scene::{Entity, Mesh, Object, Primitive, Role, Scene};
-use enfilade_geom::{DMat4, Plane};
+use enfilade_geom::{Aabb, ConvexSolid, DMat4, DVec3, Plane, Winding};
 use enfilade_testkit::{Rng, clinic};
 
+use super::cells;
+use super::input::BspInput;
 use super::*;
 use crate::complex::poly;
 use crate::{BakeConfig, BakeContext, Method, Silent, bake};

@@ -5,7 +5,22 @@ use rayon::prelude::*;
 
 use crate::complex::poly::{self, Poly, Sides};
 
-use super::{Guide, Heuristic, Tolerance};
+use super::guide::Guide;
+use super::tolerance::Tolerance;
+
+/// How the plane that cuts a region is chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Heuristic {
+    /// Few cuts and a balanced tree, judged by a sample of surfaces: fewest cuts in all.
+    #[default]
+    Default,
+    /// The plane that cuts fewest surfaces (Lefebvre & Hornus 2003); quadratic.
+    MinCut,
+    /// The plane with most surface in it.
+    MaxArea,
+    /// The plane most orthogonal to what it cuts; quadratic.
+    MaxOrtho,
+}
 
 /// A convex piece of a surface.
 #[derive(Clone, Debug)]
