@@ -59,23 +59,21 @@ impl Default for BakeConfig {
 ///
 /// The default of 10 mm is wider than what exporters, scanners and hurried hands leave between surfaces that are meant to
 /// touch, and narrower than what anybody looks or shoots through.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SmallestHole {
+    /// Sealed gaps of 10 mm, or wider ones in a model whose triangles miss each other by more.
+    #[default]
+    Auto,
     /// Gaps are closed by seals, polygons that are matter to every consumer of the world.
     Sealed(f64),
     /// Gaps stay open, as portals of kind crack. What is a gap is told by this, and which rooms there are, too.
     Open(f64),
 }
 
-impl Default for SmallestHole {
-    fn default() -> Self {
-        Self::Sealed(0.01)
-    }
-}
-
 impl std::fmt::Display for SmallestHole {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Self::Auto => write!(f, "auto"),
             Self::Sealed(width) => write!(f, "{width}"),
             Self::Open(_) => write!(f, "0"),
         }
@@ -83,12 +81,29 @@ impl std::fmt::Display for SmallestHole {
 }
 
 impl SmallestHole {
+    /// What [`SmallestHole::Auto`] is in a model whose triangles fit. [Units: wu]
+    pub const LEAST: f64 = 0.01;
+    /// What it is at most: wider ones are looked through. [Units: wu]
+    const MOST: f64 = 0.05;
+    /// How many times as wide as nearly all slits are the widest, where several triangles meet.
+    const SPREAD: f64 = 3.0;
+
     /// As users say it: 0 leaves gaps open.
     #[must_use]
     pub fn of_width(width: f64) -> Self {
-        match Self::default() {
-            Self::Sealed(default) if width == 0.0 => Self::Open(default),
-            _ => Self::Sealed(width),
+        if width == 0.0 {
+            Self::Open(Self::LEAST)
+        } else {
+            Self::Sealed(width)
+        }
+    }
+
+    /// What it is for a model whose triangles miss each other by `misfit`, nearly all of them. [Units: wu]
+    #[must_use]
+    pub(crate) fn resolved(self, misfit: impl FnOnce() -> f64) -> Self {
+        match self {
+            Self::Auto => Self::Sealed((Self::SPREAD * misfit()).clamp(Self::LEAST, Self::MOST)),
+            given => given,
         }
     }
 
@@ -96,6 +111,7 @@ impl SmallestHole {
     #[must_use]
     pub fn gap(self) -> f64 {
         match self {
+            Self::Auto => Self::LEAST,
             Self::Sealed(width) | Self::Open(width) => width,
         }
     }
@@ -103,7 +119,7 @@ impl SmallestHole {
     /// Whether gaps are closed.
     #[must_use]
     pub fn has_seals(self) -> bool {
-        matches!(self, Self::Sealed(_))
+        !matches!(self, Self::Open(_))
     }
 
     pub(crate) fn check(self) -> Result<(), BakeError> {
@@ -142,7 +158,6 @@ impl BakeConfig {
                     .map_or_else(|| "auto".to_owned(), |v| v.to_string()),
             ),
             ("min_opening", self.min_opening.to_string()),
-            ("smallest_hole", self.smallest_hole.to_string()),
             ("max_voxels", self.max_voxels.to_string()),
             ("noise", self.noise.to_string()),
             ("merge.threshold", m.threshold.to_string()),

@@ -9,8 +9,8 @@ use crate::assemble::{Cut, assemble};
 use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex};
 use crate::join::{VOID, join_unparted, join_voids};
 use crate::proposal::Proposal;
-use crate::structure::Structure;
-use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Stage};
+use crate::structure::{Structure, misfit};
+use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
 
 /// Makes a world of what a method proposes.
 ///
@@ -23,15 +23,27 @@ pub(crate) fn realize(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
-    let structure = structure.into_scene();
     context.begin(Stage::Complex)?;
+    let structure = structure.into_scene();
+    let hole = config
+        .smallest_hole
+        .resolved(|| misfit(&structure.triangles, &structure.bvh));
+    if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
+        proposal.notes.push(format!(
+            "triangles that should meet miss each other: gaps up to {:.0} mm are closed instead of {:.0} (--smallest-hole)",
+            hole.gap() * 1e3,
+            SmallestHole::LEAST * 1e3
+        ));
+    }
+    let settings = &mut proposal.settings;
+    settings.insert("smallest_hole".to_owned(), hole.to_string());
     let candidates = proposal.candidates.iter();
     let complex = build_complex(&ComplexInput {
         triangles: &structure.triangles,
         screens: &candidates.map(|c| c.winding.clone()).collect::<Vec<_>>(),
         bounds: proposal.bounds,
-        gap: config.smallest_hole.gap(),
-        has_seals: config.smallest_hole.has_seals(),
+        gap: hole.gap(),
+        has_seals: hole.has_seals(),
     });
     context.begin(Stage::Partition)?;
     let partition = part(&complex, &mut proposal);

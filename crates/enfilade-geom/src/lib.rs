@@ -19,7 +19,7 @@ pub use aabb::Aabb;
 pub use bvh::{Bvh, Nearest};
 pub use glam::{DMat3, DMat4, DVec2, DVec3};
 pub use plane::Plane;
-pub use ray::{Hit, Ray};
+pub use ray::{Hit, Ray, closest_point_on_triangle};
 pub use sets::Sets;
 pub use solid::{BoxTree, ConvexSolid, SolidError};
 pub use tolerance::{plane_tolerance, world_tolerance};

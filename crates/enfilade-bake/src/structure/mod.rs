@@ -5,6 +5,7 @@
 //! | which triangles bound rooms, which are stairs, along which axes | `of`, `stairs`, `frame` |
 //! | what closes openings: door leaves and panes | `blockers` |
 //! | where storeys end | `slabs` |
+//! | how badly triangles fit together | `misfit` |
 //! | which side of a surface is matter | `backs` |
 //! | where cells are one room | `pinch`, `lattice` |
 //! | which plane an opening lies in | `candidate` |
@@ -14,6 +15,7 @@ mod blockers;
 mod candidate;
 mod frame;
 mod lattice;
+mod misfit;
 mod of;
 mod pinch;
 mod slabs;
@@ -24,6 +26,7 @@ pub(crate) use blockers::plates;
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
 pub(crate) use lattice::{connected_count, rim_share};
+pub(crate) use misfit::misfit;
 pub(crate) use of::{OUTDOORS, Stairs, Structure, bounds_of, in_own_order, structural_triangles};
 pub use pinch::MergeSettings;
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};

@@ -91,7 +91,8 @@ pub(crate) struct BakeOptions {
     /// Width in meters of the narrowest opening that must be found [default: 0.6].
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     min_opening: Option<f64>,
-    /// Narrower openings, in meters, are gaps of the model and closed by seals; 0 leaves them open, as cracks [default: 0.01].
+    /// Narrower openings, in meters, are gaps of the model and closed by seals; 0 leaves them open, as cracks [default:
+    /// 0.01, and more where triangles that should meet miss each other by more].
     #[arg(long, value_name = "METERS", value_parser = parse_hole, allow_hyphen_values = true)]
     smallest_hole: Option<f64>,
     /// Threads to use; as many as there are cores if not given. The result is the same.
