@@ -19,7 +19,7 @@ pub struct WidestPath {
     /// Voxel indices from the start on; each is one of the 26 neighbors of the one before, the last
     /// lies in the outermost layer.
     pub voxels: Vec<usize>,
-    /// Which of them is the narrowest: behind it begins air wider than it that reaches the edge. On a
+    /// Which of them is the narrowest, or leads by what is: behind it begins air wider than it that reaches the edge. On a
     /// stretch that is narrowest all along, such as a passage, its far end.
     pub narrowest: usize,
     /// Squared distance there. [Units: vx²]
@@ -53,8 +53,16 @@ pub fn widest_path(dims: [usize; 3], distances: &[u16], start: usize) -> Option<
     );
     // From the narrowest place on nothing is in the way any more. Where nothing is wider, it is the last.
     let end = voxels.iter().position(|&v| beyond.get_index(v));
-    let narrow = |&i: &usize| distances[voxels[i]] == bottleneck;
-    let narrowest = (0..end.unwrap_or(voxels.len())).rev().find(narrow)?;
+    let before = || (0..end.unwrap_or(voxels.len())).rev();
+    let is_narrow = |&i: &usize| distances[voxels[i]] == bottleneck;
+    // A slanting step may pass beside the narrowest voxels without touching one.
+    let leads_by_narrow = |&i: &usize| {
+        let next = *voxels.get(i + 1).unwrap_or(&voxels[i]);
+        narrowest_around(dims, distances, [voxels[i], next]) == bottleneck
+    };
+    let narrowest = before()
+        .find(is_narrow)
+        .or_else(|| before().find(leads_by_narrow))?;
     Some(WidestPath {
         voxels,
         narrowest,
@@ -92,6 +100,14 @@ impl WidestPath {
         }
         out
     }
+}
+
+/// Least squared distance in the box around both ends of a step.
+fn narrowest_around(dims: [usize; 3], distances: &[u16], ends: [usize; 2]) -> u16 {
+    let [a, b] = ends.map(|i| coords(dims, i));
+    let vertex = |c: usize| [0, 1, 2].map(|k| if c >> k & 1 == 1 { a[k] } else { b[k] });
+    let at = |[x, y, z]: [usize; 3]| distances[x + dims[0] * (y + dims[1] * z)];
+    (0..8).map(|c| at(vertex(c))).min().unwrap_or(0)
 }
 
 /// Whether all voxels are wide enough that the line between the middles of two touches.
@@ -319,9 +335,14 @@ mod tests {
         assert_eq!(path.voxels[0], start);
         let last = path.voxels[path.voxels.len() - 1];
         assert!(is_border(dims, coords(dims, last)));
-        let least = path.voxels.iter().map(|&v| distances[v]).min();
+        // Were all the air that the path sweeps wider, so were a way from face to face within it.
+        let least_of_step = |i: usize| {
+            let next = path.voxels[(i + 1).min(path.voxels.len() - 1)];
+            narrowest_around(dims, distances, [path.voxels[i], next])
+        };
+        let least = (0..path.voxels.len()).map(least_of_step).min();
         assert_eq!(least, expected);
-        assert_eq!(Some(distances[path.voxels[path.narrowest]]), expected);
+        assert_eq!(Some(least_of_step(path.narrowest)), expected);
         for pair in path.voxels.windows(2) {
             let [a, b] = [coords(dims, pair[0]), coords(dims, pair[1])];
             assert!((0..3).all(|k| a[k].abs_diff(b[k]) <= 1));
@@ -374,6 +395,28 @@ mod tests {
             let numbers: Vec<u16> = (0..n).map(|_| (random() * 7.0) as u16).collect();
             check(dims, &numbers, start % n);
         }
+    }
+
+    #[test]
+    fn a_step_that_slants_past_the_narrowest_voxels_is_the_narrowest_place() {
+        // Two rooms one voxel high in a layer, joined over an edge by two voxels that are narrower.
+        let dims = [6, 6, 3];
+        let mut distances = vec![0; 6 * 6 * 3];
+        let mut set = |x: usize, y: usize, d: u16| distances[x + 6 * (y + 6)] = d;
+        for (x, y, d) in [
+            (2, 2, 9),
+            (3, 2, 4),
+            (2, 3, 4),
+            (3, 3, 9),
+            (4, 3, 9),
+            (5, 3, 9),
+        ] {
+            set(x, y, d);
+        }
+        let start = 2 + 6 * (2 + 6);
+        let path = widest_path(dims, &distances, start).unwrap();
+        assert_eq!((path.bottleneck, path.narrowest), (4, 0));
+        check(dims, &distances, start);
     }
 
     #[test]
