@@ -11,7 +11,7 @@ pub struct CellId(pub u32);
 pub struct PortalId(pub u32);
 
 impl CellId {
-    /// Its position in [`CellPortalGraph::cells`].
+    /// Its position in [`CellPortalGraph::cells`](crate::CellPortalGraph::cells).
     #[inline]
     #[must_use]
     pub fn idx(self) -> usize {
@@ -20,7 +20,7 @@ impl CellId {
 }
 
 impl PortalId {
-    /// Its position in [`CellPortalGraph::portals`].
+    /// Its position in [`CellPortalGraph::portals`](crate::CellPortalGraph::portals).
     #[inline]
     #[must_use]
     pub fn idx(self) -> usize {

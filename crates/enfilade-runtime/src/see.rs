@@ -5,7 +5,7 @@
 //! Dirkse 2002, chapter 3; Gjørup 1999, section 2.3.4). We depart from them in that the ways are not
 //! followed depth first but nearest first, from a queue:
 //!
-//! - A visit is a cell, a [`Region`] of the screen and the plane of the portal entered by, beyond which
+//! - A visit is a cell, a `Region` of the screen and the plane of the portal entered by, beyond which
 //!   it begins. It holds nothing of the way that led there, so two visits of a cell can be compared: one
 //!   within another adds nothing and is not entered. That also is Dirkse's lock against endless loops.
 //! - While visits of a cell wait, they can be joined where that wastes little (his section 8.4).
