@@ -8,6 +8,7 @@ mod bench;
 mod check;
 mod features;
 mod floors;
+mod lengths;
 mod messy;
 mod mutual;
 mod score;

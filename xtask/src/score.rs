@@ -237,126 +237,14 @@ pub(crate) fn score_world(
         .into_owned();
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)
         .with_context(|| format!("{name}/truth.json"))?;
-    let empty = Vec::new();
-    let list = |v: &'_ Value| v.as_array().cloned().unwrap_or_else(|| empty.clone());
     let (rooms, openings) = (list(&truth["rooms"]), list(&truth["openings"]));
-    let group = groups(&rooms, &openings);
+    let locate = |points: &[V3]| locate(profile, world, points);
     let mut failed = Vec::new();
 
-    // Rooms.
-    let (mut points, mut owner) = (Vec::new(), Vec::new());
-    for r in &rooms {
-        for p in list(&r["sample_points"]).iter().filter_map(vec3) {
-            points.push(p);
-            owner.push(text(&r["id"]));
-        }
-    }
-    let cells = locate(profile, world, &points)?;
-    // A point that is nowhere shares its cell with no other.
-    let found: Vec<String> = cells
-        .iter()
-        .enumerate()
-        .map(|(i, c)| {
-            if c == "-" {
-                format!("none{i}")
-            } else {
-                c.clone()
-            }
-        })
-        .collect();
-    let (mut per_room, mut per_cell) = (
-        BTreeMap::<&str, BTreeMap<&str, usize>>::new(),
-        BTreeMap::<&str, BTreeMap<&str, usize>>::new(),
-    );
-    for (room, cell) in owner.iter().zip(&found) {
-        *per_room.entry(room).or_default().entry(cell).or_default() += 1;
-        *per_cell
-            .entry(cell)
-            .or_default()
-            .entry(&group[room])
-            .or_default() += 1;
-    }
-    let mut good = 0;
-    for r in &rooms {
-        let id = text(&r["id"]);
-        let Some(counts) = per_room.get(id.as_str()) else {
-            continue;
-        };
-        let Some((cell, n)) = counts.iter().max_by_key(|c| c.1) else {
-            continue;
-        };
-        let whole = *n as f64 >= 0.95 * counts.values().sum::<usize>() as f64;
-        let inside = &per_cell[cell];
-        let own = inside.get(group[&id].as_str()).copied().unwrap_or(0);
-        let alone = own as f64 >= 0.95 * inside.values().sum::<usize>() as f64;
-        if whole && alone {
-            good += 1;
-        } else {
-            let why = if whole { "shares its cell" } else { "is split" };
-            failed.push(format!("room {} {why}", text(&r["name"])));
-        }
-    }
-
-    // Doors and windows.
-    let portals: Vec<(u64, V3, f64, V3, BTreeSet<String>)> = list(&graph["portals"])
-        .iter()
-        .filter_map(|p| {
-            let outline: Vec<V3> = list(&p["outline"]).iter().filter_map(vec3).collect();
-            let (center, area) = center_and_area(&outline);
-            let sides = list(&p["cells"]).iter().map(ToString::to_string).collect();
-            Some((
-                p["id"].as_u64()?,
-                center,
-                area,
-                unit(vec3(&p["normal"])?),
-                sides,
-            ))
-        })
-        .collect();
-    let usable: Vec<&Value> = openings
-        .iter()
-        .filter(|o| o.get("usable").is_none_or(|u| u == true) && !list(&o["corners"]).is_empty())
-        .collect();
-    let place = |o: &Value| -> Option<(V3, V3, f64)> {
-        let thickness = o["thickness"].as_f64().unwrap_or(0.0);
-        Some((vec3(&o["centre"])?, unit(vec3(&o["normal"])?), thickness))
-    };
-    let mut probes = Vec::new();
-    for o in &usable {
-        let (c, n, t) = place(o).context("an opening without place")?;
-        probes.extend([along(c, n, 0.35 + t / 2.0), along(c, n, -0.35 - t / 2.0)]);
-    }
-    let sides = locate(profile, world, &probes)?;
-    let (mut hits, mut tried) = (
-        BTreeMap::<String, usize>::new(),
-        BTreeMap::<String, usize>::new(),
-    );
-    let mut used = BTreeSet::new();
-    for (k, o) in usable.iter().enumerate() {
-        let (c, n, t) = place(o).context("an opening without place")?;
-        let want: BTreeSet<String> = sides[2 * k..2 * k + 2].iter().cloned().collect();
-        let corners: Vec<V3> = list(&o["corners"]).iter().filter_map(vec3).collect();
-        let size = center_and_area(&corners).1;
-        let mut hit = false;
-        for (id, center, area, normal, cells) in &portals {
-            let off = sub(*center, c);
-            let depth = dot(off, n).abs();
-            let across = (dot(off, off) - depth * depth).max(0.0).sqrt();
-            let is_turned = dot(*normal, n).abs() < 15.0_f64.to_radians().cos();
-            if depth > 0.3 + t / 2.0 || across > 0.3 || is_turned {
-                continue;
-            }
-            used.insert(*id);
-            hit |= (0.5 * size..=2.0 * size).contains(area) && *cells == want && want.len() == 2;
-        }
-        let kind = text(&o["kind"]);
-        *tried.entry(kind.clone()).or_default() += 1;
-        if hit {
-            *hits.entry(kind).or_default() += 1;
-        } else if kind == "door" || kind == "window" {
-            failed.push(format!("{kind} {} missed", text(&o["name"])));
-        }
-    }
+    let samples = Samples::of(rooms, openings, &locate)?;
+    let n_good = samples.n_whole_and_alone(rooms, &mut failed);
+    let portals = portals_of(graph);
+    let found = find_openings(openings, &portals, &locate, &mut failed)?;
     let outdoor: BTreeSet<String> = list(&graph["cells"])
         .iter()
         .filter(|c| c["outdoor"] == true)
@@ -364,31 +252,215 @@ pub(crate) fn score_world(
         .collect();
     let extra = portals
         .iter()
-        .filter(|p| p.4.is_disjoint(&outdoor) && !used.contains(&p.0))
+        .filter(|p| p.cells.is_disjoint(&outdoor) && !found.used.contains(&p.id))
         .count();
     let n = rooms.len();
     let per_n = |x: usize| (n > 0).then(|| x as f64 / n as f64);
-    let share = |kind: &str| {
-        tried
-            .get(kind)
-            .map(|&t| hits.get(kind).copied().unwrap_or(0) as f64 / t as f64)
-    };
-    let with_points: BTreeSet<&String> = cells.iter().filter(|c| *c != "-").collect();
-    let owner_group: Vec<String> = owner.iter().map(|o| group[o].clone()).collect();
     Ok(Row {
         name,
         n_rooms: n,
         figures: [
-            per_n(good),
-            share("door"),
-            share("window"),
-            per_n(with_points.len()),
+            per_n(n_good),
+            found.share("door"),
+            found.share("window"),
+            per_n(samples.n_cells),
             per_n(extra),
-            pair_mcc(&owner, &owner_group, &found),
+            pair_mcc(&samples.rooms, &samples.groups, &samples.cells),
         ],
         seconds: f64::NAN,
         failed,
     })
+}
+
+/// The elements of an array; none of anything else.
+fn list(v: &Value) -> &[Value] {
+    v.as_array().map_or(&[], Vec::as_slice)
+}
+
+/// Points in rooms: one entry a point in each list.
+struct Samples {
+    rooms: Vec<String>,
+    /// The group of the room.
+    groups: Vec<String>,
+    /// The cell found; a point that is nowhere shares its cell with no other.
+    cells: Vec<String>,
+    /// Cells that hold points.
+    n_cells: usize,
+}
+
+impl Samples {
+    fn of(
+        rooms: &[Value],
+        openings: &[Value],
+        locate: &impl Fn(&[V3]) -> anyhow::Result<Vec<String>>,
+    ) -> anyhow::Result<Self> {
+        let (mut points, mut owners) = (Vec::new(), Vec::new());
+        for r in rooms {
+            for p in list(&r["sample_points"]).iter().filter_map(vec3) {
+                points.push(p);
+                owners.push(text(&r["id"]));
+            }
+        }
+        let located = locate(&points)?;
+        let with_points: BTreeSet<&String> = located.iter().filter(|c| *c != "-").collect();
+        let group = groups(rooms, openings);
+        let cell = |(i, c): (usize, &String)| match c.as_str() {
+            "-" => format!("none{i}"),
+            cell => cell.to_owned(),
+        };
+        Ok(Self {
+            groups: owners.iter().map(|o| group[o].clone()).collect(),
+            rooms: owners,
+            n_cells: with_points.len(),
+            cells: located.iter().enumerate().map(cell).collect(),
+        })
+    }
+
+    /// Rooms of which nearly all points are in one cell that holds hardly any of other groups.
+    fn n_whole_and_alone(&self, rooms: &[Value], failed: &mut Vec<String>) -> usize {
+        let mut per_room = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
+        let mut per_cell = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
+        let mut group_of = BTreeMap::<&str, &str>::new();
+        for (i, (room, cell)) in self.rooms.iter().zip(&self.cells).enumerate() {
+            let group = &self.groups[i];
+            *per_room.entry(room).or_default().entry(cell).or_default() += 1;
+            *per_cell.entry(cell).or_default().entry(group).or_default() += 1;
+            group_of.insert(room, group);
+        }
+        let mut n_good = 0;
+        for r in rooms {
+            let id = text(&r["id"]);
+            let Some(counts) = per_room.get(id.as_str()) else {
+                continue;
+            };
+            let Some((cell, n)) = counts.iter().max_by_key(|c| c.1) else {
+                continue;
+            };
+            let whole = *n as f64 >= 0.95 * counts.values().sum::<usize>() as f64;
+            let inside = &per_cell[cell];
+            let own = inside.get(group_of[id.as_str()]).copied().unwrap_or(0);
+            let alone = own as f64 >= 0.95 * inside.values().sum::<usize>() as f64;
+            if whole && alone {
+                n_good += 1;
+            } else {
+                let why = if whole { "shares its cell" } else { "is split" };
+                failed.push(format!("room {} {why}", text(&r["name"])));
+            }
+        }
+        n_good
+    }
+}
+
+/// A portal of the world.
+struct Portal {
+    id: u64,
+    center: V3,
+    area: f64,
+    normal: V3,
+    cells: BTreeSet<String>,
+}
+
+fn portals_of(graph: &Value) -> Vec<Portal> {
+    let portal = |p: &Value| {
+        let outline: Vec<V3> = list(&p["outline"]).iter().filter_map(vec3).collect();
+        let (center, area) = center_and_area(&outline);
+        Some(Portal {
+            id: p["id"].as_u64()?,
+            center,
+            area,
+            normal: unit(vec3(&p["normal"])?),
+            cells: list(&p["cells"]).iter().map(ToString::to_string).collect(),
+        })
+    };
+    list(&graph["portals"]).iter().filter_map(portal).collect()
+}
+
+/// Where an opening of the truth is.
+struct Place {
+    center: V3,
+    normal: V3,
+    thickness: f64,
+    area: f64,
+}
+
+impl Place {
+    fn of(opening: &Value) -> Option<Self> {
+        let corners = list(&opening["corners"]);
+        let corners: Vec<V3> = corners.iter().filter_map(vec3).collect();
+        Some(Self {
+            center: vec3(&opening["centre"])?,
+            normal: unit(vec3(&opening["normal"])?),
+            thickness: opening["thickness"].as_f64().unwrap_or(0.0),
+            area: center_and_area(&corners).1,
+        })
+    }
+
+    /// Points on either side of it.
+    fn probes(&self) -> [V3; 2] {
+        let far = 0.35 + self.thickness / 2.0;
+        [far, -far].map(|t| along(self.center, self.normal, t))
+    }
+
+    /// Whether a portal lies in it, and so is none too many.
+    fn holds(&self, portal: &Portal) -> bool {
+        let off = sub(portal.center, self.center);
+        let depth = dot(off, self.normal).abs();
+        let across = (dot(off, off) - depth * depth).max(0.0).sqrt();
+        let is_turned = dot(portal.normal, self.normal).abs() < 15.0_f64.to_radians().cos();
+        !(depth > 0.3 + self.thickness / 2.0 || across > 0.3 || is_turned)
+    }
+}
+
+/// Openings of the truth by kind, and the portals that lie in one.
+#[derive(Default)]
+struct FoundOpenings {
+    hits: BTreeMap<String, usize>,
+    tried: BTreeMap<String, usize>,
+    used: BTreeSet<u64>,
+}
+
+impl FoundOpenings {
+    fn share(&self, kind: &str) -> Option<f64> {
+        let n_hit = self.hits.get(kind).copied().unwrap_or(0);
+        self.tried.get(kind).map(|&n| n_hit as f64 / n as f64)
+    }
+}
+
+/// Looks for a portal of each usable opening's place, size and cells.
+fn find_openings(
+    openings: &[Value],
+    portals: &[Portal],
+    locate: &impl Fn(&[V3]) -> anyhow::Result<Vec<String>>,
+    failed: &mut Vec<String>,
+) -> anyhow::Result<FoundOpenings> {
+    let usable: Vec<&Value> = openings
+        .iter()
+        .filter(|o| o.get("usable").is_none_or(|u| u == true) && !list(&o["corners"]).is_empty())
+        .collect();
+    let places = usable
+        .iter()
+        .map(|o| Place::of(o).context("an opening without place"))
+        .collect::<anyhow::Result<Vec<Place>>>()?;
+    let probes: Vec<V3> = places.iter().flat_map(Place::probes).collect();
+    let sides = locate(&probes)?;
+    let mut found = FoundOpenings::default();
+    for (k, (o, place)) in usable.iter().zip(&places).enumerate() {
+        let want: BTreeSet<String> = sides[2 * k..2 * k + 2].iter().cloned().collect();
+        let sizes = 0.5 * place.area..=2.0 * place.area;
+        let mut hit = false;
+        for portal in portals.iter().filter(|p| place.holds(p)) {
+            found.used.insert(portal.id);
+            hit |= sizes.contains(&portal.area) && portal.cells == want && want.len() == 2;
+        }
+        let kind = text(&o["kind"]);
+        *found.tried.entry(kind.clone()).or_default() += 1;
+        if hit {
+            *found.hits.entry(kind).or_default() += 1;
+        } else if kind == "door" || kind == "window" {
+            failed.push(format!("{kind} {} missed", text(&o["name"])));
+        }
+    }
+    Ok(found)
 }
 
 /// Matthews correlation over pairs of points: same room? same cell? Pairs of two rooms in one group

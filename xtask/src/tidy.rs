@@ -1,5 +1,5 @@
-//! What no lint checks: who may use whom, files that import each other, file lengths, strings that must not be
-//! there, links.
+//! What no lint checks: who may use whom, files that import each other, lengths of files and functions, strings
+//! that must not be there, links.
 //!
 //! The table here is the "may not" column of ARCHITECTURE.md; change both together.
 
@@ -10,7 +10,7 @@ use std::process::Command;
 use anyhow::bail;
 use serde_json::Value;
 
-use crate::{cargo, mutual, output_of, root};
+use crate::{cargo, lengths, mutual, output_of, root};
 
 /// What one crate may use. Dependencies for its tests alone are free.
 struct Fence {
@@ -156,12 +156,6 @@ const FENCES: [Fence; 16] = [
 /// What every program of the façade links; all else of ours is behind a feature.
 const FACADE_ALWAYS: [&str; 3] = ["enfilade-geom", "enfilade-cpg", "enfilade-runtime"];
 
-/// Lines a source file may have.
-const MAX_LINES: usize = 800;
-
-/// Longer files that read worse in pieces.
-const MAY_BE_LONGER: [&str; 0] = [];
-
 /// Finds all problems, and fails with one line for each.
 pub(crate) fn run() -> anyhow::Result<()> {
     let listed = output_of(
@@ -197,6 +191,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
         }
     }
     problems.extend(mutual::problems(&sources));
+    problems.extend(lengths::problems(&sources));
     if !problems.is_empty() {
         bail!("{}", problems.join("\n"));
     }
@@ -233,13 +228,9 @@ fn dependency_problems(metadata: &Value) -> Vec<String> {
     problems
 }
 
-/// Lengths, and what must stand in no file.
+/// What must stand in no file.
 fn text_problems(file: &str, text: &str) -> Vec<String> {
     let mut problems = Vec::new();
-    let n = text.lines().count();
-    if file.ends_with(".rs") && n > MAX_LINES && !MAY_BE_LONGER.contains(&file) {
-        problems.push(format!("{file}: {n} lines, more than {MAX_LINES}"));
-    }
     // Put together here, so that this file does not find itself. The first are absolute paths of
     // somebody's machine.
     let forbidden = [
@@ -379,10 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn long_files_and_paths_of_a_machine_are_found() {
-        assert!(text_problems("a.rs", &"\n".repeat(MAX_LINES)).is_empty());
-        assert_eq!(text_problems("a.rs", &"\n".repeat(MAX_LINES + 1)).len(), 1);
-        assert!(text_problems("a.md", &"\n".repeat(MAX_LINES + 1)).is_empty());
+    fn paths_of_a_machine_are_found() {
         let path = ["see /ho", "me/me/x"].concat();
         assert_eq!(
             text_problems("a.md", &format!("\n{path}\n")),

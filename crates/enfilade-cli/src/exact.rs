@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use enfilade::cpg::World;
+use enfilade::cpg::{CellId, World};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, Gpu, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio,
     Style,
@@ -59,11 +59,15 @@ struct Lost {
     look: [f32; 3],
     fov_degrees: f32,
     cell: Option<u32>,
+    #[serde(skip)]
+    cell_name: Option<String>,
     at: [u32; 2],
     pixels: usize,
     expected: String,
     /// Cells that see what is lost.
     cells: Vec<u32>,
+    #[serde(skip)]
+    cell_names: Vec<String>,
     found: String,
     /// Distances along the view direction of what is lost and what is shown. [Units: wu]
     depths: [f32; 2],
@@ -89,21 +93,21 @@ impl fmt::Display for Exactness {
             let p = |p: [f32; 3]| format!("{},{},{}", p[0], p[1], p[2]);
             writeln!(
                 f,
-                "  view {}: {} pixels, at {},{} {} of cells {:?} at {:.4} m is not drawn, {} at {:.4} m is; \
+                "  view {}: {} pixels, at {},{} {} of {} at {:.4} m is not drawn, {} at {:.4} m is; \
                  --eye {} --look {} --fov {}, in {}",
                 l.view,
                 l.pixels,
                 l.at[0],
                 l.at[1],
                 l.expected,
-                l.cells,
+                l.cell_names.join(" "),
                 l.depths[0],
                 l.found,
                 l.depths[1],
                 p(l.eye),
                 p(l.look),
                 l.fov_degrees,
-                l.cell.map_or("no cell".to_owned(), |c| format!("cell {c}"))
+                l.cell_name.as_deref().unwrap_or("no cell")
             )?;
         }
         Ok(())
@@ -111,20 +115,19 @@ impl fmt::Display for Exactness {
 }
 
 /// What a pixel shows, in words, and the cells that see it.
-fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<u32>) {
-    let ids = |cells: &[enfilade::cpg::CellId]| cells.iter().map(|c| c.0).collect();
+fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) {
     match shown {
         Shown::Sky => ("the sky".into(), Vec::new()),
         Shown::Structure { triangle } => {
             let chunk = studio.world.chunk_of_triangle(triangle);
             let batch = chunk.and_then(|c| studio.world.batch_of_chunk(c));
-            let cells = batch.map_or(Vec::new(), |b| ids(&world.batches[b as usize].cells));
+            let cells = batch.map_or(Vec::new(), |b| world.batches[b as usize].cells.clone());
             let batch = batch.map_or("?".to_owned(), |b| b.to_string());
             (format!("triangle {triangle} of batch {batch}"), cells)
         }
         Shown::Detail { detail, .. } => {
             let d = &world.details[detail as usize];
-            (format!("detail {detail} ({})", d.name), ids(&d.cells))
+            (format!("detail {detail} ({})", d.name), d.cells.clone())
         }
     }
 }
@@ -222,16 +225,20 @@ fn describe(
     let first = lost[0];
     let (expected, cells) = named(studio, world, first.expected.0);
     let (found, _) = named(studio, world, first.found.0);
+    let cell = studio.sight.locate(camera.eye);
+    let name = |c: &CellId| world.graph[*c].name.clone();
     Lost {
         view,
         eye: camera.eye,
         look: [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]),
         fov_degrees: camera.fov_y.to_degrees(),
-        cell: studio.sight.locate(camera.eye).map(|c| c.0),
+        cell: cell.map(|c| c.0),
+        cell_name: cell.as_ref().map(name),
         at: first.at,
         pixels: lost.len(),
         expected,
-        cells,
+        cell_names: cells.iter().map(name).collect(),
+        cells: cells.iter().map(|c| c.0).collect(),
         found,
         depths: [first.expected.1, first.found.1].map(Camera::distance_of),
     }

@@ -206,7 +206,7 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     }
     writeln!(
         out,
-        "\n{:>6}  {:<8} {:>15} {:>9} {:>9} {:>10} {:>7} {:>10} {:>8} {:>9}  middle in m",
+        "\n{:>12}  {:<8} {:>21} {:>9} {:>9} {:>10} {:>7} {:>10} {:>8} {:>9}  middle in m",
         "portal",
         "kind",
         "cells",
@@ -219,13 +219,17 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
         "score"
     )?;
     let scores = portal_scores(world, &CostModel::default());
-    for (id, (p, s)) in graph.portals.iter().zip(&scores).enumerate() {
+    for (id, s) in graph.portal_ids().zip(&scores) {
+        let p = &graph[id];
         let [width, height] = p.size();
         let [x, y, z] = p.center();
-        let cells = format!("{} – {}", p.cells[0].0, p.cells[1].0);
+        let [one, other] = p.cells.map(|c| &graph[c].name);
+        let cells = format!("{one} – {other}");
+        // As a text, so that it is as wide as the column.
+        let id = id.to_string();
         writeln!(
             out,
-            "{id:>6}  {:<8} {cells:>15} {width:>9.2} {height:>9.2} {:>10.3} {:>7} {:>10.1} {:>8.0} {:>9.2e}  {x:.2} {y:.2} {z:.2}",
+            "{id:>12}  {:<8} {cells:>21} {width:>9.2} {height:>9.2} {:>10.3} {:>7} {:>10.1} {:>8.0} {:>9.2e}  {x:.2} {y:.2} {z:.2}",
             kind_name(p.kind),
             p.area,
             p.pieces.len(),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
-use enfilade::cpg::{CellSet, SightGraph, SightPortal, World};
+use enfilade::cpg::{CellId, CellSet, SightGraph, SightPortal, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
 use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
@@ -95,6 +95,9 @@ struct Report {
     visible_cells: Vec<usize>,
     /// The ten cells from which most can be seen, the worst first.
     worst: Vec<usize>,
+    /// Their names.
+    #[serde(skip)]
+    worst_names: Vec<String>,
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
@@ -109,7 +112,7 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     }
     let start = Instant::now();
     let vis = compute(args, &input)?;
-    let report = report(graph, &vis, start.elapsed());
+    let report = report(&input, &vis, start.elapsed());
     let rows = vis.cells.iter().map(CellSet::ranges).collect();
     let text = write_pvs_text(&PvsText {
         notes: notes(&report, args.mode),
@@ -143,6 +146,15 @@ struct Input {
     world: Option<World>,
     /// Changes with the file.
     hash: u64,
+}
+
+impl Input {
+    /// The name of a cell; clusters of a portal file have none but by number.
+    fn name(&self, cell: usize) -> String {
+        let id = CellId(cell as u32);
+        let world = self.world.as_ref();
+        world.map_or_else(|| id.to_string(), |w| w.graph[id].name.clone())
+    }
 }
 
 /// Reads a portal file or a world as a graph to look through; with a world, what stands in the way.
@@ -294,7 +306,7 @@ fn read_checkpoint(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     }
 }
 
-fn report(graph: &SightGraph, vis: &VisOutput, took: Duration) -> Report {
+fn report(input: &Input, vis: &VisOutput, took: Duration) -> Report {
     let cells = vis.cells.len();
     let pairs: usize = vis.cells.iter().map(CellSet::len).sum();
     let undecided: usize = vis.undecided.iter().map(CellSet::len).sum();
@@ -305,7 +317,7 @@ fn report(graph: &SightGraph, vis: &VisOutput, took: Duration) -> Report {
     let mean = pairs as f64 / cells.max(1) as f64;
     Report {
         cells,
-        portals: graph.portals.len(),
+        portals: input.graph.portals.len(),
         pairs,
         mean_visible: mean,
         mean_visible_percent: 100.0 * mean / cells.max(1) as f64,
@@ -317,6 +329,7 @@ fn report(graph: &SightGraph, vis: &VisOutput, took: Duration) -> Report {
         steps: vis.n_steps,
         seconds: took.as_secs_f64(),
         visible_cells,
+        worst_names: worst.iter().map(|&c| input.name(c)).collect(),
         worst,
     }
 }
@@ -369,7 +382,8 @@ fn print(report: &Report, is_json: bool) -> anyhow::Result<()> {
         let worst: Vec<String> = r
             .worst
             .iter()
-            .map(|&c| format!("{c} ({})", r.visible_cells[c]))
+            .zip(&r.worst_names)
+            .map(|(&c, name)| format!("{name} ({})", r.visible_cells[c]))
             .collect();
         writeln!(out, "cells that see most: {}", worst.join(", "))?;
         writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;

@@ -171,10 +171,10 @@ fn print_table(
             "eye in no cell: all that meets the view counts as visible"
         )?,
     }
-    writeln!(out, "{:>8} {:>8}  cell", "depth m", "portal")?;
+    writeln!(out, "{:>8} {:>12}  cell", "depth m", "portal")?;
     for v in seen.visits() {
-        let via = v.via.map_or("-".to_owned(), |p| p.0.to_string());
-        writeln!(out, "{:>8.2} {via:>8}  {}", v.depth, name(v.cell.0))?;
+        let via = v.via.map_or("-".to_owned(), |p| p.to_string());
+        writeln!(out, "{:>8.2} {via:>12}  {}", v.depth, name(v.cell.0))?;
     }
     let [structure, details] = triangles(sight, seen);
     writeln!(

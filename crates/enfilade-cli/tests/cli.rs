@@ -139,6 +139,9 @@ fn inspect_prints_a_table_for_people() {
         "2 and outdoors",
         "2 (1 open, 1 window)",
         "4.00 × 3.00 × 5.00",
+        "portal-0",
+        "cell-0 – cell-1",
+        "cell-1 – outdoors",
     ] {
         assert!(table.contains(part), "{part:?} is missing from\n{table}");
     }

@@ -231,6 +231,12 @@ fn a_world_takes_the_answer_along_and_a_portal_file_cannot() {
     let [p, o, i] = ["pvs", "-o", "--into"].map(Path::new);
     let done = enfilade(&[p, &glb, o, &pvs, i, &told]);
     assert!(done.status.success(), "{done:?}");
+    // Named as the world names it, not by its number.
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    let most = said
+        .lines()
+        .find(|l| l.starts_with("cells that see most: "));
+    assert!(most.is_some_and(|l| l.contains("outdoors (")), "{said}");
     let answer = enfilade::open(&told).unwrap().pvs.unwrap();
     let text = fs::read_to_string(&pvs).unwrap();
     let rows = enfilade::import::read_pvs_text(&text).unwrap().rows;

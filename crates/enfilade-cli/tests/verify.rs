@@ -59,7 +59,7 @@ fn a_broken_promise_ends_in_exit_code_1_and_says_where() {
         String::from_utf8(done.stderr).unwrap(),
     );
     assert!(
-        out.contains("a triangle's batch lacks a cell that sees it; seen from cell 1"),
+        out.contains("a triangle's batch lacks a cell that sees it; seen from cell-1"),
         "{out}"
     );
     assert!(err.contains("breaks a promise"), "{err}");

@@ -1,43 +1,10 @@
 //! Ways into a graph: by id, by name, from cell to cell.
 
-use std::fmt;
 use std::ops::{Index, IndexMut};
 
 use enfilade_geom::DVec3;
 
 use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, World};
-
-impl CellId {
-    /// Its position in [`CellPortalGraph::cells`].
-    #[inline]
-    #[must_use]
-    pub fn idx(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl PortalId {
-    /// Its position in [`CellPortalGraph::portals`].
-    #[inline]
-    #[must_use]
-    pub fn idx(self) -> usize {
-        self.0 as usize
-    }
-}
-
-/// `cell-3`: the name that builders give the cell, unless it is the outdoors.
-impl fmt::Display for CellId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "cell-{}", self.0)
-    }
-}
-
-/// `portal-3`. Portals have no names of their own.
-impl fmt::Display for PortalId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "portal-{}", self.0)
-    }
-}
 
 /// A portal as left from one of its cells.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,44 +7,21 @@
 //!
 //! Same triangles in the same order give the same tree and the same answers.
 
+mod build;
+
 use std::ops::ControlFlow;
 
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
 use crate::ray::{
     Hit, Ray, ShearedRay, closest_point_on_triangle, segment_to_triangle_distance,
     triangle_touches_box,
 };
 use crate::{Aabb, DVec3, Triangle};
+use build::{Built, Node, build_nodes, round_down, round_up};
 
-/// Triangles a leaf may hold; four `f64` triangles cost about as much as one more node.
-const LEAF_SIZE: usize = 4;
-/// Candidate planes an axis is divided by.
-const N_BINS: usize = 16;
-/// Below this depth nodes are split by count, so that hostile input cannot make the tree deep.
-const MAX_SAH_DEPTH: usize = 40;
-/// Enough for [`MAX_SAH_DEPTH`] levels and 16 more that quarter 2³² triangles, three pushes each.
+/// Enough for `MAX_SAH_DEPTH` levels and 16 more that quarter 2³² triangles, three pushes each.
 const STACK_SIZE: usize = 192;
-/// Larger coordinates overflow `f32` products on the way; such triangles are never met.
-const MAX_COORDINATE: f64 = 1e15;
-
-/// Four children: their boxes as `[min, max][axis]`, and what they are.
-#[derive(Clone, Debug)]
-#[repr(align(128))]
-struct Node {
-    bounds: [[Vec4; 3]; 2],
-    /// A node, or the first triangle of a leaf.
-    children: [u32; 4],
-    /// Triangles of a leaf; 0 for a node. Unused children have an empty box.
-    counts: [u32; 4],
-}
-
-const UNUSED: Node = Node {
-    bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]],
-    children: [0; 4],
-    counts: [0; 4],
-};
-
 /// A tree over triangles that answers in about the logarithm of their number.
 #[derive(Clone, Debug)]
 pub struct Bvh {
@@ -67,39 +44,13 @@ pub struct Nearest {
     pub point: DVec3,
 }
 
-/// What the builder knows of a triangle.
-struct Entry {
-    bounds: Aabb,
-    center: DVec3,
-    id: u32,
-}
-
 impl Bvh {
     /// Builds the tree. O(n log n); 128 bytes a node and 76 a triangle.
     ///
     /// Triangles with a corner that is not finite or beyond 10¹⁵ are left out: nothing meets them.
     #[must_use]
     pub fn build(triangles: &[Triangle]) -> Self {
-        let mut entries: Vec<Entry> = triangles
-            .iter()
-            .enumerate()
-            .filter(|(_, t)| {
-                t.iter()
-                    .all(|p| p.abs().max_element() <= MAX_COORDINATE && p.is_finite())
-            })
-            .map(|(i, t)| {
-                let bounds = Aabb::of_points(t);
-                Entry {
-                    bounds,
-                    center: bounds.center(),
-                    id: i as u32,
-                }
-            })
-            .collect();
-        let bounds = entries.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
-        let mut nodes = Vec::with_capacity(entries.len() / 2 + 1);
-        build_node(&mut nodes, &mut entries, 0, 0);
-        let ids: Vec<u32> = entries.iter().map(|e| e.id).collect();
+        let Built { nodes, ids, bounds } = build_nodes(triangles);
         let triangles = ids
             .iter()
             .map(|&i| triangles[i as usize].map(|p| p.to_array()))
@@ -511,154 +462,6 @@ impl Stack {
             self.entries[at] = entry;
         }
     }
-}
-
-fn round_down(p: DVec3) -> Vec3 {
-    Vec3::from_array(p.to_array().map(|x| {
-        let rounded = x as f32;
-        if f64::from(rounded) > x {
-            rounded.next_down()
-        } else {
-            rounded
-        }
-    }))
-}
-
-fn round_up(p: DVec3) -> Vec3 {
-    -round_down(-p)
-}
-
-/// A part of the entries that becomes one child.
-struct Part {
-    first: usize,
-    count: usize,
-    bounds: Aabb,
-}
-
-/// Appends the node over `entries`, which start at `offset` in leaf order, and all below it.
-fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth: usize) {
-    if entries.is_empty() {
-        return;
-    }
-    let by_count = depth >= MAX_SAH_DEPTH;
-    let whole = entries.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
-    let mut parts = vec![Part {
-        first: 0,
-        count: entries.len(),
-        bounds: whole,
-    }];
-    while parts.len() < 4 {
-        // The part whose children a ray is likeliest to meet; by count, the largest.
-        let weight = |p: &Part| {
-            if by_count {
-                p.count as f64
-            } else {
-                p.bounds.surface_area()
-            }
-        };
-        let Some(widest) = (0..parts.len())
-            .filter(|&i| parts[i].count > LEAF_SIZE)
-            .max_by(|&a, &b| {
-                weight(&parts[a])
-                    .total_cmp(&weight(&parts[b]))
-                    .then(b.cmp(&a))
-            })
-        else {
-            break;
-        };
-        let part = &parts[widest];
-        let slice = &mut entries[part.first..part.first + part.count];
-        let left = if by_count {
-            slice.len() / 2
-        } else {
-            split(slice)
-        };
-        let bounds_of = |s: &[Entry]| s.iter().fold(Aabb::EMPTY, |b, e| b.union(e.bounds));
-        let halves = [
-            Part {
-                first: part.first,
-                count: left,
-                bounds: bounds_of(&slice[..left]),
-            },
-            Part {
-                first: part.first + left,
-                count: part.count - left,
-                bounds: bounds_of(&slice[left..]),
-            },
-        ];
-        parts.splice(widest..=widest, halves);
-    }
-    let this = nodes.len();
-    nodes.push(UNUSED);
-    for (k, part) in parts.iter().enumerate() {
-        let (min, max) = (round_down(part.bounds.min), round_up(part.bounds.max));
-        for axis in 0..3 {
-            nodes[this].bounds[0][axis][k] = min[axis];
-            nodes[this].bounds[1][axis][k] = max[axis];
-        }
-        if part.count <= LEAF_SIZE {
-            nodes[this].children[k] = (offset + part.first) as u32;
-            nodes[this].counts[k] = part.count as u32;
-        } else {
-            nodes[this].children[k] = nodes.len() as u32;
-            let slice = &mut entries[part.first..part.first + part.count];
-            build_node(nodes, slice, offset + part.first, depth + 1);
-        }
-    }
-}
-
-/// Reorders `entries` into two parts, neither empty, and returns the size of the first.
-fn split(entries: &mut [Entry]) -> usize {
-    let centers = entries
-        .iter()
-        .fold(Aabb::EMPTY, |b, e| b.including(e.center));
-    let size = centers.size();
-    let mut best: Option<(f64, usize, usize)> = None;
-    for axis in 0..3 {
-        if size[axis] <= 0.0 {
-            continue;
-        }
-        let mut bins = [(Aabb::EMPTY, 0_usize); N_BINS];
-        for e in entries.iter() {
-            let bin = &mut bins[bin_of(e.center[axis], centers.min[axis], size[axis])];
-            bin.0 = bin.0.union(e.bounds);
-            bin.1 += 1;
-        }
-        let mut right_cost = [0.0; N_BINS];
-        let mut right = (Aabb::EMPTY, 0);
-        for k in (1..N_BINS).rev() {
-            right = (right.0.union(bins[k].0), right.1 + bins[k].1);
-            right_cost[k] = right.0.surface_area() * right.1 as f64;
-        }
-        let mut left = (Aabb::EMPTY, 0);
-        for k in 1..N_BINS {
-            left = (left.0.union(bins[k - 1].0), left.1 + bins[k - 1].1);
-            if left.1 == 0 || left.1 == entries.len() {
-                continue;
-            }
-            let cost = left.0.surface_area() * left.1 as f64 + right_cost[k];
-            if best.is_none_or(|b| cost < b.0) {
-                best = Some((cost, axis, k));
-            }
-        }
-    }
-    let Some((_, axis, bin)) = best else {
-        // All centers in one place: any halves are as good.
-        return entries.len() / 2;
-    };
-    let mut left = 0;
-    for i in 0..entries.len() {
-        if bin_of(entries[i].center[axis], centers.min[axis], size[axis]) < bin {
-            entries.swap(left, i);
-            left += 1;
-        }
-    }
-    left
-}
-
-fn bin_of(center: f64, min: f64, size: f64) -> usize {
-    // A tiny size can make the quotient infinite or not a number; the cast and `min` tame both.
-    (((center - min) / size * N_BINS as f64) as usize).min(N_BINS - 1)
 }
 
 #[cfg(test)]

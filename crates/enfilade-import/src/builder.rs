@@ -331,32 +331,7 @@ impl<'a> Builder<'a> {
             self.note(placement.place, "an object without triangles; left out");
             return Ok(());
         }
-        let is_clear: Vec<bool> = mesh
-            .primitives
-            .iter()
-            .filter(|p| !p.indices.is_empty())
-            .map(|p| self.is_see_through(p))
-            .collect();
-        let is_mixed = is_clear.contains(&true) && is_clear.contains(&false);
-        let all_clear = is_clear.iter().all(|&c| c);
-        let materials: Vec<&str> = mesh
-            .primitives
-            .iter()
-            .filter(|p| !p.indices.is_empty())
-            .map(|p| {
-                p.material
-                    .and_then(|m| self.material(m))
-                    .map_or("", |m| &m.name)
-            })
-            .collect();
-        let verdict = self.options.roles.judge(&Facts {
-            names: placement.names,
-            ancestors: placement.ancestors,
-            materials: &materials,
-            is_see_through: all_clear,
-            moves: placement.moves,
-            is_detail_file: self.is_detail_file,
-        });
+        let (verdict, is_mixed) = self.judge(placement, mesh);
         let (role, reason) = match verdict {
             Verdict::Ignore(reason) => {
                 self.note(placement.place, format!("left out: {reason}"));
@@ -391,22 +366,7 @@ impl<'a> Builder<'a> {
             &[(Part::All, role, "")]
         };
         for &transform in placement.transforms {
-            if !transform.is_finite() {
-                return Err(self.malformed(
-                    placement.place,
-                    "its transform overflows; look for a huge scale on it or above it",
-                ));
-            }
-            let determinant = transform.determinant();
-            if determinant == 0.0 {
-                self.note(placement.place, "a transform that flattens the object");
-            }
-            let is_mirrored = determinant < 0.0;
-            let transform = if is_mirrored {
-                transform * DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0))
-            } else {
-                transform
-            };
+            let (transform, is_mirrored) = self.unmirrored(placement, transform)?;
             for &(part, role, why) in parts {
                 let mesh = self.variant(placement, is_mirrored, part)?;
                 self.scene.objects.push(Object {
@@ -427,6 +387,49 @@ impl<'a> Builder<'a> {
             file.n_triangles += n_placed_triangles;
         }
         Ok(())
+    }
+
+    /// What a mesh is where it is placed, and whether one can see through a part of it alone.
+    fn judge(&self, placement: &Placement<'_>, mesh: &Mesh) -> (Verdict, bool) {
+        let drawn = || mesh.primitives.iter().filter(|p| !p.indices.is_empty());
+        let is_clear: Vec<bool> = drawn().map(|p| self.is_see_through(p)).collect();
+        let is_mixed = is_clear.contains(&true) && is_clear.contains(&false);
+        let material = |p: &Primitive| p.material.and_then(|m| self.material(m));
+        let materials: Vec<&str> = drawn()
+            .map(|p| material(p).map_or("", |m| &m.name))
+            .collect();
+        let verdict = self.options.roles.judge(&Facts {
+            names: placement.names,
+            ancestors: placement.ancestors,
+            materials: &materials,
+            is_see_through: is_clear.iter().all(|&c| c),
+            moves: placement.moves,
+            is_detail_file: self.is_detail_file,
+        });
+        (verdict, is_mixed)
+    }
+
+    /// The transform with a positive determinant, and whether it takes the mirrored mesh for that.
+    fn unmirrored(
+        &mut self,
+        placement: &Placement<'_>,
+        transform: DMat4,
+    ) -> Result<(DMat4, bool), ImportError> {
+        if !transform.is_finite() {
+            return Err(self.malformed(
+                placement.place,
+                "its transform overflows; look for a huge scale on it or above it",
+            ));
+        }
+        let determinant = transform.determinant();
+        if determinant == 0.0 {
+            self.note(placement.place, "a transform that flattens the object");
+        }
+        if determinant < 0.0 {
+            let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+            return Ok((transform * mirror, true));
+        }
+        Ok((transform, false))
     }
 
     fn is_see_through(&self, primitive: &Primitive) -> bool {

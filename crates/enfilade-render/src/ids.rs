@@ -4,12 +4,12 @@
 //! drawn. Two layers: surfaces that hide what is behind them, and the nearest that is seen through.
 
 use crate::camera::Projection;
+use crate::frame::Style;
 use crate::gpu::{Gpu, RenderError};
 use crate::list::DrawList;
 use crate::pipelines::ID;
-use crate::renderer::{
-    Renderer, Stage, Style, bound, color_attachment, depth_attachment, read_texture, texture,
-};
+use crate::renderer::{Renderer, Stage};
+use crate::resources::{bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
 
 /// What one pixel shows.

@@ -10,6 +10,7 @@
 //! light and dark corners. Metal, roughness and normal maps are not drawn.
 
 mod camera;
+mod frame;
 mod gpu;
 mod ids;
 mod levels;
@@ -21,10 +22,13 @@ mod picture;
 mod pipelines;
 mod queries;
 mod renderer;
+mod resources;
 mod scene;
+mod shadings;
 mod studio;
 
 pub use camera::{Camera, Projection};
+pub use frame::{Frame, Paint, Style};
 pub use gpu::{AdapterChoice, Gpu, RenderError};
 pub use ids::{Difference, IdPicture, LostPixel, Shown};
 pub use list::{DrawList, Lister, Reason, Shot, Sparing};
@@ -32,6 +36,6 @@ pub use marks::{Mark, Shape};
 pub use oracle::Oracle;
 pub use picture::Picture;
 pub use queries::QueryCounts;
-pub use renderer::{Frame, Paint, Renderer, Stage, Style};
+pub use renderer::{Renderer, Stage};
 pub use scene::{GpuWorld, cell_color};
 pub use studio::{Culling, Studio, Target};

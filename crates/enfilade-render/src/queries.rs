@@ -18,8 +18,9 @@ use crate::Style;
 use crate::camera::Camera;
 use crate::gpu::RenderError;
 use crate::list::{DrawList, Reason};
-use crate::renderer::{depth_attachment, map_bytes, set_buffers};
+use crate::resources::{depth_attachment, map_bytes};
 use crate::scene::Finish;
+use crate::shadings::set_buffers;
 use crate::studio::Studio;
 
 /// What it took to ask.

@@ -1,66 +1,22 @@
 //! Frames: surfaces, then the picture of them, then what is seen through.
 
+use std::ops::Range;
+
 use glam::{Mat4, Vec3};
 
 use crate::camera::Projection;
+use crate::frame::{Frame, Paint, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::list::{DrawList, Run};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::pipelines::{COLOR, DEPTH, Layouts, Pipelines, Shading, Variant};
-use crate::scene::{Finish, GpuWorld, Instance};
+use crate::pipelines::{COLOR, DEPTH, Layouts, Pipelines};
+use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
+use crate::scene::{GpuWorld, Instance};
+use crate::shadings::{Shadings, draw_runs, set_buffers};
 
 /// Side of the sun's picture of the world, in texels.
 const SHADOW_SIDE: u32 = 4096;
-
-/// How surfaces are painted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Paint {
-    /// As they look.
-    #[default]
-    Lit,
-    /// In the color of a cell that sees them.
-    Cells,
-    /// By how many times each pixel is drawn.
-    Overdraw,
-}
-
-/// How a frame looks, apart from what is in it.
-#[derive(Clone, Copy, Debug)]
-pub struct Style {
-    /// How surfaces are painted.
-    pub paint: Paint,
-    /// Whether corners are darkened; costs about as much as all else.
-    pub dark_corners: bool,
-    /// Whether the sun casts shadows; their picture is made with the first frame of a world.
-    pub shadows: bool,
-    /// What is higher is not drawn: a ceiling taken off. [Units: wu]
-    pub cut_above: f32,
-}
-
-impl Default for Style {
-    fn default() -> Self {
-        Self {
-            paint: Paint::Lit,
-            dark_corners: true,
-            shadows: true,
-            cut_above: f32::INFINITY,
-        }
-    }
-}
-
-/// One frame.
-#[derive(Clone, Copy)]
-pub struct Frame<'a> {
-    /// What takes points to the screen.
-    pub projection: Projection,
-    /// What is drawn.
-    pub list: &'a DrawList,
-    /// How it looks.
-    pub style: Style,
-    /// Lines and polygons over it.
-    pub marks: &'a [Mark],
-}
 
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -81,39 +37,6 @@ pub(crate) struct Targets {
     pub(crate) color: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     post: wgpu::BindGroup,
-}
-
-/// A buffer that grows.
-pub(crate) struct Grown {
-    pub(crate) buffer: wgpu::Buffer,
-    usage: wgpu::BufferUsages,
-}
-
-impl Grown {
-    pub(crate) fn new(gpu: &Gpu, usage: wgpu::BufferUsages) -> Self {
-        let usage = usage | wgpu::BufferUsages::COPY_DST;
-        Self {
-            buffer: Self::make(gpu, usage, 1 << 16),
-            usage,
-        }
-    }
-
-    fn make(gpu: &Gpu, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
-        gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("frame"),
-            size,
-            usage,
-            mapped_at_creation: false,
-        })
-    }
-
-    pub(crate) fn write(&mut self, gpu: &Gpu, bytes: &[u8]) {
-        if self.buffer.size() < bytes.len() as u64 {
-            let size = (bytes.len() as u64).next_power_of_two();
-            self.buffer = Self::make(gpu, self.usage, size);
-        }
-        gpu.queue.write_buffer(&self.buffer, 0, bytes);
-    }
 }
 
 /// Draws worlds; one for each format of picture.
@@ -355,20 +278,10 @@ impl Renderer {
         self.write_globals(gpu, stage, &frame.projection, &frame.style, size);
         let list = frame.list;
         self.write_instances(gpu, world, list);
-        let stand_ins: Vec<Mark> = list
-            .stand_ins
-            .iter()
-            .map(|&(portal, cell)| world.stand_in(portal, cell))
-            .collect();
-        let [behind, _] = crate::marks::corners(&stand_ins, &frame.projection, size);
-        let [hidden, on_top] = crate::marks::corners(frame.marks, &frame.projection, size);
-        let hidden = [behind, hidden].concat();
-        let n_hidden = hidden.len() as u32;
-        let marks = [hidden, on_top].concat();
-        self.marks.write(gpu, bytemuck::cast_slice(&marks));
+        let marks = self.write_marks(gpu, world, frame, size);
         let globals = self.globals_group(gpu);
         let shadings = Shadings::of(frame);
-        shadings.prepare(self, gpu, list);
+        shadings.prepare(gpu, &self.layouts, &mut self.pipelines, list);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -387,32 +300,10 @@ impl Renderer {
             depth_stencil_attachment: Some(depth_attachment(&targets.depth, Some(0.0))),
             ..wgpu::RenderPassDescriptor::default()
         });
-        pass.set_bind_group(0, &stage.world, &[]);
-        set_buffers(&mut pass, world, &self.instances);
-        draw_runs(&mut pass, world, &list.opaque, size, |run| {
-            self.pipelines.surface(shadings.opaque(run))
-        });
-        if shadings.is_count {
-            draw_runs(&mut pass, world, &list.transparent, size, |run| {
-                self.pipelines.surface(shadings.opaque(run))
-            });
-        }
+        self.draw_surfaces(&mut pass, world, stage, &shadings, list, size);
         if in_two {
             drop(pass);
-            let mut picture = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("picture"),
-                color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
-                ..wgpu::RenderPassDescriptor::default()
-            });
-            picture.set_pipeline(if shadings.is_count {
-                &self.pipelines.heat_map
-            } else {
-                &self.pipelines.post
-            });
-            picture.set_bind_group(0, &globals, &[]);
-            picture.set_bind_group(1, &targets.post, &[]);
-            picture.draw(0..3, 0..1);
-            drop(picture);
+            self.draw_picture(&mut encoder, &globals, targets, &shadings, output);
             pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("glass"),
                 color_attachments: &[Some(color_attachment(output, None))],
@@ -432,18 +323,94 @@ impl Renderer {
                 self.pipelines.surface(shadings.glass(run))
             });
         }
-        if !marks.is_empty() {
-            pass.set_scissor_rect(0, 0, size[0], size[1]);
-            pass.set_bind_group(0, &globals, &[]);
-            pass.set_vertex_buffer(0, self.marks.buffer.slice(..));
-            pass.set_pipeline(&self.pipelines.marks);
-            pass.draw(0..n_hidden, 0..1);
-            pass.set_pipeline(&self.pipelines.marks_on_top);
-            pass.draw(n_hidden..marks.len() as u32, 0..1);
-        }
+        self.draw_marks(&mut pass, &globals, &marks, size);
         drop(pass);
         gpu.queue.submit([encoder.finish()]);
         Ok(())
+    }
+
+    /// Writes the corners of marks, those hidden behind surfaces first; returns both ranges.
+    fn write_marks(
+        &mut self,
+        gpu: &Gpu,
+        world: &GpuWorld,
+        frame: &Frame<'_>,
+        size: [u32; 2],
+    ) -> [Range<u32>; 2] {
+        let stand_ins: Vec<Mark> = frame
+            .list
+            .stand_ins
+            .iter()
+            .map(|&(portal, cell)| world.stand_in(portal, cell))
+            .collect();
+        let [behind, _] = crate::marks::corners(&stand_ins, &frame.projection, size);
+        let [hidden, on_top] = crate::marks::corners(frame.marks, &frame.projection, size);
+        let hidden = [behind, hidden].concat();
+        let n_hidden = hidden.len() as u32;
+        let marks = [hidden, on_top].concat();
+        self.marks.write(gpu, bytemuck::cast_slice(&marks));
+        [0..n_hidden, n_hidden..marks.len() as u32]
+    }
+
+    fn draw_surfaces(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        world: &GpuWorld,
+        stage: &Stage,
+        shadings: &Shadings,
+        list: &DrawList,
+        size: [u32; 2],
+    ) {
+        pass.set_bind_group(0, &stage.world, &[]);
+        set_buffers(pass, world, &self.instances);
+        let surface = |run: &Run| self.pipelines.surface(shadings.opaque(run));
+        draw_runs(pass, world, &list.opaque, size, surface);
+        if shadings.is_count {
+            draw_runs(pass, world, &list.transparent, size, surface);
+        }
+    }
+
+    /// Draws what was painted so far to `output`, with dark corners or as counts.
+    fn draw_picture(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        globals: &wgpu::BindGroup,
+        targets: &Targets,
+        shadings: &Shadings,
+        output: &wgpu::TextureView,
+    ) {
+        let mut picture = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        picture.set_pipeline(if shadings.is_count {
+            &self.pipelines.heat_map
+        } else {
+            &self.pipelines.post
+        });
+        picture.set_bind_group(0, globals, &[]);
+        picture.set_bind_group(1, &targets.post, &[]);
+        picture.draw(0..3, 0..1);
+    }
+
+    fn draw_marks(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        globals: &wgpu::BindGroup,
+        [hidden, on_top]: &[Range<u32>; 2],
+        size: [u32; 2],
+    ) {
+        if on_top.end == 0 {
+            return;
+        }
+        pass.set_scissor_rect(0, 0, size[0], size[1]);
+        pass.set_bind_group(0, globals, &[]);
+        pass.set_vertex_buffer(0, self.marks.buffer.slice(..));
+        pass.set_pipeline(&self.pipelines.marks);
+        pass.draw(hidden.clone(), 0..1);
+        pass.set_pipeline(&self.pipelines.marks_on_top);
+        pass.draw(on_top.clone(), 0..1);
     }
 
     /// Draws a frame and brings it back.
@@ -476,235 +443,4 @@ impl Renderer {
             rgba,
         })
     }
-}
-
-pub(crate) fn bound(binding: u32, buffer: &wgpu::Buffer) -> wgpu::BindGroupEntry<'_> {
-    wgpu::BindGroupEntry {
-        binding,
-        resource: buffer.as_entire_binding(),
-    }
-}
-
-pub(crate) fn texture(
-    gpu: &Gpu,
-    label: &str,
-    [width, height]: [u32; 2],
-    format: wgpu::TextureFormat,
-    usage: wgpu::TextureUsages,
-) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    })
-}
-
-pub(crate) fn color_attachment(
-    view: &wgpu::TextureView,
-    clear: Option<wgpu::Color>,
-) -> wgpu::RenderPassColorAttachment<'_> {
-    wgpu::RenderPassColorAttachment {
-        view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations {
-            load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear),
-            store: wgpu::StoreOp::Store,
-        },
-    }
-}
-
-pub(crate) fn depth_attachment(
-    view: &wgpu::TextureView,
-    clear: Option<f32>,
-) -> wgpu::RenderPassDepthStencilAttachment<'_> {
-    wgpu::RenderPassDepthStencilAttachment {
-        view,
-        depth_ops: Some(wgpu::Operations {
-            load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear),
-            store: wgpu::StoreOp::Store,
-        }),
-        stencil_ops: None,
-    }
-}
-
-pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Grown) {
-    pass.set_index_buffer(world.indices.slice(..), wgpu::IndexFormat::Uint32);
-    pass.set_vertex_buffer(0, world.corners.slice(..));
-    pass.set_vertex_buffer(1, instances.buffer.slice(..));
-}
-
-/// Which pipelines a frame draws with.
-struct Shadings {
-    is_count: bool,
-    is_last: bool,
-    casts_shadows: bool,
-    explains: bool,
-    /// A cut makes holes in everything.
-    has_cut: bool,
-}
-
-impl Shadings {
-    fn of(frame: &Frame<'_>) -> Self {
-        let style = &frame.style;
-        let is_count = style.paint == Paint::Overdraw;
-        let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
-        Self {
-            is_count,
-            is_last: !is_count && !style.dark_corners,
-            casts_shadows: style.shadows,
-            explains: style.paint == Paint::Cells || frame.list.instances.iter().any(is_reasoned),
-            has_cut: style.cut_above < f32::INFINITY,
-        }
-    }
-
-    fn variant(&self, shading: Shading, is_smooth: bool, is_last: bool) -> Variant {
-        if self.is_count {
-            return Variant {
-                shading: Shading::Count,
-                is_smooth: false,
-                casts_shadows: false,
-                explains: false,
-                is_last: false,
-            };
-        }
-        Variant {
-            shading,
-            is_smooth,
-            casts_shadows: self.casts_shadows,
-            explains: self.explains,
-            is_last,
-        }
-    }
-
-    fn opaque(&self, run: &Run) -> Variant {
-        let shading = match run.finish {
-            Finish::Plain if !self.has_cut => Shading::Plain,
-            Finish::Textured if !self.has_cut => Shading::Textured,
-            _ => Shading::Masked,
-        };
-        self.variant(shading, run.is_smooth, self.is_last)
-    }
-
-    fn glass(&self, run: &Run) -> Variant {
-        self.variant(Shading::Glass, run.is_smooth, true)
-    }
-
-    /// Makes those that a list needs.
-    fn prepare(&self, renderer: &mut Renderer, gpu: &Gpu, list: &DrawList) {
-        let mut prepare = |variant| {
-            renderer.pipelines.prepare(gpu, &renderer.layouts, variant);
-        };
-        let mut last = None;
-        for run in &list.opaque {
-            if last != Some((run.finish, run.is_smooth)) {
-                last = Some((run.finish, run.is_smooth));
-                prepare(self.opaque(run));
-            }
-        }
-        for run in &list.transparent {
-            prepare(self.glass(run));
-        }
-    }
-}
-
-/// Draws runs, changing pipelines, textures and scissors only where they differ. `surface` by run.
-fn draw_runs<'p>(
-    pass: &mut wgpu::RenderPass<'_>,
-    world: &GpuWorld,
-    runs: &[Run],
-    size: [u32; 2],
-    surface: impl Fn(&Run) -> Option<&'p wgpu::RenderPipeline>,
-) {
-    let (mut texture, mut scissor, mut kind) = (u32::MAX, None, None);
-    pass.set_scissor_rect(0, 0, size[0], size[1]);
-    for run in runs {
-        if kind != Some((run.finish, run.is_smooth)) {
-            kind = Some((run.finish, run.is_smooth));
-            if let Some(pipeline) = surface(run) {
-                pass.set_pipeline(pipeline);
-            }
-        }
-        if run.texture != texture {
-            texture = run.texture;
-            pass.set_bind_group(1, &world.textures[texture as usize], &[]);
-        }
-        if run.scissor != scissor {
-            scissor = run.scissor;
-            let [x, y, w, h] = scissor.unwrap_or([0, 0, size[0], size[1]]);
-            pass.set_scissor_rect(x, y, w, h);
-        }
-        pass.draw_indexed(run.first..run.first + run.n, 0, run.instances.clone());
-    }
-}
-
-/// The bytes of a texture, rows one after the other.
-pub(crate) fn read_texture(
-    gpu: &Gpu,
-    texture: &wgpu::Texture,
-    [width, height]: [u32; 2],
-    bytes_per_pixel: u32,
-) -> Result<Vec<u8>, RenderError> {
-    let row = width * bytes_per_pixel;
-    let stride = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("back"),
-        size: u64::from(stride) * u64::from(height),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu
-        .device
-        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(stride),
-                rows_per_image: None,
-            },
-        },
-        wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-    );
-    gpu.queue.submit([encoder.finish()]);
-    let mapped = map_bytes(gpu, &buffer)?;
-    let mut out = Vec::with_capacity((row * height) as usize);
-    for line in mapped.chunks_exact(stride as usize) {
-        out.extend_from_slice(&line[..row as usize]);
-    }
-    Ok(out)
-}
-
-/// The bytes of a buffer, once all that was submitted is done.
-pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
-    let lost = |why: String| RenderError::Lost(why);
-    let (sender, receiver) = std::sync::mpsc::channel();
-    buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-        // Nobody listens any more where waiting failed.
-        let _ = sender.send(result);
-    });
-    gpu.wait()?;
-    receiver
-        .recv()
-        .map_err(|why| lost(why.to_string()))?
-        .map_err(|why| lost(why.to_string()))?;
-    let mapped = buffer
-        .get_mapped_range(..)
-        .map_err(|why| lost(why.to_string()))?;
-    Ok(mapped.to_vec())
 }

@@ -4,12 +4,13 @@ use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
 
 use crate::camera::Camera;
+use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::ids::IdPicture;
 use crate::list::{DrawList, Lister, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::renderer::{Frame, Renderer, Stage, Style};
+use crate::renderer::{Renderer, Stage};
 use crate::scene::GpuWorld;
 
 /// What of a world is drawn.
@@ -162,7 +163,7 @@ impl Studio {
     pub fn target(&self, size: [u32; 2]) -> Result<Target, RenderError> {
         let limit = self.gpu.device.limits().max_texture_dimension_2d;
         Gpu::check("a side of the picture", size[0].max(size[1]).into(), limit)?;
-        let texture = crate::renderer::texture(
+        let texture = crate::resources::texture(
             &self.gpu,
             "target",
             size,

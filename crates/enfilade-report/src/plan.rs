@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use enfilade_cpg::{Portal, PortalKind, World};
+use enfilade_cpg::{PortalId, PortalKind, World};
 use enfilade_geom::{DMat4, DVec2, DVec3, Plane, Winding};
 
 use crate::section::{Label, Section};
@@ -167,14 +167,17 @@ fn draw_storey(
     }
     draw_details(out, world, storey, y);
     draw_walls(out, world, y);
-    for (id, portal) in world.graph.portals.iter().enumerate() {
-        draw_portal(out, id, portal, storey, y);
+    for id in world.graph.portal_ids() {
+        draw_portal(out, world, id, storey, y);
     }
     for (label, region) in &regions {
         let Label::Cell(id) = label else { continue };
-        // Legible where there is room; small cells get a number that still fits.
-        let height = (region.radius * 0.55).clamp(0.06, 0.32 * zoom) * SCALE;
-        text(out, region.inner, height, "middle", &id.to_string());
+        // Legible where there is room; small cells get a name that still fits, a letter being about 0.6 of its
+        // height wide.
+        let name = &world.graph.cells[*id as usize].name;
+        let fitting = 1.9 / (0.6 * name.chars().count().max(1) as f64);
+        let height = (region.radius * fitting.min(0.55)).clamp(0.06, 0.32 * zoom) * SCALE;
+        text(out, region.inner, height, "middle", name);
         if region.radius > 0.25 {
             let below = region.inner + DVec2::new(0.0, height / SCALE * 0.9);
             text(
@@ -233,7 +236,8 @@ fn cut(corners: &[DVec3], y: f64) -> Option<(DVec2, DVec2)> {
 }
 
 /// A line for upright portals, at their true width; an outline for level ones.
-fn draw_portal(out: &mut String, id: usize, portal: &Portal, storey: &Storey, y: f64) {
+fn draw_portal(out: &mut String, world: &World, id: PortalId, storey: &Storey, y: f64) {
+    let portal = &world.graph[id];
     let outline: Vec<DVec3> = portal
         .outline
         .iter()
@@ -250,10 +254,8 @@ fn draw_portal(out: &mut String, id: usize, portal: &Portal, storey: &Storey, y:
         PortalKind::Window => "window",
         PortalKind::Crack => "crack",
     };
-    let title = format!(
-        "portal {id}, cells {} and {}",
-        portal.cells[0].0, portal.cells[1].0
-    );
+    let [one, other] = portal.cells.map(|c| escaped(&world.graph[c].name));
+    let title = format!("{id}, {one} and {other}");
     // Half a meter: a hole in a floor belongs to the storeys on both sides of that floor.
     let is_near = high > storey.floor - 0.5 && low < storey.top + 0.5;
     let is_level = portal.normal[1].abs() > 0.7;

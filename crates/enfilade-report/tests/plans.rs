@@ -110,12 +110,17 @@ fn two_storeys() -> World {
 fn every_room_is_named_with_its_area() {
     let svg = plan(&house());
     let texts = texts(&svg);
-    for expected in ["0", "1", "Storey 1 of 1 · floor +0.00 m, cut +1.20 m"] {
+    for expected in [
+        "cell-0",
+        "cell-1",
+        "Storey 1 of 1 · floor +0.00 m, cut +1.20 m",
+    ] {
         assert!(
             texts.iter().any(|t| t == expected),
             "{expected} in {texts:?}"
         );
     }
+    assert!(svg.contains("<title>portal-0, cell-0 and cell-1</title>"));
     // 16 m² and half of the doorway in the wall, 0.125 m²; the grid is 2 cm fine, so that each
     // border of 4 m may be off by 0.04 m².
     let areas: Vec<f64> = texts
@@ -212,7 +217,7 @@ fn storeys_are_found_by_their_floors_and_share_the_stair_hole() {
     assert_eq!(holes.len(), 2);
     let texts = texts(&svg);
     assert!(texts.contains(&"Storey 2 of 2 · floor +3.25 m, cut +4.45 m".to_owned()));
-    assert!(texts.contains(&"0".to_owned()) && texts.contains(&"1".to_owned()));
+    assert!(texts.contains(&"cell-0".to_owned()) && texts.contains(&"cell-1".to_owned()));
 }
 
 #[test]

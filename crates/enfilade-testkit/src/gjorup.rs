@@ -99,39 +99,78 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
         Variant::Tessellated => "gjorup-tessellated",
         Variant::Distorted => "gjorup-distorted",
     };
-    let mut mesh = Interior::default();
-    // Floor corners 0-3 and ceiling corners 4-7 of every room.
-    let rooms: Vec<[u32; 8]> = PLANS
-        .iter()
-        .enumerate()
-        .map(|(r, [low, high])| {
-            let plan = [
-                [low[0], low[1]],
-                [high[0], low[1]],
-                [high[0], high[1]],
-                [low[0], high[1]],
-            ];
-            [0, 1, 2, 3, 4, 5, 6, 7].map(|k: usize| {
-                let y = if k < 4 { 0.0 } else { HEIGHT };
-                let mut p = DVec3::new(plan[k % 4][0], y, plan[k % 4][1]);
-                if variant == Variant::Distorted {
-                    let middle = DVec3::new(
-                        f64::midpoint(low[0], high[0]),
-                        HEIGHT * 0.5,
-                        f64::midpoint(low[1], high[1]),
-                    );
-                    p = middle + turn(TURNS[r]) * (p - middle);
-                    for &(_, _, by) in MOVED.iter().filter(|m| m.0 == r && m.1 == k) {
-                        p += DVec3::from_array(by);
-                    }
-                }
-                mesh.corner(p)
+    let mut rooms = FourRooms::new(variant);
+    let corridors = CORRIDORS.map(|c| rooms.add_ends(c));
+    let volumes = [0, 1, 2, 3].map(|r| rooms.add_room(r));
+    let mut mesh = rooms.mesh;
+    for Corridor { p, q, .. } in &corridors {
+        mesh.quad([p[0], p[1], q[0], q[1]]);
+        mesh.quad([p[2], q[3], q[2], p[3]]);
+        mesh.quad([p[0], q[1], q[3], p[2]]);
+        mesh.quad([p[1], p[3], q[2], q[0]]);
+    }
+    let mut site = Site::new(name);
+    let storey = site.storey("rooms", 0.0);
+    for (r, corners) in rooms.corners.iter().enumerate() {
+        let part = solid_of(corners.map(|i| mesh.corners[i as usize]));
+        let mut room = Room::new(&format!("room {r}"), storey, vec![part], &[]);
+        room.volume = volumes[r];
+        site.add_room(room);
+    }
+    for corridor in &corridors {
+        site.add_opening(corridor.opening(&mesh));
+    }
+    if variant == Variant::Tessellated {
+        mesh.bisect_to(400);
+    }
+    finish(site, mesh, degrees)
+}
+
+/// The corners of a corridor's end on a wall, in the wall's direction: floor 0, floor 1, ceiling 0,
+/// ceiling 1.
+type End = [u32; 4];
+
+/// The four rooms while they are built.
+struct FourRooms {
+    variant: Variant,
+    mesh: Interior,
+    /// Floor corners 0-3 and ceiling corners 4-7 of every room.
+    corners: [[u32; 8]; 4],
+    /// By room and wall.
+    ends: [[Option<End>; 4]; 4],
+}
+
+impl FourRooms {
+    fn new(variant: Variant) -> Self {
+        let mut mesh = Interior::default();
+        let corners = [0, 1, 2, 3].map(|r| {
+            [0, 1, 2, 3, 4, 5, 6, 7].map(|k| {
+                let p = plan_corner(r, k);
+                let is_distorted = variant == Variant::Distorted;
+                mesh.corner(if is_distorted { distorted(r, k, p) } else { p })
             })
-        })
-        .collect();
-    // Ends of corridors on a wall, in the wall's direction: floor 0, floor 1, ceiling 0, ceiling 1.
-    let mut ends = [[None; 4]; 4];
-    let mut end = |mesh: &mut Interior, room: usize, wall: usize, extent: [f64; 2]| {
+        });
+        Self {
+            variant,
+            mesh,
+            corners,
+            ends: [[None; 4]; 4],
+        }
+    }
+
+    /// The two ends of a corridor.
+    fn add_ends(&mut self, corridor: (usize, usize, usize, usize, [f64; 2])) -> Corridor {
+        let (a, wall_a, b, wall_b, extent) = corridor;
+        let p = self.add_end(a, wall_a, extent);
+        let q = self.add_end(b, wall_b, extent);
+        Corridor {
+            rooms: [a, b],
+            p,
+            q,
+        }
+    }
+
+    fn add_end(&mut self, room: usize, wall: usize, extent: [f64; 2]) -> End {
         let axis = wall % 2;
         let (a, b) = (wall, (wall + 1) % 4);
         let corner = |k: usize| {
@@ -139,25 +178,18 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
         };
         let share = extent.map(|x| (x - corner(a)) / (corner(b) - corner(a)));
         let share = [share[0].min(share[1]), share[0].max(share[1])];
-        let on = |mesh: &mut Interior, lift: usize, t: f64| {
-            let edge = [a + lift, b + lift].map(|k| mesh.corners[rooms[room][k] as usize]);
-            mesh.corner(edge[0].lerp(edge[1], t))
-        };
-        let made = [(0, 0), (0, 1), (4, 0), (4, 1)].map(|(lift, i)| on(mesh, lift, share[i]));
-        ends[room][wall] = Some(made);
+        let made = [(0, 0), (0, 1), (4, 0), (4, 1)].map(|(lift, i)| {
+            let edge = [a + lift, b + lift].map(|k| self.corners[room][k]);
+            let edge = edge.map(|c| self.mesh.corners[c as usize]);
+            self.mesh.corner(edge[0].lerp(edge[1], share[i]))
+        });
+        self.ends[room][wall] = Some(made);
         made
-    };
-    let corridors: Vec<_> = CORRIDORS
-        .iter()
-        .map(|&(a, wall_a, b, wall_b, extent)| {
-            let p = end(&mut mesh, a, wall_a, extent);
-            let q = end(&mut mesh, b, wall_b, extent);
-            (a, b, p, q)
-        })
-        .collect();
+    }
 
-    let mut volumes = [0.0; 4];
-    for (r, c) in rooms.iter().enumerate() {
+    /// Walls, floor and ceiling of a room, around the ends of its corridors; returns its volume.
+    fn add_room(&mut self, r: usize) -> f64 {
+        let (mesh, c) = (&mut self.mesh, &self.corners[r]);
         let first = mesh.triangles.len();
         let mut ceiling = Vec::new();
         let mut floor = Vec::new();
@@ -166,16 +198,16 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
             let k = (j + 1) % 4;
             floor.push(c[j]);
             ceiling.push(c[j + 4]);
-            if let Some([f0, f1, t0, t1]) = ends[r][j] {
-                mesh.quad([c[j], f0, t0, c[j + 4]]);
-                mesh.quad([f1, c[k], c[k + 4], t1]);
-                plugs.push([f0, f1, t1, t0]);
-                if variant == Variant::Tessellated {
-                    floor.extend([f0, f1]);
-                    ceiling.extend([t0, t1]);
-                }
-            } else {
+            let Some([f0, f1, t0, t1]) = self.ends[r][j] else {
                 mesh.quad([c[j], c[k], c[k + 4], c[j + 4]]);
+                continue;
+            };
+            mesh.quad([c[j], f0, t0, c[j + 4]]);
+            mesh.quad([f1, c[k], c[k + 4], t1]);
+            plugs.push([f0, f1, t1, t0]);
+            if self.variant == Variant::Tessellated {
+                floor.extend([f0, f1]);
+                ceiling.extend([t0, t1]);
             }
         }
         floor.reverse();
@@ -186,46 +218,70 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
                 mesh.polygon(&polygon);
             }
         }
-        volumes[r] = mesh.air_volume(&mesh.triangles[first..], &plugs);
+        mesh.air_volume(&mesh.triangles[first..], &plugs)
     }
-    for &(_, _, p, q) in &corridors {
-        mesh.quad([p[0], p[1], q[0], q[1]]);
-        mesh.quad([p[2], q[3], q[2], p[3]]);
-        mesh.quad([p[0], q[1], q[3], p[2]]);
-        mesh.quad([p[1], p[3], q[2], q[0]]);
-    }
+}
 
-    let mut site = Site::new(name);
-    let storey = site.storey("rooms", 0.0);
-    for (r, corners) in rooms.iter().enumerate() {
-        // Faces of distorted rooms are not planar; cut as the mesh cuts them where it does not
-        // make room for a corridor, they bound the room to within a few centimeters.
-        let faces: [[u32; 4]; 6] = [
-            [1, 2, 3, 0],
-            [4, 7, 6, 5],
-            [0, 4, 5, 1],
-            [1, 5, 6, 2],
-            [2, 6, 7, 3],
-            [3, 7, 4, 0],
-        ];
-        let triangles = faces
-            .iter()
-            .flat_map(|f| [vec![f[0], f[1], f[2]], vec![f[0], f[2], f[3]]]);
-        let part = Convex {
-            corners: corners.map(|i| mesh.corners[i as usize]).to_vec(),
-            faces: triangles.collect(),
-        };
-        let mut room = Room::new(&format!("room {r}"), storey, vec![part], &[]);
-        room.volume = volumes[r];
-        site.add_room(room);
+/// A corner of a room by its plan: floor 0-3, ceiling 4-7. [Units: wu]
+fn plan_corner(r: usize, k: usize) -> DVec3 {
+    let [low, high] = PLANS[r];
+    let plan = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    let y = if k < 4 { 0.0 } else { HEIGHT };
+    DVec3::new(plan[k % 4][0], y, plan[k % 4][1])
+}
+
+/// The same corner of the distorted room.
+fn distorted(r: usize, k: usize, p: DVec3) -> DVec3 {
+    let [low, high] = PLANS[r];
+    let middle = DVec3::new(
+        f64::midpoint(low[0], high[0]),
+        HEIGHT * 0.5,
+        f64::midpoint(low[1], high[1]),
+    );
+    let moves = MOVED.iter().filter(|m| m.0 == r && m.1 == k);
+    moves.fold(middle + turn(TURNS[r]) * (p - middle), |p, m| {
+        p + DVec3::from_array(m.2)
+    })
+}
+
+/// The solid of a room's eight corners.
+fn solid_of(corners: [DVec3; 8]) -> Convex {
+    // Faces of distorted rooms are not planar; cut as the mesh cuts them where it does not
+    // make room for a corridor, they bound the room to within a few centimeters.
+    let faces: [[u32; 4]; 6] = [
+        [1, 2, 3, 0],
+        [4, 7, 6, 5],
+        [0, 4, 5, 1],
+        [1, 5, 6, 2],
+        [2, 6, 7, 3],
+        [3, 7, 4, 0],
+    ];
+    let triangles = faces
+        .iter()
+        .flat_map(|f| [vec![f[0], f[1], f[2]], vec![f[0], f[2], f[3]]]);
+    Convex {
+        corners: corners.to_vec(),
+        faces: triangles.collect(),
     }
-    for &(a, b, p, q) in &corridors {
+}
+
+/// A corridor by the rooms that it joins and its ends in them.
+struct Corridor {
+    rooms: [usize; 2],
+    p: End,
+    q: End,
+}
+
+impl Corridor {
+    /// The rectangle in its middle.
+    fn opening(&self, mesh: &Interior) -> Opening {
         let at = |i: u32| mesh.corners[i as usize];
         // q runs against p.
-        let middle = |i: usize, j: usize| at(p[i]).midpoint(at(q[j]));
+        let middle = |i: usize, j: usize| at(self.p[i]).midpoint(at(self.q[j]));
         let corners = [middle(1, 0), middle(0, 1), middle(2, 3), middle(3, 2)];
-        let along = at(q[0]) - at(p[1]);
-        site.add_opening(Opening {
+        let along = at(self.q[0]) - at(self.p[1]);
+        let [a, b] = self.rooms;
+        Opening {
             kind: OpeningKind::Opening,
             name: format!("corridor {a} to {b}"),
             center: corners.iter().sum::<DVec3>() / 4.0,
@@ -235,12 +291,8 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
             thickness: along.length(),
             corners,
             rooms: [Side::Room(a), Side::Room(b)],
-        });
+        }
     }
-    if variant == Variant::Tessellated {
-        mesh.bisect_to(400);
-    }
-    finish(site, mesh, degrees)
 }
 
 fn finish(mut site: Site, mesh: Interior, degrees: [f64; 3]) -> Generated {
@@ -279,7 +331,29 @@ const NECK: [f64; 2] = [0.55, 0.75];
 pub fn gjorup_cavern(degrees: [f64; 3]) -> Generated {
     let mut site = Site::new("gjorup-cavern");
     let storey = site.storey("cavern", -GLOBE.y);
-    // One shape for all rooms: every corner a little off the globe.
+    let shape = cavern_shape();
+    let mut mesh = Interior::default();
+    for cell in 0..6 {
+        let center = DVec3::new((cell % 3) as f64, 0.0, (cell / 3) as f64) * PITCH;
+        let first = mesh.triangles.len();
+        let necks = add_globe(&mut mesh, &shape, center, cell);
+        for &(quad, other) in necks.iter().filter(|n| n.1 > cell) {
+            site.add_opening(neck(&mesh, quad, [cell, other]));
+        }
+        let plugs: Vec<[u32; 4]> = necks.iter().map(|n| n.0).collect();
+        let part = Convex::ellipsoid(center, GLOBE * 0.75);
+        let mut room = Room::new(&format!("room {cell}"), storey, vec![part], &[]);
+        room.volume = mesh.air_volume(&mesh.triangles[first..], &plugs);
+        site.add_room(room);
+    }
+    finish(site, mesh, degrees)
+}
+
+/// Corners of a cavern room by parallel and meridian, about its center.
+type Shape = [[DVec3; MERIDIANS]; 4];
+
+/// One shape for all rooms: every corner a little off the globe, with its four necks.
+fn cavern_shape() -> Shape {
     let mut rng = Rng::new(1999);
     let mut shape = [[DVec3::ZERO; MERIDIANS]; 4];
     for (ring, latitude) in PARALLELS.iter().enumerate() {
@@ -316,57 +390,48 @@ pub fn gjorup_cavern(degrees: [f64; 3]) -> Generated {
             }
         }
     }
+    shape
+}
 
-    let mut mesh = Interior::default();
-    for cell in 0..6 {
-        let (ix, iz) = (cell % 3, cell / 3);
-        let center = DVec3::new(ix as f64, 0.0, iz as f64) * PITCH;
-        let ids = shape.map(|ring| ring.map(|p| mesh.corner(center + p)));
-        let top = mesh.corner(center + DVec3::Y * GLOBE.y);
-        let bottom = mesh.corner(center - DVec3::Y * GLOBE.y);
-        let first = mesh.triangles.len();
-        let mut plugs = Vec::new();
-        for m in 0..MERIDIANS {
-            let n = (m + 1) % MERIDIANS;
-            // Seen from inside, longitude grows to the right.
-            mesh.triangles.push([bottom, ids[0][n], ids[0][m]]);
-            mesh.triangles.push([top, ids[3][m], ids[3][n]]);
-            for ring in 0..3 {
-                let quad = [
-                    ids[ring][m],
-                    ids[ring][n],
-                    ids[ring + 1][n],
-                    ids[ring + 1][m],
-                ];
-                if ring != 1 || m % 3 != 2 {
-                    mesh.quad(quad);
-                    continue;
-                }
-                // Meridian 2 begins the neck towards +z, 5 towards -x, 8 to -z, 11 to +x.
-                let neighbor = match m {
-                    11 => (ix < 2).then(|| cell + 1),
-                    2 => (iz < 1).then_some(cell + 3),
-                    5 => (ix > 0).then(|| cell - 1),
-                    _ => (iz > 0).then(|| cell - 3),
-                };
-                match neighbor {
-                    None => mesh.quad(quad),
-                    Some(other) => {
-                        plugs.push(quad);
-                        if other > cell {
-                            site.add_opening(neck(&mesh, quad, [cell, other]));
-                        }
-                    }
-                }
+/// Adds a room of the cavern; returns the ends of the necks that lead on, and to which room.
+fn add_globe(
+    mesh: &mut Interior,
+    shape: &Shape,
+    center: DVec3,
+    cell: usize,
+) -> Vec<([u32; 4], usize)> {
+    let ids = shape.map(|ring| ring.map(|p| mesh.corner(center + p)));
+    let top = mesh.corner(center + DVec3::Y * GLOBE.y);
+    let bottom = mesh.corner(center - DVec3::Y * GLOBE.y);
+    let mut necks = Vec::new();
+    for m in 0..MERIDIANS {
+        let n = (m + 1) % MERIDIANS;
+        // Seen from inside, longitude grows to the right.
+        mesh.triangles.push([bottom, ids[0][n], ids[0][m]]);
+        mesh.triangles.push([top, ids[3][m], ids[3][n]]);
+        for ring in 0..3 {
+            let (low, high) = (&ids[ring], &ids[ring + 1]);
+            let quad = [low[m], low[n], high[n], high[m]];
+            let neighbor = (ring == 1).then(|| neighbor_beyond(m, cell)).flatten();
+            match neighbor {
+                None => mesh.quad(quad),
+                Some(other) => necks.push((quad, other)),
             }
         }
-        let volume = mesh.air_volume(&mesh.triangles[first..], &plugs);
-        let part = Convex::ellipsoid(center, GLOBE * 0.75);
-        let mut room = Room::new(&format!("room {cell}"), storey, vec![part], &[]);
-        room.volume = volume;
-        site.add_room(room);
     }
-    finish(site, mesh, degrees)
+    necks
+}
+
+/// The room that a neck beginning at meridian `m` leads to: 2 towards +z, 5 towards -x, 8 to -z, 11 to +x.
+fn neighbor_beyond(m: usize, cell: usize) -> Option<usize> {
+    let (ix, iz) = (cell % 3, cell / 3);
+    match m {
+        11 => (ix < 2).then(|| cell + 1),
+        2 => (iz < 1).then_some(cell + 3),
+        5 => (ix > 0).then(|| cell - 1),
+        8 => (iz > 0).then(|| cell - 3),
+        _ => None,
+    }
 }
 
 /// The opening at the end of a neck; `quad` faces the first room.

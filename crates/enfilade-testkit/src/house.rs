@@ -28,6 +28,25 @@ const ROOF: GableRoof = GableRoof {
     window: Some([6.6, 7.7]),
 };
 
+/// Clear widths of the rooms between the walls, along x, and where the last along z end. [Units: wu]
+const WEST: [f64; 2] = [OUTER, 4.3];
+const MID: [f64; 2] = [4.45, 7.05];
+const EAST: [f64; 2] = [7.2, LENGTH - OUTER];
+const NORTH_END: f64 = DEPTH - OUTER;
+/// Faces of the outer walls along x, and the runs of outer walls along x and z. [Units: wu]
+const NORTH: [f64; 2] = [0.0, OUTER];
+const SOUTH: [f64; 2] = [DEPTH - OUTER, DEPTH];
+const ALL: [f64; 2] = [0.0, LENGTH];
+const INNER: [f64; 2] = [OUTER, DEPTH - OUTER];
+
+/// Steps from the hall to the landing.
+const STEPS: Steps = Steps {
+    n: 16,
+    riser: 2.9 / 16.0,
+    going: 0.26,
+    waist: 0.18,
+};
+
 struct House {
     site: Site,
     palette: Palette,
@@ -134,280 +153,292 @@ pub fn furnished_house() -> Generated {
         plaster,
         oak,
     };
-
-    let ground = house.site.storey("ground floor", GROUND[0]);
-    let upper = house.site.storey("upper floor", UPPER[0]);
-    let attic = house.site.storey("attic", ATTIC);
-    let steps = Steps {
-        n: 16,
-        riser: 2.9 / 16.0,
-        going: 0.26,
-        waist: 0.18,
-    };
-    let stair_hole = aabb([6.05, GROUND[1], 3.4], [7.05, UPPER[0], 6.5]);
-    let hatch = aabb([4.6, UPPER[1], 6.3], [5.3, ATTIC, 7.5]);
-
-    // The stairs fill the hall below and, above the slab's underside, the hole.
-    let mut stairs = MeshBuilder::new(oak);
-    stairs.flight(
-        DVec3::new(6.55, 0.0, 3.4 + steps.run()),
-        -DVec3::Z,
-        1.0,
-        &steps,
-    );
-    let flight_box = aabb([6.05, 0.0, 3.4], [7.05, 2.9, 3.4 + steps.run()]);
-    let flight_volume = steps.volume_below(1.0, GROUND[1]);
-
-    let room = |site: &mut Site, name: &str, storey: usize, [x, z]: [[f64; 2]; 2]| {
-        let up = if storey == ground { GROUND } else { UPPER };
-        site.room(name, storey, aabb([x[0], up[0], z[0]], [x[1], up[1], z[1]]))
-    };
-    let (west, mid, east) = ([OUTER, 4.3], [4.45, 7.05], [7.2, LENGTH - OUTER]);
-    let north_end = DEPTH - OUTER;
-    let s = &mut house.site;
-    let living = room(s, "living room", ground, [west, [OUTER, north_end]]);
-    let hall_air = aabb([mid[0], GROUND[0], 2.45], [mid[1], GROUND[1], north_end]);
-    let hall = s.add_room(Room::new(
-        "entrance hall",
-        ground,
-        vec![Convex::of_aabb(&hall_air)],
-        &[(flight_box, flight_volume)],
-    ));
-    let toilet = room(s, "toilet", ground, [mid, [OUTER, 2.3]]);
-    let kitchen = room(s, "kitchen", ground, [east, [4.4, north_end]]);
-    let dining = room(s, "dining room", ground, [east, [OUTER, 4.25]]);
-    let landing_air = aabb([mid[0], UPPER[0], 2.45], [mid[1], UPPER[1], north_end]);
-    let landing = s.add_room(Room::new(
-        "landing",
-        upper,
-        vec![Convex::of_aabb(&landing_air)],
-        &[],
-    ));
-    let bedroom_1 = room(s, "bedroom 1", upper, [west, [4.4, north_end]]);
-    let bedroom_2 = room(s, "bedroom 2", upper, [west, [OUTER, 4.25]]);
-    let bedroom_3 = room(s, "bedroom 3", upper, [east, [OUTER, 4.25]]);
-    let study = room(s, "study", upper, [east, [4.4, north_end]]);
-    let bath = room(s, "bath", upper, [mid, [OUTER, 2.3]]);
-    let loft_air = ROOF.loft();
-    let loft = s.add_room(Room::new("attic", attic, vec![loft_air], &[]));
-
-    house.site.structure("stairs", stairs);
-    let out = Side::Outside;
-    house.slab(-0.3, 0.0, &[]);
-    house.slab(GROUND[1], UPPER[0], &[stair_hole]);
-    house.slab(UPPER[1], ATTIC, &[hatch]);
-    house
-        .site
-        .opening(OpeningKind::Opening, stair_hole, 1, [hall, landing]);
-    house
-        .site
-        .opening(OpeningKind::Opening, hatch, 1, [landing, loft]);
-
-    let (north, south) = ([0.0, OUTER], [DEPTH - OUTER, DEPTH]);
-    let (inner, all) = ([OUTER, DEPTH - OUTER], [0.0, LENGTH]);
-    let sill = [0.9, 2.2];
-    house.wall(
-        2,
-        north,
-        all,
-        GROUND,
-        &[
-            window([1.4, 3.2], sill, [out, living]),
-            window([5.5, 6.1], [1.4, 2.1], [out, toilet]),
-            window([8.2, 9.8], sill, [out, dining]),
-        ],
-    );
-    house.wall(
-        2,
-        south,
-        all,
-        GROUND,
-        &[
-            window([1.0, 3.6], [0.3, 2.2], [living, out]),
-            door([4.75, 5.75], 0.0, [hall, out]).swung(0.0),
-            window([8.2, 9.8], sill, [kitchen, out]),
-        ],
-    );
-    house.wall(
-        0,
-        [0.0, OUTER],
-        inner,
-        GROUND,
-        &[
-            window([1.5, 3.0], sill, [out, living]),
-            window([5.2, 6.7], sill, [out, living]),
-        ],
-    );
-    house.wall(
-        0,
-        [LENGTH - OUTER, LENGTH],
-        inner,
-        GROUND,
-        &[
-            window([1.6, 3.0], sill, [dining, out]),
-            window([5.6, 7.0], sill, [kitchen, out]),
-        ],
-    );
-    house.wall(
-        0,
-        [4.3, 4.45],
-        inner,
-        GROUND,
-        &[door([3.2, 4.8], 0.0, [living, hall])],
-    );
-    let passage = Hole {
-        along: [8.2, 9.6],
-        up: [0.0, 2.1],
-        kind: OpeningKind::Opening,
-        rooms: [dining, kitchen],
-        swing: 0.0,
-    };
-    house.wall(
-        0,
-        [7.05, 7.2],
-        inner,
-        GROUND,
-        &[door([7.38, 8.18], 0.0, [hall, kitchen])],
-    );
-    house.wall(
-        2,
-        [2.3, 2.45],
-        mid,
-        GROUND,
-        &[door([4.75, 5.55], 0.0, [toilet, hall]).swung(0.0)],
-    );
-    house.wall(2, [4.25, 4.4], east, GROUND, &[passage]);
-
-    let f = UPPER[0];
-    let sill = [f + 0.9, f + 2.1];
-    house.wall(
-        2,
-        north,
-        all,
-        UPPER,
-        &[
-            window([1.6, 3.0], sill, [out, bedroom_2]),
-            window([5.3, 6.2], [f + 1.2, f + 2.1], [out, bath]),
-            window([8.2, 9.6], sill, [out, bedroom_3]),
-        ],
-    );
-    house.wall(
-        2,
-        south,
-        all,
-        UPPER,
-        &[
-            window([1.6, 3.0], sill, [bedroom_1, out]),
-            window([4.9, 6.1], sill, [landing, out]),
-            window([8.2, 9.6], sill, [study, out]),
-        ],
-    );
-    house.wall(0, [0.0, OUTER], inner, UPPER, &[]);
-    house.wall(0, [LENGTH - OUTER, LENGTH], inner, UPPER, &[]);
-    house.wall(
-        0,
-        [4.3, 4.45],
-        inner,
-        UPPER,
-        &[
-            door([2.8, 3.65], f, [bedroom_2, landing]),
-            door([6.3, 7.15], f, [bedroom_1, landing]).swung(0.0),
-        ],
-    );
-    house.wall(
-        0,
-        [7.05, 7.2],
-        inner,
-        UPPER,
-        &[
-            door([2.55, 3.35], f, [landing, bedroom_3]).swung(AJAR),
-            door([6.7, 7.5], f, [landing, study]),
-        ],
-    );
-    house.wall(2, [4.25, 4.4], west, UPPER, &[]);
-    house.wall(2, [4.25, 4.4], east, UPPER, &[]);
-    house.wall(
-        2,
-        [2.3, 2.45],
-        mid,
-        UPPER,
-        &[door([4.8, 5.6], f, [bath, landing]).swung(-AJAR)],
-    );
-
-    roof(&mut house, loft);
-    furnish(&mut house);
+    let rooms = house.add_rooms();
+    house.add_floors(&rooms);
+    house.add_ground_walls(&rooms);
+    house.add_upper_walls(&rooms);
+    house.add_roof(rooms.loft);
+    house.furnish();
     house.site.finish()
 }
 
-fn roof(house: &mut House, loft: Side) {
-    let tiles = house.site.material("roof tiles", [0.42, 0.13, 0.08]);
-    let brick = house.site.material("brick", [0.45, 0.20, 0.14]);
-    let turf = house.site.material("turf", [0.13, 0.30, 0.09]);
-    ROOF.add_to(&mut house.site, tiles, house.plaster);
-    for (i, sides) in [[Side::Outside, loft], [loft, Side::Outside]]
-        .into_iter()
-        .enumerate()
-    {
-        let hole = ROOF.gable_windows()[i];
-        house.site.opening(OpeningKind::Window, hole, 0, sides);
-        glaze(&mut house.site, &house.palette, &hole, 0);
-    }
-    let mut chimney = MeshBuilder::new(brick);
-    chimney.cuboid(aabb([8.0, 9.2, 3.2], [8.6, 10.9, 3.8]));
-    house.site.structure("chimney", chimney);
-    let mut lawn = MeshBuilder::new(turf);
-    lawn.cuboid(aabb(
-        [-12.0, -0.5, -12.0],
-        [LENGTH + 12.0, -0.15, DEPTH + 12.0],
-    ));
-    house.site.structure("ground", lawn);
+/// The rooms, as sides of openings.
+struct Rooms {
+    living: Side,
+    hall: Side,
+    toilet: Side,
+    kitchen: Side,
+    dining: Side,
+    landing: Side,
+    bedroom_1: Side,
+    bedroom_2: Side,
+    bedroom_3: Side,
+    study: Side,
+    bath: Side,
+    loft: Side,
 }
 
-fn furnish(house: &mut House) {
-    let site = &mut house.site;
-    let f = Furniture::new(site, &house.palette);
-    let up = UPPER[0];
-    let mut put = |name: &str, mesh: u32, x: f64, y: f64, z: f64, yaw: f64| {
-        site.furnish(name, mesh, DVec3::new(x, y, z), yaw);
-    };
-    put("rug", f.rug, 2.2, 0.0, 5.8, 0.0);
-    put("sofa", f.sofa, 2.2, 0.0, 7.2, 180.0);
-    put("table", f.table, 2.2, 0.01, 5.6, 0.0);
-    put("shelf", f.shelf, 2.2, 0.0, 0.56, 0.0);
-    put("plant", f.plant, 0.8, 0.0, 7.8, 0.0);
-    put("lamp", f.lamp, 3.9, 0.0, 7.8, 0.0);
-    put("plant", f.plant, 4.85, 0.0, 2.9, 0.0);
-    put("cabinet", f.cabinet, 4.75, 0.0, 6.0, 90.0);
-    put("toilet", f.toilet, 6.6, 0.0, 0.72, 0.0);
-    put("kitchen cabinet", f.counter, 10.3, 0.0, 6.0, -90.0);
-    put("kitchen cabinet", f.counter, 9.0, 0.0, 7.9, 180.0);
-    put("table", f.table, 8.9, 0.0, 2.2, 90.0);
-    for (x, z, yaw) in [
-        (8.2, 1.7, 90.0),
-        (8.2, 2.7, 90.0),
-        (9.6, 1.7, -90.0),
-        (9.6, 2.7, -90.0),
-    ] {
-        put("chair", f.chair, x, 0.0, z, yaw);
+const OUT: Side = Side::Outside;
+
+impl House {
+    fn add_rooms(&mut self) -> Rooms {
+        let s = &mut self.site;
+        let ground = s.storey("ground floor", GROUND[0]);
+        let upper = s.storey("upper floor", UPPER[0]);
+        let attic = s.storey("attic", ATTIC);
+        let air = |storey: usize, [x, z]: [[f64; 2]; 2]| {
+            let up = if storey == ground { GROUND } else { UPPER };
+            aabb([x[0], up[0], z[0]], [x[1], up[1], z[1]])
+        };
+        let room = |s: &mut Site, name: &str, storey: usize, plan: [[f64; 2]; 2]| {
+            s.room(name, storey, air(storey, plan))
+        };
+        // The stairs fill the hall below and, above the slab's underside, the hole.
+        let flight_box = aabb([6.05, 0.0, 3.4], [7.05, 2.9, 3.4 + STEPS.run()]);
+        let flight = (flight_box, STEPS.volume_below(1.0, GROUND[1]));
+        let stair_hall = |s: &mut Site, name: &str, storey: usize, solids: &[(Aabb, f64)]| {
+            let part = Convex::of_aabb(&air(storey, [MID, [2.45, NORTH_END]]));
+            s.add_room(Room::new(name, storey, vec![part], solids))
+        };
+        // Rooms are numbered in this order.
+        Rooms {
+            living: room(s, "living room", ground, [WEST, [OUTER, NORTH_END]]),
+            hall: stair_hall(s, "entrance hall", ground, &[flight]),
+            toilet: room(s, "toilet", ground, [MID, [OUTER, 2.3]]),
+            kitchen: room(s, "kitchen", ground, [EAST, [4.4, NORTH_END]]),
+            dining: room(s, "dining room", ground, [EAST, [OUTER, 4.25]]),
+            landing: stair_hall(s, "landing", upper, &[]),
+            bedroom_1: room(s, "bedroom 1", upper, [WEST, [4.4, NORTH_END]]),
+            bedroom_2: room(s, "bedroom 2", upper, [WEST, [OUTER, 4.25]]),
+            bedroom_3: room(s, "bedroom 3", upper, [EAST, [OUTER, 4.25]]),
+            study: room(s, "study", upper, [EAST, [4.4, NORTH_END]]),
+            bath: room(s, "bath", upper, [MID, [OUTER, 2.3]]),
+            loft: s.add_room(Room::new("attic", attic, vec![ROOF.loft()], &[])),
+        }
     }
-    put("plant", f.plant, 10.2, 0.0, 0.8, 0.0);
-    put("bed", f.bed, 1.45, up, 6.3, 90.0);
-    put("wardrobe", f.wardrobe, 2.6, up, 4.75, 0.0);
-    put("lamp", f.lamp, 0.7, up, 7.8, 0.0);
-    put("bed", f.bed, 1.45, up, 1.6, 90.0);
-    put("wardrobe", f.wardrobe, 2.0, up, 3.9, 180.0);
-    put("bed", f.bed, 9.6, up, 1.6, -90.0);
-    put("wardrobe", f.wardrobe, 9.0, up, 3.9, 180.0);
-    put("desk", f.desk, 10.1, up, 6.3, -90.0);
-    put("chair", f.chair, 9.4, up, 6.3, 90.0);
-    put("shelf", f.shelf, 8.2, up, 4.6, 0.0);
-    put("plant", f.plant, 10.2, up, 7.8, 0.0);
-    put("bathtub", f.tub, 6.6, up, 1.3, 90.0);
-    put("toilet", f.toilet, 4.9, up, 0.72, 0.0);
-    put("lamp", f.lamp, 4.8, up, 5.2, 0.0);
-    put("cabinet", f.cabinet, 2.5, ATTIC, 3.0, 10.0);
-    put("cabinet", f.cabinet, 3.2, ATTIC, 3.2, 40.0);
-    put("shelf", f.shelf, 8.5, ATTIC, 1.0, 0.0);
+
+    /// The slabs, the stairs and the hatch through them.
+    fn add_floors(&mut self, rooms: &Rooms) {
+        let stair_hole = aabb([6.05, GROUND[1], 3.4], [7.05, UPPER[0], 6.5]);
+        let hatch = aabb([4.6, UPPER[1], 6.3], [5.3, ATTIC, 7.5]);
+        let mut stairs = MeshBuilder::new(self.oak);
+        let foot = DVec3::new(6.55, 0.0, 3.4 + STEPS.run());
+        stairs.flight(foot, -DVec3::Z, 1.0, &STEPS);
+        self.site.structure("stairs", stairs);
+        self.slab(-0.3, 0.0, &[]);
+        self.slab(GROUND[1], UPPER[0], &[stair_hole]);
+        self.slab(UPPER[1], ATTIC, &[hatch]);
+        for (hole, sides) in [
+            (stair_hole, [rooms.hall, rooms.landing]),
+            (hatch, [rooms.landing, rooms.loft]),
+        ] {
+            self.site.opening(OpeningKind::Opening, hole, 1, sides);
+        }
+    }
+
+    fn add_ground_walls(&mut self, rooms: &Rooms) {
+        let sill = [0.9, 2.2];
+        self.wall(
+            2,
+            NORTH,
+            ALL,
+            GROUND,
+            &[
+                window([1.4, 3.2], sill, [OUT, rooms.living]),
+                window([5.5, 6.1], [1.4, 2.1], [OUT, rooms.toilet]),
+                window([8.2, 9.8], sill, [OUT, rooms.dining]),
+            ],
+        );
+        self.wall(
+            2,
+            SOUTH,
+            ALL,
+            GROUND,
+            &[
+                window([1.0, 3.6], [0.3, 2.2], [rooms.living, OUT]),
+                door([4.75, 5.75], 0.0, [rooms.hall, OUT]).swung(0.0),
+                window([8.2, 9.8], sill, [rooms.kitchen, OUT]),
+            ],
+        );
+        self.wall(
+            0,
+            [0.0, OUTER],
+            INNER,
+            GROUND,
+            &[
+                window([1.5, 3.0], sill, [OUT, rooms.living]),
+                window([5.2, 6.7], sill, [OUT, rooms.living]),
+            ],
+        );
+        self.wall(
+            0,
+            [LENGTH - OUTER, LENGTH],
+            INNER,
+            GROUND,
+            &[
+                window([1.6, 3.0], sill, [rooms.dining, OUT]),
+                window([5.6, 7.0], sill, [rooms.kitchen, OUT]),
+            ],
+        );
+        self.wall(
+            0,
+            [4.3, 4.45],
+            INNER,
+            GROUND,
+            &[door([3.2, 4.8], 0.0, [rooms.living, rooms.hall])],
+        );
+        let passage = Hole {
+            along: [8.2, 9.6],
+            up: [0.0, 2.1],
+            kind: OpeningKind::Opening,
+            rooms: [rooms.dining, rooms.kitchen],
+            swing: 0.0,
+        };
+        self.wall(
+            0,
+            [7.05, 7.2],
+            INNER,
+            GROUND,
+            &[door([7.38, 8.18], 0.0, [rooms.hall, rooms.kitchen])],
+        );
+        self.wall(
+            2,
+            [2.3, 2.45],
+            MID,
+            GROUND,
+            &[door([4.75, 5.55], 0.0, [rooms.toilet, rooms.hall]).swung(0.0)],
+        );
+        self.wall(2, [4.25, 4.4], EAST, GROUND, &[passage]);
+    }
+
+    fn add_upper_walls(&mut self, rooms: &Rooms) {
+        let f = UPPER[0];
+        let sill = [f + 0.9, f + 2.1];
+        self.wall(
+            2,
+            NORTH,
+            ALL,
+            UPPER,
+            &[
+                window([1.6, 3.0], sill, [OUT, rooms.bedroom_2]),
+                window([5.3, 6.2], [f + 1.2, f + 2.1], [OUT, rooms.bath]),
+                window([8.2, 9.6], sill, [OUT, rooms.bedroom_3]),
+            ],
+        );
+        self.wall(
+            2,
+            SOUTH,
+            ALL,
+            UPPER,
+            &[
+                window([1.6, 3.0], sill, [rooms.bedroom_1, OUT]),
+                window([4.9, 6.1], sill, [rooms.landing, OUT]),
+                window([8.2, 9.6], sill, [rooms.study, OUT]),
+            ],
+        );
+        self.wall(0, [0.0, OUTER], INNER, UPPER, &[]);
+        self.wall(0, [LENGTH - OUTER, LENGTH], INNER, UPPER, &[]);
+        self.wall(
+            0,
+            [4.3, 4.45],
+            INNER,
+            UPPER,
+            &[
+                door([2.8, 3.65], f, [rooms.bedroom_2, rooms.landing]),
+                door([6.3, 7.15], f, [rooms.bedroom_1, rooms.landing]).swung(0.0),
+            ],
+        );
+        self.wall(
+            0,
+            [7.05, 7.2],
+            INNER,
+            UPPER,
+            &[
+                door([2.55, 3.35], f, [rooms.landing, rooms.bedroom_3]).swung(AJAR),
+                door([6.7, 7.5], f, [rooms.landing, rooms.study]),
+            ],
+        );
+        self.wall(2, [4.25, 4.4], WEST, UPPER, &[]);
+        self.wall(2, [4.25, 4.4], EAST, UPPER, &[]);
+        self.wall(
+            2,
+            [2.3, 2.45],
+            MID,
+            UPPER,
+            &[door([4.8, 5.6], f, [rooms.bath, rooms.landing]).swung(-AJAR)],
+        );
+    }
+
+    fn add_roof(&mut self, loft: Side) {
+        let tiles = self.site.material("roof tiles", [0.42, 0.13, 0.08]);
+        let brick = self.site.material("brick", [0.45, 0.20, 0.14]);
+        let turf = self.site.material("turf", [0.13, 0.30, 0.09]);
+        ROOF.add_to(&mut self.site, tiles, self.plaster);
+        for (i, sides) in [[Side::Outside, loft], [loft, Side::Outside]]
+            .into_iter()
+            .enumerate()
+        {
+            let hole = ROOF.gable_windows()[i];
+            self.site.opening(OpeningKind::Window, hole, 0, sides);
+            glaze(&mut self.site, &self.palette, &hole, 0);
+        }
+        let mut chimney = MeshBuilder::new(brick);
+        chimney.cuboid(aabb([8.0, 9.2, 3.2], [8.6, 10.9, 3.8]));
+        self.site.structure("chimney", chimney);
+        let mut lawn = MeshBuilder::new(turf);
+        lawn.cuboid(aabb(
+            [-12.0, -0.5, -12.0],
+            [LENGTH + 12.0, -0.15, DEPTH + 12.0],
+        ));
+        self.site.structure("ground", lawn);
+    }
+
+    fn furnish(&mut self) {
+        let site = &mut self.site;
+        let f = Furniture::new(site, &self.palette);
+        let up = UPPER[0];
+        let mut put = |name: &str, mesh: u32, x: f64, y: f64, z: f64, yaw: f64| {
+            site.furnish(name, mesh, DVec3::new(x, y, z), yaw);
+        };
+        put("rug", f.rug, 2.2, 0.0, 5.8, 0.0);
+        put("sofa", f.sofa, 2.2, 0.0, 7.2, 180.0);
+        put("table", f.table, 2.2, 0.01, 5.6, 0.0);
+        put("shelf", f.shelf, 2.2, 0.0, 0.56, 0.0);
+        put("plant", f.plant, 0.8, 0.0, 7.8, 0.0);
+        put("lamp", f.lamp, 3.9, 0.0, 7.8, 0.0);
+        put("plant", f.plant, 4.85, 0.0, 2.9, 0.0);
+        put("cabinet", f.cabinet, 4.75, 0.0, 6.0, 90.0);
+        put("toilet", f.toilet, 6.6, 0.0, 0.72, 0.0);
+        put("kitchen cabinet", f.counter, 10.3, 0.0, 6.0, -90.0);
+        put("kitchen cabinet", f.counter, 9.0, 0.0, 7.9, 180.0);
+        put("table", f.table, 8.9, 0.0, 2.2, 90.0);
+        for (x, z, yaw) in [
+            (8.2, 1.7, 90.0),
+            (8.2, 2.7, 90.0),
+            (9.6, 1.7, -90.0),
+            (9.6, 2.7, -90.0),
+        ] {
+            put("chair", f.chair, x, 0.0, z, yaw);
+        }
+        put("plant", f.plant, 10.2, 0.0, 0.8, 0.0);
+        put("bed", f.bed, 1.45, up, 6.3, 90.0);
+        put("wardrobe", f.wardrobe, 2.6, up, 4.75, 0.0);
+        put("lamp", f.lamp, 0.7, up, 7.8, 0.0);
+        put("bed", f.bed, 1.45, up, 1.6, 90.0);
+        put("wardrobe", f.wardrobe, 2.0, up, 3.9, 180.0);
+        put("bed", f.bed, 9.6, up, 1.6, -90.0);
+        put("wardrobe", f.wardrobe, 9.0, up, 3.9, 180.0);
+        put("desk", f.desk, 10.1, up, 6.3, -90.0);
+        put("chair", f.chair, 9.4, up, 6.3, 90.0);
+        put("shelf", f.shelf, 8.2, up, 4.6, 0.0);
+        put("plant", f.plant, 10.2, up, 7.8, 0.0);
+        put("bathtub", f.tub, 6.6, up, 1.3, 90.0);
+        put("toilet", f.toilet, 4.9, up, 0.72, 0.0);
+        put("lamp", f.lamp, 4.8, up, 5.2, 0.0);
+        put("cabinet", f.cabinet, 2.5, ATTIC, 3.0, 10.0);
+        put("cabinet", f.cabinet, 3.2, ATTIC, 3.2, 40.0);
+        put("shelf", f.shelf, 8.5, ATTIC, 1.0, 0.0);
+    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! 50 × 55 squares but for a block of 3 × 5. Sizes in meters and the layout are ours.
 
 use enfilade_geom::scene::Role;
-use enfilade_geom::{DMat4, DVec3};
+use enfilade_geom::{Aabb, DMat4, DVec3};
 
 use crate::interior::Interior;
 use crate::rng::Rng;
@@ -61,6 +61,26 @@ impl Plot {
         b.low[axis] = at;
         [a, b]
     }
+
+    /// Where the wall across `axis` stands, on the plot's side of it. [Units: wu]
+    fn face(&self, axis: usize, high: bool) -> f64 {
+        let at = if high {
+            self.high[axis]
+        } else {
+            self.low[axis]
+        } as f64
+            * SQUARE;
+        if high {
+            at - WALL * 0.5
+        } else {
+            at + WALL * 0.5
+        }
+    }
+
+    /// From its lower to its upper wall. [Units: wu]
+    fn faces(&self, axis: usize) -> [f64; 2] {
+        [false, true].map(|high| self.face(axis, high))
+    }
 }
 
 /// A way from plot `from`, through its wall towards greater x or z, to plot `to`; `square` along
@@ -72,10 +92,6 @@ struct Passage {
     axis: usize,
     square: usize,
 }
-
-/// Where a passage ends in a wall: place along it; floor corners and head corners, in the wall's
-/// direction.
-type End = (f64, [u32; 4]);
 
 fn plots(rng: &mut Rng) -> Vec<Plot> {
     let [[bx0, bz0], [bx1, bz1]] = BLOCK;
@@ -125,24 +141,22 @@ fn passages(plots: &[Plot], rng: &mut Rng) -> Vec<Passage> {
         }
     }
     let mut candidates = Vec::new();
-    for z in 0..PLAN[1] {
-        for x in 0..PLAN[0] {
-            for axis in 0..2 {
-                let (nx, nz) = if axis == 0 { (x + 1, z) } else { (x, z + 1) };
-                if nx == PLAN[0] || nz == PLAN[1] {
-                    continue;
-                }
-                let pair = (at[z * PLAN[0] + x], at[nz * PLAN[0] + nx]);
-                if let (Some(from), Some(to)) = pair
-                    && from != to
-                {
-                    candidates.push(Passage {
-                        from,
-                        to,
-                        axis,
-                        square: [z, x][axis],
-                    });
-                }
+    for i in 0..PLAN[0] * PLAN[1] {
+        let (x, z) = (i % PLAN[0], i / PLAN[0]);
+        for (axis, next) in [(0, [x + 1, z]), (1, [x, z + 1])] {
+            if next[0] == PLAN[0] || next[1] == PLAN[1] {
+                continue;
+            }
+            let pair = (at[i], at[next[1] * PLAN[0] + next[0]]);
+            if let (Some(from), Some(to)) = pair
+                && from != to
+            {
+                candidates.push(Passage {
+                    from,
+                    to,
+                    axis,
+                    square: [z, x][axis],
+                });
             }
         }
     }
@@ -173,110 +187,138 @@ pub fn dirkse_maze(seed: u64) -> Generated {
     let passages = passages(&plots, &mut rng);
     let mut site = Site::new("dirkse-maze");
     let storey = site.storey("maze", 0.0);
-
-    let face = |p: &Plot, axis: usize, high: bool| {
-        let at = if high { p.high[axis] } else { p.low[axis] } as f64 * SQUARE;
-        if high {
-            at - WALL * 0.5
-        } else {
-            at + WALL * 0.5
-        }
-    };
     let sides: Vec<Side> = plots
         .iter()
         .enumerate()
         .map(|(i, p)| {
-            let (low, high) = (
-                [0, 1].map(|a| face(p, a, false)),
-                [0, 1].map(|a| face(p, a, true)),
-            );
-            let air = aabb([low[0], 0.0, low[1]], [high[0], CEILING, high[1]]);
+            let [x, z] = [0, 1].map(|axis| p.faces(axis));
+            let air = aabb([x[0], 0.0, z[0]], [x[1], CEILING, z[1]]);
             site.room(&format!("cell {i}"), storey, air)
         })
         .collect();
 
     let mut mesh = Interior::default();
-    // By plot and wall.
-    let mut ends: Vec<[Vec<End>; 4]> = vec![Default::default(); plots.len()];
+    let mut ends: Vec<Ends> = vec![Ends::default(); plots.len()];
     for p in &passages {
-        let wall = [
-            face(&plots[p.from], p.axis, true),
-            face(&plots[p.to], p.axis, false),
-        ];
+        let tunnel = Tunnel::new(p, &plots);
+        let axis = if p.axis == 0 { 0 } else { 2 };
+        let rooms = [sides[p.from], sides[p.to]];
+        site.opening(OpeningKind::Opening, tunnel.hole(), axis, rooms);
+        let (walls, made) = tunnel.add_to(&mut mesh);
+        ends[p.from][walls[0]].push((tunnel.middle, made[0]));
+        ends[p.to][walls[1]].push((tunnel.middle, made[1]));
+    }
+    for (plot, ends) in plots.iter().zip(&mut ends) {
+        add_cell(&mut mesh, plot, ends);
+    }
+    mesh.bisect_to(N_WALL_TRIANGLES);
+    place(&mut site, mesh, &plots);
+    site.finish()
+}
+
+/// Where a passage ends in a wall: place along it; floor corners and head corners, in the wall's
+/// direction.
+type End = (f64, [u32; 4]);
+
+/// By wall of a plot.
+type Ends = [Vec<End>; 4];
+
+/// A passage through the wall between two plots.
+struct Tunnel {
+    axis: usize,
+    /// Where it begins and ends across the wall. [Units: wu]
+    across: [f64; 2],
+    /// Its middle and its sides along the wall. [Units: wu]
+    middle: f64,
+    along: [f64; 2],
+}
+
+impl Tunnel {
+    fn new(p: &Passage, plots: &[Plot]) -> Self {
         let middle = (p.square as f64 + 0.5) * SQUARE;
-        let along = [middle - PASSAGE[0] * 0.5, middle + PASSAGE[0] * 0.5];
-        let point = |across: f64, along: f64, y: f64| {
-            if p.axis == 0 {
-                DVec3::new(across, y, along)
-            } else {
-                DVec3::new(along, y, across)
-            }
-        };
-        let hole = [
-            point(wall[0], along[0], 0.0),
-            point(wall[1], along[1], PASSAGE[1]),
+        Self {
+            axis: p.axis,
+            across: [
+                plots[p.from].face(p.axis, true),
+                plots[p.to].face(p.axis, false),
+            ],
+            middle,
+            along: [middle - PASSAGE[0] * 0.5, middle + PASSAGE[0] * 0.5],
+        }
+    }
+
+    fn point(&self, across: f64, along: f64, y: f64) -> DVec3 {
+        if self.axis == 0 {
+            DVec3::new(across, y, along)
+        } else {
+            DVec3::new(along, y, across)
+        }
+    }
+
+    fn hole(&self) -> Aabb {
+        let ends = [
+            self.point(self.across[0], self.along[0], 0.0),
+            self.point(self.across[1], self.along[1], PASSAGE[1]),
         ];
-        let hole = enfilade_geom::Aabb::new(hole[0].min(hole[1]), hole[0].max(hole[1]));
-        let world_axis = if p.axis == 0 { 0 } else { 2 };
-        site.opening(
-            OpeningKind::Opening,
-            hole,
-            world_axis,
-            [sides[p.from], sides[p.to]],
-        );
+        Aabb::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
+    }
+
+    /// Adds its four faces; returns which wall of either plot it ends in, and the corners there.
+    fn add_to(&self, mesh: &mut Interior) -> ([usize; 2], [[u32; 4]; 2]) {
+        let [low, high] = self.along;
         let mut end = |across: f64| {
             [
-                (along[0], 0.0),
-                (along[1], 0.0),
-                (along[0], PASSAGE[1]),
-                (along[1], PASSAGE[1]),
+                (low, 0.0),
+                (high, 0.0),
+                (low, PASSAGE[1]),
+                (high, PASSAGE[1]),
             ]
-            .map(|(a, y)| mesh.corner(point(across, a, y)))
+            .map(|(along, y)| mesh.corner(self.point(across, along, y)))
         };
-        let (a, b) = (end(wall[0]), end(wall[1]));
+        let (a, b) = (end(self.across[0]), end(self.across[1]));
         // Walls turn as the corners of a plan do, (x0, z0), (x1, z0), (x1, z1), (x0, z1): along z
         // in the wall at greater x, against x in the wall at greater z.
         let flip = |e: [u32; 4]| [e[1], e[0], e[3], e[2]];
-        let (p_end, q_end, walls) = if p.axis == 0 {
+        let (p, q, walls) = if self.axis == 0 {
             (a, flip(b), [1, 3])
         } else {
             (flip(a), b, [2, 0])
         };
-        mesh.quad([p_end[0], p_end[1], q_end[0], q_end[1]]);
-        mesh.quad([p_end[2], q_end[3], q_end[2], p_end[3]]);
-        mesh.quad([p_end[0], q_end[1], q_end[3], p_end[2]]);
-        mesh.quad([p_end[1], p_end[3], q_end[2], q_end[0]]);
-        ends[p.from][walls[0]].push((middle, p_end));
-        ends[p.to][walls[1]].push((middle, q_end));
+        mesh.quad([p[0], p[1], q[0], q[1]]);
+        mesh.quad([p[2], q[3], q[2], p[3]]);
+        mesh.quad([p[0], q[1], q[3], p[2]]);
+        mesh.quad([p[1], p[3], q[2], q[0]]);
+        (walls, [p, q])
     }
-    for (p, ends) in plots.iter().zip(&mut ends) {
-        let (x, z) = (
-            [false, true].map(|h| face(p, 0, h)),
-            [false, true].map(|h| face(p, 1, h)),
-        );
-        let plan = [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]];
-        let low = plan.map(|[x, z]| mesh.corner(DVec3::new(x, 0.0, z)));
-        let high = plan.map(|[x, z]| mesh.corner(DVec3::new(x, CEILING, z)));
-        let mut floor = Vec::new();
-        for j in 0..4 {
-            let k = (j + 1) % 4;
-            let sign = if j < 2 { 1.0 } else { -1.0 };
-            ends[j].sort_by(|a, b| (a.0 * sign).total_cmp(&(b.0 * sign)));
-            floor.push(low[j]);
-            let mut wall = vec![low[j]];
-            for (_, [f0, f1, h0, h1]) in &ends[j] {
-                floor.extend([*f0, *f1]);
-                wall.extend([*f0, *h0, *h1, *f1]);
-            }
-            wall.extend([low[k], high[k], high[j]]);
-            mesh.polygon(&wall);
-        }
-        floor.reverse();
-        mesh.polygon(&floor);
-        mesh.quad(high);
-    }
-    mesh.bisect_to(N_WALL_TRIANGLES);
+}
 
+/// Walls, floor and ceiling of a cell, around the ends of its passages.
+fn add_cell(mesh: &mut Interior, plot: &Plot, ends: &mut Ends) {
+    let [x, z] = [0, 1].map(|axis| plot.faces(axis));
+    let plan = [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]];
+    let low = plan.map(|[x, z]| mesh.corner(DVec3::new(x, 0.0, z)));
+    let high = plan.map(|[x, z]| mesh.corner(DVec3::new(x, CEILING, z)));
+    let mut floor = Vec::new();
+    for j in 0..4 {
+        let k = (j + 1) % 4;
+        let sign = if j < 2 { 1.0 } else { -1.0 };
+        ends[j].sort_by(|a, b| (a.0 * sign).total_cmp(&(b.0 * sign)));
+        floor.push(low[j]);
+        let mut wall = vec![low[j]];
+        for (_, [f0, f1, h0, h1]) in &ends[j] {
+            floor.extend([*f0, *f1]);
+            wall.extend([*f0, *h0, *h1, *f1]);
+        }
+        wall.extend([low[k], high[k], high[j]]);
+        mesh.polygon(&wall);
+    }
+    floor.reverse();
+    mesh.polygon(&floor);
+    mesh.quad(high);
+}
+
+/// Places the walls, the shell around them and the dots.
+fn place(site: &mut Site, mesh: Interior, plots: &[Plot]) {
     let stone = site.material("maze wall", [0.10, 0.12, 0.55]);
     let gold = site.material("dot", [0.95, 0.75, 0.25]);
     let walls = site.add_mesh(mesh.into_mesh("maze walls", stone, true));
@@ -291,7 +333,7 @@ pub fn dirkse_maze(seed: u64) -> Generated {
     let mut dot = MeshBuilder::new(gold);
     dot.icosahedron(DVec3::ZERO, DVec3::splat(0.12));
     let dot = site.mesh("dot prop", dot);
-    for p in &plots {
+    for p in plots {
         for z in p.low[1]..p.high[1] {
             for x in p.low[0]..p.high[0] {
                 let at = DVec3::new((x as f64 + 0.5) * SQUARE, 0.8, (z as f64 + 0.5) * SQUARE);
@@ -299,7 +341,6 @@ pub fn dirkse_maze(seed: u64) -> Generated {
             }
         }
     }
-    site.finish()
 }
 
 #[cfg(test)]

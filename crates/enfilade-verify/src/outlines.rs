@@ -1,6 +1,6 @@
 //! *Planar, convex outline*: every portal, straight from its corners.
 
-use enfilade_cpg::World;
+use enfilade_cpg::{PortalId, World};
 use enfilade_geom::ray::closest_point_on_segment;
 use enfilade_geom::{DVec3, Plane, Winding};
 
@@ -12,12 +12,12 @@ use crate::subject::to_dvec;
 /// `eps` pass: that is how far a corner may be snapped and rounded.
 pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
     let mut problems = Vec::new();
-    for (i, portal) in world.graph.portals.iter().enumerate() {
+    for (id, portal) in (0..).map(PortalId).zip(&world.graph.portals) {
         let normal = to_dvec(portal.normal);
         let outline: Vec<DVec3> = portal.outline.iter().copied().map(to_dvec).collect();
         let mut say = |what: String| {
             let at = outline.first().copied().unwrap_or_default();
-            problems.push(format!("portal {i} near ({at:.3}): {what}"));
+            problems.push(format!("{id} near ({at:.3}): {what}"));
         };
         let Some(&origin) = outline.first() else {
             say("it has no outline".into());

@@ -267,6 +267,9 @@ pub struct VerifyReport {
     pub failures: Vec<Failure>,
     /// How many kinds of failure there are in all.
     pub failure_groups: usize,
+    /// By cell, its name.
+    #[serde(skip)]
+    names: Vec<String>,
 }
 
 impl VerifyReport {
@@ -297,7 +300,63 @@ impl VerifyReport {
             incomplete: 0,
             failures: Vec::new(),
             failure_groups: 0,
+            names: world.graph.cells.iter().map(|c| c.name.clone()).collect(),
         }
+    }
+
+    fn write_failure(&self, f: &mut fmt::Formatter<'_>, failure: &Failure) -> fmt::Result {
+        let cell = |c: Option<u32>| c.map_or("solid".to_owned(), |c| self.name(c));
+        let crossed: Vec<String> = (failure.crossed.iter())
+            .map(|&p| PortalId(p).to_string())
+            .collect();
+        let point = |p: [f64; 3]| format!("({:.6} {:.6} {:.6})", p[0], p[1], p[2]);
+        write!(
+            f,
+            "{} × {}: {}",
+            failure.count,
+            failure.kind.promise(),
+            failure.kind.words()
+        )?;
+        match failure.kind {
+            FailureKind::Unlisted | FailureKind::MissingTriangle => {
+                write!(f, "; seen from {}", cell(failure.expected))?;
+            }
+            _ => write!(
+                f,
+                "; in {}, found {}",
+                cell(failure.expected),
+                cell(failure.found)
+            )?,
+        }
+        if let Some(portal) = failure.portal {
+            write!(f, ", {}", PortalId(portal))?;
+        }
+        writeln!(
+            f,
+            "\n  at {}, {:.2e} m from any edge",
+            point(failure.at),
+            failure.clearance
+        )?;
+        writeln!(
+            f,
+            "  from {} to {}, crossing {}",
+            point(failure.start),
+            point(failure.end),
+            if crossed.is_empty() {
+                "no portal".to_owned()
+            } else {
+                crossed.join(" ")
+            }
+        )?;
+        if let Some([a, b, c]) = failure.triangle {
+            writeln!(f, "  triangle {} {} {}", point(a), point(b), point(c))?;
+        }
+        Ok(())
+    }
+    /// The name that other commands print for a cell, too.
+    fn name(&self, cell: u32) -> String {
+        let name = self.names.get(cell as usize);
+        name.map_or_else(|| CellId(cell).to_string(), Clone::clone)
     }
 
     pub(crate) fn new(
@@ -384,7 +443,7 @@ impl fmt::Display for VerifyReport {
                 .unsampled_cells
                 .iter()
                 .take(20)
-                .map(ToString::to_string)
+                .map(|&c| self.name(c))
                 .collect();
             writeln!(
                 f,
@@ -394,7 +453,7 @@ impl fmt::Display for VerifyReport {
             )?;
         }
         for failure in &self.failures {
-            write!(f, "{failure}")?;
+            self.write_failure(f, failure)?;
         }
         if self.failure_groups > self.failures.len() {
             writeln!(
@@ -408,50 +467,5 @@ impl fmt::Display for VerifyReport {
             (true, _) => writeln!(f, "no promise was seen broken"),
             (false, _) => writeln!(f, "BROKEN"),
         }
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let cell = |c: Option<u32>| c.map_or("solid".to_owned(), |c| format!("cell {c}"));
-        let point = |p: [f64; 3]| format!("({:.6} {:.6} {:.6})", p[0], p[1], p[2]);
-        write!(
-            f,
-            "{} × {}: {}",
-            self.count,
-            self.kind.promise(),
-            self.kind.words()
-        )?;
-        match self.kind {
-            FailureKind::Unlisted | FailureKind::MissingTriangle => {
-                write!(f, "; seen from {}", cell(self.expected))?;
-            }
-            _ => write!(
-                f,
-                "; in {}, found {}",
-                cell(self.expected),
-                cell(self.found)
-            )?,
-        }
-        if let Some(portal) = self.portal {
-            write!(f, ", portal {portal}")?;
-        }
-        writeln!(
-            f,
-            "\n  at {}, {:.2e} m from any edge",
-            point(self.at),
-            self.clearance
-        )?;
-        writeln!(
-            f,
-            "  from {} to {}, crossing {:?}",
-            point(self.start),
-            point(self.end),
-            self.crossed
-        )?;
-        if let Some([a, b, c]) = self.triangle {
-            writeln!(f, "  triangle {} {} {}", point(a), point(b), point(c))?;
-        }
-        Ok(())
     }
 }

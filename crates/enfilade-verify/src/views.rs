@@ -111,7 +111,7 @@ impl Default for ViewOptions {
 }
 
 /// Something that a ray hit and the answer lacks.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missed {
     /// The view.
     pub view: ViewQuery,
@@ -119,6 +119,9 @@ pub struct Missed {
     pub number: u64,
     /// The cell that the eye is in.
     pub eye_cell: Option<u32>,
+    /// Its name.
+    #[serde(skip)]
+    pub eye_cell_name: Option<String>,
     /// The batch of the triangle hit, or none for a detail.
     pub batch: Option<u32>,
     /// The triangle in its batch, or the detail.
@@ -211,12 +214,12 @@ impl fmt::Display for ViewReport {
                 .map_or("detail".into(), |b| format!("batch {b}, triangle"));
             writeln!(
                 f,
-                "  missed: {what} {} at {:?}, view {} from {:?} (cell {:?}) along {:?}, fov {}, aspect {}",
+                "  missed: {what} {} at {:?}, view {} from {:?} (in {}) along {:?}, fov {}, aspect {}",
                 m.index,
                 m.at,
                 m.number,
                 m.view.eye,
-                m.eye_cell,
+                m.eye_cell_name.as_deref().unwrap_or("no cell"),
                 m.view.toward,
                 m.view.fov_y,
                 m.view.aspect
@@ -509,6 +512,7 @@ impl<'a> Court<'a> {
                 view: *view,
                 number,
                 eye_cell: eye_cell.map(|c| c.0),
+                eye_cell_name: eye_cell.map(|c| self.subject.world.graph[c].name.clone()),
                 batch,
                 index,
                 at: at.to_array(),

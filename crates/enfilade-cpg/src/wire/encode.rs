@@ -79,15 +79,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
     let batches = lay_out_batches(layout, world, &mut meshes, &mut nodes, &mut top);
     let (details, detail_meshes) =
         lay_out_details(layout, world, &mut meshes, &mut nodes, &mut top);
-    let leak_path = (!world.leak_path.is_empty()).then(|| {
-        meshes.push(layout.push_line(LEAK_PATH, &world.leak_path));
-        nodes.push(json::Node {
-            name: LEAK_PATH.into(),
-            mesh: Some(meshes.len() as u32 - 1),
-            ..Default::default()
-        });
-        nodes.len() as u32 - 1
-    });
+    let leak_path = lay_out_leak_path(layout, world, &mut meshes, &mut nodes);
     top.extend(leak_path);
     nodes[0].children = top;
     layout.close_sections();
@@ -114,15 +106,8 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         runs: layout.view(pvs.runs.len() as u64 * 8),
     });
     let n_bin = layout.len.next_multiple_of(4);
-    let generator = match graph.provenance.generator.as_str() {
-        "" => "enfilade",
-        generator => generator,
-    };
     json::Root {
-        asset: json::Asset {
-            version: "2.0".into(),
-            generator: generator.into(),
-        },
+        asset: asset(world),
         extensions_used: used.into_iter().collect(),
         scene: 0,
         scenes: vec![json::Scene { nodes: vec![0] }],
@@ -153,12 +138,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 locator,
                 leak_path,
                 pvs,
-                provenance: json::Provenance {
-                    generator: graph.provenance.generator.clone(),
-                    method: graph.provenance.method.clone(),
-                    settings: graph.provenance.settings.clone(),
-                    input_hash: graph.provenance.input_hash.clone(),
-                },
+                provenance: provenance(world),
                 statistics: statistics(layout, world),
             },
         },
@@ -283,6 +263,24 @@ fn lay_out_details<'a>(
     (details, detail_meshes)
 }
 
+fn lay_out_leak_path<'a>(
+    layout: &mut Layout<'a>,
+    world: &'a World,
+    meshes: &mut Vec<json::Mesh>,
+    nodes: &mut Vec<json::Node>,
+) -> Option<u32> {
+    if world.leak_path.is_empty() {
+        return None;
+    }
+    meshes.push(layout.push_line(LEAK_PATH, &world.leak_path));
+    nodes.push(json::Node {
+        name: LEAK_PATH.into(),
+        mesh: Some(meshes.len() as u32 - 1),
+        ..Default::default()
+    });
+    Some(nodes.len() as u32 - 1)
+}
+
 fn lay_out_textures(
     world: &World,
     used: &mut BTreeSet<String>,
@@ -339,6 +337,27 @@ fn lay_out_locator(layout: &mut Layout, world: &World) -> json::Locator {
         root: locator.root,
         planes: layout.view(locator.planes.len() as u64 * 32),
         nodes: layout.view(locator.nodes.len() as u64 * 12),
+    }
+}
+
+fn asset(world: &World) -> json::Asset {
+    let generator = match world.graph.provenance.generator.as_str() {
+        "" => "enfilade",
+        generator => generator,
+    };
+    json::Asset {
+        version: "2.0".into(),
+        generator: generator.into(),
+    }
+}
+
+fn provenance(world: &World) -> json::Provenance {
+    let provenance = &world.graph.provenance;
+    json::Provenance {
+        generator: provenance.generator.clone(),
+        method: provenance.method.clone(),
+        settings: provenance.settings.clone(),
+        input_hash: provenance.input_hash.clone(),
     }
 }
 

@@ -233,47 +233,13 @@ struct Visit {
 impl Reader<'_, '_, '_> {
     fn read_scene(mut self) -> Result<(), ImportError> {
         let root = &self.document.root;
-        let n = root.nodes.len();
-        let mut parents = vec![u32::MAX; n];
-        for (i, node) in root.nodes.iter().enumerate() {
-            for &child in node.children.iter() {
-                let place = || format!("node {i}");
-                match parents.get_mut(child as usize) {
-                    None => {
-                        return Err(self
-                            .builder
-                            .malformed(place(), format!("no child node {child}")));
-                    }
-                    Some(parent) if *parent != u32::MAX => {
-                        return Err(self.builder.malformed(
-                            place(),
-                            format!("child node {child} has another parent, node {parent}"),
-                        ));
-                    }
-                    Some(parent) => *parent = i as u32,
-                }
-            }
-        }
-        let starts: Vec<usize> = if root.scenes.is_empty() {
-            (0..n).filter(|&i| parents[i] == u32::MAX).collect()
-        } else {
-            let index = root.scene.unwrap_or(0);
-            let Some(scene) = root.scenes.get(index) else {
-                return Err(self.builder.malformed("scene", format!("no scene {index}")));
-            };
-            if root.scenes.len() > 1 {
-                self.builder.note(
-                    format!("scene {index}"),
-                    "several scenes; only the default one is read",
-                );
-            }
-            scene.nodes.to_vec()
-        };
+        let parents = self.parents()?;
+        let starts = self.starts(&parents)?;
         let animated = self.animated_nodes();
-        let mut is_visited = vec![false; n];
+        let mut is_visited = vec![false; root.nodes.len()];
         let mut stack: Vec<Visit> = Vec::new();
         for &start in starts.iter().rev() {
-            if start >= n {
+            if start >= root.nodes.len() {
                 return Err(self.builder.malformed("scene", format!("no node {start}")));
             }
             stack.push(Visit {
@@ -285,35 +251,10 @@ impl Reader<'_, '_, '_> {
         }
         while let Some(visit) = stack.pop() {
             let i = visit.node as usize;
-            let place = || format!("node {i}");
-            // With one parent a node, a second visit means a cycle or a root listed twice.
-            if std::mem::replace(&mut is_visited[i], true) {
-                return Err(self
-                    .builder
-                    .malformed(place(), "is reached twice: the node tree has a cycle"));
-            }
-            if visit.depth > self.builder.limits().max_node_depth {
-                return Err(ImportError::TooMuch {
-                    path: self.builder.path.clone(),
-                    place: place(),
-                    what: "levels of nodes",
-                    n: visit.depth.into(),
-                    limit: self.builder.limits().max_node_depth.into(),
-                });
-            }
+            self.check_visit(&visit, &mut is_visited)?;
             let node = &root.nodes[i];
-            let name = node.name.as_deref().unwrap_or("");
-            let is_hidden = node
-                .extensions
-                .as_ref()
-                .and_then(|e| e.visibility.as_ref())
-                .is_some_and(|v| v.visible == Some(false));
-            let dropped = if is_hidden {
-                Some("hidden by KHR_node_visibility".to_owned())
-            } else {
-                crate::roles::drops_subtree(name)
-            };
-            if let Some(reason) = dropped {
+            if let Some(reason) = why_dropped(node) {
+                let name = node.name.as_deref().unwrap_or("");
                 self.builder.note(
                     format!("node {i} '{name}'"),
                     format!("left out with all below it: {reason}"),
@@ -321,7 +262,7 @@ impl Reader<'_, '_, '_> {
                 continue;
             }
             let local = local_transform(node)
-                .map_err(|problem| self.builder.malformed(place(), problem))?;
+                .map_err(|problem| self.builder.malformed(format!("node {i}"), problem))?;
             let world = visit.parent * local;
             let moves = visit
                 .moves
@@ -337,6 +278,72 @@ impl Reader<'_, '_, '_> {
                     moves,
                 });
             }
+        }
+        Ok(())
+    }
+
+    /// By node its parent, or `u32::MAX`.
+    fn parents(&self) -> Result<Vec<u32>, ImportError> {
+        let nodes = &self.document.root.nodes;
+        let mut parents = vec![u32::MAX; nodes.len()];
+        let edges = nodes
+            .iter()
+            .enumerate()
+            .flat_map(|(i, node)| node.children.iter().map(move |&child| (i, child)));
+        for (i, child) in edges {
+            let problem = match parents.get_mut(child as usize) {
+                None => format!("no child node {child}"),
+                Some(parent) if *parent != u32::MAX => {
+                    format!("child node {child} has another parent, node {parent}")
+                }
+                Some(parent) => {
+                    *parent = i as u32;
+                    continue;
+                }
+            };
+            return Err(self.builder.malformed(format!("node {i}"), problem));
+        }
+        Ok(parents)
+    }
+
+    /// The nodes at the top of the scene that is read.
+    fn starts(&mut self, parents: &[u32]) -> Result<Vec<usize>, ImportError> {
+        let root = &self.document.root;
+        if root.scenes.is_empty() {
+            let tops = (0..parents.len()).filter(|&i| parents[i] == u32::MAX);
+            return Ok(tops.collect());
+        }
+        let index = root.scene.unwrap_or(0);
+        let Some(scene) = root.scenes.get(index) else {
+            return Err(self.builder.malformed("scene", format!("no scene {index}")));
+        };
+        if root.scenes.len() > 1 {
+            self.builder.note(
+                format!("scene {index}"),
+                "several scenes; only the default one is read",
+            );
+        }
+        Ok(scene.nodes.to_vec())
+    }
+
+    /// Marks the node as visited; fails at a cycle, and too far down.
+    fn check_visit(&self, visit: &Visit, is_visited: &mut [bool]) -> Result<(), ImportError> {
+        let place = || format!("node {}", visit.node);
+        // With one parent a node, a second visit means a cycle or a root listed twice.
+        if std::mem::replace(&mut is_visited[visit.node as usize], true) {
+            return Err(self
+                .builder
+                .malformed(place(), "is reached twice: the node tree has a cycle"));
+        }
+        let limit = self.builder.limits().max_node_depth;
+        if visit.depth > limit {
+            return Err(ImportError::TooMuch {
+                path: self.builder.path.clone(),
+                place: place(),
+                what: "levels of nodes",
+                n: visit.depth.into(),
+                limit: limit.into(),
+            });
         }
         Ok(())
     }
@@ -439,6 +446,16 @@ impl Reader<'_, '_, '_> {
         }
         Ok(self.builder.push_mesh(mesh))
     }
+}
+
+/// Why a node is left out with all below it, if it is.
+fn why_dropped(node: &Node) -> Option<String> {
+    let extensions = node.extensions.as_ref();
+    let visibility = extensions.and_then(|e| e.visibility.as_ref());
+    if visibility.is_some_and(|v| v.visible == Some(false)) {
+        return Some("hidden by KHR_node_visibility".to_owned());
+    }
+    crate::roles::drops_subtree(node.name.as_deref().unwrap_or(""))
 }
 
 /// Turns a text of [`Document`] into the fitting error.

@@ -20,94 +20,28 @@ pub(super) fn read_primitive(
     place: &str,
     builder: &mut Builder<'_>,
 ) -> Result<Option<Primitive>, ImportError> {
-    let mode = def.mode.unwrap_or(4);
-    match mode {
-        4..=6 => {}
-        0..=3 => {
-            builder.note(place, "points or lines; left out");
-            return Ok(None);
-        }
-        _ => return Err(builder.malformed(place, format!("unknown mode {mode}"))),
-    }
-    let Some(&position) = def.attributes.get("POSITION") else {
-        builder.note(place, "no POSITION; left out");
+    let mut reader = PrimitiveReader {
+        document,
+        def,
+        place,
+        builder,
+    };
+    let Some(mode) = reader.mode()? else {
         return Ok(None);
     };
-    let is_hollow = document
-        .root
-        .accessors
-        .get(position as usize)
-        .is_some_and(|a| a.buffer_view.is_none());
-    if is_hollow && def.extensions.as_ref().is_some_and(|e| e.draco.is_some()) {
-        return Err(unsupported_extension(builder, "KHR_draco_mesh_compression"));
-    }
-    let positions = document
-        .elements(position, &["VEC3"])
-        .map_err(|problem| data_error(builder, place, &format!("POSITION: {problem}")))?;
+    let Some(positions) = reader.positions()? else {
+        return Ok(None);
+    };
     let n_vertices = positions.count;
-    let mut indices = match def.indices {
-        None => {
-            builder.charge_vertices(place, n_vertices)?;
-            builder.charge_memory(place, n_vertices, 4)?;
-            (0..n_vertices as u32).collect()
-        }
-        Some(index) => {
-            let elements = document
-                .elements(index, &["SCALAR"])
-                .map_err(|problem| data_error(builder, place, &format!("indices: {problem}")))?;
-            builder.check_triangles(place, elements.count / 3)?;
-            // A strip or fan grows to three times its length.
-            builder.charge_memory(place, elements.count, if mode == 4 { 4 } else { 12 })?;
-            elements
-                .read_indices()
-                .map_err(|problem| builder.malformed(place, problem))?
-        }
-    };
-    if let Some(&bad) = indices.iter().find(|&&i| u64::from(i) >= n_vertices) {
-        return Err(builder.malformed(
-            place,
-            format!("index {bad} is out of range: there are {n_vertices} vertices"),
-        ));
-    }
-    indices = match mode {
-        5 => unroll_strip(&indices),
-        6 => unroll_fan(&indices),
-        _ => indices,
-    };
-    let n_over = indices.len() % 3;
-    if n_over != 0 {
-        builder.note(
-            place,
-            "one or two indices after the last triangle; left out",
-        );
-        indices.truncate(indices.len() - n_over);
-    }
+    let mut indices = reader.triangles(mode, n_vertices)?;
     if indices.is_empty() {
         return Ok(None);
     }
-    // Exporters let many primitives share one long vertex list. Take the used ones only, or a
-    // small file could ask for (primitives x vertices) of memory.
-    let mut used: Option<Vec<u32>> = None;
-    if def.indices.is_some() {
-        let distinct = distinct(&indices, n_vertices);
-        builder.charge_vertices(place, distinct.len() as u64)?;
-        if distinct.len() as u64 != n_vertices {
-            for i in &mut indices {
-                // Found: `distinct` holds every index.
-                *i = distinct.binary_search(i).unwrap_or(0) as u32;
-            }
-            used = Some(distinct);
-        }
-    }
-    let material = match def.material {
-        None => None,
-        Some(m) => match materials.get(m as usize) {
-            Some(&m) => Some(m),
-            None => return Err(builder.malformed(place, format!("no material {m}"))),
-        },
-    };
+    let used = reader.take_used(&mut indices, n_vertices)?;
+    let material = reader.material(materials)?;
     let used = used.as_deref();
     let n_used = used.map_or(n_vertices, |u| u.len() as u64);
+    let builder = &mut *reader.builder;
     builder.charge_memory(place, n_used, bytes_a_vertex(&def.attributes))?;
     let mut primitive = Primitive {
         positions: positions.read(used, 0.0),
@@ -115,16 +49,166 @@ pub(super) fn read_primitive(
         material,
         ..Primitive::default()
     };
-    let attribute = |name: &str, shapes: &[&str]| -> Result<_, ImportError> {
-        let Some(&index) = def.attributes.get(name) else {
+    reader.read_attributes(&mut primitive, used, n_vertices)?;
+    reader.builder.drop_nonfinite(place, &mut primitive);
+    Ok(Some(primitive))
+}
+
+/// How a list of indices makes triangles.
+#[derive(Clone, Copy, PartialEq)]
+enum Mode {
+    List,
+    Strip,
+    Fan,
+}
+
+/// One primitive while it is read.
+struct PrimitiveReader<'r, 'a, 'b> {
+    document: &'r Document<'b>,
+    def: &'r PrimitiveDef,
+    place: &'r str,
+    builder: &'r mut Builder<'a>,
+}
+
+impl<'r> PrimitiveReader<'r, '_, '_> {
+    /// `None` where it holds no triangles.
+    fn mode(&mut self) -> Result<Option<Mode>, ImportError> {
+        match self.def.mode.unwrap_or(4) {
+            4 => Ok(Some(Mode::List)),
+            5 => Ok(Some(Mode::Strip)),
+            6 => Ok(Some(Mode::Fan)),
+            0..=3 => {
+                self.builder.note(self.place, "points or lines; left out");
+                Ok(None)
+            }
+            mode => Err(self
+                .builder
+                .malformed(self.place, format!("unknown mode {mode}"))),
+        }
+    }
+
+    fn positions(&mut self) -> Result<Option<Elements<'r>>, ImportError> {
+        let Some(&position) = self.def.attributes.get("POSITION") else {
+            self.builder.note(self.place, "no POSITION; left out");
             return Ok(None);
         };
-        let elements = document
+        let accessors = &self.document.root.accessors;
+        let is_hollow = accessors
+            .get(position as usize)
+            .is_some_and(|a| a.buffer_view.is_none());
+        let extensions = self.def.extensions.as_ref();
+        if is_hollow && extensions.is_some_and(|e| e.draco.is_some()) {
+            return Err(unsupported_extension(
+                self.builder,
+                "KHR_draco_mesh_compression",
+            ));
+        }
+        let positions = self
+            .document
+            .elements(position, &["VEC3"])
+            .map_err(|problem| self.data_error("POSITION", &problem))?;
+        Ok(Some(positions))
+    }
+
+    /// Index triples, of a strip or fan as well; none that is out of range.
+    fn triangles(&mut self, mode: Mode, n_vertices: u64) -> Result<Vec<u32>, ImportError> {
+        let indices = self.indices(mode, n_vertices)?;
+        if let Some(&bad) = indices.iter().find(|&&i| u64::from(i) >= n_vertices) {
+            return Err(self.builder.malformed(
+                self.place,
+                format!("index {bad} is out of range: there are {n_vertices} vertices"),
+            ));
+        }
+        let mut indices = match mode {
+            Mode::List => indices,
+            Mode::Strip => unroll_strip(&indices),
+            Mode::Fan => unroll_fan(&indices),
+        };
+        let n_over = indices.len() % 3;
+        if n_over != 0 {
+            self.builder.note(
+                self.place,
+                "one or two indices after the last triangle; left out",
+            );
+            indices.truncate(indices.len() - n_over);
+        }
+        Ok(indices)
+    }
+
+    fn indices(&mut self, mode: Mode, n_vertices: u64) -> Result<Vec<u32>, ImportError> {
+        let Some(index) = self.def.indices else {
+            self.builder.charge_vertices(self.place, n_vertices)?;
+            self.builder.charge_memory(self.place, n_vertices, 4)?;
+            return Ok((0..n_vertices as u32).collect());
+        };
+        let elements = self
+            .document
+            .elements(index, &["SCALAR"])
+            .map_err(|problem| self.data_error("indices", &problem))?;
+        self.builder
+            .check_triangles(self.place, elements.count / 3)?;
+        // A strip or fan grows to three times its length.
+        let n_bytes = if mode == Mode::List { 4 } else { 12 };
+        self.builder
+            .charge_memory(self.place, elements.count, n_bytes)?;
+        elements
+            .read_indices()
+            .map_err(|problem| self.builder.malformed(self.place, problem))
+    }
+
+    /// The vertices in use, increasing, by which `indices` then count; `None` where all are.
+    ///
+    /// Exporters let many primitives share one long vertex list. Take the used ones only, or a
+    /// small file could ask for (primitives x vertices) of memory.
+    fn take_used(
+        &mut self,
+        indices: &mut [u32],
+        n_vertices: u64,
+    ) -> Result<Option<Vec<u32>>, ImportError> {
+        if self.def.indices.is_none() {
+            return Ok(None);
+        }
+        let distinct = distinct(indices, n_vertices);
+        self.builder
+            .charge_vertices(self.place, distinct.len() as u64)?;
+        if distinct.len() as u64 == n_vertices {
+            return Ok(None);
+        }
+        for i in indices {
+            // Found: `distinct` holds every index.
+            *i = distinct.binary_search(i).unwrap_or(0) as u32;
+        }
+        Ok(Some(distinct))
+    }
+
+    fn material(&self, materials: &[u32]) -> Result<Option<u32>, ImportError> {
+        let Some(m) = self.def.material else {
+            return Ok(None);
+        };
+        let material = materials.get(m as usize).copied();
+        let none = || {
+            self.builder
+                .malformed(self.place, format!("no material {m}"))
+        };
+        material.map(Some).ok_or_else(none)
+    }
+
+    fn attribute(
+        &self,
+        name: &str,
+        shapes: &[&str],
+        n_vertices: u64,
+    ) -> Result<Option<Elements<'r>>, ImportError> {
+        let Some(&index) = self.def.attributes.get(name) else {
+            return Ok(None);
+        };
+        let elements = self
+            .document
             .elements(index, shapes)
-            .map_err(|problem| data_error(builder, place, &format!("{name}: {problem}")))?;
+            .map_err(|problem| self.data_error(name, &problem))?;
         if elements.count != n_vertices {
-            return Err(builder.malformed(
-                place,
+            return Err(self.builder.malformed(
+                self.place,
                 format!(
                     "{name} has {} elements and POSITION {n_vertices}",
                     elements.count
@@ -132,45 +216,58 @@ pub(super) fn read_primitive(
             ));
         }
         Ok(Some(elements))
-    };
-    let normals = attribute("NORMAL", &["VEC3"])?;
-    let tangents = attribute("TANGENT", &["VEC4"])?;
-    let colors = attribute("COLOR_0", &["VEC3", "VEC4"])?;
-    let mut uvs: Vec<Elements<'_>> = Vec::new();
-    while uvs.len() < MAX_UV_SETS {
-        match attribute(&format!("TEXCOORD_{}", uvs.len()), &["VEC2"])? {
-            Some(set) => uvs.push(set),
-            None => break,
+    }
+
+    /// Normals, tangents, colors and texture coordinates of the vertices in use.
+    fn read_attributes(
+        &mut self,
+        primitive: &mut Primitive,
+        used: Option<&[u32]>,
+        n_vertices: u64,
+    ) -> Result<(), ImportError> {
+        let attribute = |name: &str, shapes: &[&str]| self.attribute(name, shapes, n_vertices);
+        let normals = attribute("NORMAL", &["VEC3"])?;
+        let tangents = attribute("TANGENT", &["VEC4"])?;
+        let colors = attribute("COLOR_0", &["VEC3", "VEC4"])?;
+        let mut uvs: Vec<Elements<'_>> = Vec::new();
+        while uvs.len() < MAX_UV_SETS {
+            match attribute(&format!("TEXCOORD_{}", uvs.len()), &["VEC2"])? {
+                Some(set) => uvs.push(set),
+                None => break,
+            }
         }
+        let n_kept = 1 + uvs.len() + [&normals, &tangents, &colors].into_iter().flatten().count();
+        if n_kept < self.def.attributes.len() {
+            self.builder.note(
+                self.place,
+                "attributes other than position, normal, tangent, texture coordinates and \
+                 the first color; left out",
+            );
+        }
+        if self.def.targets.is_some() {
+            self.builder.note(self.place, "morph targets; left out");
+        }
+        let mut n_repaired = 0;
+        primitive.normals = cleaned(normals.map(|e| e.read(used, 0.0)), &mut n_repaired);
+        primitive.tangents = cleaned(tangents.map(|e| e.read(used, 1.0)), &mut n_repaired);
+        primitive.colors = cleaned(colors.map(|e| e.read(used, 1.0)), &mut n_repaired);
+        for set in uvs {
+            primitive
+                .uvs
+                .push(cleaned(Some(set.read(used, 0.0)), &mut n_repaired));
+        }
+        if n_repaired > 0 {
+            self.builder.note(
+                self.place,
+                "normals, tangents, colors or texture coordinates that are no finite numbers; set to 0",
+            );
+        }
+        Ok(())
     }
-    let n_kept = 1 + uvs.len() + [&normals, &tangents, &colors].into_iter().flatten().count();
-    if n_kept < def.attributes.len() {
-        builder.note(
-            place,
-            "attributes other than position, normal, tangent, texture coordinates and \
-             the first color; left out",
-        );
+
+    fn data_error(&self, what: &str, problem: &str) -> ImportError {
+        data_error(self.builder, self.place, &format!("{what}: {problem}"))
     }
-    if def.targets.is_some() {
-        builder.note(place, "morph targets; left out");
-    }
-    let mut n_repaired = 0;
-    primitive.normals = cleaned(normals.map(|e| e.read(used, 0.0)), &mut n_repaired);
-    primitive.tangents = cleaned(tangents.map(|e| e.read(used, 1.0)), &mut n_repaired);
-    primitive.colors = cleaned(colors.map(|e| e.read(used, 1.0)), &mut n_repaired);
-    for set in uvs {
-        primitive
-            .uvs
-            .push(cleaned(Some(set.read(used, 0.0)), &mut n_repaired));
-    }
-    if n_repaired > 0 {
-        builder.note(
-            place,
-            "normals, tangents, colors or texture coordinates that are no finite numbers; set to 0",
-        );
-    }
-    builder.drop_nonfinite(place, &mut primitive);
-    Ok(Some(primitive))
 }
 
 /// Bytes that the attributes of a vertex take here.

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{Entity, Material, Mesh, Primitive, Role};
 use enfilade_geom::solid::exposed_faces;
-use enfilade_geom::{ConvexSolid, DMat3, DVec3, Plane, SolidError};
+use enfilade_geom::{ConvexSolid, DMat3, DMat4, DVec3, Plane, SolidError};
 use serde_json::json;
 
 use crate::builder::Builder;
@@ -242,6 +242,9 @@ fn snapped(mut solid: ConvexSolid) -> ConvexSolid {
     solid
 }
 
+/// By entity and part, and then by texture: what becomes one object each, so that each keeps its identity.
+type Faces<'t> = BTreeMap<(usize, Part), BTreeMap<&'t str, Primitive>>;
+
 fn build(
     entities: &[RawEntity<'_>],
     shaped: &[Shaped<'_>],
@@ -254,93 +257,14 @@ fn build(
     let scale = options.unit.unwrap_or(UNIT);
     let rotation = DMat3::from_mat4(base) * (1.0 / scale);
     let offset = base.w_axis.truncate();
-    let class_of = |e: usize| entities[e].get("classname").unwrap_or("brushes");
-    let roles: Vec<(Role, String)> = (0..entities.len())
-        .map(|e| {
-            let class = class_of(e);
-            let told = || match kind_of_class(class) {
-                _ if builder.is_detail_file => (Role::Detail, "from a detail file".to_owned()),
-                Kind::Structural => (Role::Structural, format!("map: brushes of {class}")),
-                _ => (Role::Detail, format!("map: brushes of {class}")),
-            };
-            builder
-                .options
-                .roles
-                .forced(&format!("{class} {e}"))
-                .unwrap_or_else(told)
-        })
-        .collect();
-    let seals =
-        |s: &Shaped<'_>| s.matter == Matter::Sky && class_of(s.entity).starts_with("func_detail");
-    let is_structural = |s: &Shaped<'_>| {
-        s.matter != Matter::Liquid && (roles[s.entity].0 == Role::Structural || seals(s))
+    let brushwork = Brushwork {
+        entities,
+        shaped,
+        roles: roles_of(entities, builder),
     };
-    let structural: Vec<&ConvexSolid> = shaped
-        .iter()
-        .filter(|s| is_structural(s))
-        .map(|s| &s.solid)
-        .collect();
-    let exposed = exposed_faces(&structural, WELD);
-    let mut exposed = exposed.iter();
-    // One object for each entity and kind of matter, so that each keeps its identity.
-    let mut meshes: BTreeMap<(usize, Part), BTreeMap<&str, Primitive>> = BTreeMap::new();
-    for s in shaped {
-        let visible = is_structural(s).then(|| exposed.next()).flatten();
-        let part = match s.matter {
-            Matter::Liquid => Part::Liquid,
-            Matter::Sky if seals(s) => Part::Sky,
-            _ => Part::Own,
-        };
-        let parts = meshes.entry((s.entity, part)).or_default();
-        for (f, face) in s.solid.faces.iter().enumerate() {
-            if visible.is_some_and(|v| v[f].is_empty()) {
-                continue;
-            }
-            let to = parts.entry(s.textures[f]).or_default();
-            let first = to.positions.len() as u32;
-            let n = face.points.len() as u32;
-            builder.charge_vertices("faces", u64::from(n))?;
-            let normal = s.solid.planes[f].normal.as_vec3().to_array();
-            to.positions
-                .extend(face.points.iter().map(|p| p.as_vec3().to_array()));
-            to.normals.extend(face.points.iter().map(|_| normal));
-            to.indices
-                .extend((1..n - 1).flat_map(|k| [first, first + k, first + k + 1]));
-        }
-    }
-    let mut material_of: BTreeMap<(&str, bool), u32> = BTreeMap::new();
-    let mut object_of: BTreeMap<usize, u32> = BTreeMap::new();
-    for ((e, part), parts) in meshes {
-        if parts.is_empty() {
-            continue;
-        }
-        let class = class_of(e);
-        let is_liquid = part == Part::Liquid;
-        let name = match part {
-            Part::Own => format!("{class} {e}"),
-            Part::Sky => format!("{class} {e} sky"),
-            Part::Liquid => format!("{class} {e} liquid"),
-        };
-        let mut primitives = Vec::new();
-        for (texture, mut primitive) in parts {
-            let material = *material_of
-                .entry((texture, is_liquid))
-                .or_insert_with(|| builder.push_material(material(texture, is_liquid)));
-            primitive.material = Some(material);
-            primitives.push(primitive);
-        }
-        let (role, reason) = match part {
-            Part::Own => (roles[e].0, roles[e].1.as_str()),
-            Part::Sky => (Role::Structural, "map: sky closes the world"),
-            Part::Liquid => (Role::Detail, "map: a liquid"),
-        };
-        let mesh = builder.push_mesh(Mesh {
-            name: name.clone(),
-            primitives,
-        });
-        let object = builder.place_as(mesh, base, &name, role, reason)?;
-        object_of.entry(e).or_insert(object);
-    }
+    let structural = brushwork.structural();
+    let faces = brushwork.visible_faces(&structural, builder)?;
+    let object_of = brushwork.place(faces, base, builder)?;
     builder.add_solids(
         structural
             .iter()
@@ -367,6 +291,130 @@ fn build(
         builder.note("world", "no structural brush");
     }
     Ok(())
+}
+
+fn class_of<'t>(entity: &RawEntity<'t>) -> &'t str {
+    entity.get("classname").unwrap_or("brushes")
+}
+
+/// By entity: its role, and why.
+fn roles_of(entities: &[RawEntity<'_>], builder: &Builder<'_>) -> Vec<(Role, String)> {
+    let role = |(e, entity): (usize, &RawEntity<'_>)| {
+        let class = class_of(entity);
+        let told = || match kind_of_class(class) {
+            _ if builder.is_detail_file => (Role::Detail, "from a detail file".to_owned()),
+            Kind::Structural => (Role::Structural, format!("map: brushes of {class}")),
+            _ => (Role::Detail, format!("map: brushes of {class}")),
+        };
+        let rules = &builder.options.roles;
+        rules.forced(&format!("{class} {e}")).unwrap_or_else(told)
+    };
+    entities.iter().enumerate().map(role).collect()
+}
+
+/// All brushes of a map that have a shape.
+struct Brushwork<'s, 't> {
+    entities: &'s [RawEntity<'t>],
+    shaped: &'s [Shaped<'t>],
+    /// By entity.
+    roles: Vec<(Role, String)>,
+}
+
+impl<'s, 't> Brushwork<'s, 't> {
+    /// Whether a brush is sky that closes the world, though it is detail.
+    fn seals(&self, s: &Shaped<'_>) -> bool {
+        let class = class_of(&self.entities[s.entity]);
+        s.matter == Matter::Sky && class.starts_with("func_detail")
+    }
+
+    fn is_structural(&self, s: &Shaped<'_>) -> bool {
+        let is_of_structure = self.roles[s.entity].0 == Role::Structural;
+        s.matter != Matter::Liquid && (is_of_structure || self.seals(s))
+    }
+
+    fn structural(&self) -> Vec<&'s ConvexSolid> {
+        let structural = self.shaped.iter().filter(|s| self.is_structural(s));
+        structural.map(|s| &s.solid).collect()
+    }
+
+    /// The faces of all brushes, without those that other structural brushes hide altogether.
+    fn visible_faces(
+        &self,
+        structural: &[&ConvexSolid],
+        builder: &mut Builder<'_>,
+    ) -> Result<Faces<'t>, ImportError> {
+        let exposed = exposed_faces(structural, WELD);
+        let mut exposed = exposed.iter();
+        let mut faces = Faces::new();
+        for s in self.shaped {
+            let visible = self.is_structural(s).then(|| exposed.next()).flatten();
+            let part = match s.matter {
+                Matter::Liquid => Part::Liquid,
+                Matter::Sky if self.seals(s) => Part::Sky,
+                _ => Part::Own,
+            };
+            let parts = faces.entry((s.entity, part)).or_default();
+            for (f, face) in s.solid.faces.iter().enumerate() {
+                if visible.is_some_and(|v| v[f].is_empty()) {
+                    continue;
+                }
+                let to = parts.entry(s.textures[f]).or_default();
+                let first = to.positions.len() as u32;
+                let n = face.points.len() as u32;
+                builder.charge_vertices("faces", u64::from(n))?;
+                let normal = s.solid.planes[f].normal.as_vec3().to_array();
+                to.positions
+                    .extend(face.points.iter().map(|p| p.as_vec3().to_array()));
+                to.normals.extend(face.points.iter().map(|_| normal));
+                to.indices
+                    .extend((1..n - 1).flat_map(|k| [first, first + k, first + k + 1]));
+            }
+        }
+        Ok(faces)
+    }
+
+    /// Places an object for each entity and part; returns the first of each entity.
+    fn place(
+        &self,
+        faces: Faces<'_>,
+        base: DMat4,
+        builder: &mut Builder<'_>,
+    ) -> Result<BTreeMap<usize, u32>, ImportError> {
+        let mut material_of: BTreeMap<(&str, bool), u32> = BTreeMap::new();
+        let mut object_of: BTreeMap<usize, u32> = BTreeMap::new();
+        for ((e, part), parts) in faces {
+            if parts.is_empty() {
+                continue;
+            }
+            let class = class_of(&self.entities[e]);
+            let (role, reason) = &self.roles[e];
+            let (name, role, reason) = match part {
+                Part::Own => (format!("{class} {e}"), *role, reason.as_str()),
+                Part::Sky => (
+                    format!("{class} {e} sky"),
+                    Role::Structural,
+                    "map: sky closes the world",
+                ),
+                Part::Liquid => (format!("{class} {e} liquid"), Role::Detail, "map: a liquid"),
+            };
+            let is_liquid = part == Part::Liquid;
+            let mut primitives = Vec::new();
+            for (texture, mut primitive) in parts {
+                let material = *material_of
+                    .entry((texture, is_liquid))
+                    .or_insert_with(|| builder.push_material(material(texture, is_liquid)));
+                primitive.material = Some(material);
+                primitives.push(primitive);
+            }
+            let mesh = builder.push_mesh(Mesh {
+                name: name.clone(),
+                primitives,
+            });
+            let object = builder.place_as(mesh, base, &name, role, reason)?;
+            object_of.entry(e).or_insert(object);
+        }
+        Ok(object_of)
+    }
 }
 
 /// A plain material of a texture's name, in a color of its own.

@@ -1,0 +1,218 @@
+//! Is a portal a flat, convex opening between two cells, and are its pieces what it says?
+
+use enfilade_geom::{DVec3, Plane, Winding};
+
+use super::error::{Findings, GraphError};
+use crate::Portal;
+
+/// How far a stored corner may be from where it was computed. [Units: wu]
+///
+/// Corners and normal are computed in `f64` and rounded once to `f32`, which moves each coordinate
+/// by at most 2⁻²⁴ of its size: √3·2⁻²⁴·|corner| for a corner, and the normal's own rounding tilts
+/// the plane by as much across the polygon. Rounding outlines *outwards* takes the neighbouring
+/// `f32` instead of the nearest, twice as far. Four times their sum leaves room for the corners
+/// that a check compares with each other, and is still a tenth of a millimeter at 100 m.
+fn corner_slack<'a>(corners: impl IntoIterator<Item = &'a [f32; 3]>) -> f64 {
+    let largest = corners
+        .into_iter()
+        .flatten()
+        .fold(0.0_f32, |m, c| m.max(c.abs()));
+    4.0 * 2.0 * (3.0_f64.sqrt() * 2.0_f64.powi(-24)) * 2.0 * f64::from(largest)
+        // Coordinates near zero: what is below a nanometer does not matter to anyone.
+        + 1e-9
+}
+
+/// Relative error of an area that was summed in `f64` and stored as `f32`, doubled.
+const AREA_ROUNDING: f64 = 2.4e-7;
+
+/// How far the length of a normal rounded to `f32` may be from 1: √3 · 2⁻²⁴, times ten for
+/// normals that were normalized in `f32` arithmetic.
+const UNIT_SLACK: f64 = 1e-6;
+
+pub(super) fn check_portal(portal: u32, p: &Portal, n_cells: usize, found: &mut Findings) {
+    let cells = p.cells.map(|c| c.0);
+    if cells[0] == cells[1] || cells.iter().any(|&c| c as usize >= n_cells) {
+        found.push(GraphError::PortalCells {
+            portal,
+            cells,
+            n_cells,
+        });
+    }
+    let normal = dvec(p.normal);
+    if exceeds((normal.length() - 1.0).abs(), UNIT_SLACK) {
+        return found.push(GraphError::PortalNormal {
+            portal,
+            normal: p.normal,
+        });
+    }
+    let corners = || p.outline.iter().chain(p.pieces.iter().flatten());
+    if let Some(&at) = corners().find(|c| !c.iter().all(|v| v.is_finite())) {
+        return found.push(GraphError::PortalCorner { portal, at });
+    }
+    let slack = corner_slack(corners());
+    if p.outline.len() < 3 {
+        let n_corners = p.outline.len();
+        return found.push(GraphError::TooFewCorners {
+            portal,
+            piece: None,
+            n_corners,
+        });
+    }
+    let outline: Vec<DVec3> = p.outline.iter().map(|&c| dvec(c)).collect();
+    let plane = Plane::through(Winding::new(outline.clone()).mean(), normal.normalize());
+    let check = PolygonCheck {
+        portal,
+        plane,
+        slack,
+    };
+    check.polygon(None, &p.outline, found);
+    let mut measured = 0.0;
+    for (i, piece) in p.pieces.iter().enumerate() {
+        if found.is_full() {
+            return;
+        }
+        measured += check.polygon(Some(i as u32), piece, found);
+    }
+    check.pieces_inside(p, &outline, found);
+    let reach: f64 = p.pieces.iter().map(|piece| perimeter(&dvecs(piece))).sum();
+    let allowed = measured * AREA_ROUNDING + reach * slack;
+    if p.pieces.is_empty() || exceeds((f64::from(p.area) - measured).abs(), allowed) {
+        found.push(GraphError::PortalArea {
+            portal,
+            stored: p.area,
+            measured,
+        });
+    }
+}
+
+/// Checks the polygons of one portal.
+///
+/// Whether a polygon is convex, and whether polygons lie inside another, is asked of convex hulls:
+/// a closed curve is convex if and only if it is as long as its hull's and encloses as much, and a
+/// set lies in a convex polygon if and only if it adds nothing to its hull. That takes
+/// O(n log n) for n corners, does not depend on how short an edge is (a corner test across a
+/// hair-short edge amplifies rounding without bound), and the allowance is exact: the hull of
+/// points moved by at most ε has at most ε·perimeter + πε² more area and is at most 2πε longer
+/// (Steiner's formula).
+struct PolygonCheck {
+    portal: u32,
+    plane: Plane,
+    slack: f64,
+}
+
+impl PolygonCheck {
+    /// Checks one polygon and returns its area.
+    fn polygon(&self, piece: Option<u32>, corners: &[[f32; 3]], found: &mut Findings) -> f64 {
+        let Self {
+            portal,
+            plane,
+            slack,
+        } = *self;
+        if corners.len() < 3 {
+            let n_corners = corners.len();
+            found.push(GraphError::TooFewCorners {
+                portal,
+                piece,
+                n_corners,
+            });
+            return 0.0;
+        }
+        for &at in corners {
+            let distance = plane.signed_distance(dvec(at));
+            if distance.abs() > slack {
+                found.push(GraphError::NotPlanar {
+                    portal,
+                    piece,
+                    at,
+                    distance,
+                });
+                return 0.0;
+            }
+        }
+        let points = dvecs(corners);
+        let length = perimeter(&points);
+        let area = Winding::new(points.clone()).area_normal().dot(plane.normal) * 0.5;
+        // A piece may be a sliver that rounding has flattened or turned; an outline may not.
+        let least = if piece.is_some() {
+            -slack * length
+        } else {
+            f64::MIN_POSITIVE
+        };
+        if area < least {
+            found.push(GraphError::WrongWay {
+                portal,
+                piece,
+                near: corners[0],
+            });
+            return 0.0;
+        }
+        let hull = Winding::hull_in_plane(&plane, &points);
+        let hull_length = perimeter(&hull.points);
+        let dent = hull.area() - area;
+        // Each corner moved by the slack makes two edges longer by it; a curve that runs around
+        // twice is twice as long, however many corners it has.
+        let longer = (4.0 * points.len() as f64 * slack).min(0.25 * hull_length.max(slack));
+        if dent > slack * (length + 4.0 * slack) || length > hull_length + longer {
+            found.push(GraphError::NotConvex {
+                portal,
+                piece,
+                near: corners[0],
+            });
+        }
+        area.max(0.0)
+    }
+
+    fn pieces_inside(&self, p: &Portal, outline: &[DVec3], found: &mut Findings) {
+        let Self {
+            portal,
+            plane,
+            slack,
+        } = *self;
+        let own = Winding::hull_in_plane(&plane, outline);
+        let mut all = outline.to_vec();
+        all.extend(p.pieces.iter().flatten().map(|&c| dvec(c)));
+        let both = Winding::hull_in_plane(&plane, &all);
+        let length = perimeter(&own.points);
+        let tau = std::f64::consts::TAU;
+        if both.area() > own.area() + slack * (length + tau * slack)
+            || perimeter(&both.points) > length + tau * slack
+        {
+            let middle = own.mean();
+            let far = |c: &&[f32; 3]| dvec(**c).distance_squared(middle);
+            let farthest = p
+                .pieces
+                .iter()
+                .flatten()
+                .max_by(|a, b| far(a).total_cmp(&far(b)))
+                .copied();
+            found.push(GraphError::PieceOutside {
+                portal,
+                at: farthest.unwrap_or_default(),
+            });
+        }
+    }
+}
+
+/// Whether `value` is above `limit`, or no number at all.
+fn exceeds(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
+}
+
+fn dvec(p: [f32; 3]) -> DVec3 {
+    DVec3::from(p.map(f64::from))
+}
+
+fn dvecs(points: &[[f32; 3]]) -> Vec<DVec3> {
+    points.iter().map(|&p| dvec(p)).collect()
+}
+
+fn perimeter(points: &[DVec3]) -> f64 {
+    let Some(&last) = points.last() else {
+        return 0.0;
+    };
+    let mut from = last;
+    points
+        .iter()
+        .map(|&p| std::mem::replace(&mut from, p).distance(p))
+        .sum()
+}

@@ -1,0 +1,224 @@
+//! Triangles of all batches and meshes, side by side in one buffer.
+
+use enfilade_cpg::World;
+use enfilade_geom::scene::Primitive;
+use enfilade_runtime::Sight;
+use glam::Vec3;
+
+use super::color::color_of;
+use crate::levels::coarser;
+use crate::materials::Look;
+
+/// A corner of a triangle, 40 bytes. The shader that draws ids reads it as ten words.
+///
+/// What a material says comes with each corner: to look it up by pixel costs software more than light
+/// does.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Corner {
+    position: [f32; 3],
+    normal: [i8; 4],
+    uv: [f32; 2],
+    /// The material's times the corner's own; 16 bits, for dark ones.
+    color: [u16; 4],
+    /// Light of its own, and the least alpha that is drawn.
+    emissive: [u8; 4],
+    part: u32,
+}
+
+pub(crate) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Corner>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![
+        0 => Float32x3, 1 => Snorm8x4, 2 => Float32x2, 3 => Unorm16x4, 4 => Unorm8x4, 5 => Uint32
+    ],
+};
+
+/// Triangles that are drawn alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Span {
+    pub(crate) first: u32,
+    pub(crate) n: u32,
+    /// Index into [`GpuWorld::textures`].
+    pub(crate) texture: u32,
+    pub(crate) finish: Finish,
+    /// Whether its corners have normals.
+    pub(crate) is_smooth: bool,
+    pub(crate) is_transparent: bool,
+}
+
+/// What it takes to shade a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Finish {
+    Plain = 0,
+    Textured = 1,
+    /// With holes.
+    Masked = 2,
+}
+
+/// A detail mesh as drawn from some distance.
+#[derive(Clone, Debug)]
+pub(crate) struct Level {
+    /// How far its surface is from where it should be, at most. [Units: wu of the mesh]
+    pub(crate) error: f32,
+    /// By part.
+    pub(crate) spans: Vec<Span>,
+}
+
+/// Fills the buffers; what is on the adapter is made of it at the end.
+pub(super) struct Filling<'w> {
+    pub(super) world: &'w World,
+    pub(super) looks: Vec<Look>,
+    /// By texture of the world: index into the textures drawn, 0 for none.
+    pub(super) texture_of: Vec<u32>,
+    pub(super) corners: Vec<Corner>,
+    pub(super) indices: Vec<u32>,
+    pub(super) cell_colors: Vec<u32>,
+}
+
+impl Filling<'_> {
+    fn look(&self, primitive: &Primitive) -> Look {
+        // The last stands for none.
+        let none = self.looks.len() - 1;
+        let at = primitive.material.map_or(none, |m| m as usize).min(none);
+        self.looks[at]
+    }
+
+    /// Adds a primitive's triangles, by `order` of its positions; returns where they stand.
+    fn add(&mut self, primitive: &Primitive, order: &[u32], color: u32) -> Span {
+        let look = self.look(primitive);
+        let part = self.cell_colors.len() as u32;
+        self.cell_colors.push(color);
+        let [r, g, b] = look.emissive;
+        let emissive = [r, g, b, look.cutoff].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
+        let uvs = primitive.uvs.get(look.uv_set);
+        let base = self.corners.len() as u32;
+        for (i, &position) in primitive.positions.iter().enumerate() {
+            let normal = primitive.normals.get(i).map_or([0; 4], |n| {
+                let [x, y, z] = n.map(|v| (v.clamp(-1.0, 1.0) * 127.0).round() as i8);
+                [x, y, z, 127]
+            });
+            let color = primitive.colors.get(i).copied().unwrap_or([1.0; 4]);
+            self.corners.push(Corner {
+                position,
+                normal,
+                uv: uvs.and_then(|u| u.get(i)).copied().unwrap_or_default(),
+                color: [0, 1, 2, 3].map(|k| {
+                    let c = color[k] * look.base_color[k];
+                    (c.clamp(0.0, 1.0) * 65535.0).round() as u16
+                }),
+                emissive,
+                part,
+            });
+        }
+        let first = self.indices.len() as u32;
+        self.indices.extend(order.iter().map(|&i| base + i));
+        let texture = look
+            .texture
+            .and_then(|t| self.texture_of.get(t as usize))
+            .copied()
+            .filter(|_| uvs.is_some());
+        let texture = texture.unwrap_or(0);
+        Span {
+            first,
+            n: order.len() as u32,
+            texture,
+            finish: if look.cutoff > 0.0 {
+                Finish::Masked
+            } else if texture > 0 {
+                Finish::Textured
+            } else {
+                Finish::Plain
+            },
+            is_smooth: primitive.normals.len() == primitive.positions.len(),
+            is_transparent: look.is_transparent,
+        }
+    }
+    pub(super) fn add_batches(&mut self, sight: &Sight) -> Vec<Span> {
+        let batches = &self.world.batches;
+        batches
+            .iter()
+            .enumerate()
+            .map(|(i, batch)| {
+                let order = sight.indices(i as u32);
+                self.add(&batch.primitive, order, color_of(&batch.cells))
+            })
+            .collect()
+    }
+
+    /// The mean color of what is seen of each cell's surfaces, by area, in the light of the sky.
+    pub(super) fn cell_looks(&self) -> Vec<[f32; 3]> {
+        const SKY: f32 = 0.55;
+        let mut sums = vec![[0.0; 4]; self.world.graph.cells.len()];
+        for batch in &self.world.batches {
+            let color = self.look(&batch.primitive).base_color;
+            let corner = |i: u32| Vec3::from(batch.primitive.positions[i as usize]);
+            let triangles = batch.primitive.indices.chunks_exact(3);
+            let area: f32 = triangles
+                .map(|t| {
+                    let [a, b, c] = [t[0], t[1], t[2]].map(corner);
+                    (b - a).cross(c - a).length() * 0.5
+                })
+                .sum();
+            for cell in &batch.cells {
+                if let Some(sum) = sums.get_mut(cell.0 as usize) {
+                    for k in 0..3 {
+                        sum[k] += color[k] * area;
+                    }
+                    sum[3] += area;
+                }
+            }
+        }
+        let mean =
+            |s: [f32; 4]| [0, 1, 2].map(|k| SKY * if s[3] > 0.0 { s[k] / s[3] } else { 0.8 });
+        sums.into_iter().map(mean).collect()
+    }
+
+    pub(super) fn add_meshes(&mut self, has_levels: bool) -> Vec<Vec<Level>> {
+        let meshes = &self.world.detail_meshes;
+        meshes
+            .iter()
+            .map(|mesh| {
+                let parts: Vec<&Primitive> = mesh
+                    .primitives
+                    .iter()
+                    .filter(|p| !p.indices.is_empty())
+                    .collect();
+                // Where the corners of each part begin.
+                let mut bases = Vec::new();
+                let spans = parts
+                    .iter()
+                    .map(|p| {
+                        bases.push(self.corners.len() as u32);
+                        self.add(p, &p.indices, 0)
+                    })
+                    .collect();
+                let mut levels = vec![Level { error: 0.0, spans }];
+                let coarser = if has_levels {
+                    coarser(&parts)
+                } else {
+                    Vec::new()
+                };
+                for less in coarser {
+                    let spans = (levels[0].spans.clone().into_iter())
+                        .zip(bases.iter().zip(&less.indices))
+                        .map(|(span, (base, order))| {
+                            let first = self.indices.len() as u32;
+                            self.indices.extend(order.iter().map(|&i| base + i));
+                            Span {
+                                first,
+                                n: order.len() as u32,
+                                ..span
+                            }
+                        })
+                        .collect();
+                    levels.push(Level {
+                        error: less.error as f32,
+                        spans,
+                    });
+                }
+                levels
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,139 @@
+//! Where structure and detail objects stand.
+
+use enfilade_cpg::{CellId, World};
+use glam::{Mat4, Vec3, Vec4};
+
+use super::color::{color_of, packed};
+
+/// Where something stands, 56 bytes: structure, or a detail object.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Instance {
+    rows: [[f32; 4]; 3],
+    /// Its number and the reason why it is drawn, as in [`crate::DrawList`].
+    key: u32,
+    /// Color of its cell.
+    color: u32,
+}
+
+impl Instance {
+    /// The same, drawn for a reason.
+    pub(crate) fn drawn(self, key: u32) -> Self {
+        Self { key, ..self }
+    }
+}
+
+pub(crate) const INSTANCE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Instance>() as u64,
+    step_mode: wgpu::VertexStepMode::Instance,
+    attributes: &wgpu::vertex_attr_array![
+        6 => Float32x4, 7 => Float32x4, 8 => Float32x4, 9 => Uint32x2
+    ],
+};
+
+/// A placed detail object, as drawn.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    pub(crate) mesh: u32,
+    /// Those that it stands in.
+    pub(crate) cells: Vec<CellId>,
+    pub(crate) center: Vec3,
+    /// Of a sphere that holds it. [Units: wu]
+    pub(crate) radius: f32,
+    /// How much longer than in the mesh a length of it can be.
+    pub(crate) stretch: f32,
+}
+
+pub(super) fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
+    // The first is where structure stands: where it is.
+    let mut instances = vec![Instance {
+        rows: [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ],
+        key: 0,
+        color: packed([0.35; 3]),
+    }];
+    let mut details = Vec::new();
+    for detail in &world.details {
+        let m = Mat4::from_cols_array(&detail.transform);
+        instances.push(Instance {
+            rows: [m.row(0), m.row(1), m.row(2)].map(|r| r.to_array()),
+            key: 0,
+            color: color_of(&detail.cells),
+        });
+        let mut low = Vec3::INFINITY;
+        let mut high = Vec3::NEG_INFINITY;
+        let mesh = world.detail_meshes.get(detail.mesh as usize);
+        for p in mesh.iter().flat_map(|m| &m.primitives) {
+            for &q in &p.positions {
+                let q = m.transform_point3(q.into());
+                (low, high) = (low.min(q), high.max(q));
+            }
+        }
+        let is_empty = low.x > high.x;
+        details.push(Placed {
+            mesh: detail.mesh,
+            cells: detail.cells.clone(),
+            center: if is_empty {
+                m.w_axis.truncate()
+            } else {
+                (low + high) * 0.5
+            },
+            radius: if is_empty {
+                0.0
+            } else {
+                (high - low).length() * 0.5
+            },
+            stretch: stretch(&m),
+        });
+    }
+    (instances, details)
+}
+
+/// How much longer a map can make a length, at most; exact where its axes stay at right angles.
+fn stretch(m: &Mat4) -> f32 {
+    let axes = [m.x_axis, m.y_axis, m.z_axis].map(Vec4::truncate);
+    // The greatest eigenvalue of the matrix of these products is its square; Gershgorin's bound on that.
+    let rows = axes.map(|a| axes.iter().map(|b| a.dot(*b).abs()).sum::<f32>());
+    rows.into_iter().fold(0.0, f32::max).sqrt()
+}
+
+pub(super) fn bounds_of(world: &World, details: &[Placed]) -> [Vec3; 2] {
+    let mut low = Vec3::INFINITY;
+    let mut high = Vec3::NEG_INFINITY;
+    for p in world.batches.iter().flat_map(|b| &b.primitive.positions) {
+        (low, high) = (low.min((*p).into()), high.max((*p).into()));
+    }
+    for d in details {
+        (low, high) = (low.min(d.center - d.radius), high.max(d.center + d.radius));
+    }
+    if low.is_finite() && high.is_finite() && low.x <= high.x {
+        [low, high]
+    } else {
+        [Vec3::NEG_ONE, Vec3::ONE]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_testkit::Rng;
+    use glam::Quat;
+
+    #[test]
+    fn no_length_grows_more_than_the_stretch_says() {
+        let mut rng = Rng::new(4);
+        for _ in 0..1000 {
+            let mut number = || rng.range(-2.0, 2.0) as f32;
+            let m = Mat4::from_cols_array(&std::array::from_fn(|_| number()));
+            let v = Vec3::new(number(), number(), number());
+            let long = m.transform_vector3(v).length();
+            assert!(long <= stretch(&m) * v.length() * 1.0001, "{m} {v}");
+        }
+        let turned = Quat::from_rotation_x(0.7) * Quat::from_rotation_y(1.9);
+        let m = Mat4::from_scale_rotation_translation(Vec3::new(2.0, 0.5, -3.0), turned, Vec3::ONE);
+        assert!((stretch(&m) - 3.0).abs() < 1e-5);
+    }
+}

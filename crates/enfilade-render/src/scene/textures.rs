@@ -1,0 +1,123 @@
+//! Base color textures and their bind groups.
+
+use enfilade_cpg::World;
+use wgpu::util::DeviceExt;
+
+use crate::gpu::{Gpu, RenderError};
+use crate::materials::{Look, decode, wrapping};
+
+/// The layout of a texture's bind group.
+pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    gpu.device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("texture"),
+            entries: &[
+                wgpu::BindGroupLayoutEntry {
+                    binding: 0,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                        view_dimension: wgpu::TextureViewDimension::D2,
+                        multisampled: false,
+                    },
+                    count: None,
+                },
+                wgpu::BindGroupLayoutEntry {
+                    binding: 1,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                    count: None,
+                },
+            ],
+        })
+}
+
+/// The textures that materials use; by texture of the world, which of them; how many are missing.
+pub(super) fn load_textures(
+    gpu: &Gpu,
+    world: &World,
+    looks: &[Look],
+) -> Result<(Vec<wgpu::BindGroup>, Vec<u32>, u32), RenderError> {
+    let layout = texture_layout(gpu);
+    let white = image::RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
+    let repeat = [wgpu::AddressMode::Repeat; 2];
+    let mut groups = vec![texture_group(gpu, &layout, &[white], repeat)?];
+    let mut texture_of = vec![0; world.textures.len()];
+    let mut n_missing = 0;
+    for look in looks {
+        let Some(t) = look.texture else { continue };
+        if texture_of.get(t as usize).is_none_or(|&g| g != 0) {
+            continue;
+        }
+        match decode(world, t) {
+            Some(picture) => {
+                texture_of[t as usize] = groups.len() as u32;
+                let wrap = wrapping(world, t);
+                groups.push(texture_group(gpu, &layout, &picture.levels, wrap)?);
+            }
+            None => n_missing += 1,
+        }
+    }
+    Ok((groups, texture_of, n_missing))
+}
+
+fn texture_group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    levels: &[image::RgbaImage],
+    wrap: [wgpu::AddressMode; 2],
+) -> Result<wgpu::BindGroup, RenderError> {
+    let (width, height) = levels[0].dimensions();
+    Gpu::check(
+        "a texture's side",
+        width.max(height).into(),
+        gpu.device.limits().max_texture_dimension_2d,
+    )?;
+    let size = wgpu::Extent3d {
+        width,
+        height,
+        depth_or_array_layers: 1,
+    };
+    let texels: Vec<u8> = levels
+        .iter()
+        .flat_map(|l| l.as_raw().iter().copied())
+        .collect();
+    let texture = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some("base color"),
+            size,
+            mip_level_count: levels.len() as u32,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8UnormSrgb,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::MipMajor,
+        &texels,
+    );
+    let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        address_mode_u: wrap[0],
+        address_mode_v: wrap[1],
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        ..wgpu::SamplerDescriptor::default()
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("base color"),
+        layout,
+        entries: &[
+            wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&view),
+            },
+            wgpu::BindGroupEntry {
+                binding: 1,
+                resource: wgpu::BindingResource::Sampler(&sampler),
+            },
+        ],
+    }))
+}

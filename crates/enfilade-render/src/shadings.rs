@@ -1,0 +1,124 @@
+//! Which pipelines a frame draws its runs with.
+
+use crate::frame::{Frame, Paint};
+use crate::gpu::Gpu;
+use crate::list::{DrawList, Run};
+use crate::pipelines::{Layouts, Pipelines, Shading, Variant};
+use crate::resources::Grown;
+use crate::scene::{Finish, GpuWorld};
+
+pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Grown) {
+    pass.set_index_buffer(world.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.set_vertex_buffer(0, world.corners.slice(..));
+    pass.set_vertex_buffer(1, instances.buffer.slice(..));
+}
+
+/// Which pipelines a frame draws with.
+pub(crate) struct Shadings {
+    pub(crate) is_count: bool,
+    pub(crate) is_last: bool,
+    casts_shadows: bool,
+    explains: bool,
+    /// A cut makes holes in everything.
+    has_cut: bool,
+}
+
+impl Shadings {
+    pub(crate) fn of(frame: &Frame<'_>) -> Self {
+        let style = &frame.style;
+        let is_count = style.paint == Paint::Overdraw;
+        let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
+        Self {
+            is_count,
+            is_last: !is_count && !style.dark_corners,
+            casts_shadows: style.shadows,
+            explains: style.paint == Paint::Cells || frame.list.instances.iter().any(is_reasoned),
+            has_cut: style.cut_above < f32::INFINITY,
+        }
+    }
+
+    fn variant(&self, shading: Shading, is_smooth: bool, is_last: bool) -> Variant {
+        if self.is_count {
+            return Variant {
+                shading: Shading::Count,
+                is_smooth: false,
+                casts_shadows: false,
+                explains: false,
+                is_last: false,
+            };
+        }
+        Variant {
+            shading,
+            is_smooth,
+            casts_shadows: self.casts_shadows,
+            explains: self.explains,
+            is_last,
+        }
+    }
+
+    pub(crate) fn opaque(&self, run: &Run) -> Variant {
+        let shading = match run.finish {
+            Finish::Plain if !self.has_cut => Shading::Plain,
+            Finish::Textured if !self.has_cut => Shading::Textured,
+            _ => Shading::Masked,
+        };
+        self.variant(shading, run.is_smooth, self.is_last)
+    }
+
+    pub(crate) fn glass(&self, run: &Run) -> Variant {
+        self.variant(Shading::Glass, run.is_smooth, true)
+    }
+
+    /// Makes those that a list needs.
+    pub(crate) fn prepare(
+        &self,
+        gpu: &Gpu,
+        layouts: &Layouts,
+        pipelines: &mut Pipelines,
+        list: &DrawList,
+    ) {
+        let mut prepare = |variant| {
+            pipelines.prepare(gpu, layouts, variant);
+        };
+        let mut last = None;
+        for run in &list.opaque {
+            if last != Some((run.finish, run.is_smooth)) {
+                last = Some((run.finish, run.is_smooth));
+                prepare(self.opaque(run));
+            }
+        }
+        for run in &list.transparent {
+            prepare(self.glass(run));
+        }
+    }
+}
+
+/// Draws runs, changing pipelines, textures and scissors only where they differ. `surface` by run.
+pub(crate) fn draw_runs<'p>(
+    pass: &mut wgpu::RenderPass<'_>,
+    world: &GpuWorld,
+    runs: &[Run],
+    size: [u32; 2],
+    surface: impl Fn(&Run) -> Option<&'p wgpu::RenderPipeline>,
+) {
+    let (mut texture, mut scissor, mut kind) = (u32::MAX, None, None);
+    pass.set_scissor_rect(0, 0, size[0], size[1]);
+    for run in runs {
+        if kind != Some((run.finish, run.is_smooth)) {
+            kind = Some((run.finish, run.is_smooth));
+            if let Some(pipeline) = surface(run) {
+                pass.set_pipeline(pipeline);
+            }
+        }
+        if run.texture != texture {
+            texture = run.texture;
+            pass.set_bind_group(1, &world.textures[texture as usize], &[]);
+        }
+        if run.scissor != scissor {
+            scissor = run.scissor;
+            let [x, y, w, h] = scissor.unwrap_or([0, 0, size[0], size[1]]);
+            pass.set_scissor_rect(x, y, w, h);
+        }
+        pass.draw_indexed(run.first..run.first + run.n, 0, run.instances.clone());
+    }
+}

@@ -1,0 +1,186 @@
+//! What of a world is drawn, in pieces small enough to be left out one by one, and the trees over their boxes.
+
+use enfilade_cpg::{Batch, CellId, DetailObject, World};
+use enfilade_geom::{Aabb, DMat4};
+
+use super::error::SightError;
+use crate::boxes::{BoxTrees, Boxed, Root};
+use crate::chunks::{Chunk, chunks_of};
+use crate::options::SightOptions;
+use crate::point::point;
+
+/// A detail object, placed.
+#[derive(Clone, Debug)]
+pub(crate) struct Detail {
+    pub(crate) bounds: Aabb,
+    pub(crate) n_triangles: u32,
+}
+
+/// Chunks of batches and placed details.
+pub(super) struct Drawn {
+    pub(super) chunks: Vec<Chunk>,
+    pub(super) details: Vec<Detail>,
+    /// By batch: its triangles as index triples, sorted so that chunks are ranges.
+    pub(super) indices: Vec<Vec<u32>>,
+    /// Largest absolute coordinate, or 1. [Units: wu]
+    pub(super) extent: f64,
+}
+
+impl Drawn {
+    pub(super) fn of(world: &World, options: &SightOptions) -> Result<Self, SightError> {
+        let mut drawn = Self {
+            chunks: Vec::new(),
+            details: Vec::new(),
+            indices: Vec::new(),
+            extent: 1.0,
+        };
+        for (index, batch) in world.batches.iter().enumerate() {
+            let index = index as u32;
+            drawn
+                .add_batch(world, index, batch, options)
+                .ok_or(SightError::Geometry {
+                    what: "batch",
+                    index,
+                })?;
+        }
+        for (index, detail) in world.details.iter().enumerate() {
+            let index = index as u32;
+            drawn
+                .add_detail(world, detail)
+                .ok_or(SightError::Geometry {
+                    what: "detail",
+                    index,
+                })?;
+        }
+        Ok(drawn)
+    }
+
+    /// `None` where it names what does not exist, or a corner is not finite.
+    fn add_batch(
+        &mut self,
+        world: &World,
+        index: u32,
+        batch: &Batch,
+        options: &SightOptions,
+    ) -> Option<()> {
+        let positions = &batch.primitive.positions;
+        let used = &batch.primitive.indices;
+        let is_good = exist(world, &batch.cells)
+            && used.iter().all(|&i| (i as usize) < positions.len())
+            && positions.iter().flatten().all(|x| x.is_finite());
+        if !is_good {
+            return None;
+        }
+        for p in positions {
+            self.extent = self.extent.max(point(*p).abs().max_element());
+        }
+        let size = options.chunk_triangles.max(1);
+        let indices = chunks_of(index, &batch.primitive, size, &mut self.chunks);
+        self.indices.push(indices);
+        Some(())
+    }
+
+    /// `None` where it names what does not exist, or a corner is not finite.
+    fn add_detail(&mut self, world: &World, detail: &DetailObject) -> Option<()> {
+        let mesh = world.detail_meshes.get(detail.mesh as usize);
+        let mesh = mesh.filter(|_| exist(world, &detail.cells))?;
+        let transform = DMat4::from_cols_array(&detail.transform.map(f64::from));
+        let mut bounds = Aabb::EMPTY;
+        let mut n_triangles = 0;
+        for primitive in &mesh.primitives {
+            n_triangles += primitive.indices.len() as u32 / 3;
+            for p in &primitive.positions {
+                let p = transform.transform_point3(point(*p));
+                if !p.is_finite() {
+                    return None;
+                }
+                bounds = bounds.including(p);
+                self.extent = self.extent.max(p.abs().max_element());
+            }
+        }
+        self.details.push(Detail {
+            bounds,
+            n_triangles,
+        });
+        Some(())
+    }
+
+    pub(super) fn n_triangles(&self) -> u64 {
+        let chunks = self.chunks.iter().map(|c| u64::from(c.n_triangles()));
+        let details = self.details.iter().map(|d| u64::from(d.n_triangles));
+        chunks.sum::<u64>() + details.sum::<u64>()
+    }
+}
+
+fn exist(world: &World, cells: &[CellId]) -> bool {
+    let n_cells = world.graph.cells.len();
+    cells.iter().all(|c| (c.0 as usize) < n_cells)
+}
+
+/// Trees over the boxes of what is drawn, by cell, and of the cells.
+pub(super) struct Boxes {
+    pub(super) trees: BoxTrees,
+    pub(super) cell_roots: Vec<Root>,
+    pub(super) unlisted_root: Root,
+    pub(super) world_root: Root,
+    /// Largest absolute coordinate of a cell's box. [Units: wu]
+    pub(super) extent: f64,
+}
+
+impl Boxes {
+    pub(super) fn of(world: &World, drawn: &Drawn, tolerance: f64) -> Self {
+        let (mut listed, mut unlisted) = listed(world, drawn);
+        let mut trees = BoxTrees::default();
+        let mut boxes = Vec::new();
+        let mut cell_roots = Vec::new();
+        let mut extent = 0.0_f64;
+        for (c, items) in listed.iter_mut().enumerate() {
+            let [low, high] = world.graph.cells[c].aabb.map(point);
+            let mut bounds = Aabb::EMPTY;
+            if low.is_finite() && high.is_finite() {
+                bounds = bounds.union(Aabb::new(low, high));
+            }
+            let bounds = items.iter().fold(bounds, |b, i| b.union(i.bounds));
+            if !bounds.is_empty() {
+                extent = extent.max(bounds.min.abs().max(bounds.max.abs()).max_element());
+                boxes.push(Boxed {
+                    bounds,
+                    item: c as u32,
+                });
+            }
+            cell_roots.push(trees.add(items, tolerance));
+        }
+        let world_root = trees.add(&mut boxes, tolerance);
+        let unlisted_root = trees.add(&mut unlisted, tolerance);
+        Self {
+            trees,
+            cell_roots,
+            unlisted_root,
+            world_root,
+            extent,
+        }
+    }
+}
+
+/// By cell the chunks and details that it sees, and those that no cell sees.
+fn listed(world: &World, drawn: &Drawn) -> (Vec<Vec<Boxed>>, Vec<Boxed>) {
+    let mut listed: Vec<Vec<Boxed>> = world.graph.cells.iter().map(|_| Vec::new()).collect();
+    let mut unlisted = Vec::new();
+    let mut list = |cells: &[CellId], bounds: Aabb, item: u32| {
+        if cells.is_empty() {
+            unlisted.push(Boxed { bounds, item });
+        }
+        for c in cells {
+            listed[c.0 as usize].push(Boxed { bounds, item });
+        }
+    };
+    let n_chunks = drawn.chunks.len() as u32;
+    for (item, chunk) in (0..).zip(&drawn.chunks) {
+        let batch = &world.batches[chunk.batch as usize];
+        list(&batch.cells, chunk.bounds(), item);
+    }
+    for (item, (placed, detail)) in (n_chunks..).zip(world.details.iter().zip(&drawn.details)) {
+        list(&placed.cells, detail.bounds, item);
+    }
+    (listed, unlisted)
+}

@@ -1,0 +1,143 @@
+//! Portals of a world as exits of its cells, with convex outlines of few corners.
+
+use enfilade_cpg::{Portal, PortalId};
+use enfilade_geom::{DVec2, DVec3, Plane, Winding};
+
+use super::error::SightError;
+use crate::exits::Exit;
+use crate::point::point;
+use crate::region::{MAX_CORNERS, reduced_around};
+
+/// Pieces are used instead of the outline where there are at most so many.
+const MAX_PIECES: usize = 4;
+/// ... and where they fill less of the outline than this.
+const PIECES_SHARE: f64 = 0.75;
+
+/// Exits while they are collected.
+#[derive(Default)]
+pub(super) struct Portals {
+    /// With the cell that each leaves.
+    exits: Vec<(u32, Exit)>,
+    pub(super) corners: Vec<[f32; 3]>,
+    pub(super) extent: f64,
+    pub(super) off_plane: f64,
+}
+
+impl Portals {
+    pub(super) fn add(
+        &mut self,
+        id: PortalId,
+        portal: &Portal,
+        n_cells: usize,
+    ) -> Result<(), SightError> {
+        let cells = portal.cells.map(|c| c.0);
+        if cells[0] == cells[1] || cells.iter().any(|&c| c as usize >= n_cells) {
+            return Err(SightError::PortalCells {
+                portal: id.0,
+                cells,
+                n_cells,
+            });
+        }
+        let outline = || SightError::PortalOutline {
+            portal: id.0,
+            n_corners: portal.outline.len(),
+        };
+        let normal = point(portal.normal).try_normalize().ok_or_else(outline)?;
+        let whole = convex(&portal.outline, normal).ok_or_else(outline)?;
+        let pieces: Vec<Winding> = portal
+            .pieces
+            .iter()
+            .filter_map(|p| convex(p, normal))
+            .collect();
+        // A piece that is no polygon may be a sliver by rounding, and light passes it all the same.
+        let is_whole = pieces.len() != portal.pieces.len();
+        let area: f64 = pieces.iter().map(Winding::area).sum();
+        let openings = if is_whole
+            || pieces.is_empty()
+            || pieces.len() > MAX_PIECES
+            || area > PIECES_SHARE * whole.area()
+        {
+            vec![whole]
+        } else {
+            pieces
+        };
+        for opening in openings {
+            self.add_opening(id, cells, &opening, normal);
+        }
+        Ok(())
+    }
+
+    fn add_opening(&mut self, id: PortalId, cells: [u32; 2], opening: &Winding, normal: DVec3) {
+        // Bounds are rounded to the `f32` in which they are read.
+        let center = opening.aabb().center().as_vec3();
+        let middle = center.as_dvec3();
+        let first_corner = self.corners.len() as u32;
+        let (mut radius, n_corners) = (0.0_f64, opening.points.len() as u32);
+        for &p in &opening.points {
+            radius = radius.max(p.distance(middle));
+            self.off_plane = self.off_plane.max(normal.dot(p - middle).abs());
+            self.extent = self.extent.max(p.abs().max_element());
+            self.corners.push(p.as_vec3().to_array());
+        }
+        let n = normal.as_vec3();
+        for (from, to, normal, is_turned) in [
+            (cells[0], cells[1], n, true),
+            (cells[1], cells[0], -n, false),
+        ] {
+            self.exits.push((
+                from,
+                Exit {
+                    center: center.to_array(),
+                    radius: (radius as f32).next_up(),
+                    normal: normal.to_array(),
+                    to,
+                    portal: id.0,
+                    first_corner,
+                    n_corners,
+                    is_turned,
+                },
+            ));
+        }
+    }
+
+    pub(super) fn by_cell(&mut self, n_cells: usize) -> (Vec<u32>, Vec<Exit>) {
+        self.exits.sort_by_key(|(from, _)| *from);
+        let mut first = vec![0; n_cells + 1];
+        for (from, _) in &self.exits {
+            first[*from as usize + 1] += 1;
+        }
+        for c in 0..n_cells {
+            first[c + 1] += first[c];
+        }
+        (first, self.exits.iter().map(|(_, e)| *e).collect())
+    }
+}
+
+/// The convex polygon around corners of a plane, counter-clockwise about `normal`, of at most
+/// `MAX_CORNERS`; `None` without an area, or with a corner that is not finite.
+fn convex(corners: &[[f32; 3]], normal: DVec3) -> Option<Winding> {
+    if corners.len() < 3 || corners.iter().flatten().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let points: Vec<DVec3> = corners.iter().map(|p| point(*p)).collect();
+    let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+    let plane = Plane::through(middle, normal);
+    let hull = Winding::hull_in_plane(&plane, &points);
+    // Corners that rounding put off the hull are what the tolerance is for.
+    if hull.points.len() < 3 {
+        return None;
+    }
+    if hull.points.len() <= MAX_CORNERS {
+        return Some(hull);
+    }
+    let (u, v) = plane.basis();
+    let flat: Vec<DVec2> = hull
+        .points
+        .iter()
+        .map(|&p| DVec2::new(u.dot(p - middle), v.dot(p - middle)))
+        .collect();
+    let around = reduced_around(&flat, MAX_CORNERS);
+    Some(Winding::new(
+        around.iter().map(|p| middle + u * p.x + v * p.y).collect(),
+    ))
+}

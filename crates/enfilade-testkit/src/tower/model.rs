@@ -1,0 +1,161 @@
+//! The tower while it is built: its measures, and the walls that all parts of it are made of.
+
+use enfilade_geom::{Aabb, DVec3};
+
+use super::params::TowerParams;
+use crate::furniture::{Furniture, Palette, glaze, hang_door};
+use crate::rng::Rng;
+use crate::site::Site;
+use crate::solid::{MeshBuilder, snapped};
+use crate::truth::{OpeningKind, Side};
+
+/// Floor to floor. [Units: wu]
+pub(super) const STOREY: f64 = 3.2;
+pub(super) const SLAB: f64 = 0.25;
+pub(super) const FACADE: f64 = 0.3;
+pub(super) const CORRIDOR_WALL: f64 = 0.15;
+pub(super) const PARTITION: f64 = 0.12;
+/// A double wall: two leaves and what is between them. [Units: wu]
+pub(super) const LEAF: f64 = 0.08;
+pub(super) const CAVITY: f64 = 0.06;
+pub(super) const CORRIDOR: f64 = 2.0;
+/// Clear depth of the rows of rooms on the two sides of a corridor. [Units: wu]
+pub(super) const ROWS: [f64; 2] = [6.2, 4.9];
+pub(super) const STAIRWELL: f64 = 2.8;
+/// Mean clear width of an office, with its share of partition. [Units: wu]
+pub(super) const BAY: f64 = 3.7;
+/// Rooms that one corridor serves at most.
+pub(super) const WING: usize = 40;
+
+/// A wall across `axis`: the box it fills, holes through it, and the chance of cracks.
+pub(super) struct Wall {
+    pub(super) axis: usize,
+    pub(super) body: Aabb,
+    pub(super) holes: Vec<(OpeningKind, Aabb, [Side; 2])>,
+    pub(super) double: bool,
+}
+
+/// Where a wing is to be built.
+pub(super) struct Wing {
+    pub(super) s: usize,
+    pub(super) storey: usize,
+    pub(super) w: usize,
+    pub(super) up: [f64; 2],
+    /// The cross corridor.
+    pub(super) cross: Option<Side>,
+    /// Where its flight of stairs leaves no air: a box, and how much of it.
+    pub(super) flight: Option<(Aabb, f64)>,
+}
+
+/// What the walls around a wing need to know of it.
+pub(super) struct BuiltWing {
+    pub(super) corridor: Side,
+    pub(super) corridor_z: [f64; 2],
+    pub(super) rows: [Vec<([f64; 2], Side)>; 2],
+    pub(super) rows_z: [[f64; 2]; 2],
+    pub(super) stairwell: Option<Side>,
+}
+
+pub(super) struct Tower<'a> {
+    pub(super) params: &'a TowerParams,
+    pub(super) site: Site,
+    pub(super) palette: Palette,
+    pub(super) furniture: Furniture,
+    pub(super) rng: Rng,
+    /// Walls of the storey under construction.
+    pub(super) walls: MeshBuilder,
+    /// Length of the rows, between the cross corridor and the east facade. [Units: wu]
+    pub(super) row_length: f64,
+    /// West end of the rows. [Units: wu]
+    pub(super) row_start: f64,
+    /// Offices in each row of each wing.
+    pub(super) rows: Vec<[usize; 2]>,
+    pub(super) has_stairs: bool,
+    pub(super) concrete: u32,
+}
+
+/// Depth of a wing between its facades or the walls to other wings. [Units: wu]
+const WING_DEPTH: f64 = ROWS[0] + ROWS[1] + CORRIDOR + 2.0 * CORRIDOR_WALL;
+
+impl Tower<'_> {
+    /// The rows' ends along x. [Units: wu]
+    pub(super) fn rows_x(&self) -> [f64; 2] {
+        [self.row_start, snapped(self.row_start + self.row_length)]
+    }
+
+    /// Where a wing begins along z. [Units: wu]
+    pub(super) fn wing_start(w: usize) -> f64 {
+        FACADE + w as f64 * (WING_DEPTH + CORRIDOR_WALL)
+    }
+
+    /// Depth of all wings together. [Units: wu]
+    pub(super) fn inner_depth(&self) -> f64 {
+        let n = self.rows.len();
+        n as f64 * WING_DEPTH + (n - 1) as f64 * CORRIDOR_WALL
+    }
+
+    /// Outer measures on plan; y is 0. [Units: wu]
+    pub(super) fn size(&self) -> DVec3 {
+        DVec3::new(
+            self.row_start + self.row_length + FACADE,
+            0.0,
+            self.inner_depth() + 2.0 * FACADE,
+        )
+    }
+
+    /// Models a wall, cracked or doubled where asked for, and notes its openings.
+    pub(super) fn add_wall(&mut self, wall: Wall) {
+        let Wall {
+            axis,
+            mut body,
+            holes,
+            double,
+        } = wall;
+        if self.params.cracks {
+            let along = 2 - axis;
+            // Two in three walls are whole.
+            match self.rng.below(6) {
+                0 => body.max.y -= self.rng.range(0.002, 0.02),
+                1 => body.max[along] -= self.rng.range(0.002, 0.02),
+                _ => {}
+            }
+        }
+        let voids: Vec<Aabb> = holes.iter().map(|(_, hole, _)| *hole).collect();
+        if double {
+            let middle = body.center()[axis];
+            let leaf = |low: f64| {
+                let mut b = body;
+                (b.min[axis], b.max[axis]) = (low, low + LEAF);
+                b
+            };
+            for low in [middle - CAVITY * 0.5 - LEAF, middle + CAVITY * 0.5] {
+                let leaf = leaf(low);
+                let cut: Vec<Aabb> = voids
+                    .iter()
+                    .map(|v| {
+                        let mut v = *v;
+                        (v.min[axis], v.max[axis]) = (leaf.min[axis], leaf.max[axis]);
+                        v
+                    })
+                    .collect();
+                self.walls.carved(&[leaf], &cut);
+            }
+        } else {
+            self.walls.carved(&[body], &voids);
+        }
+        for (kind, mut hole, sides) in holes {
+            if self.params.leaves {
+                match kind {
+                    OpeningKind::Window => glaze(&mut self.site, &self.palette, &hole, axis),
+                    _ => hang_door(&mut self.site, &self.palette, &hole, axis, 75.0),
+                }
+            }
+            if double {
+                let middle = hole.center()[axis];
+                let half = CAVITY * 0.5 + LEAF;
+                (hole.min[axis], hole.max[axis]) = (middle - half, middle + half);
+            }
+            self.site.opening(kind, hole, axis, sides);
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Files and functions that are too long to be read at once.
+//!
+//! Tests do not count as functions, and their files may be longer: a list of cases is read one by one.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Lines a source file may have.
+const MAX_FILE: usize = 600;
+/// Lines a file of tests may have.
+const MAX_TEST_FILE: usize = 800;
+/// Lines a function may have, from `fn` to its closing brace.
+const MAX_FUNCTION: usize = 100;
+
+/// What is still too long, to be split by who works on it next; none may be added. A file, or a file and
+/// a function in it.
+const KNOWN: [(&str, &str); 10] = [
+    ("crates/enfilade-bake/examples/kernel_bench.rs", "main"),
+    ("crates/enfilade-bake/src/bsp/decompose.rs", "bake_bsp"),
+    ("crates/enfilade-bake/src/bsp/rooms.rs", ""),
+    ("crates/enfilade-bake/src/complex/partition.rs", "realize"),
+    ("crates/enfilade-bake/src/delaunay/branches.rs", ""),
+    ("crates/enfilade-bake/src/delaunay/decimate.rs", "decided"),
+    ("crates/enfilade-bake/src/delaunay/space.rs", "divide"),
+    ("crates/enfilade-bake/src/delaunay/tetrahedra.rs", ""),
+    ("crates/enfilade-bake/src/pipeline.rs", "bake"),
+    ("crates/enfilade-bake/src/watershed/fit.rs", "free_section"),
+];
+
+/// A line for each file and function among `sources` (path in the repository, text) that is too long and not
+/// known, and for each known that no longer is. Time grows with the length of all files.
+pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
+    compared(&too_long(sources), &KNOWN)
+}
+
+/// Lines by file and function; the function is empty where the file itself is too long.
+type Lengths<'a> = BTreeMap<(&'a str, &'a str), usize>;
+
+fn compared(found: &Lengths<'_>, known: &[(&str, &str)]) -> Vec<String> {
+    let known: BTreeSet<(&str, &str)> = known.iter().copied().collect();
+    let place = |(file, function): (&str, &str)| match function {
+        "" => file.to_owned(),
+        _ => format!("{file}: {function}"),
+    };
+    let mut out = Vec::new();
+    for (&at, n) in found.iter().filter(|(at, _)| !known.contains(at)) {
+        let limit = if at.1.is_empty() {
+            max_lines(at.0)
+        } else {
+            MAX_FUNCTION
+        };
+        out.push(format!(
+            "{}: {n} lines, more than {limit}; split it by the questions it answers",
+            place(at)
+        ));
+    }
+    for &at in known.iter().filter(|at| !found.contains_key(at)) {
+        let place = place(at);
+        out.push(format!(
+            "{place} is no longer too long: take it off the list in xtask/src/lengths.rs"
+        ));
+    }
+    out
+}
+
+fn too_long(sources: &BTreeMap<String, String>) -> Lengths<'_> {
+    let mut out = BTreeMap::new();
+    for (file, text) in sources {
+        let n = text.lines().count();
+        if n > max_lines(file) {
+            out.insert((file.as_str(), ""), n);
+        }
+        if is_test(file) {
+            continue;
+        }
+        // Unit tests stand at the foot of the file.
+        let end = text.find("\n#[cfg(test)]\nmod tests {");
+        for (name, n) in functions(&text[..end.unwrap_or(text.len())]) {
+            if n > MAX_FUNCTION {
+                let longest = out.entry((file.as_str(), name)).or_insert(n);
+                *longest = n.max(*longest);
+            }
+        }
+    }
+    out
+}
+
+fn max_lines(file: &str) -> usize {
+    if is_test(file) {
+        MAX_TEST_FILE
+    } else {
+        MAX_FILE
+    }
+}
+
+fn is_test(file: &str) -> bool {
+    file.contains("/tests/") || file.ends_with("tests.rs")
+}
+
+/// Names of the functions with bodies, and their lines from `fn` to the closing brace.
+fn functions(text: &str) -> Vec<(&str, usize)> {
+    let code = without_literals(text);
+    let mut out = Vec::new();
+    for (at, _) in code.match_indices("fn ") {
+        if code[..at].ends_with(is_word) {
+            continue;
+        }
+        let name = &text[at + 3..];
+        let name = &name[..name.find(|c| !is_word(c)).unwrap_or(name.len())];
+        // A pointer's type or a macro's variable has no name here, a trait's declaration no body.
+        let n = body_end(&code[at..]).map(|end| code[at..at + end].matches('\n').count() + 1);
+        if let Some(n) = n.filter(|_| !name.is_empty()) {
+            out.push((name, n));
+        }
+    }
+    out
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// Where the body of the function ends that `code` begins with; `None` where a semicolon comes first.
+fn body_end(code: &str) -> Option<usize> {
+    // Braces in brackets of the signature, as in `[u8; { N }]`, do not begin the body.
+    let mut depth = 0_usize;
+    let mut is_body = false;
+    for (i, c) in code.char_indices() {
+        match c {
+            '{' if depth == 0 => (is_body, depth) = (true, 1),
+            '{' | '(' | '[' => depth += 1,
+            '}' | ')' | ']' => depth = depth.checked_sub(1)?,
+            ';' if depth == 0 => return None,
+            _ => {}
+        }
+        if is_body && depth == 0 {
+            return Some(i);
+        }
+    }
+    None
+}
+
+/// The text with comments, strings and characters blanked, byte for byte; line breaks stay.
+fn without_literals(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let is_in_word = out.ends_with(is_word);
+        let n = literal(rest, is_in_word).unwrap_or(0);
+        if n == 0 {
+            out.push(c);
+            rest = &rest[c.len_utf8()..];
+        } else {
+            let blank = |b: u8| if b == b'\n' { '\n' } else { ' ' };
+            out.extend(rest.bytes().take(n).map(blank));
+            rest = &rest[n..];
+        }
+    }
+    out
+}
+
+/// Bytes of the comment, string or character that `rest` begins with; `None` where it begins with none.
+fn literal(rest: &str, is_in_word: bool) -> Option<usize> {
+    let to = |end: Option<usize>| Some(end.unwrap_or(rest.len()));
+    if rest.starts_with("//") {
+        return to(rest.find('\n'));
+    }
+    if rest.starts_with("/*") {
+        return to(block_comment(rest));
+    }
+    if rest.starts_with('"') {
+        return to(quoted(rest, '"'));
+    }
+    if let Some(inner) = rest.strip_prefix('\'') {
+        // A character has one, or an escape; a lifetime has no second quote there.
+        let mut inner = inner.chars();
+        let first = inner.next()?;
+        let is_char = first == '\\' || inner.next() == Some('\'');
+        return if is_char {
+            to(quoted(rest, '\''))
+        } else {
+            None
+        };
+    }
+    if is_in_word {
+        return None;
+    }
+    let raw = rest.strip_prefix("br").or_else(|| rest.strip_prefix('r'))?;
+    let hashes = &raw[..raw.len() - raw.trim_start_matches('#').len()];
+    let inner = raw[hashes.len()..].strip_prefix('"')?;
+    let close = format!("\"{hashes}");
+    let end = inner.find(&close).map(|at| at + close.len());
+    to(end.map(|end| rest.len() - inner.len() + end))
+}
+
+/// Where a comment that may hold others ends.
+fn block_comment(rest: &str) -> Option<usize> {
+    let (mut depth, mut at) = (0_usize, 0);
+    loop {
+        let tail = rest.get(at..)?;
+        let open = tail.find("/*").unwrap_or(usize::MAX);
+        let close = tail.find("*/")?;
+        depth = if open < close { depth + 1 } else { depth - 1 };
+        at += open.min(close) + 2;
+        if depth == 0 {
+            return Some(at);
+        }
+    }
+}
+
+/// Where a literal ends that begins and ends with `quote`, and may hold escaped ones.
+fn quoted(rest: &str, quote: char) -> Option<usize> {
+    let mut is_escaped = false;
+    for (i, c) in rest.char_indices().skip(1) {
+        match c {
+            _ if is_escaped => is_escaped = false,
+            '\\' => is_escaped = true,
+            _ if c == quote => return Some(i + 1),
+            _ => {}
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sources(files: &[(&str, String)]) -> BTreeMap<String, String> {
+        let owned = |(path, text): &(&str, String)| ((*path).to_owned(), text.clone());
+        files.iter().map(owned).collect()
+    }
+
+    fn function(name: &str, n_lines: usize) -> String {
+        format!("fn {name}() {{{}}}\n", "\n".repeat(n_lines - 1))
+    }
+
+    #[test]
+    fn a_file_that_is_too_long_is_found_and_tests_may_be_longer() {
+        let found = |path, n| {
+            let sources = sources(&[(path, "\n".repeat(n))]);
+            too_long(&sources).get(&(path, "")).copied()
+        };
+        assert_eq!(found("crates/x/src/a.rs", MAX_FILE), None);
+        assert_eq!(found("crates/x/src/a.rs", MAX_FILE + 1), Some(MAX_FILE + 1));
+        for path in ["crates/x/src/a/tests.rs", "crates/x/tests/b.rs"] {
+            assert_eq!(found(path, MAX_TEST_FILE), None);
+            assert!(found(path, MAX_TEST_FILE + 1).is_some());
+        }
+    }
+
+    #[test]
+    fn a_function_that_is_too_long_is_found_outside_tests() {
+        let long = function("long", MAX_FUNCTION + 1);
+        let files = sources(&[
+            ("a.rs", function("short", MAX_FUNCTION) + &long),
+            ("b.rs", format!("\n#[cfg(test)]\nmod tests {{\n{long}}}\n")),
+            ("c/tests.rs", long.clone()),
+        ]);
+        let found: Vec<_> = too_long(&files).into_iter().collect();
+        assert_eq!(found, [(("a.rs", "long"), MAX_FUNCTION + 1)]);
+    }
+
+    #[test]
+    fn braces_that_are_no_code_do_not_end_a_function() {
+        let body = [
+            "    // }",
+            "    /* } /* } */ } */",
+            "    let s = \"}\\\"}\";",
+            "    let r = (r\"}\\\", br##\"}\"#}\"##, b'}');",
+            "    let c: &'static [char] = &['}', '\\'', '{'];",
+            "    'outer: loop {}",
+            "    fn inner() {}",
+            "}",
+        ];
+        let text = format!(
+            "pub const fn f<'a>(n: [u8; {{ 3 }}]) -> u8 {{\n{}\n",
+            body.join("\n")
+        );
+        assert_eq!(functions(&text), [("f", 9), ("inner", 1)]);
+    }
+
+    #[test]
+    fn what_has_no_body_is_no_function() {
+        let text = "trait T {\n    fn declared(&self) -> [u8; 3];\n}\ntype F = fn (u8);\n\
+                    // fn said() {}\nstatic S: &str = \"fn quoted() {}\";\nstruct Gfn {}\n";
+        assert_eq!(functions(text), []);
+    }
+
+    #[test]
+    fn a_new_offender_fails_and_one_that_is_gone_must_be_taken_off() {
+        let found = BTreeMap::from([(("a.rs", ""), 700), (("b.rs", "f"), 101)]);
+        assert!(compared(&found, &[("a.rs", ""), ("b.rs", "f")]).is_empty());
+        let said = compared(&found, &[("a.rs", ""), ("c.rs", "g")]);
+        assert_eq!(
+            said,
+            [
+                "b.rs: f: 101 lines, more than 100; split it by the questions it answers",
+                "c.rs: g is no longer too long: take it off the list in xtask/src/lengths.rs"
+            ]
+        );
+    }
+}
