@@ -457,7 +457,7 @@ pub(super) fn openings(
 mod tests {
     use enfilade_testkit::Rng;
 
-    use super::super::tetrahedra::tetrahedralize;
+    use super::super::insert::tetrahedralize;
     use super::*;
 
     fn random_point(rng: &mut Rng) -> DVec3 {

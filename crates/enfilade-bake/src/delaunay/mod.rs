@@ -5,7 +5,7 @@
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
-//! | tetrahedra of points | `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
+//! | tetrahedra of points | `insert`, `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
 //! | points where surfaces need them | `refine` | Chew 1993; Boissonnat & Oudot 2005 |
 //! | tetrahedra cut by polygons, what is open between | `cut` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
@@ -17,6 +17,7 @@ mod bake;
 mod branches;
 mod cut;
 mod decimate;
+mod insert;
 mod order;
 mod predicate;
 mod refine;
@@ -34,5 +35,6 @@ pub use decimate::{
     CellPortal, Cells, Choices, Decimation, JOINED, OUTDOOR_CELL, Step, Weight, decimate,
     default_stop, flow_together,
 };
+pub use insert::tetrahedralize;
 pub use space::{LEAST_BALL, Link, Space, divide};
-pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};
+pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron};

@@ -17,8 +17,9 @@ use std::collections::HashMap;
 use enfilade_geom::{Aabb, Bvh, DVec3};
 use rayon::prelude::*;
 
+use super::insert::Growing;
 use super::space::{circle, circumsphere};
-use super::tetrahedra::{Delaunay, DelaunayError, Growing};
+use super::tetrahedra::{Delaunay, DelaunayError};
 
 /// A surface may enter a ball by this share of its radius. Walls then have points about half a radius
 /// apart, and radii are right to a twentieth.
