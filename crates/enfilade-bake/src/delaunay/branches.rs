@@ -31,9 +31,9 @@ use std::f64::consts::PI;
 
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 
+use super::balls::circumsphere;
 use super::decimate::OUTDOOR_CELL;
-use super::rooms::connected;
-use super::space::{Space, circumsphere};
+use super::space::{Space, connected};
 use forks::Walls;
 
 mod forks;

@@ -6,18 +6,20 @@
 //! | stage | file | source |
 //! | --- | --- | --- |
 //! | tetrahedra of points | `insert`, `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
-//! | points where surfaces need them | `refine` | Chew 1993; Boissonnat & Oudot 2005 |
-//! | tetrahedra cut by polygons, what is open between | `cut` | §4.2.1, §4.2.2 |
+//! | points where surfaces need them | `refine`, `balls` | Chew 1993; Boissonnat & Oudot 2005 |
+//! | tetrahedra cut by polygons, what is open between | `cut`, `openings` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
 //! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | screens and votes | `rooms` | ours |
 
 mod bake;
+mod balls;
 mod branches;
 mod cut;
 mod decimate;
 mod insert;
+mod openings;
 mod order;
 mod predicate;
 mod refine;
