@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs that are still there, to be parted by who works on them next; none may be added.
-const KNOWN: [[&str; 2]; 10] = [
+const KNOWN: [[&str; 2]; 7] = [
     [
         "crates/enfilade-bake/src/bsp/mod.rs",
         "crates/enfilade-bake/src/bsp/portals.rs",
@@ -22,18 +22,6 @@ const KNOWN: [[&str; 2]; 10] = [
     [
         "crates/enfilade-bake/src/complex/partition.rs",
         "crates/enfilade-bake/src/complex/seen.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/delaunay/bake.rs",
-        "crates/enfilade-bake/src/delaunay/rooms.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/delaunay/branches.rs",
-        "crates/enfilade-bake/src/delaunay/branches/forks.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/delaunay/branches.rs",
-        "crates/enfilade-bake/src/delaunay/decimate.rs",
     ],
     [
         "crates/enfilade-bake/src/simplify/merge.rs",

@@ -1,4 +1,4 @@
-//! The Delaunay builder: tetrahedra between the surfaces, put together to rooms.
+//! The Delaunay builder: tetrahedra between the surfaces, merged into rooms.
 //!
 //! Gjørup, "Portal techniques for large interactive worlds" (1999), chapter 4. As with the
 //! watershed, what comes out are screens and votes, and the cell complex makes them exact.
@@ -9,13 +9,17 @@
 //! | points where surfaces need them | `refine`, `balls` | Chew 1993; Boissonnat & Oudot 2005 |
 //! | tetrahedra cut by polygons, what is open between | `cut`, `openings` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
+//! | parts of the air that nothing narrows between, merged | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
-//! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
+//! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | screens and votes | `rooms` | ours |
+//!
+//! `session` runs the stages up to decimation, `bake` the rest.
 
 mod bake;
 mod balls;
 mod branches;
+mod cells;
 mod cut;
 mod decimate;
 mod insert;
@@ -24,6 +28,7 @@ mod order;
 mod predicate;
 mod refine;
 mod rooms;
+mod session;
 mod space;
 mod tetrahedra;
 
@@ -32,11 +37,10 @@ mod space_tests;
 #[cfg(test)]
 mod tests;
 
-pub use bake::{DelaunayConfig, Session, bake_delaunay, bake_session};
-pub use decimate::{
-    CellPortal, Cells, Choices, Decimation, JOINED, OUTDOOR_CELL, Step, Weight, decimate,
-    default_stop, flow_together,
-};
+pub use bake::{bake_delaunay, bake_session};
+pub use cells::{CellPortal, Cells, OUTDOOR_CELL, flow_together};
+pub use decimate::{Choices, Decimation, JOINED, Step, Weight, decimate, default_stop};
 pub use insert::tetrahedralize;
+pub use session::{DelaunayConfig, Session};
 pub use space::{LEAST_BALL, Link, Space, divide};
 pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron};

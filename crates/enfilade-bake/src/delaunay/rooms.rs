@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray};
 use rayon::prelude::*;
 
-use super::bake::Session;
-use super::decimate::{Cells, OUTDOOR_CELL};
+use super::cells::{Cells, OUTDOOR_CELL};
+use super::session::{DelaunayConfig, Session};
 use super::space::{Space, connected};
 use crate::complex::Vote;
 use crate::watershed::{OUTDOORS, Opening, Screen, fit_screen_at};
@@ -83,19 +83,25 @@ impl Standing {
     }
 }
 
-/// How many rooms a decimation left, and how many cells besides: crevices, and the insides of walls.
-pub(super) fn count_rooms(
-    space: &Space,
-    cells: &Cells,
-    room_of_cell: &[u32],
-    bvh: &Bvh,
-    min_radius: f64,
-) -> [usize; 2] {
-    let standing = Standing::of(space, cells, room_of_cell, bvh, min_radius);
-    let mut all: BTreeSet<u32> = standing.room_of_cell.into_iter().collect();
-    all.remove(&OUTDOOR_CELL);
-    let n_hollow = all.intersection(&standing.hollow).count();
-    [all.len() - n_hollow, n_hollow]
+impl Session {
+    /// How many rooms are left after the first `n_steps`, which is how many cells indoors [`bake_session`](super::bake_session) makes of them,
+    /// and how many cells besides: crevices, and the insides of walls, which are dropped.
+    ///
+    /// `O(n log n)` in the parts of the space; a fraction of a second.
+    #[must_use]
+    pub fn count_rooms(&self, n_steps: usize, config: &DelaunayConfig) -> [usize; 2] {
+        let standing = Standing::of(
+            &self.space,
+            &self.cells,
+            &self.decimation.after(n_steps),
+            &self.bvh,
+            config.common.merge.min_radius,
+        );
+        let mut all: BTreeSet<u32> = standing.room_of_cell.into_iter().collect();
+        all.remove(&OUTDOOR_CELL);
+        let n_hollow = all.intersection(&standing.hollow).count();
+        [all.len() - n_hollow, n_hollow]
+    }
 }
 
 /// Screens where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
