@@ -2,7 +2,7 @@
 //!
 //! Tests do not count as functions, and their files may be longer: a list of cases is read one by one.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Lines a source file may have.
 const MAX_FILE: usize = 600;
@@ -11,56 +11,21 @@ const MAX_TEST_FILE: usize = 800;
 /// Lines a function may have, from `fn` to its closing brace.
 const MAX_FUNCTION: usize = 100;
 
-/// What is still too long, to be split by who works on it next; none may be added. A file, or a file and
-/// a function in it.
-const KNOWN: [(&str, &str); 10] = [
-    ("crates/enfilade-bake/examples/kernel_bench.rs", "main"),
-    ("crates/enfilade-bake/src/bsp/decompose.rs", "bake_bsp"),
-    ("crates/enfilade-bake/src/bsp/rooms.rs", ""),
-    ("crates/enfilade-bake/src/complex/partition.rs", "realize"),
-    ("crates/enfilade-bake/src/delaunay/branches.rs", ""),
-    ("crates/enfilade-bake/src/delaunay/decimate.rs", "decided"),
-    ("crates/enfilade-bake/src/delaunay/space.rs", "divide"),
-    ("crates/enfilade-bake/src/delaunay/tetrahedra.rs", ""),
-    ("crates/enfilade-bake/src/pipeline.rs", "bake"),
-    ("crates/enfilade-bake/src/watershed/fit.rs", "free_section"),
-];
-
-/// A line for each file and function among `sources` (path in the repository, text) that is too long and not
-/// known, and for each known that no longer is. Time grows with the length of all files.
+/// A line for each file and function among `sources` (path in the repository, text) that is too long. Time grows
+/// with the length of all files.
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
-    compared(&too_long(sources), &KNOWN)
+    let line = |((file, function), n): ((&str, &str), usize)| {
+        let (place, limit) = match function {
+            "" => (file.to_owned(), max_lines(file)),
+            _ => (format!("{file}: {function}"), MAX_FUNCTION),
+        };
+        format!("{place}: {n} lines, more than {limit}; split it by the questions it answers")
+    };
+    too_long(sources).into_iter().map(line).collect()
 }
 
 /// Lines by file and function; the function is empty where the file itself is too long.
 type Lengths<'a> = BTreeMap<(&'a str, &'a str), usize>;
-
-fn compared(found: &Lengths<'_>, known: &[(&str, &str)]) -> Vec<String> {
-    let known: BTreeSet<(&str, &str)> = known.iter().copied().collect();
-    let place = |(file, function): (&str, &str)| match function {
-        "" => file.to_owned(),
-        _ => format!("{file}: {function}"),
-    };
-    let mut out = Vec::new();
-    for (&at, n) in found.iter().filter(|(at, _)| !known.contains(at)) {
-        let limit = if at.1.is_empty() {
-            max_lines(at.0)
-        } else {
-            MAX_FUNCTION
-        };
-        out.push(format!(
-            "{}: {n} lines, more than {limit}; split it by the questions it answers",
-            place(at)
-        ));
-    }
-    for &at in known.iter().filter(|at| !found.contains_key(at)) {
-        let place = place(at);
-        out.push(format!(
-            "{place} is no longer too long: take it off the list in xtask/src/lengths.rs"
-        ));
-    }
-    out
-}
 
 fn too_long(sources: &BTreeMap<String, String>) -> Lengths<'_> {
     let mut out = BTreeMap::new();
@@ -287,16 +252,11 @@ mod tests {
     }
 
     #[test]
-    fn a_new_offender_fails_and_one_that_is_gone_must_be_taken_off() {
-        let found = BTreeMap::from([(("a.rs", ""), 700), (("b.rs", "f"), 101)]);
-        assert!(compared(&found, &[("a.rs", ""), ("b.rs", "f")]).is_empty());
-        let said = compared(&found, &[("a.rs", ""), ("c.rs", "g")]);
+    fn an_offender_is_named_with_its_length_and_the_limit() {
+        let files = sources(&[("b.rs", function("f", MAX_FUNCTION + 1))]);
         assert_eq!(
-            said,
-            [
-                "b.rs: f: 101 lines, more than 100; split it by the questions it answers",
-                "c.rs: g is no longer too long: take it off the list in xtask/src/lengths.rs"
-            ]
+            problems(&files),
+            ["b.rs: f: 101 lines, more than 100; split it by the questions it answers"]
         );
     }
 }

@@ -5,43 +5,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Pairs that are still there, to be parted by who works on them next; none may be added.
-const KNOWN: [[&str; 2]; 3] = [
-    [
-        "crates/enfilade-bake/src/delaunay/branches.rs",
-        "crates/enfilade-bake/src/delaunay/branches/forks.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/delaunay/branches.rs",
-        "crates/enfilade-bake/src/delaunay/decimate.rs",
-    ],
-    [
-        "crates/enfilade-bake/src/delaunay/refine.rs",
-        "crates/enfilade-bake/src/delaunay/space.rs",
-    ],
-];
-
 /// How often a name that is handed on is followed.
 const MAX_HOPS: usize = 8;
 
-/// A line for each pair among `sources` (path in the repository, text) that is not known. Time grows with the
+/// A line for each pair among `sources` (path in the repository, text) that imports each other. Time grows with the
 /// length of all files.
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
-    let pairs = pairs(sources);
-    let is_known = |a: &str, b: &str| KNOWN.contains(&[a, b]);
-    let new = pairs.iter().filter(|(a, b)| !is_known(a, b));
-    let mut out: Vec<String> = new
+    let found = pairs(sources).into_iter();
+    found
         .map(|(a, b)| format!("{a} and {b} import each other; move what both need to a third file"))
-        .collect();
-    let gone = KNOWN
-        .iter()
-        .filter(|[a, b]| !pairs.contains(&((*a).to_owned(), (*b).to_owned())));
-    out.extend(gone.map(|[a, b]| {
-        format!(
-            "{a} and {b} no longer import each other: take them off the list in xtask/src/mutual.rs"
-        )
-    }));
-    out
+        .collect()
 }
 
 /// A source file by what its paths mean.

@@ -101,94 +101,15 @@ fn main() {
         .build()
         .expect("threads");
 
-    let occupied = || BitVolume::from_fn(dims, |i| bytes[i] == 0);
-    let mut out: Vec<u8> = Vec::new();
-    let (times, result) = pool.install(|| match kernel.as_str() {
-        "edt-u16" => {
-            let set = occupied();
-            let (times, field) = measure(repeats, || (), |()| distance_squared(&set));
-            let sum: u64 = field.iter().map(|&d| u64::from(d)).sum();
-            (times, format!("\"sum\":{sum}"))
-        }
-        "edt-f32" => {
-            let set = occupied();
-            let (times, field) = measure(repeats, || (), |()| distance(&set));
-            if option("--out").is_some() {
-                out = field.iter().flat_map(|d| d.to_le_bytes()).collect();
-            }
-            let sum: f64 = field.iter().map(|&d| f64::from(d)).sum();
-            (times, format!("\"sum\":{sum}"))
-        }
-        "components6" | "components26" => {
-            let set = occupied().complement();
-            let connectivity = if kernel == "components6" {
-                Connectivity::Faces6
-            } else {
-                Connectivity::Corners26
-            };
-            let (times, answer) = measure(repeats, || (), |()| components(&set, connectivity));
-            (times, format!("\"components\":{}", answer.n_components))
-        }
-        "flood" => {
-            let set = occupied().complement();
-            let mut seed = BitVolume::new(dims);
-            if let Some(v) = set.iter_set().next() {
-                let [nx, ny, _] = dims;
-                seed.set(v % nx, v / nx % ny, v / nx / ny, true);
-            }
-            let (times, wet) = measure(
-                repeats,
-                || (),
-                |()| flood(&set, &seed, Connectivity::Faces6),
-            );
-            (times, format!("\"voxels\":{}", wet.count()))
-        }
-        "watershed" => {
-            let field = distance_squared(&occupied());
-            let (times, (answer, dams)) = measure(
-                repeats,
-                || field.clone(),
-                |field| {
-                    let answer = watershed(dims, field, WatershedOptions { h, outdoors: None });
-                    let dams = mark_dams(dims, &answer.labels);
-                    (answer, dams)
-                },
-            );
-            if option("--out").is_some() {
-                out = answer.labels.iter().flat_map(u32::to_le_bytes).collect();
-            }
-            (
-                times,
-                format!(
-                    "\"basins\":{},\"saddles\":{},\"dams\":{}",
-                    answer.basins.len(),
-                    answer.saddles.len(),
-                    dams.count()
-                ),
-            )
-        }
-        "voxelize" => {
-            let values: Vec<f64> = bytes
-                .chunks_exact(8)
-                .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")))
-                .collect();
-            let triangles: Vec<Triangle> = values
-                .chunks_exact(9)
-                .map(|t| [0, 3, 6].map(|i| DVec3::new(t[i], t[i + 1], t[i + 2])))
-                .collect();
-            let grid = Grid {
-                origin: DVec3::ZERO,
-                voxel: 1.0,
-                dims,
-            };
-            let (times, set) = measure(repeats, || (), |()| voxelize(&grid, &triangles));
-            (
-                times,
-                format!("\"triangles\":{},\"set\":{}", triangles.len(), set.count()),
-            )
-        }
-        other => panic!("no kernel `{other}`"),
-    });
+    let run = Run {
+        kernel,
+        dims,
+        bytes: &bytes,
+        repeats,
+        h,
+        is_written: option("--out").is_some(),
+    };
+    let (times, result, out) = pool.install(|| run.kernel());
     if let Some(path) = option("--out") {
         std::fs::write(path, out).expect("the output file");
     }
@@ -197,4 +118,118 @@ fn main() {
          \"peak_mib\":{:.1},{result}}}",
         times.user, times.system, times.wall, times.peak
     );
+}
+
+/// A kernel and what it is run on.
+struct Run<'a> {
+    kernel: &'a str,
+    dims: [usize; 3],
+    bytes: &'a [u8],
+    repeats: usize,
+    h: f64,
+    is_written: bool,
+}
+
+impl Run<'_> {
+    /// Runs it: times, figures of the answer as JSON, and the answer's bytes where they are written.
+    fn kernel(&self) -> (Times, String, Vec<u8>) {
+        let dims = self.dims;
+        let occupied = || BitVolume::from_fn(dims, |i| self.bytes[i] == 0);
+        let mut out: Vec<u8> = Vec::new();
+        let (times, result) = match self.kernel {
+            "edt-u16" => {
+                let set = occupied();
+                let (times, field) = measure(self.repeats, || (), |()| distance_squared(&set));
+                let sum: u64 = field.iter().map(|&d| u64::from(d)).sum();
+                (times, format!("\"sum\":{sum}"))
+            }
+            "edt-f32" => {
+                let set = occupied();
+                let (times, field) = measure(self.repeats, || (), |()| distance(&set));
+                if self.is_written {
+                    out = field.iter().flat_map(|d| d.to_le_bytes()).collect();
+                }
+                let sum: f64 = field.iter().map(|&d| f64::from(d)).sum();
+                (times, format!("\"sum\":{sum}"))
+            }
+            "components6" | "components26" => {
+                let set = occupied().complement();
+                let connectivity = if self.kernel == "components6" {
+                    Connectivity::Faces6
+                } else {
+                    Connectivity::Corners26
+                };
+                let (times, answer) =
+                    measure(self.repeats, || (), |()| components(&set, connectivity));
+                (times, format!("\"components\":{}", answer.n_components))
+            }
+            "flood" => {
+                let set = occupied().complement();
+                let mut seed = BitVolume::new(dims);
+                if let Some(v) = set.iter_set().next() {
+                    let [nx, ny, _] = dims;
+                    seed.set(v % nx, v / nx % ny, v / nx / ny, true);
+                }
+                let (times, wet) = measure(
+                    self.repeats,
+                    || (),
+                    |()| flood(&set, &seed, Connectivity::Faces6),
+                );
+                (times, format!("\"voxels\":{}", wet.count()))
+            }
+            "watershed" => {
+                let field = distance_squared(&occupied());
+                let (times, (answer, dams)) = measure(
+                    self.repeats,
+                    || field.clone(),
+                    |field| {
+                        let answer = watershed(
+                            dims,
+                            field,
+                            WatershedOptions {
+                                h: self.h,
+                                outdoors: None,
+                            },
+                        );
+                        let dams = mark_dams(dims, &answer.labels);
+                        (answer, dams)
+                    },
+                );
+                if self.is_written {
+                    out = answer.labels.iter().flat_map(u32::to_le_bytes).collect();
+                }
+                (
+                    times,
+                    format!(
+                        "\"basins\":{},\"saddles\":{},\"dams\":{}",
+                        answer.basins.len(),
+                        answer.saddles.len(),
+                        dams.count()
+                    ),
+                )
+            }
+            "voxelize" => self.voxelize(),
+            other => panic!("no kernel `{other}`"),
+        };
+        (times, result, out)
+    }
+
+    fn voxelize(&self) -> (Times, String) {
+        let number = |b: &[u8]| f64::from_le_bytes(b.try_into().expect("eight bytes"));
+        let values: Vec<f64> = self.bytes.chunks_exact(8).map(number).collect();
+        let triangles: Vec<Triangle> = values
+            .chunks_exact(9)
+            .map(|t| [0, 3, 6].map(|i| DVec3::new(t[i], t[i + 1], t[i + 2])))
+            .collect();
+        let grid = Grid {
+            origin: DVec3::ZERO,
+            voxel: 1.0,
+            dims: self.dims,
+        };
+        let (times, set) = measure(self.repeats, || (), |()| voxelize(&grid, &triangles));
+        (
+            times,
+            format!("\"triangles\":{},\"set\":{}", triangles.len(), set.count()),
+        )
+    }
 }

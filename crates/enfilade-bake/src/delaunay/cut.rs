@@ -1,9 +1,9 @@
-//! Tetrahedra cut by the model's polygons, and what a facet leaves open.
+//! Tetrahedra cut by the model's polygons.
 //!
 //! Gjørup 1999, §4.2.1–4.2.2: a tetrahedron that a polygon runs through is cut along the polygon's
-//! plane, its parts again by the next, until every polygon lies on boundaries; an opening is then what
-//! the polygons of a boundary leave of it, as convex pieces. His loops over all pairs are questions to a
-//! BVH here, so that the cost is that of the pairs that meet.
+//! plane, and its parts by the next polygon, until every polygon lies on boundaries. An opening is then what
+//! the polygons leave of a boundary, as convex pieces. He loops over all pairs; here a BVH
+//! finds those that meet.
 
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle};
 use smallvec::{SmallVec, smallvec};
@@ -11,15 +11,15 @@ use smallvec::{SmallVec, smallvec};
 use super::tetrahedra::Delaunay;
 use crate::complex::poly::{Poly, Sides, area_normal, clip, cut_out, split, width};
 
-/// Parts of one tetrahedron at most; what would cut it further is passed over, and counted.
+/// Most parts of one tetrahedron; polygons that would cut it further are passed over, and counted.
 pub(super) const MAX_PARTS: usize = 512;
 
-/// What lengths mean when polygons are cut.
+/// Which lengths count as zero when polygons are cut.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolerance {
-    /// Points nearer to a plane lie in it. [Units: wu]
+    /// Points this near to a plane lie in it. [Units: wu]
     pub(super) plane: f64,
-    /// What polygons leave of a facet is open where it is this wide. [Units: wu]
+    /// A piece of a facet that polygons leave is open if it is at least this wide. [Units: wu]
     pub(super) width: f64,
 }
 
@@ -67,13 +67,13 @@ impl Part {
         }
     }
 
-    /// Whether a corner of the tetrahedron is one of the part's own.
-    pub(super) fn has_corner(&self, p: DVec3) -> bool {
+    /// Whether a vertex of the tetrahedron is one of the part's own.
+    pub(super) fn has_vertex(&self, p: DVec3) -> bool {
         self.faces.iter().any(|f| f.poly.contains(&p))
     }
 
-    /// What of this part lies on a facet of the tetrahedron.
-    fn on_facet(&self, i: usize) -> impl Iterator<Item = &Poly> {
+    /// The faces of this part that lie on a facet of the tetrahedron.
+    pub(super) fn on_facet(&self, i: usize) -> impl Iterator<Item = &Poly> {
         let on = On::Facet(i as u8);
         self.faces
             .iter()
@@ -83,7 +83,7 @@ impl Part {
 }
 
 /// A tetrahedron that polygons run through.
-pub(super) struct Parts {
+pub(super) struct CutParts {
     pub(super) parts: Vec<Part>,
     /// Where two parts meet openly: the parts, and an outline counter-clockwise seen from the second.
     pub(super) inner: Vec<([u32; 2], Poly)>,
@@ -91,176 +91,214 @@ pub(super) struct Parts {
     pub(super) n_passed_over: usize,
 }
 
-/// What polygons do to a tetrahedron.
-pub(super) struct Found {
+/// How polygons cut and cover a tetrahedron.
+pub(super) struct Cutting {
     /// Bit `i`: a polygon lies in facet `i`, in some of it.
-    pub(super) covered: u8,
+    covered: u8,
     /// The parts, if there are several.
-    pub(super) parts: Option<Box<Parts>>,
+    pub(super) parts: Option<Box<CutParts>>,
 }
 
-/// A polygon in a tetrahedron.
+impl Cutting {
+    pub(super) fn is_covered(&self, facet: usize) -> bool {
+        self.covered >> facet & 1 == 1
+    }
+}
+
+/// What of a polygon lies in a tetrahedron.
 struct Cutter {
     poly: Poly,
     plane: Plane,
 }
 
-/// Cuts tetrahedron `t` by the polygons of `walls`.
-pub(super) fn cut(
-    delaunay: &Delaunay,
-    t: u32,
-    walls: &[Triangle],
-    bvh: &Bvh,
-    tolerance: Tolerance,
-) -> Found {
-    let corners = delaunay.corners(t);
-    let eps = tolerance.plane;
-    let mut near: SmallVec<[u32; 16]> = SmallVec::new();
-    bvh.for_each_in_box(&Aabb::of_points(&corners).expanded(eps), |w| near.push(w));
-    let mut found = Found {
-        covered: 0,
-        parts: None,
-    };
-    if near.is_empty() {
-        return found;
+/// How a wall lies to a tetrahedron.
+enum Lies {
+    Beside,
+    /// In the plane of these facets (bit `i`: facet `i`), or touching no more than an edge or a vertex.
+    InFacets(u8),
+    Through(Cutter),
+}
+
+/// What tetrahedra are cut with.
+#[derive(Clone, Copy)]
+pub(super) struct Knife<'a> {
+    pub(super) delaunay: &'a Delaunay,
+    pub(super) walls: &'a [Triangle],
+    pub(super) bvh: &'a Bvh,
+    pub(super) tolerance: Tolerance,
+}
+
+impl Knife<'_> {
+    /// Cuts a tetrahedron by the walls.
+    pub(super) fn cut(&self, t: u32) -> Cutting {
+        let corners = self.delaunay.corners(t);
+        let near = self.walls_near(&corners);
+        let mut cutting = Cutting {
+            covered: 0,
+            parts: None,
+        };
+        if near.is_empty() {
+            return cutting;
+        }
+        // Seen from outside facets run counter-clockwise; their planes face inwards.
+        let facets: [Option<Plane>; 4] =
+            std::array::from_fn(|i| Plane::of_triangle(&self.facet(t, i)).map(Plane::flipped));
+        let mut cutters: SmallVec<[Cutter; 4]> = SmallVec::new();
+        for w in near {
+            match self.lies(&self.walls[w as usize], &corners, &facets) {
+                Lies::Beside => {}
+                Lies::InFacets(facets) => cutting.covered |= facets,
+                Lies::Through(cutter) => cutters.push(cutter),
+            }
+        }
+        if !cutters.is_empty() {
+            cutting.parts = self.divided(t, &facets, &cutters).map(Box::new);
+        }
+        cutting
     }
-    near.sort_unstable();
-    let facets: [Option<Plane>; 4] = std::array::from_fn(|i| {
-        let f = facet_corners(delaunay, t, i);
-        // Seen from outside they run counter-clockwise.
-        Plane::of_triangle(&f).map(Plane::flipped)
-    });
-    let mut cutters: SmallVec<[Cutter; 4]> = SmallVec::new();
-    for w in near {
-        let wall = &walls[w as usize];
+
+    /// Walls whose boxes are near the box of some points, in order.
+    pub(super) fn walls_near(&self, points: &[DVec3]) -> SmallVec<[u32; 16]> {
+        let bounds = Aabb::of_points(points).expanded(self.tolerance.plane);
+        let mut near: SmallVec<[u32; 16]> = SmallVec::new();
+        self.bvh.for_each_in_box(&bounds, |w| near.push(w));
+        near.sort_unstable();
+        near
+    }
+
+    /// The facet opposite vertex `i`, counter-clockwise seen from outside. [Units: wu]
+    pub(super) fn facet(&self, t: u32, i: usize) -> Triangle {
+        let tet = &self.delaunay.tetrahedra[t as usize];
+        tet.facet(i).map(|v| self.delaunay.vertices[v as usize])
+    }
+
+    fn lies(&self, wall: &Triangle, corners: &[DVec3; 4], facets: &[Option<Plane>; 4]) -> Lies {
+        let eps = self.tolerance.plane;
         let Some(plane) = Plane::of_triangle(wall) else {
-            continue;
+            return Lies::Beside;
         };
         let beyond = |p: &Option<Plane>| {
             p.is_some_and(|p| wall.iter().all(|&q| p.signed_distance(q) < -eps))
         };
         if facets.iter().any(beyond) {
-            continue;
+            return Lies::Beside;
         }
         let side = corners.map(|c| plane.signed_distance(c));
-        let near_plane = side.map(|d| d.abs() <= eps);
-        let (mut front, mut back) = (false, false);
-        for d in side {
-            front |= d > eps;
-            back |= d < -eps;
-        }
-        if !(front && back) {
-            for i in 0..4 {
-                if (0..4).all(|k| k == i || near_plane[k]) {
-                    found.covered |= 1 << i;
-                }
-            }
-            continue;
+        if !(side.iter().any(|&d| d > eps) && side.iter().any(|&d| d < -eps)) {
+            let is_in = |i: &usize| (0..4).all(|k| k == *i || side[k].abs() <= eps);
+            return Lies::InFacets((0..4).filter(is_in).fold(0, |bits, i| bits | 1 << i));
         }
         // Where facets are too thin to have a plane there is nothing to cut.
         let inside = facets.iter().try_fold(Poly::from_slice(wall), |poly, f| {
             clip(&poly, f.as_ref()?, eps)
         });
-        if let Some(poly) = inside.filter(|poly| width(poly) > 4.0 * eps) {
-            cutters.push(Cutter { poly, plane });
+        match inside.filter(|poly| width(poly) > 4.0 * eps) {
+            Some(poly) => Lies::Through(Cutter { poly, plane }),
+            None => Lies::Beside,
         }
     }
-    if !cutters.is_empty() {
-        found.parts = divided(delaunay, t, &facets, &cutters, tolerance).map(Box::new);
-    }
-    found
-}
 
-fn facet_corners(delaunay: &Delaunay, t: u32, i: usize) -> Triangle {
-    let tet = &delaunay.tetrahedra[t as usize];
-    tet.facet(i).map(|v| delaunay.vertices[v as usize])
-}
-
-fn divided(
-    delaunay: &Delaunay,
-    t: u32,
-    facets: &[Option<Plane>; 4],
-    cutters: &[Cutter],
-    tolerance: Tolerance,
-) -> Option<Parts> {
-    let eps = tolerance.plane;
-    let mut whole = Vec::with_capacity(4);
-    for (i, plane) in facets.iter().enumerate() {
-        whole.push(Face {
-            poly: Poly::from_slice(&facet_corners(delaunay, t, i)),
-            plane: (*plane)?,
-            on: On::Facet(i as u8),
-        });
-    }
-    let mut parts: Vec<Vec<Face>> = vec![whole];
-    let mut cuts: Vec<Plane> = Vec::new();
-    let mut n_passed_over = 0;
-    for c in cutters {
-        if parts.len() >= MAX_PARTS {
-            n_passed_over += 1;
-            continue;
+    /// The parts of a tetrahedron; `None` if it stays whole.
+    fn divided(&self, t: u32, facets: &[Option<Plane>; 4], cutters: &[Cutter]) -> Option<CutParts> {
+        let eps = self.tolerance.plane;
+        let mut whole = Vec::with_capacity(4);
+        for (i, plane) in facets.iter().enumerate() {
+            whole.push(Face {
+                poly: Poly::from_slice(&self.facet(t, i)),
+                plane: (*plane)?,
+                on: On::Facet(i as u8),
+            });
         }
-        for k in 0..parts.len() {
-            // Only what the polygon itself runs through is cut.
-            let in_part = parts[k]
-                .iter()
-                .try_fold(c.poly.clone(), |poly, f| clip(&poly, &f.plane, eps));
-            if in_part.is_none_or(|poly| width(&poly) <= 4.0 * eps) {
+        let mut parts: Vec<Vec<Face>> = vec![whole];
+        let mut cuts: Vec<Plane> = Vec::new();
+        let mut n_passed_over = 0;
+        for c in cutters {
+            if parts.len() >= MAX_PARTS {
+                n_passed_over += 1;
                 continue;
             }
-            let Some((front, back)) = split_part(&parts[k], &c.plane, cuts.len() as u32, eps)
-            else {
-                continue;
-            };
-            cuts.push(c.plane);
-            parts[k] = front;
-            parts.push(back);
+            for k in 0..parts.len() {
+                // Only what the polygon itself runs through is cut.
+                let in_part = parts[k]
+                    .iter()
+                    .try_fold(c.poly.clone(), |poly, f| clip(&poly, &f.plane, eps));
+                if in_part.is_none_or(|poly| width(&poly) <= 4.0 * eps) {
+                    continue;
+                }
+                let cut = cuts.len() as u32;
+                if let Some((front, back)) = split_part(&parts[k], &c.plane, cut, eps) {
+                    cuts.push(c.plane);
+                    parts[k] = front;
+                    parts.push(back);
+                }
+            }
         }
+        if parts.len() < 2 {
+            return None;
+        }
+        Some(CutParts {
+            inner: self.inner_openings(&parts, &cuts, cutters),
+            parts: parts.into_iter().map(Part::new).collect(),
+            n_passed_over,
+        })
     }
-    if parts.len() < 2 {
-        return None;
+
+    /// What the cutters leave open where two parts of a tetrahedron meet.
+    fn inner_openings(
+        &self,
+        parts: &[Vec<Face>],
+        cuts: &[Plane],
+        cutters: &[Cutter],
+    ) -> Vec<([u32; 2], Poly)> {
+        let eps = self.tolerance.plane;
+        let mut inner = Vec::new();
+        for (plane, [fronts, backs]) in cuts.iter().zip(&faces_on_cuts(parts, cuts)) {
+            let in_plane = |c: &&Cutter| {
+                let off = |&p: &DVec3| plane.signed_distance(p).abs();
+                c.poly.iter().map(off).fold(0.0, f64::max) <= 2.0 * eps
+            };
+            let covers: Vec<Poly> = cutters
+                .iter()
+                .filter(in_plane)
+                .map(|c| turned_to(c.poly.clone(), plane.normal))
+                .collect();
+            for (b, behind) in backs {
+                for (f, before) in fronts {
+                    let Some(shared) = shared(behind, before, plane.normal, eps) else {
+                        continue;
+                    };
+                    let open = less(smallvec![shared], &covers, plane.normal, self.tolerance);
+                    // It runs counter-clockwise seen from the plane's front.
+                    inner.extend(open.into_iter().map(|poly| ([*b, *f], poly)));
+                }
+            }
+        }
+        inner
     }
-    let mut on_cut: Vec<[Vec<(u32, &Poly)>; 2]> = cuts.iter().map(|_| Default::default()).collect();
+}
+
+/// Parts and their faces before a plane, and those behind it, all turned to its normal.
+type FacesOnCut = [Vec<(u32, Poly)>; 2];
+
+/// The faces that lie on each cut.
+fn faces_on_cuts(parts: &[Vec<Face>], cuts: &[Plane]) -> Vec<FacesOnCut> {
+    let mut on_cut: Vec<FacesOnCut> = cuts.iter().map(|_| Default::default()).collect();
     for (k, faces) in parts.iter().enumerate() {
         for f in faces {
             if let On::Cut(c) = f.on {
-                let is_back = f.plane.normal.dot(cuts[c as usize].normal) < 0.0;
-                on_cut[c as usize][usize::from(is_back)].push((k as u32, &f.poly));
+                let normal = cuts[c as usize].normal;
+                let is_back = f.plane.normal.dot(normal) < 0.0;
+                let face = (k as u32, turned_to(f.poly.clone(), normal));
+                on_cut[c as usize][usize::from(is_back)].push(face);
             }
         }
     }
-    let mut inner = Vec::new();
-    for (plane, [fronts, backs]) in cuts.iter().zip(&on_cut) {
-        let in_plane = |c: &&Cutter| {
-            let off = |&p: &DVec3| plane.signed_distance(p).abs();
-            c.poly.iter().map(off).fold(0.0, f64::max) <= 2.0 * eps
-        };
-        let covers: Vec<Poly> = cutters
-            .iter()
-            .filter(in_plane)
-            .map(|c| turned_to(c.poly.clone(), plane.normal))
-            .collect();
-        for &(b, behind) in backs {
-            let behind = turned_to(behind.clone(), plane.normal);
-            for &(f, before) in fronts {
-                let before = turned_to(before.clone(), plane.normal);
-                let mut rest = Vec::new();
-                let Some(shared) =
-                    cut_out(&behind, &before, plane.normal, eps, 4.0 * eps, &mut rest)
-                else {
-                    continue;
-                };
-                let open = less(smallvec![shared], &covers, plane.normal, tolerance);
-                // It runs counter-clockwise seen from the plane's front.
-                inner.extend(open.into_iter().map(|poly| ([b, f], poly)));
-            }
-        }
-    }
-    Some(Parts {
-        inner,
-        parts: parts.into_iter().map(Part::new).collect(),
-        n_passed_over,
-    })
+    on_cut
+}
+
+/// What two convex polygons of one plane share.
+pub(super) fn shared(a: &Poly, b: &Poly, normal: DVec3, eps: f64) -> Option<Poly> {
+    cut_out(a, b, normal, eps, 4.0 * eps, &mut Vec::new())
 }
 
 /// The parts of a part before and behind a plane; `None` when one of them has no volume.
@@ -306,16 +344,16 @@ fn split_part(faces: &[Face], plane: &Plane, cut: u32, eps: f64) -> Option<(Vec<
     Some((front, back))
 }
 
-/// The polygon as it runs counter-clockwise about a normal.
-fn turned_to(mut poly: Poly, normal: DVec3) -> Poly {
+/// The polygon, reversed if need be so that it runs counter-clockwise about a normal.
+pub(super) fn turned_to(mut poly: Poly, normal: DVec3) -> Poly {
     if area_normal(&poly).dot(normal) < 0.0 {
         poly.reverse();
     }
     poly
 }
 
-/// What of convex polygons no cover lies on, as convex pieces.
-fn less(
+/// What the covers leave of convex polygons, as convex pieces.
+pub(super) fn less(
     open: SmallVec<[Poly; 2]>,
     covers: &[Poly],
     normal: DVec3,
@@ -345,119 +383,11 @@ fn less(
     open
 }
 
-/// An outline that is less than a facet; `None` for the facet.
-pub(super) type Outline = Option<Poly>;
-
-/// An opening between a part of one tetrahedron and a part of its neighbor.
-pub(super) struct Opening {
-    /// Parts of the first and of the second tetrahedron.
-    pub(super) parts: [u32; 2],
-    /// The outline, counter-clockwise seen from the second; `None` for the whole facet.
-    pub(super) outline: Outline,
-}
-
-/// What is open of facet `i` of tetrahedron `t` towards its neighbor.
-///
-/// `found` is what [`cut`] found of the two.
-pub(super) fn openings(
-    delaunay: &Delaunay,
-    (t, i): (u32, usize),
-    found: [&Found; 2],
-    walls: &[Triangle],
-    bvh: &Bvh,
-    tolerance: Tolerance,
-) -> SmallVec<[Opening; 2]> {
-    let tet = &delaunay.tetrahedra[t as usize];
-    let other_facet = (tet.neighbors[i] & 3) as usize;
-    let is_covered = found[0].covered >> i & 1 == 1 || found[1].covered >> other_facet & 1 == 1;
-    let whole: SmallVec<[Opening; 2]> = smallvec![Opening {
-        parts: [0, 0],
-        outline: None
-    }];
-    if !is_covered && found.iter().all(|f| f.parts.is_none()) {
-        return whole;
-    }
-    let f = facet_corners(delaunay, t, i);
-    let Some(plane) = Plane::of_triangle(&f) else {
-        return whole;
-    };
-    let eps = tolerance.plane;
-    let mut near: SmallVec<[u32; 16]> = SmallVec::new();
-    bvh.for_each_in_box(&Aabb::of_points(&f).expanded(eps), |w| near.push(w));
-    near.sort_unstable();
-    let covers_of = |poly: &[DVec3], off: f64| -> Vec<Poly> {
-        let walls = near.iter().map(|&w| &walls[w as usize]);
-        let in_plane = |p: Plane| poly.iter().all(|&c| p.signed_distance(c).abs() <= off);
-        walls
-            .filter(|wall| Plane::of_triangle(wall).is_some_and(in_plane))
-            .map(|wall| turned_to(Poly::from_slice(wall), plane.normal))
-            .collect()
-    };
-    let mut open: SmallVec<[Poly; 2]> = smallvec![Poly::from_slice(&f)];
-    if is_covered {
-        let covers = covers_of(&f, eps);
-        let n_covers = covers.len();
-        open = less(open, &covers, plane.normal, tolerance);
-        if open.is_empty() {
-            return SmallVec::new();
-        }
-        let untouched = open.len() == 1 && open[0].len() == 3 && n_covers > 0 && {
-            let rest = area_normal(&open[0]).length();
-            rest >= area_normal(&f).length() * (1.0 - 1e-12)
-        };
-        if untouched && found.iter().all(|f| f.parts.is_none()) {
-            return whole;
-        }
-    }
-    // A tetrahedron in one part is that part, whose face is the facet.
-    let faces = |found: &Found, facet: usize| -> Option<Vec<(u32, Poly)>> {
-        let parts = &found.parts.as_ref()?.parts;
-        let turned = |p: &Poly| turned_to(p.clone(), plane.normal);
-        let of_part = |(k, part): (usize, &Part)| {
-            part.on_facet(facet)
-                .map(move |p| (k as u32, turned(p)))
-                .collect::<Vec<_>>()
-        };
-        Some(parts.iter().enumerate().flat_map(of_part).collect())
-    };
-    let within =
-        |open: SmallVec<[([u32; 2], Poly); 4]>, faces: Option<Vec<(u32, Poly)>>, side: usize| {
-            let Some(faces) = faces else { return open };
-            let mut out: SmallVec<[([u32; 2], Poly); 4]> = SmallVec::new();
-            let mut rest = Vec::new();
-            for (parts, poly) in &open {
-                for (k, face) in &faces {
-                    rest.clear();
-                    let shared = cut_out(poly, face, plane.normal, eps, 4.0 * eps, &mut rest);
-                    if let Some(shared) = shared {
-                        let mut parts = *parts;
-                        parts[side] = *k;
-                        out.push((parts, shared));
-                    }
-                }
-            }
-            out
-        };
-    let open = open.into_iter().map(|p| ([0, 0], p)).collect();
-    let open = within(open, faces(found[0], i), 0);
-    let open = within(open, faces(found[1], other_facet), 1);
-    // A wall that ends within the facet may lie in a piece of it though not in all of it.
-    let rest = |(parts, poly): ([u32; 2], Poly)| {
-        let covers = covers_of(&poly, 2.0 * eps);
-        let open = less(smallvec![poly], &covers, plane.normal, tolerance);
-        open.into_iter().map(move |poly| Opening {
-            parts,
-            outline: Some(poly),
-        })
-    };
-    open.into_iter().flat_map(rest).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use enfilade_testkit::Rng;
 
-    use super::super::tetrahedra::tetrahedralize;
+    use super::super::insert::tetrahedralize;
     use super::*;
 
     fn random_point(rng: &mut Rng) -> DVec3 {
@@ -493,13 +423,20 @@ mod tests {
                 plane: 1e-9,
                 width: 1e-7,
             };
-            let found = cut(&delaunay, 0, &walls, &Bvh::build(&walls), tolerance);
-            let Some(parts) = found.parts else { continue };
+            let knife = Knife {
+                delaunay: &delaunay,
+                walls: &walls,
+                bvh: &Bvh::build(&walls),
+                tolerance,
+            };
+            let Some(parts) = knife.cut(0).parts else {
+                continue;
+            };
             let total: f64 = parts.parts.iter().map(|p| p.volume).sum();
             let whole = a.cross(b).dot(c).abs() / 6.0;
             assert!((total - whole).abs() < 1e-9, "{seed}: {total} {whole}");
             for _ in 0..60 {
-                // Any mean of the corners.
+                // Any mean of the vertices.
                 let shares = [(); 4].map(|()| rng.unit() + 1e-3);
                 let sum: f64 = shares.iter().sum();
                 let p: DVec3 = (0..4).map(|k| points[k] * (shares[k] / sum)).sum();

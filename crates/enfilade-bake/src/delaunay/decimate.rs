@@ -1,7 +1,7 @@
-//! Decimation: tetrahedra become cells, cells become rooms, one portal at a time.
+//! Decimation: neighboring cells are merged, one portal at a time, until rooms are left.
 //!
-//! Gjørup 1999, §4.1.4 and §4.2.3: every pair of neighbors has a weight, the pair of least weight
-//! becomes one cell, and so on. His two weights are here beside ours:
+//! Gjørup 1999, §4.1.4 and §4.2.3: every portal between two cells has a weight, the cells on both sides of the
+//! portal of least weight become one, and so on. His two weights are here beside ours:
 //!
 //! | weight | is | source |
 //! | --- | --- | --- |
@@ -14,38 +14,34 @@
 //! tetrahedron in the middle of a room has the same ball as its neighbors, and a spike has none, so
 //! it goes first. Doors come out at 1.8 and more, alcoves and bulges below 1.5.
 //!
-//! It goes in two rounds. The first joins what flows into one another, by radius, in one sweep over
-//! all links: millions of tetrahedra become a few cells a room ([`Cells`]). The second is Gjørup's,
-//! with a heap, and is recorded down to the last portal ([`Decimation`]), so that a person can go
-//! forwards and back, and overrule it. Between the two, cells are cut where branches leave them
-//! (`branches`), which no pinch shows: the steps that give a branch back to its trunk are part of the record.
+//! It begins with the [`Cells`] that parts of the air flow together to, and is recorded down to the last portal
+//! ([`Decimation`]), so that a person can go forwards and back, and overrule it. The steps that give a branch
+//! (`branches`) back to its trunk are part of the record.
 //!
-//! Ties are broken by the numbers of tetrahedra, which depend on coordinates only. `O(n log n)`.
+//! Ties are broken by the ids of cells, which depend on coordinates only. `O(n log n)`.
 
 use std::cmp::Ordering;
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::f64::consts::PI;
 
-use enfilade_geom::{Aabb, DVec3, Sets};
+use enfilade_geom::{Aabb, DVec3};
 
-use super::branches::Branches;
-use super::space::Space;
-
-/// Two cells whose lesser ball is hardly larger than what passes between them are parts of one
-/// bulge: differences this small come from where points happen to be sampled.
-const FLOWS: f64 = 1.05;
+use super::cells::{CellPortal, Cells};
 
 /// A cell of less than this share of its ball's volume does not hold the ball, which lies in a neighbor: it is
 /// a bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
 const HOLDS: f64 = 0.1;
 
-/// Weights of crevices that open to the mouth of a branch only, beside those of others: nearer to zero.
+/// Factor on the weight of a crevice's portal that is the mouth of a branch. Weights of crevices are negative, so
+/// crevices behind mouths merge last: only when they have no other way.
 const LAST: f64 = 1e-9;
-
-/// The cell around the scene.
-pub const OUTDOOR_CELL: u32 = 0;
 
 /// Weight of a portal that a person joined: less than that of any other.
 pub const JOINED: f64 = -2.0;
+
+/// Portals and areas count as at least this large, so that no ratio is infinite. [Units: wu, wu²]
+const TINY: f64 = 1e-9;
 
 /// How the quality of a portal is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -59,138 +55,7 @@ pub enum Weight {
     ScaleFree,
 }
 
-/// Cells before decimation, and how they meet.
-pub struct Cells {
-    /// Cell of each part of the space.
-    pub cell_of_part: Vec<u32>,
-    /// Radius of the largest ball in each cell. [Units: wu]
-    pub radii: Vec<f64>,
-    /// Volume of each cell. [Units: wu³]
-    pub volumes: Vec<f64>,
-    /// Box of each cell. [Units: wu]
-    pub boxes: Vec<Aabb>,
-    /// Where two cells meet, lesser number first.
-    pub portals: BTreeMap<(u32, u32), CellPortal>,
-}
-
-/// Where two cells meet.
-#[derive(Clone, Debug)]
-pub struct CellPortal {
-    /// Radius of the widest ball that passes. [Units: wu]
-    pub radius: f64,
-    /// Where that ball enters a branch: how many times wider what it leaves is. 0 elsewhere.
-    pub mouth: f64,
-    /// Sum of the facets' area normals, from the lesser to the greater cell. [Units: wu²]
-    pub vector: DVec3,
-    /// Mean of the middles of the facets. [Units: wu]
-    pub center: DVec3,
-    /// Links of the space.
-    pub links: Vec<u32>,
-}
-
-/// Joins tetrahedra that flow into one another to cells. Outdoors is [`OUTDOOR_CELL`].
-#[must_use]
-pub fn flow_together(space: &Space) -> Cells {
-    let n = space.radii.len();
-    let mut sets = Sets::new(n);
-    let mut radius = space.radii.clone();
-    let mut outdoors: Option<u32> = None;
-    for t in (0..n as u32).filter(|&t| space.radii[t as usize] == f64::INFINITY) {
-        let first = *outdoors.get_or_insert(t);
-        sets.join(first, t);
-    }
-    let mut order: Vec<u32> = (0..space.links.len() as u32).collect();
-    order.sort_unstable_by(|&a, &b| {
-        let (p, q) = (
-            space.links[a as usize].radius,
-            space.links[b as usize].radius,
-        );
-        q.total_cmp(&p).then(a.cmp(&b))
-    });
-    for l in order {
-        let link = &space.links[l as usize];
-        let [a, b] = link.parts.map(|t| sets.find(t));
-        let (ra, rb) = (radius[a as usize], radius[b as usize]);
-        if a == b || ra.min(rb) > FLOWS * link.radius {
-            continue;
-        }
-        radius[sets.join(a, b) as usize] = ra.max(rb);
-    }
-    let roots: Vec<u32> = (0..n as u32).map(|t| sets.find(t)).collect();
-    gathered(space, |t| (roots[t as usize], 0), &Branches::none(n))
-}
-
-/// Cells that end where branches begin.
-pub(super) fn parted(space: &Space, cells: &Cells, branches: &Branches) -> Cells {
-    let key = |t: u32| {
-        let t = t as usize;
-        (cells.cell_of_part[t], branches.label_of_part[t])
-    };
-    gathered(space, key, branches)
-}
-
-/// Cells of parts with equal keys, in the order of their first parts.
-fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches) -> Cells {
-    let n = space.radii.len() as u32;
-    let mut number: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-    if let Some(t) = (0..n).find(|&t| space.radii[t as usize] == f64::INFINITY) {
-        number.insert(key(t), OUTDOOR_CELL);
-    }
-    let mut cells = Cells {
-        cell_of_part: vec![0; n as usize],
-        radii: vec![f64::INFINITY],
-        volumes: vec![0.0],
-        boxes: vec![Aabb::EMPTY],
-        portals: BTreeMap::new(),
-    };
-    for t in 0..n {
-        let next = cells.radii.len() as u32;
-        let cell = *number.entry(key(t)).or_insert(next);
-        if cell == next {
-            cells.radii.push(0.0);
-            cells.volumes.push(0.0);
-            cells.boxes.push(Aabb::EMPTY);
-        }
-        let radius = &mut cells.radii[cell as usize];
-        *radius = radius.max(space.radii[t as usize]);
-        cells.volumes[cell as usize] += space.volumes[t as usize];
-        cells.cell_of_part[t as usize] = cell;
-        let b = &mut cells.boxes[cell as usize];
-        *b = space.corners(t).iter().fold(*b, |b, &p| b.including(p));
-    }
-    for (l, link) in space.links.iter().enumerate() {
-        let [a, b] = link.parts.map(|t| cells.cell_of_part[t as usize]);
-        if a == b {
-            continue;
-        }
-        let portal = cells
-            .portals
-            .entry((a.min(b), a.max(b)))
-            .or_insert(CellPortal {
-                radius: 0.0,
-                mouth: 0.0,
-                vector: DVec3::ZERO,
-                center: DVec3::ZERO,
-                links: Vec::new(),
-            });
-        let labels = link.parts.map(|t| branches.label_of_part[t as usize]);
-        let mouth = branches.weight(labels);
-        if (link.radius, mouth) > (portal.radius, portal.mouth) {
-            (portal.radius, portal.mouth) = (link.radius, mouth);
-        }
-        let normal = space.area_vector(link);
-        portal.vector += if a < b { normal } else { -normal };
-        let outline = space.outline(link);
-        portal.center += outline.iter().sum::<DVec3>() / outline.len() as f64;
-        portal.links.push(l as u32);
-    }
-    for portal in cells.portals.values_mut() {
-        portal.center /= portal.links.len() as f64;
-    }
-    cells
-}
-
-/// One step: two cells become one, which keeps the lesser number.
+/// One step: two cells become one, which keeps the lesser id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// The cell that stays.
@@ -201,13 +66,13 @@ pub struct Step {
     pub weight: f64,
     /// The weight is that of a branch at its mouth, not that of a pinch.
     pub is_mouth: bool,
-    /// Middle of that portal, or of the widest of the portals that it has become from. [Units: wu]
+    /// Center of that portal; if it was merged from several, of the widest of them. [Units: wu]
     pub position: DVec3,
 }
 
-/// What a person decided, by places as [`Step::position`] tells them. A choice is about the portal between cells before
-/// decimation that has its middle there, and later about whatever that has become part of. Where none has, since the
-/// scene was mended or has other points, it is about the nearest that goes if nobody decides.
+/// What a person decided, by places as [`Step::position`] reports them. A choice is about the portal between cells before
+/// decimation that has its center there, and later about whatever that has become part of. Where none has, since the
+/// scene was mended or has other points, it is about the nearest portal that goes if nobody decides.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
     /// Portals here stay, whatever they weigh. [Units: wu]
@@ -218,11 +83,11 @@ pub struct Choices {
 }
 
 impl Choices {
-    /// How far from a portal's middle a choice may lie. [Units: radii of the ball that passes]
+    /// How far from a portal's center a choice may lie. [Units: radii of the ball that passes]
     pub const REACH: f64 = 1.0;
 
-    /// The portals that are decided about: true to keep. `undecided` are the portals that go if nobody decides.
-    fn of(&self, cells: &Cells, undecided: &[(u32, u32)]) -> BTreeMap<(u32, u32), bool> {
+    /// The portals that are decided about. `undecided` are the portals that go if nobody decides.
+    fn by_portal(&self, cells: &Cells, undecided: &[(u32, u32)]) -> BTreeMap<(u32, u32), Choice> {
         let portal = |p: &DVec3| {
             let off = |pair: &(u32, u32)| cells.portals[pair].center.distance(*p);
             let is_at = |pair: &&(u32, u32)| off(pair) == 0.0;
@@ -233,13 +98,28 @@ impl Choices {
                 nearest.filter(is_near).copied()
             })
         };
-        let join = self.join.iter().filter_map(portal).map(|p| (p, false));
-        let keep = self.keep.iter().filter_map(portal).map(|p| (p, true));
+        let join = self
+            .join
+            .iter()
+            .filter_map(portal)
+            .map(|p| (p, Choice::Join));
+        let keep = self
+            .keep
+            .iter()
+            .filter_map(portal)
+            .map(|p| (p, Choice::Keep));
         join.chain(keep).collect()
     }
 }
 
-/// A decimation on record, from the cells of [`flow_together`] down to one cell a connected part.
+/// What a person decided about one portal.
+#[derive(Clone, Copy, PartialEq)]
+enum Choice {
+    Keep,
+    Join,
+}
+
+/// A decimation on record, from the first cells down to one cell in each connected part of the air.
 pub struct Decimation {
     /// Number of cells before the first step.
     pub n_cells: usize,
@@ -247,6 +127,19 @@ pub struct Decimation {
     pub steps: Vec<Step>,
     /// After how many steps it stops by itself.
     pub stop: usize,
+}
+
+impl Decimation {
+    /// The cell that each cell of the beginning belongs to after the first `n` steps.
+    #[must_use]
+    pub fn after(&self, n: usize) -> Vec<u32> {
+        let mut cell: Vec<u32> = (0..self.n_cells as u32).collect();
+        // A cell is gone before the one that it went into: from the last on.
+        for s in self.steps.iter().take(n).rev() {
+            cell[s.from as usize] = cell[s.into as usize];
+        }
+        cell
+    }
 }
 
 /// The weight at which decimation stops by itself, for [`Weight::ScaleFree`] and, as Gjørup suggests
@@ -260,6 +153,97 @@ pub fn default_stop(weight: Weight) -> f64 {
     }
 }
 
+/// Removes portals, least weight first, and records each step.
+///
+/// A cell in which no ball of `min_radius` fits is a crevice, and one much smaller than its ball is a
+/// bundle of spikes: both are merged across their largest opening before anything else is decided, choices
+/// excepted.
+#[must_use]
+pub fn decimate(
+    cells: &Cells,
+    weight: Weight,
+    stop: f64,
+    min_radius: f64,
+    choices: &Choices,
+) -> Decimation {
+    let rules = Rules {
+        weight,
+        stop,
+        min_radius,
+    };
+    let (undecided, portals) = Merging::new(cells, rules, &BTreeMap::new()).run();
+    if *choices == Choices::default() {
+        return undecided;
+    }
+    // Nobody means a crevice that lies in a doorway.
+    let steps = undecided.steps.iter().zip(portals);
+    let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
+    Merging::new(cells, rules, &choices.by_portal(cells, &portals))
+        .run()
+        .0
+}
+
+/// What decides which portal goes next, and when to stop.
+#[derive(Clone, Copy)]
+struct Rules {
+    weight: Weight,
+    stop: f64,
+    /// [Units: wu]
+    min_radius: f64,
+}
+
+/// A cell while others are merged into it.
+#[derive(Clone, Copy)]
+struct Body {
+    /// Of its largest ball. [Units: wu]
+    radius: f64,
+    /// [Units: wu³]
+    volume: f64,
+    /// [Units: wu]
+    bounds: Aabb,
+}
+
+impl Rules {
+    /// Too narrow for a room, or a bundle of spikes.
+    fn is_crevice(&self, cell: &Body) -> bool {
+        let ball = 4.0 / 3.0 * PI * cell.radius.powi(3);
+        cell.radius < self.min_radius || ball.is_finite() && cell.volume < HOLDS * ball
+    }
+
+    /// What a portal between two cells weighs if nobody decided about it.
+    fn weigh(&self, portal: &Live, [a, b]: [&Body; 2]) -> f64 {
+        if self.is_crevice(a) || self.is_crevice(b) {
+            // Between -1 and 0, widest opening first.
+            let last = if portal.mouth > 0.0 { LAST } else { 1.0 };
+            return -last / (1.0 + 1.0 / portal.radius.max(TINY));
+        }
+        if self.weight == Weight::ScaleFree {
+            let least = a.radius.min(b.radius);
+            return (least / portal.radius.max(TINY)).max(portal.mouth);
+        }
+        let area = portal.vector.length().max(TINY);
+        let projected = |b: &Aabb| {
+            let s = b.size().max(DVec3::ZERO);
+            let n = (portal.vector / area).abs();
+            n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
+        };
+        let largest = projected(&a.bounds).max(projected(&b.bounds));
+        let aspect = largest / area;
+        match self.weight {
+            Weight::Aspect => aspect,
+            _ => aspect / largest.sqrt(),
+        }
+    }
+
+    /// Whether portals of `before` must be weighed anew when it has become `after`.
+    fn weighs_anew(&self, before: &Body, after: &Body) -> bool {
+        before.radius != after.radius
+            || self.is_crevice(before) != self.is_crevice(after)
+            || self.weight != Weight::ScaleFree && before.bounds != after.bounds
+    }
+}
+
+/// A portal in the queue. It is stale if the portal has another version by now.
 struct Candidate {
     weight: f64,
     pair: (u32, u32),
@@ -268,7 +252,7 @@ struct Candidate {
 
 impl Ord for Candidate {
     fn cmp(&self, other: &Self) -> Ordering {
-        // The heap gives the greatest first; least weight first, then least numbers.
+        // The heap gives the greatest first; least weight first, then least ids.
         other
             .weight
             .total_cmp(&self.weight)
@@ -291,254 +275,257 @@ impl PartialEq for Candidate {
 
 impl Eq for Candidate {}
 
+/// A portal that is still there, merged from one or several.
+#[derive(Clone, Copy)]
 struct Live {
+    /// Of the widest ball that passes. [Units: wu]
     radius: f64,
+    /// As [`CellPortal::mouth`] of the widest one.
     mouth: f64,
+    /// Sum of area vectors, from the lesser to the greater slot. [Units: wu²]
     vector: DVec3,
-    /// The widest one that it has become from, whose radius this is.
+    /// The widest of the portals before decimation that are part of it.
     widest: (u32, u32),
-    /// A person wants it to stay; two cells with such a portal among theirs never join.
+    /// A person wants it to stay; two cells with such a portal among theirs never merge.
     stays: bool,
     /// A person wants it to go.
     goes: bool,
     version: u32,
 }
 
-/// Removes portals, least weight first, and records each step.
-///
-/// A cell in which no ball of `min_radius` fits is a crevice, and one much smaller than its ball is a
-/// bundle of spikes: both join the neighbor that they open to most before anything else is decided, choices
-/// excepted.
-#[must_use]
-pub fn decimate(
-    cells: &Cells,
-    weight: Weight,
-    stop: f64,
-    min_radius: f64,
-    choices: &Choices,
-) -> Decimation {
-    let (undecided, portals) = decided(cells, weight, stop, min_radius, &BTreeMap::new());
-    if *choices == Choices::default() {
-        return undecided;
+impl Live {
+    fn new(pair: (u32, u32), portal: &CellPortal, choice: Option<Choice>) -> Self {
+        Self {
+            radius: portal.radius,
+            mouth: portal.mouth,
+            vector: portal.vector,
+            widest: pair,
+            stays: choice == Some(Choice::Keep),
+            goes: choice == Some(Choice::Join),
+            version: 0,
+        }
     }
-    // Nobody means a crevice that lies in a doorway.
-    let steps = undecided.steps.iter().zip(portals);
-    let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
-    decided(
-        cells,
-        weight,
-        stop,
-        min_radius,
-        &choices.of(cells, &portals),
-    )
-    .0
+
+    /// Takes in another portal between the same two cells.
+    fn absorb(&mut self, other: &Self) {
+        if (other.radius, other.mouth) > (self.radius, self.mouth) {
+            (self.radius, self.mouth, self.widest) = (other.radius, other.mouth, other.widest);
+        }
+        self.vector += other.vector;
+        self.stays |= other.stays;
+        self.goes |= other.goes;
+    }
 }
 
-/// Also gives the portal of each step, as it was before decimation.
-fn decided(
-    cells: &Cells,
-    weight: Weight,
-    stop: f64,
-    min_radius: f64,
-    choices: &BTreeMap<(u32, u32), bool>,
-) -> (Decimation, Vec<(u32, u32)>) {
-    let n = cells.radii.len();
-    let mut radius = cells.radii.clone();
-    let mut volumes = cells.volumes.clone();
-    let mut boxes = cells.boxes.clone();
-    let mut neighbors = vec![BTreeSet::new(); n];
-    let mut portals: BTreeMap<(u32, u32), Live> = BTreeMap::new();
-    for (&(a, b), portal) in &cells.portals {
-        neighbors[a as usize].insert(b);
-        neighbors[b as usize].insert(a);
-        let choice = choices.get(&(a, b)).copied();
-        portals.insert(
-            (a, b),
-            Live {
-                radius: portal.radius,
-                mouth: portal.mouth,
-                vector: portal.vector,
-                widest: (a, b),
-                stays: choice == Some(true),
-                goes: choice == Some(false),
-                version: 0,
-            },
-        );
+/// The key of the portal between two cells: lesser slot first.
+fn pair_of(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+/// A decimation under way.
+///
+/// A merged cell lives in the slot of the one that had more neighbors, so that a hall that takes in thousands of
+/// crevices is not moved each time.
+struct Merging<'a> {
+    cells: &'a Cells,
+    rules: Rules,
+    /// Of each slot.
+    bodies: Vec<Body>,
+    /// Of each slot, the slots that a portal leads to.
+    neighbors: Vec<BTreeSet<u32>>,
+    portals: BTreeMap<(u32, u32), Live>,
+    queue: BinaryHeap<Candidate>,
+    /// Of each slot, the original cell id as reported in [`Step`].
+    ids: Vec<u32>,
+    steps: Vec<Step>,
+    /// Of each step, the widest of the portals before decimation that it removed.
+    removed: Vec<(u32, u32)>,
+    stop_at: Option<usize>,
+    /// Portals that a person joined are in the queue with their own weight.
+    has_joins: bool,
+}
+
+impl<'a> Merging<'a> {
+    fn new(cells: &'a Cells, rules: Rules, choices: &BTreeMap<(u32, u32), Choice>) -> Self {
+        let n = cells.radii.len();
+        let body = |c: usize| Body {
+            radius: cells.radii[c],
+            volume: cells.volumes[c],
+            bounds: cells.boxes[c],
+        };
+        let mut neighbors = vec![BTreeSet::new(); n];
+        let mut portals = BTreeMap::new();
+        for (&(a, b), portal) in &cells.portals {
+            neighbors[a as usize].insert(b);
+            neighbors[b as usize].insert(a);
+            let choice = choices.get(&(a, b)).copied();
+            portals.insert((a, b), Live::new((a, b), portal, choice));
+        }
+        let mut merging = Self {
+            cells,
+            rules,
+            bodies: (0..n).map(body).collect(),
+            neighbors,
+            portals,
+            queue: BinaryHeap::new(),
+            ids: (0..n as u32).collect(),
+            steps: Vec::new(),
+            removed: Vec::new(),
+            stop_at: None,
+            has_joins: false,
+        };
+        let all = merging.portals.iter();
+        merging.queue = all.map(|(&pair, p)| merging.candidate(pair, p)).collect();
+        merging
     }
-    let is_crevice = |radius: f64, volume: f64| {
-        let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
-        radius < min_radius || ball.is_finite() && volume < HOLDS * ball
-    };
-    let weigh = |portal: &Live,
-                 pair: (u32, u32),
-                 radius: &[f64],
-                 volumes: &[f64],
-                 boxes: &[Aabb],
-                 has_joins: bool|
-     -> f64 {
-        let (a, b) = (pair.0 as usize, pair.1 as usize);
-        if portal.stays {
-            return f64::INFINITY;
-        }
-        if portal.goes && has_joins {
-            return JOINED;
-        }
-        let least = radius[a].min(radius[b]);
-        if [a, b].iter().any(|&c| is_crevice(radius[c], volumes[c])) {
-            // Widest opening first among crevices; through the mouth of a branch when there is no other.
-            let last = if portal.mouth > 0.0 { LAST } else { 1.0 };
-            return -last / (1.0 + 1.0 / portal.radius.max(1e-9));
-        }
-        if weight == Weight::ScaleFree {
-            return (least / portal.radius.max(1e-9)).max(portal.mouth);
-        }
-        let area = portal.vector.length().max(1e-9);
-        let projected = |b: &Aabb| {
-            let s = b.size().max(DVec3::ZERO);
-            let n = (portal.vector / area).abs();
-            n.dot(DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y))
-        };
-        let largest = projected(&boxes[a]).max(projected(&boxes[b]));
-        let aspect = largest / area;
-        match weight {
-            Weight::Aspect => aspect,
-            _ => aspect / largest.sqrt(),
-        }
-    };
-    let mut queue: BinaryHeap<Candidate> = portals
-        .iter()
-        .map(|(&pair, p)| Candidate {
-            weight: weigh(p, pair, &radius, &volumes, &boxes, false),
-            pair,
-            version: 0,
-        })
-        .collect();
-    // What is known of a cell lies in the slot of the one that had more neighbors, so that a hall that takes in
-    // thousands of crevices is not moved each time; `names` are the numbers that steps tell.
-    let mut names: Vec<u32> = (0..n as u32).collect();
-    let (mut steps, mut widest): (Vec<Step>, Vec<(u32, u32)>) = Default::default();
-    let mut stop_at = None;
-    // Portals that a person joined are among the next.
-    let mut has_joins = false;
-    while let Some(c) = queue.pop() {
-        let Some(portal) = portals.get(&c.pair).filter(|p| p.version == c.version) else {
-            continue;
-        };
-        if c.weight > stop && stop_at.is_none() {
-            // Rooms are what they are without the joins before they are joined: what was shown is what was meant.
-            if !has_joins {
-                has_joins = true;
-                let before = queue.len();
-                let goes = portals.iter().filter(|(_, p)| p.goes && !p.stays);
-                queue.extend(goes.map(|(&pair, p)| Candidate {
-                    weight: JOINED,
-                    pair,
-                    version: p.version,
-                }));
-                if queue.len() > before {
-                    queue.push(c);
-                    continue;
-                }
-            }
-            stop_at = Some(steps.len());
-        }
-        let [into, from] = {
-            let (a, b) = c.pair;
-            let count = |x: u32| neighbors[x as usize].len();
-            if count(a) >= count(b) { [a, b] } else { [b, a] }
-        };
-        let [one, other] = [into, from].map(|x| names[x as usize]);
-        steps.push(Step {
-            into: one.min(other),
-            from: one.max(other),
-            weight: c.weight,
-            is_mouth: weight == Weight::ScaleFree && portal.mouth > 0.0 && c.weight == portal.mouth,
-            position: cells.portals[&portal.widest].center,
-        });
-        widest.push(portal.widest);
-        names[into as usize] = one.min(other);
-        portals.remove(&c.pair);
-        let joined_radius = radius[into as usize].max(radius[from as usize]);
-        let joined_box = boxes[into as usize].union(boxes[from as usize]);
-        // The weight of a portal that nothing joined changes with its cells only.
-        let joined_volume = volumes[into as usize] + volumes[from as usize];
-        let was_crevice = is_crevice(radius[into as usize], volumes[into as usize]);
-        let weighs_anew = joined_radius != radius[into as usize]
-            || was_crevice != is_crevice(joined_radius, joined_volume)
-            || weight != Weight::ScaleFree && joined_box != boxes[into as usize];
-        radius[into as usize] = joined_radius;
-        volumes[into as usize] = joined_volume;
-        boxes[into as usize] = joined_box;
-        neighbors[into as usize].remove(&from);
-        let mut touched = Vec::new();
-        for other in std::mem::take(&mut neighbors[from as usize]) {
-            if other == into {
+
+    /// Merges until no portal is left. Also gives, for each step, the portal before decimation that it removed.
+    fn run(mut self) -> (Decimation, Vec<(u32, u32)>) {
+        while let Some(candidate) = self.queue.pop() {
+            if self.is_stale(&candidate) {
                 continue;
             }
-            neighbors[other as usize].remove(&from);
-            neighbors[other as usize].insert(into);
-            neighbors[into as usize].insert(other);
-            touched.push(other);
-            let old = portals
-                .remove(&(from.min(other), from.max(other)))
-                .expect("neighbors have a portal");
-            // Vectors point from the lesser to the greater number.
-            let sign = if (from < other) == (into < other) {
-                1.0
-            } else {
-                -1.0
-            };
-            let pair = (into.min(other), into.max(other));
-            let live = portals.entry(pair).or_insert(Live {
-                // Less than any, so that it takes the other's place.
-                radius: -1.0,
-                mouth: 0.0,
-                vector: DVec3::ZERO,
-                widest: pair,
-                stays: false,
-                goes: false,
-                version: 0,
-            });
-            if (old.radius, old.mouth) > (live.radius, live.mouth) {
-                (live.radius, live.mouth, live.widest) = (old.radius, old.mouth, old.widest);
+            if self.stop_at.is_none() && candidate.weight > self.rules.stop {
+                if self.take_up_joins() {
+                    self.queue.push(candidate);
+                    continue;
+                }
+                self.stop_at = Some(self.steps.len());
             }
-            live.vector += old.vector * sign;
-            live.stays |= old.stays;
-            live.goes |= old.goes;
+            self.remove(&candidate);
         }
-        if weighs_anew {
-            touched = neighbors[into as usize].iter().copied().collect();
-        }
-        for other in touched {
-            let pair = (into.min(other), into.max(other));
-            let live = portals.get_mut(&pair).expect("neighbors have a portal");
-            // Unlike any version of this pair before, since steps only grow in number.
-            live.version = steps.len() as u32;
-            queue.push(Candidate {
-                weight: weigh(live, pair, &radius, &volumes, &boxes, has_joins),
-                pair,
-                version: live.version,
-            });
+        let decimation = Decimation {
+            n_cells: self.bodies.len(),
+            stop: self.stop_at.unwrap_or(self.steps.len()),
+            steps: self.steps,
+        };
+        (decimation, self.removed)
+    }
+
+    fn candidate(&self, pair: (u32, u32), portal: &Live) -> Candidate {
+        let weight = if portal.stays {
+            f64::INFINITY
+        } else if portal.goes && self.has_joins {
+            JOINED
+        } else {
+            let bodies = [pair.0, pair.1].map(|c| &self.bodies[c as usize]);
+            self.rules.weigh(portal, bodies)
+        };
+        Candidate {
+            weight,
+            pair,
+            version: portal.version,
         }
     }
-    let decimation = Decimation {
-        n_cells: n,
-        stop: stop_at.unwrap_or(steps.len()),
-        steps,
-    };
-    (decimation, widest)
-}
 
-impl Decimation {
-    /// The cell that each cell of the beginning belongs to after the first `n` steps.
-    #[must_use]
-    pub fn after(&self, n: usize) -> Vec<u32> {
-        let mut cell: Vec<u32> = (0..self.n_cells as u32).collect();
-        // A cell is gone before the one that it went into: from the last on.
-        for s in self.steps.iter().take(n).rev() {
-            cell[s.from as usize] = cell[s.into as usize];
+    fn is_stale(&self, candidate: &Candidate) -> bool {
+        let portal = self.portals.get(&candidate.pair);
+        portal.is_none_or(|p| p.version != candidate.version)
+    }
+
+    /// Queues the portals that a person joined, once; false if there are none. Rooms are what they are without the
+    /// joins before they are joined: what was shown is what was meant.
+    fn take_up_joins(&mut self) -> bool {
+        if self.has_joins {
+            return false;
         }
-        cell
+        self.has_joins = true;
+        let goes = self.portals.iter().filter(|(_, p)| p.goes && !p.stays);
+        let goes: Vec<Candidate> = goes.map(|(&pair, p)| self.candidate(pair, p)).collect();
+        let is_any = !goes.is_empty();
+        self.queue.extend(goes);
+        is_any
+    }
+
+    /// Removes a portal: the cells on both sides become one.
+    fn remove(&mut self, candidate: &Candidate) {
+        let (a, b) = candidate.pair;
+        let degree = |x: u32| self.neighbors[x as usize].len();
+        let [into, from] = if degree(a) >= degree(b) {
+            [a, b]
+        } else {
+            [b, a]
+        };
+        self.record(candidate, [into, from]);
+        self.portals.remove(&candidate.pair);
+        let weighs_anew = self.merge_bodies(into, from);
+        let moved = self.move_portals(into, from);
+        let touched = if weighs_anew {
+            self.neighbors[into as usize].iter().copied().collect()
+        } else {
+            moved
+        };
+        for other in touched {
+            self.queue_anew(pair_of(into, other));
+        }
+    }
+
+    fn record(&mut self, candidate: &Candidate, [into, from]: [u32; 2]) {
+        let portal = &self.portals[&candidate.pair];
+        let [one, other] = [into, from].map(|x| self.ids[x as usize]);
+        self.steps.push(Step {
+            into: one.min(other),
+            from: one.max(other),
+            weight: candidate.weight,
+            is_mouth: self.rules.weight == Weight::ScaleFree
+                && portal.mouth > 0.0
+                && candidate.weight == portal.mouth,
+            position: self.cells.portals[&portal.widest].center,
+        });
+        self.removed.push(portal.widest);
+        self.ids[into as usize] = one.min(other);
+    }
+
+    /// Whether the portals of `into` must be weighed anew.
+    fn merge_bodies(&mut self, into: u32, from: u32) -> bool {
+        let [before, other] = [into, from].map(|x| self.bodies[x as usize]);
+        let after = Body {
+            radius: before.radius.max(other.radius),
+            volume: before.volume + other.volume,
+            bounds: before.bounds.union(other.bounds),
+        };
+        self.bodies[into as usize] = after;
+        self.rules.weighs_anew(&before, &after)
+    }
+
+    /// Makes the portals of `from` portals of `into`, and gives the cells that they lead to.
+    fn move_portals(&mut self, into: u32, from: u32) -> Vec<u32> {
+        self.neighbors[into as usize].remove(&from);
+        let mut others = std::mem::take(&mut self.neighbors[from as usize]);
+        others.remove(&into);
+        for &other in &others {
+            self.neighbors[other as usize].remove(&from);
+            self.neighbors[other as usize].insert(into);
+            self.neighbors[into as usize].insert(other);
+            let mut portal = self
+                .portals
+                .remove(&pair_of(from, other))
+                .expect("neighbors have a portal");
+            // Vectors point from the lesser to the greater slot.
+            if (from < other) != (into < other) {
+                portal.vector = -portal.vector;
+            }
+            let pair = pair_of(into, other);
+            match self.portals.entry(pair) {
+                Entry::Vacant(entry) => {
+                    entry.insert(portal);
+                }
+                Entry::Occupied(mut entry) => entry.get_mut().absorb(&portal),
+            }
+        }
+        others.into_iter().collect()
+    }
+
+    fn queue_anew(&mut self, pair: (u32, u32)) {
+        let live = self
+            .portals
+            .get_mut(&pair)
+            .expect("neighbors have a portal");
+        // Unlike any version of this pair before, since steps only grow in number.
+        live.version = self.steps.len() as u32;
+        let live = *live;
+        let candidate = self.candidate(pair, &live);
+        self.queue.push(candidate);
     }
 }
 

@@ -5,18 +5,26 @@
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
-//! | tetrahedra of points | `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
-//! | points where surfaces need them | `refine` | Chew 1993; Boissonnat & Oudot 2005 |
-//! | tetrahedra cut by polygons, what is open between | `cut` | §4.2.1, §4.2.2 |
+//! | tetrahedra of points | `insert`, `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
+//! | points where surfaces need them | `refine`, `balls` | Chew 1993; Boissonnat & Oudot 2005 |
+//! | tetrahedra cut by polygons, what is open between | `cut`, `openings` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
+//! | parts of the air that nothing narrows between, merged | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
-//! | cells, and portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
+//! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
+//! | rooms that are left, and matter | `standing` | ours |
 //! | candidates and votes | `rooms` | ours |
+//!
+//! `session` runs the stages up to decimation, `propose` the rest.
 
+mod balls;
 mod branches;
+mod cells;
 mod config;
 mod cut;
 mod decimate;
+mod insert;
+mod openings;
 mod order;
 mod predicate;
 mod propose;
@@ -32,13 +40,12 @@ mod space_tests;
 #[cfg(test)]
 mod tests;
 
+pub use cells::{CellPortal, Cells, OUTDOOR_CELL, flow_together};
 pub use config::DelaunayConfig;
-pub use decimate::{
-    CellPortal, Cells, Choices, Decimation, JOINED, OUTDOOR_CELL, Step, Weight, decimate,
-    default_stop, flow_together,
-};
+pub use decimate::{Choices, Decimation, JOINED, Step, Weight, decimate, default_stop};
+pub use insert::tetrahedralize;
 pub use propose::bake_session;
 pub(crate) use propose::propose;
 pub use session::Session;
 pub use space::{LEAST_BALL, Link, Space, divide};
-pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, tetrahedralize};
+pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron};

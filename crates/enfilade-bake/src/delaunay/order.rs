@@ -6,7 +6,7 @@
 
 use enfilade_geom::{Aabb, DVec3};
 
-/// Bits of the curve's index an axis.
+/// Bits of the curve's index for each axis.
 const BITS: u32 = 19;
 
 /// Indices of `points` in the order of insertion, equal points next to each other.
@@ -43,7 +43,7 @@ pub(super) fn insertion_order(points: &[DVec3]) -> Vec<u32> {
     keys.into_iter().map(|k| k.1).collect()
 }
 
-/// Bits without a pattern (the finalizer of splitmix64, for each coordinate).
+/// Hash of a point (the finalizer of splitmix64, for each coordinate).
 fn hash(p: DVec3) -> u64 {
     p.to_array().iter().fold(0x9e37_79b9_7f4a_7c15, |h, x| {
         let mut z = h ^ x.to_bits();

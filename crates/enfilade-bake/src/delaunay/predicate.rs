@@ -1,11 +1,11 @@
 //! Signs of determinants, never wrong: on which side of a plane, inside which sphere.
 //!
-//! Three steps, each asked only when the one before cannot tell:
+//! Three steps, each taken only when the one before is not certain:
 //! 1. floating point, with an error bound taken from the largest difference along each axis
 //!    (Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 //!    Predicates", 1997, table 4, with the permanent bounded from above);
 //! 2. whole numbers: coordinates are multiples of powers of two, and most differences need at most
-//!    40 bits, so that `i128` (and a sum of 256 bits) is exact. Cospherical corners of buildings
+//!    40 bits, so that `i128` (and a sum of 256 bits) is exact. Cospherical vertices of buildings
 //!    end here, in a tenth of the time that expansions take;
 //! 3. the expansions of the `robust` crate.
 

@@ -1,42 +1,40 @@
-//! Points where surfaces need them: until every ball between points is a ball of air.
+//! Refinement: points are added to surfaces until every ball between points is a ball of air.
 //!
 //! The circumsphere of a tetrahedron is empty of points, but surfaces may run through it where points are
-//! few; then the tetrahedron says nothing about the air. The point of the surface nearest to the ball's
-//! middle is added, and so on (Chew, "Guaranteed-quality mesh generation for curved surfaces", 1993;
+//! few; then the tetrahedron says nothing about the air. The point of the surface nearest to the sphere's
+//! center is added, and so on (Chew, "Guaranteed-quality mesh generation for curved surfaces", 1993;
 //! Boissonnat & Oudot, "Provably good sampling and meshing of surfaces", 2005, for the density that comes
-//! of it: in proportion to the distance to the next surface). Great walls of great halls get few points,
-//! the jambs of a door many, wherever the scene is large or small.
+//! of it: in proportion to the distance to the next surface). Large walls of large halls get few points,
+//! the jambs of a door many, whatever the scale of the scene.
 //!
-//! Wide places come first: passes go down to ever narrower balls of air, and the last one looks after narrow gaps,
-//! too, such as those between the two faces of a wall. When points run out, what is wide is right.
+//! Wide places come first: each pass goes down to narrower balls of air, and the last one also refines narrow gaps,
+//! such as those between the two faces of a wall. When points run out, wide places are right all the same.
 //!
-//! **It ends**: a new point lies away from all others by a tenth of a radius that is above the least.
+//! **It ends**: a new point is at least a tenth of a radius away from all others, and radii have a lower bound.
 
 use std::collections::HashMap;
 
 use enfilade_geom::{Aabb, Bvh, DVec3};
 use rayon::prelude::*;
 
-use super::space::{circle, circumsphere};
-use super::tetrahedra::{Delaunay, DelaunayError, Growing};
+use super::balls::{ENTERS, circle, circumsphere};
+use super::insert::Growing;
+use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
 
-/// A surface may enter a ball by this share of its radius. Walls then have points about half a radius
-/// apart, and radii are right to a twentieth.
-pub(super) const ENTERS: f64 = 0.1;
-/// Of points wanted in one round, none is nearer to another than this share of its ball's radius.
+/// No two points that are added in one round are nearer to each other than this share of the ball's radius.
 const APART: f64 = 0.4;
-/// More rounds of a pass than any scene took; after that it counts as points having run out.
+/// More rounds of a pass than any scene took. After that, points count as having run out.
 const MAX_ROUNDS: usize = 100;
 
 /// Tetrahedra whose balls are balls of air.
 pub(super) struct Refined {
     pub(super) delaunay: Delaunay,
-    /// Radius of balls of air down to which that holds; above the one asked for where points ran out.
+    /// Radius down to which that holds; above the requested one where points ran out.
     /// [Units: wu]
     pub(super) down_to: f64,
 }
 
-/// A point wanted, and the radius of the ball that wants it.
+/// A point to add, and the radius of the ball that the surface enters there.
 #[derive(Clone, Copy)]
 struct Wanted {
     point: DVec3,
@@ -55,7 +53,7 @@ pub(super) fn refined(
 ) -> Result<Refined, DelaunayError> {
     let mut growing = Growing::begin(points)?;
     let mut down_to = bounds.size().max_element();
-    // Least radius of a ball that wants points, and of the air about its middle.
+    // Least radius of a ball that gets points, and least distance of its center from surfaces.
     let passes = [8.0, 4.0, 2.0, 1.0].map(|k| (k * least, k * least));
     for pass in passes.into_iter().chain([(least, 0.0)]) {
         let mut fresh = growing.all();
@@ -64,7 +62,7 @@ pub(super) fn refined(
                 .par_iter()
                 .flat_map_iter(|&t| wanted_by(&growing, t, surfaces, bounds, pass))
                 .collect();
-            let round = spread(wanted);
+            let round = thinned(wanted);
             if round.is_empty() {
                 break;
             }
@@ -87,7 +85,7 @@ pub(super) fn refined(
     })
 }
 
-/// Points that the balls of a tetrahedron and of its facets want.
+/// Points to add where surfaces enter the ball of a tetrahedron or those of its facets.
 fn wanted_by(
     growing: &Growing,
     t: u32,
@@ -119,15 +117,11 @@ fn wanted_by(
     out[4] = entered(center, radius);
     if out[4].is_none() {
         // What passes a facet is as wide as the facet's own ball where that is a bottleneck: between the
-        // middles of both sides.
+        // centers of the balls on both sides.
         let tet = growing.tetrahedron(t);
         for (i, out) in out.iter_mut().take(4).enumerate() {
             let other = tet.neighbor(i);
-            if growing
-                .tetrahedron(other)
-                .vertices
-                .contains(&super::INFINITE)
-            {
+            if growing.tetrahedron(other).vertices.contains(&INFINITE) {
                 continue;
             }
             let f = tet.facet(i).map(|v| vertices[v as usize]);
@@ -146,7 +140,7 @@ fn wanted_by(
             let Some(wanted) = entered(middle, radius) else {
                 continue;
             };
-            // A facet in a wall wants nothing: nothing passes it.
+            // A facet in a wall gets no points: nothing passes it.
             let mean = |c: [DVec3; 4]| c.iter().sum::<DVec3>() / 4.0;
             if wanted.point.distance(middle) > 1e-6 * radius
                 && !surfaces.any_hit(mean(c), middle, |_| false)
@@ -159,8 +153,8 @@ fn wanted_by(
     out.into_iter().flatten()
 }
 
-/// Of the points wanted, some that are not near to each other, those of the largest balls first.
-fn spread(mut wanted: Vec<Wanted>) -> Vec<Wanted> {
+/// Those of some points to add that are not near to each other, preferring those of the largest balls.
+fn thinned(mut wanted: Vec<Wanted>) -> Vec<Wanted> {
     wanted.sort_unstable_by(|a, b| {
         let (p, q) = (a.point.to_array(), b.point.to_array());
         let order = |k: usize| p[k].total_cmp(&q[k]);
@@ -170,14 +164,14 @@ fn spread(mut wanted: Vec<Wanted>) -> Vec<Wanted> {
             .then_with(|| order(1))
             .then_with(|| order(2))
     });
-    // Cells of about the distance to be kept, a size for each octave of radii.
+    // A grid for each octave of radii, with cells of about the distance to be kept.
     let mut taken: HashMap<(i32, [i64; 3]), Vec<DVec3>> = HashMap::new();
     let mut octaves: Vec<i32> = Vec::new();
     let size = |octave: i32| APART * 2.0_f64.powi(octave);
     let cell = |p: DVec3, octave: i32| (p / size(octave)).floor().to_array().map(|x| x as i64);
     let mut out = Vec::new();
     for w in wanted {
-        // Larger balls came first, and their cells are no smaller than the distance asked about here.
+        // Larger balls came first, and their grid cells are no smaller than this ball's distance.
         let is_near = octaves.iter().any(|&octave| {
             let [x, y, z] = cell(w.point, octave);
             (0..27).any(|i| {

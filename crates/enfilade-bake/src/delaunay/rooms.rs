@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use enfilade_geom::{Bvh, DVec3, Plane};
 use rayon::prelude::*;
 
-use super::decimate::OUTDOOR_CELL;
+use super::cells::OUTDOOR_CELL;
 use super::session::Session;
 use super::space::Space;
 use super::standing::Standing;

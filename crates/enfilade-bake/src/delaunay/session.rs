@@ -4,9 +4,8 @@ use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, Triangle};
 
 use super::branches::find_branches;
-use super::decimate::{
-    Cells, Choices, Decimation, Weight, decimate, default_stop, flow_together, parted,
-};
+use super::cells::{Cells, divided_at_mouths, flow_together};
+use super::decimate::{Choices, Decimation, Weight, decimate, default_stop};
 use super::space::{Space, divide};
 use super::standing::count_rooms;
 use crate::structure::{Structure, in_own_order};
@@ -103,7 +102,7 @@ impl Session {
     }
 }
 
-/// Cells that end where branches leave the rooms that a decimation without choices comes to.
+/// Cells, divided where branches leave the rooms that a decimation without choices ends with.
 fn with_branches(
     space: &Space,
     cells: Cells,
@@ -122,6 +121,6 @@ fn with_branches(
         cells
     } else {
         let branches = branches.without_leftovers(space, &cells.cell_of_part);
-        parted(space, &cells, &branches)
+        divided_at_mouths(space, &cells, &branches)
     }
 }

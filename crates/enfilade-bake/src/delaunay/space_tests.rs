@@ -1,6 +1,6 @@
 //! Whether the air's parts are joined just where one can get from one to the next: an oracle by lines.
 
-use enfilade_geom::{Bvh, DMat4, DVec3, Triangle};
+use enfilade_geom::{Bvh, DMat4, DVec3, Sets, Triangle};
 use proptest::prelude::*;
 
 use super::space::{Space, divide};
@@ -23,21 +23,11 @@ fn is_free(walls: &[Triangle], p: DVec3, q: DVec3) -> bool {
 
 /// The connected region of each part.
 fn regions(space: &Space) -> Vec<u32> {
-    let mut region: Vec<u32> = (0..space.middles.len() as u32).collect();
-    fn root(region: &mut [u32], mut x: u32) -> u32 {
-        while region[x as usize] != x {
-            region[x as usize] = region[region[x as usize] as usize];
-            x = region[x as usize];
-        }
-        x
-    }
+    let mut sets = Sets::new(space.middles.len());
     for l in &space.links {
-        let [a, b] = l.parts.map(|p| root(&mut region, p));
-        region[a.max(b) as usize] = a.min(b);
+        sets.join(l.parts[0], l.parts[1]);
     }
-    (0..region.len() as u32)
-        .map(|x| root(&mut region, x))
-        .collect()
+    (0..sets.len() as u32).map(|x| sets.find(x)).collect()
 }
 
 /// Regions of the parts of the tetrahedron around `p` that `p` sees; its own is one of them.

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use enfilade_geom::{Bvh, DVec3};
 use rayon::prelude::*;
 
-use super::decimate::{Cells, OUTDOOR_CELL};
-use super::space::Space;
+use super::cells::{Cells, OUTDOOR_CELL};
+use super::space::{Space, connected};
 use crate::structure::{count_backs, is_crevice};
 
 /// Points of a region that ask around whether it is a room.
@@ -98,41 +98,6 @@ fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) ->
         }
     };
     room_of_cell.iter().map(room).collect()
-}
-
-/// Groups of links whose facets share corners.
-pub(super) fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
-    let facet = |l: u32| space.vertices_about(&space.links[l as usize]);
-    let mut by_corner: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (i, &l) in links.iter().enumerate() {
-        for v in facet(l) {
-            by_corner.entry(v).or_default().push(i);
-        }
-    }
-    let mut taken = vec![false; links.len()];
-    let mut out = Vec::new();
-    for first in 0..links.len() {
-        if taken[first] {
-            continue;
-        }
-        taken[first] = true;
-        let mut patch = vec![first];
-        let mut next = 0;
-        while next < patch.len() {
-            for v in facet(links[patch[next]]) {
-                for &i in &by_corner[&v] {
-                    if !taken[i] {
-                        taken[i] = true;
-                        patch.push(i);
-                    }
-                }
-            }
-            next += 1;
-        }
-        patch.sort_unstable();
-        out.push(patch.into_iter().map(|i| links[i]).collect());
-    }
-    out
 }
 
 /// Rooms that are none: the insides of walls and solids, which nothing can get into and from which

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use enfilade_geom::DVec3;
+
 use super::candidates::fit_candidates;
 use super::flooded::Flooded;
 use super::hollow::find_matter;
@@ -86,13 +88,10 @@ pub(crate) fn propose(
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh);
     let ballots = Ballots::cast(&grid, &labels, &regions, &matter.regions, &stairs);
     drop(stairs);
+    let region_at = |p| region_at(&grid, &labels, &regions, p);
     let mut voids = Vec::new();
     if matter.fronts_face_air {
-        voids = shallow_voids(&structure.walls, &structure.bvh, &|p| {
-            grid.voxel_at(p).map_or(0, |[x, y, z]| {
-                regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
-            })
-        });
+        voids = shallow_voids(&structure.walls, &structure.bvh, &region_at);
     }
     drop(labels);
     // From here on all is where the scene has it.
@@ -125,6 +124,13 @@ pub(crate) fn propose(
             frame.aabb_to_scene(&grid.aabb()),
             ballots.count(&grid, frame),
         )
+    })
+}
+
+/// The region of a point, 0 where there is none.
+fn region_at(grid: &Grid, labels: &Labels, regions: &Regions, p: DVec3) -> u32 {
+    grid.voxel_at(p).map_or(0, |[x, y, z]| {
+        regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
     })
 }
 

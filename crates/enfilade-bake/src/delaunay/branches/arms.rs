@@ -1,0 +1,95 @@
+//! Arms of forks: how deep they are, and whether their walls are round.
+//!
+//! Crossing corridors of a building are forks, too, and one room to their architect. Corridors have flat walls
+//! at right angles: with θ the directions of normals about the axis, the mean of `exp(4iθ)` has length one there and
+//! zero in any tube that is round.
+
+use std::f64::consts::TAU;
+
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
+
+use super::regions::Regions;
+use super::rule::{Arm, ArmFacts, classify_arm};
+
+/// Rays about an axis: enough for a polygon of a dozen sides to look round.
+const RAYS: usize = 32;
+
+/// The walls around, for normals.
+pub(super) struct Walls<'a> {
+    pub(super) triangles: &'a [Triangle],
+    pub(super) bvh: &'a Bvh,
+}
+
+/// A piece of what is around a fork.
+pub(super) struct ArmPiece {
+    /// Nearest to the middle of the fork first.
+    pub(super) parts: Vec<u32>,
+    /// Mean radius of its balls. [Units: wu]
+    pub(super) radius: f64,
+    /// Where it begins. [Units: wu]
+    pub(super) mouth: DVec3,
+    pub(super) kind: Arm,
+}
+
+impl Regions<'_> {
+    /// Measures an arm. `piece` holds its parts, nearest first, with their distances from the middle of the fork, from which
+    /// a ball of radius `removed` is removed; `radius` is that of the ball there.
+    pub(super) fn arm(
+        &self,
+        piece: &[(f64, u32)],
+        removed: f64,
+        radius: f64,
+        walls: &Walls<'_>,
+    ) -> ArmPiece {
+        // Mean center of the balls of a stretch, given by distances in radii from where the arm begins.
+        let stretch = |from: f64, to: f64| {
+            let at = |d: f64| piece.partition_point(|p| (p.0 - removed) / radius < d);
+            let from = at(from).min(piece.len() - 1);
+            let within = &piece[from..at(to).max(from + 1)];
+            let sum: DVec3 = within.iter().map(|p| self.centers[p.1 as usize]).sum();
+            sum / within.len() as f64
+        };
+        let [mouth, middle, far] = [0.0, 1.0, 2.0].map(|d| stretch(d, d + 1.0));
+        let depth = |p: &(f64, u32)| self.centers[p.1 as usize].distance(mouth) + self.radius(p.1);
+        let (enclosed, squareness) = squareness(middle, far - mouth, walls);
+        let facts = ArmFacts {
+            depth: piece.iter().map(depth).fold(0.0, f64::max),
+            radius,
+            enclosed,
+            squareness,
+        };
+        let sum: f64 = piece.iter().map(|p| self.radius(p.1)).sum();
+        ArmPiece {
+            parts: piece.iter().map(|p| p.1).collect(),
+            radius: sum / piece.len() as f64,
+            mouth,
+            kind: classify_arm(&facts),
+        }
+    }
+}
+
+/// Of rays about an axis, the share that meets a wall; and the length of the mean of `exp(4iθ)` over these walls.
+fn squareness(origin: DVec3, axis: DVec3, walls: &Walls<'_>) -> (f64, f64) {
+    let Some(axis) = axis.try_normalize() else {
+        return (0.0, 0.0);
+    };
+    let (u, v) = axis.any_orthonormal_pair();
+    let (mut re, mut im, mut n_hits) = (0.0, 0.0, 0);
+    for i in 0..RAYS {
+        let (sin, cos) = (TAU * i as f64 / RAYS as f64).sin_cos();
+        let ray = Ray {
+            origin,
+            direction: u * cos + v * sin,
+            t_max: f64::INFINITY,
+        };
+        if let Some(hit) = walls.bvh.closest_hit(&ray, |_| false) {
+            let normal = triangle_area_normal(&walls.triangles[hit.triangle as usize]);
+            let (sin, cos) = (4.0 * normal.dot(v).atan2(normal.dot(u))).sin_cos();
+            re += cos;
+            im += sin;
+            n_hits += 1;
+        }
+    }
+    let n_hits = f64::from(n_hits);
+    (n_hits / RAYS as f64, f64::hypot(re, im) / n_hits)
+}

@@ -1,0 +1,408 @@
+//! The rule: what a limb or an arm is, from what was measured of it.
+//!
+//! Nothing here looks at the model. A limb that is no branch is merged across its largest mouth, so each bound errs
+//! either towards more rooms or towards fewer; its comment says which. The bounds stand between what was measured:
+//! vessels and generated tubes on one side; eaves, niches, beds, window reveals and cave walls of a dozen scenes on the
+//! other. None depends on the unit.
+
+use std::f64::consts::PI;
+
+use super::labels::BranchMouth;
+
+/// The trunk's largest ball near the mouth ÷ the branch's largest ball well inside, at least. Tubes of nearly one width go on
+/// from each other. Higher gives fewer branches.
+pub(super) const NARROWS: f64 = 1.5;
+/// Depth of a branch, from its mouth to its far end, ÷ diameter of the mouth, at least. Alcoves are about as deep as wide.
+/// Higher gives fewer branches.
+pub(super) const DEEP: f64 = 2.0;
+/// Root mean square distance of a mouth from its center ÷ radius of its ball, at most: a disk has 0.7, a rectangle of
+/// 1 : 2 has 1.3, what runs all around a bed 2.5 and more. Lower gives fewer branches.
+const SPREAD: f64 = 1.5;
+/// The mouth is moved to where balls of this many times the branch's own no longer pass. Balls of one tube differ by as much,
+/// depending on where points are. Higher puts the mouth further into the trunk.
+pub(super) const FLARES: f64 = 1.05;
+
+/// Radii of the balls that are removed where tubes may meet, least first, ÷ that of the ball there. Arms at a right angle
+/// are apart from 1.42 on, at 40° from 2.75. A larger last one separates arms at smaller angles, but needs longer arms.
+pub(super) const REMOVED: [f64; 4] = [1.5, 2.0, 2.5, 3.0];
+/// Balls beside the one in the middle of a fork are at most this many times as wide: balls of one tube differ by that
+/// much. Higher tests more places that are no middle.
+pub(super) const WIDEST: f64 = 1.1;
+/// A place this near to one that was tested is not. Lower finds the middle of a fork better, and takes longer. [Units: radii]
+pub(super) const STRIDE: f64 = 0.5;
+/// Squareness of an arm that is a corridor, at least: 1 between four walls, 0.5 under a barrel vault, 0 in a round tube.
+/// Higher gives more branches.
+const SQUARE: f64 = 0.5;
+/// Share of the rays about an arm's axis that meet a wall, at least: the walls of fewer say nothing. Higher gives fewer branches.
+const ENCLOSED: f64 = 0.5;
+/// What the mouth of a fork's arm weighs: as much as that of a branch half as wide as its trunk. Only a person who
+/// decimates on sees the difference.
+pub(super) const ARM_WEIGHS: f64 = 2.0;
+
+/// What is measured of a mouth: a connected set of facets where a limb meets another region of its room.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MouthFacts {
+    /// Of the widest ball that passes. [Units: wu]
+    pub(super) radius: f64,
+    /// Projected area: the length of the sum of the facets' area vectors. [Units: wu²]
+    pub(super) area: f64,
+    /// Root mean square distance of the facets from their center. [Units: wu]
+    pub(super) spread: f64,
+}
+
+impl MouthFacts {
+    /// Much longer than wide: under a bed, along a wall or in a corner.
+    fn is_slit(&self) -> bool {
+        self.spread > SPREAD * self.radius
+    }
+
+    /// Radius of the widest disk that can pass: less than the ball's where most of the mouth's rim leads elsewhere.
+    /// [Units: wu]
+    fn disk(&self) -> f64 {
+        self.radius.min((self.area / PI).sqrt())
+    }
+
+    /// Much narrower than another, so that it is no second mouth.
+    fn is_chink_beside(&self, other: &Self) -> bool {
+        self.disk() * NARROWS < other.radius
+    }
+}
+
+/// How many mouths of a limb, which are given widest first, are main ones: a single one, but outdoors all that are nearly as wide as the
+/// first, since a tunnel is open at both ends.
+pub(super) fn n_main_mouths(radii: &[f64], is_outdoors: bool) -> usize {
+    match radii.first() {
+        Some(first) if is_outdoors => radii.partition_point(|r| r * NARROWS >= *first),
+        first => usize::from(first.is_some()),
+    }
+}
+
+/// What is measured of a limb.
+#[derive(Clone, Debug)]
+pub(super) struct LimbFacts {
+    /// It lies in the room around the scene.
+    pub(super) is_outdoors: bool,
+    /// Widest first. Mouths of branches that leave the limb itself do not count.
+    pub(super) mouths: Vec<MouthFacts>,
+    /// Radius of its largest ball that is a diameter or more away from each main mouth; `None` if no ball that large is
+    /// known. [Units: wu]
+    pub(super) body: Option<f64>,
+    /// Radius of the trunk's largest ball near the widest mouth, that is within twice [`DEEP`] radii. A taper narrows
+    /// further away, too. [Units: wu]
+    pub(super) trunk: f64,
+    /// From the center of the widest mouth to the far side of the furthest ball not [`NARROWS`] times narrower than the
+    /// mouth: narrower ones lie in corners. [Units: wu]
+    pub(super) depth: f64,
+    /// [Units: wu³]
+    pub(super) volume: f64,
+    /// Area of all openings to rooms with a ball wider than the widest mouth. By area and not by the balls that
+    /// pass, since a door leaf or a pane in an opening lets none pass. [Units: wu²]
+    pub(super) exits: f64,
+    /// Radius of the least ball of air that is known. [Units: wu]
+    pub(super) finest: f64,
+}
+
+/// What a limb is. All but a branch is merged across its widest mouth, if it has one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Limb {
+    /// Nothing else is left of its room.
+    Whole,
+    /// Not as deep as its mouth is wide.
+    Bulge,
+    /// It has a second mouth, or leads on to a room that is wider than its mouth: a passage between chambers, or a ring.
+    Neck,
+    /// Its mouth is a slit.
+    Crevice,
+    /// Not [`DEEP`] enough.
+    Alcove,
+    /// Hardly narrower than its trunk.
+    Continuation,
+    /// A tube that leaves its trunk: a room.
+    Branch(BranchMouth),
+}
+
+/// What a limb is. A tube outdoors may have several mouths and doors to rooms, and counts as deep by what it
+/// holds.
+pub(super) fn classify(limb: &LimbFacts) -> Limb {
+    let Some((widest, others)) = limb.mouths.split_first() else {
+        return Limb::Whole;
+    };
+    let Some(body) = limb.body else {
+        return Limb::Bulge;
+    };
+    let has_two_mouths = others.iter().any(|m| !m.is_chink_beside(widest));
+    // Less than the disk of the least ball that is known is a crack.
+    let leads_on = limb.exits > PI * limb.finest.powi(2);
+    if !limb.is_outdoors && (has_two_mouths || leads_on) {
+        return Limb::Neck;
+    }
+    let radii: Vec<f64> = limb.mouths.iter().map(|m| m.radius).collect();
+    let main = &limb.mouths[..n_main_mouths(&radii, limb.is_outdoors)];
+    if main.iter().any(MouthFacts::is_slit) {
+        return Limb::Crevice;
+    }
+    let is_deep = if limb.is_outdoors {
+        let needs = |m: &MouthFacts| 2.0 * DEEP * m.radius * m.area;
+        limb.volume >= limb.mouths.iter().map(needs).sum()
+    } else {
+        limb.depth >= 2.0 * DEEP * widest.radius
+    };
+    if !is_deep {
+        return Limb::Alcove;
+    }
+    let weight = limb.trunk / body;
+    if weight < NARROWS {
+        return Limb::Continuation;
+    }
+    Limb::Branch(BranchMouth {
+        weight,
+        radius: body,
+    })
+}
+
+/// What is left of a limb's surroundings when a ball is removed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Meeting {
+    /// A tube, a bend or a hall, and a larger ball leaves no more.
+    None,
+    /// A tube, or a fork with arms that are not apart yet: a larger ball may tell.
+    Unclear,
+    /// Perhaps a fork.
+    Fork,
+}
+
+/// What a place is where so many pieces go on for [`DEEP`] diameters from a ball that is removed.
+pub(super) fn meeting(n_pieces: usize) -> Meeting {
+    match n_pieces {
+        0 | 1 => Meeting::None,
+        2 => Meeting::Unclear,
+        _ => Meeting::Fork,
+    }
+}
+
+/// What is measured of a piece that is left around a fork.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ArmFacts {
+    /// From where it begins to the far side of its furthest ball. [Units: wu]
+    pub(super) depth: f64,
+    /// Of the ball in the middle of the fork. [Units: wu]
+    pub(super) radius: f64,
+    /// Share of the rays about its axis that meet a wall.
+    pub(super) enclosed: f64,
+    /// Length of the mean of `exp(4iθ)` over those walls, with θ the direction of a wall's normal about the axis.
+    pub(super) squareness: f64,
+}
+
+/// What an arm of a fork is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Arm {
+    /// No deeper than an alcove: the ball that was removed may lie off the fork's middle.
+    Stub,
+    /// Four walls at right angles: where corridors of a building cross, an architect sees one room.
+    Corridor,
+    /// Round, whichever its roundness: a circle, an ellipse, a regular polygon with other than four corners.
+    Tube,
+}
+
+/// What an arm of a fork is.
+pub(super) fn classify_arm(arm: &ArmFacts) -> Arm {
+    if arm.depth < 2.0 * DEEP * arm.radius {
+        Arm::Stub
+    } else if arm.enclosed >= ENCLOSED && arm.squareness < SQUARE {
+        Arm::Tube
+    } else {
+        Arm::Corridor
+    }
+}
+
+/// Whether tubes meet where the given arms do, widest first and without stubs: three or more, of which one that is not the widest is
+/// a tube.
+pub(super) fn is_fork(arms: &[Arm]) -> bool {
+    arms.len() >= 3 && arms[1..].contains(&Arm::Tube)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A round mouth.
+    fn mouth(radius: f64) -> MouthFacts {
+        MouthFacts {
+            radius,
+            area: PI * radius * radius,
+            spread: 0.7 * radius,
+        }
+    }
+
+    /// A tube of radius 1 and a depth of 3 diameters, on a trunk of radius 2.
+    fn tube() -> LimbFacts {
+        LimbFacts {
+            is_outdoors: false,
+            mouths: vec![mouth(1.0)],
+            body: Some(1.0),
+            trunk: 2.0,
+            depth: 6.0,
+            volume: 6.0 * PI,
+            exits: 0.0,
+            finest: 0.1,
+        }
+    }
+
+    const BRANCH: Limb = Limb::Branch(BranchMouth {
+        weight: 2.0,
+        radius: 1.0,
+    });
+
+    type Change = fn(&mut LimbFacts);
+
+    /// Changes a tube, row by row, and compares what it is then.
+    fn check(rows: &[(&str, Change, Limb)]) {
+        for (what, change, expected) in rows {
+            let mut limb = tube();
+            change(&mut limb);
+            assert_eq!(classify(&limb), *expected, "{what}");
+        }
+    }
+
+    /// A mouth that is a slit.
+    fn slit(radius: f64) -> MouthFacts {
+        MouthFacts {
+            spread: 2.5,
+            ..mouth(radius)
+        }
+    }
+
+    /// A mouth most of whose rim leads elsewhere.
+    fn rim(radius: f64) -> MouthFacts {
+        MouthFacts {
+            area: 1.0,
+            ..mouth(radius)
+        }
+    }
+
+    #[test]
+    fn each_rule_for_limbs_has_a_case_on_either_side() {
+        let just_narrow = Limb::Branch(BranchMouth {
+            weight: 1.5,
+            radius: 1.0,
+        });
+        check(&[
+            ("a tube", |_| {}, BRANCH),
+            ("no way out", |l| l.mouths.clear(), Limb::Whole),
+            ("no ball inside", |l| l.body = None, Limb::Bulge),
+            // One mouth.
+            ("a ring", |l| l.mouths.push(mouth(0.9)), Limb::Neck),
+            ("a narrow ring", |l| l.mouths.push(mouth(0.7)), Limb::Neck),
+            ("a chink beside", |l| l.mouths.push(mouth(0.6)), BRANCH),
+            ("a rim beside", |l| l.mouths.push(rim(0.9)), BRANCH),
+            // A dead end.
+            ("a door to a hall", |l| l.exits = 2.0, Limb::Neck),
+            ("a crack to a hall", |l| l.exits = 0.03, BRANCH),
+            // No slit.
+            ("under a bed", |l| l.mouths[0] = slit(1.0), Limb::Crevice),
+            ("1 : 2", |l| l.mouths[0].spread = 1.3, BRANCH),
+            ("a slit beside", |l| l.mouths.push(slit(0.1)), BRANCH),
+            // Deep.
+            ("1.9 diameters", |l| l.depth = 3.8, Limb::Alcove),
+            ("2.1 diameters", |l| l.depth = 4.2, BRANCH),
+            // Narrow.
+            ("a taper", |l| l.trunk = 1.4, Limb::Continuation),
+            ("just narrow", |l| l.trunk = 1.5, just_narrow),
+            ("wide inside", |l| l.body = Some(1.5), Limb::Continuation),
+        ]);
+    }
+
+    #[test]
+    fn outdoors_a_limb_may_have_several_mouths_but_must_hold_enough() {
+        check(&[
+            ("a dead end", |l| l.is_outdoors = true, BRANCH),
+            (
+                "a door to a hall",
+                |l| (l.is_outdoors, l.exits) = (true, 2.0),
+                BRANCH,
+            ),
+            (
+                "a long tunnel",
+                |l| {
+                    (l.is_outdoors, l.volume) = (true, 9.0 * PI);
+                    l.mouths.push(mouth(1.0));
+                },
+                BRANCH,
+            ),
+            (
+                "a short tunnel",
+                |l| {
+                    l.is_outdoors = true;
+                    l.mouths.push(mouth(1.0));
+                },
+                Limb::Alcove,
+            ),
+            (
+                "a tunnel with a slit as wide at one end",
+                |l| {
+                    (l.is_outdoors, l.volume) = (true, 9.0 * PI);
+                    l.mouths.push(slit(0.9));
+                },
+                Limb::Crevice,
+            ),
+            (
+                "a tunnel with a narrow slit",
+                |l| {
+                    (l.is_outdoors, l.volume) = (true, 9.0 * PI);
+                    l.mouths.push(slit(0.5));
+                },
+                BRANCH,
+            ),
+            (
+                "deep, but holding little",
+                |l| (l.is_outdoors, l.volume) = (true, PI),
+                Limb::Alcove,
+            ),
+        ]);
+    }
+
+    #[test]
+    fn each_rule_for_arms_has_a_case_on_either_side() {
+        let arm = |depth: f64, enclosed: f64, squareness: f64| {
+            classify_arm(&ArmFacts {
+                depth,
+                radius: 1.0,
+                enclosed,
+                squareness,
+            })
+        };
+        for (what, found, expected) in [
+            ("a round tube", arm(5.0, 1.0, 0.0), Arm::Tube),
+            ("1.9 diameters", arm(3.8, 1.0, 0.0), Arm::Stub),
+            ("2 diameters", arm(4.0, 1.0, 0.0), Arm::Tube),
+            ("four walls", arm(5.0, 1.0, 1.0), Arm::Corridor),
+            ("a barrel vault", arm(5.0, 1.0, 0.5), Arm::Corridor),
+            ("a rough cave", arm(5.0, 1.0, 0.4), Arm::Tube),
+            ("open to the sky", arm(5.0, 0.4, 0.0), Arm::Corridor),
+            ("half open", arm(5.0, 0.5, 0.0), Arm::Tube),
+        ] {
+            assert_eq!(found, expected, "{what}");
+        }
+    }
+
+    #[test]
+    fn three_pieces_and_a_tube_beside_the_widest_are_a_fork() {
+        let expected = [
+            Meeting::None,
+            Meeting::None,
+            Meeting::Unclear,
+            Meeting::Fork,
+        ];
+        assert_eq!([0, 1, 2, 3].map(meeting), expected);
+        use Arm::{Corridor, Tube};
+        for (arms, expected) in [
+            (&[Tube, Tube, Tube][..], true),
+            (&[Tube, Tube], false),
+            (&[Corridor, Corridor, Tube], true),
+            (&[Tube, Corridor, Corridor], false),
+            (&[Corridor, Corridor, Corridor, Corridor], false),
+        ] {
+            assert_eq!(is_fork(arms), expected, "{arms:?}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Separating forks: the arms become branches; the widest arm keeps the middle of the fork.
+
+use std::cmp::Reverse;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+
+use enfilade_geom::Sets;
+
+use super::arms::Walls;
+use super::forks::{Fork, reach};
+use super::labels::BranchMouth;
+use super::regions::Regions;
+use super::rule::{ARM_WEIGHS, Arm};
+
+impl Regions<'_> {
+    /// Makes the arms of forks regions of their own.
+    pub(super) fn separate_forks(&mut self, walls: &Walls<'_>) {
+        let forks = self.forks(walls);
+        let mut closed = BTreeSet::new();
+        for fork in &forks {
+            self.close_mouths(fork, &mut closed);
+        }
+        let touched: BTreeSet<u32> = forks.iter().map(|f| self.owner[f.part as usize]).collect();
+        for region in touched {
+            self.divide(region, &closed, &forks);
+        }
+    }
+
+    /// Closes the mouths of a fork's arms but for the widest: arms and middle are flooded at once, and the links where two floods
+    /// meet are closed.
+    fn close_mouths(&self, fork: &Fork, closed: &mut BTreeSet<u32>) {
+        let region = self.owner[fork.part as usize];
+        let center = self.centers[fork.part as usize];
+        let reach = reach(fork.removed, fork.radius);
+        // Arms count from 1 on; the middle, and with it the widest arm and the corridors, is 0.
+        let mut label: BTreeMap<u32, u32> = fork.middle.iter().map(|&t| (t, 0)).collect();
+        for (i, arm) in fork.arms.iter().enumerate() {
+            let l = if arm.kind == Arm::Tube { i as u32 } else { 0 };
+            label.extend(arm.parts.iter().map(|&t| (t, l)));
+        }
+        let mut heap: BinaryHeap<(u64, Reverse<(u32, u32)>)> = BinaryHeap::new();
+        let is_near = |t: u32| {
+            self.owner[t as usize] == region
+                && self.space.middles[t as usize].distance(center) <= reach
+        };
+        let push = |heap: &mut BinaryHeap<_>, label: &BTreeMap<u32, u32>, t: u32| {
+            for &(other, l) in self.ways(t) {
+                if !label.contains_key(&other) && is_near(other) {
+                    heap.push((self.passes(l).to_bits(), Reverse((other, label[&t]))));
+                }
+            }
+        };
+        for &t in label.keys() {
+            push(&mut heap, &label, t);
+        }
+        while let Some((_, Reverse((t, l)))) = heap.pop() {
+            if let Entry::Vacant(entry) = label.entry(t) {
+                entry.insert(l);
+                push(&mut heap, &label, t);
+            }
+        }
+        for (&t, &one) in &label {
+            let ways = self.ways(t).iter();
+            let differs = |w: &&(u32, u32)| label.get(&w.0).is_some_and(|&l| l != one);
+            closed.extend(ways.filter(differs).map(|w| w.1));
+        }
+    }
+
+    /// Divides a region along closed links: a piece that holds an arm becomes a branch, unless it holds the widest ball.
+    fn divide(&mut self, region: u32, closed: &BTreeSet<u32>, forks: &[Fork]) {
+        let parts = std::mem::take(&mut self.regions[region as usize].parts);
+        let places = parts.iter().enumerate();
+        let place: BTreeMap<u32, u32> = places.map(|(i, &t)| (t, i as u32)).collect();
+        let mut sets = Sets::new(parts.len());
+        for (i, &t) in parts.iter().enumerate() {
+            for (other, l) in self.ways(t) {
+                if let Some(&j) = place.get(other)
+                    && !closed.contains(l)
+                {
+                    sets.join(i as u32, j);
+                }
+            }
+        }
+        let wider = |&i: &usize, &j: &usize| {
+            let [p, q] = [i, j].map(|i| self.radius(parts[i]));
+            p.total_cmp(&q).then(parts[j].cmp(&parts[i]))
+        };
+        let widest = (0..parts.len()).max_by(wider).map(|i| sets.find(i as u32));
+        let mut radius_of_piece: BTreeMap<u32, f64> = BTreeMap::new();
+        for arm in forks.iter().flat_map(|f| &f.arms) {
+            if let Some(&i) = place.get(&arm.parts[0]) {
+                let radius = radius_of_piece.entry(sets.find(i)).or_insert(0.0);
+                *radius = radius.max(arm.radius);
+            }
+        }
+        let mut region_of_piece: BTreeMap<u32, u32> = BTreeMap::new();
+        for (piece, radius) in radius_of_piece {
+            if Some(piece) != widest {
+                let mouth = BranchMouth {
+                    weight: ARM_WEIGHS,
+                    radius,
+                };
+                region_of_piece.insert(piece, self.push(radius, Some(mouth)));
+            }
+        }
+        for (i, &t) in parts.iter().enumerate() {
+            let piece = sets.find(i as u32);
+            self.give(t, region_of_piece.get(&piece).copied().unwrap_or(region));
+        }
+    }
+}
