@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct Inspection<'a> {
     cells: Vec<CellReport<'a>>,
     portals: Vec<PortalReport<'a>>,
     suspected_holes: Vec<HoleReport>,
@@ -100,7 +100,7 @@ struct Stats<'a> {
     counts: &'a BTreeMap<String, f64>,
 }
 
-fn report(world: &World) -> Report<'_> {
+fn report(world: &World) -> Inspection<'_> {
     let graph = &world.graph;
     let cells = graph.cells.iter().enumerate().map(|(id, c)| CellReport {
         id,
@@ -141,7 +141,7 @@ fn report(world: &World) -> Report<'_> {
         reason: h.reason.to_string(),
     });
     let seals = Seals::of(world);
-    Report {
+    Inspection {
         cells: cells.collect(),
         portals: portals.collect(),
         suspected_holes: holes.collect(),

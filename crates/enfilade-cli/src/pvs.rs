@@ -33,8 +33,8 @@ pub(crate) struct Pvs {
     #[arg(long, value_name = "OUT.glb", conflicts_with = "far")]
     into: Option<PathBuf>,
     /// How thoroughly to look.
-    #[arg(long, value_enum, default_value_t = Mode::Exact)]
-    mode: Mode,
+    #[arg(long, value_enum, default_value_t = PvsMode::Exact)]
+    mode: PvsMode,
     /// Stop searching after this long; the answer is then larger than need be, and no less right.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     budget: Option<Duration>,
@@ -65,7 +65,7 @@ pub(crate) struct Pvs {
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Mode {
+enum PvsMode {
     /// Sides of planes only.
     Fast,
     /// All that planes and lines can settle.
@@ -74,7 +74,7 @@ enum Mode {
 
 /// What is printed.
 #[derive(serde::Serialize)]
-struct Report {
+struct PvsReport {
     cells: usize,
     portals: usize,
     /// Ordered pairs, each cell with itself among them.
@@ -236,8 +236,8 @@ fn same_file(a: &Path, b: &Path) -> bool {
 fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
     let config = VisConfig {
         mode: match args.mode {
-            Mode::Fast => VisMode::Fast,
-            Mode::Exact => VisMode::Exact,
+            PvsMode::Fast => VisMode::Fast,
+            PvsMode::Exact => VisMode::Exact,
         },
         far: args.far,
         has_evidence: args.evidence.is_some(),
@@ -306,7 +306,7 @@ fn read_checkpoint(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     }
 }
 
-fn report(input: &Input, vis: &VisOutput, took: Duration) -> Report {
+fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
     let cells = vis.cells.len();
     let pairs: usize = vis.cells.iter().map(CellSet::len).sum();
     let undecided: usize = vis.undecided.iter().map(CellSet::len).sum();
@@ -315,7 +315,7 @@ fn report(input: &Input, vis: &VisOutput, took: Duration) -> Report {
     worst.sort_by_key(|&c| (std::cmp::Reverse(visible_cells[c]), c));
     worst.truncate(10);
     let mean = pairs as f64 / cells.max(1) as f64;
-    Report {
+    PvsReport {
         cells,
         portals: input.graph.portals.len(),
         pairs,
@@ -335,10 +335,10 @@ fn report(input: &Input, vis: &VisOutput, took: Duration) -> Report {
 }
 
 /// Notes of the text file: nothing that differs from run to run.
-fn notes(report: &Report, mode: Mode) -> Vec<String> {
+fn notes(report: &PvsReport, mode: PvsMode) -> Vec<String> {
     let mode = match mode {
-        Mode::Fast => "fast",
-        Mode::Exact => "exact",
+        PvsMode::Fast => "fast",
+        PvsMode::Exact => "exact",
     };
     vec![
         format!("kind enfilade {}, {mode}", env!("CARGO_PKG_VERSION")),
@@ -351,7 +351,7 @@ fn notes(report: &Report, mode: Mode) -> Vec<String> {
     ]
 }
 
-fn print(report: &Report, is_json: bool) -> anyhow::Result<()> {
+fn print(report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
     let mut out = BufWriter::new(io::stdout().lock());
     if is_json {
         serde_json::to_writer(&mut out, report).map_err(io::Error::from)?;

@@ -47,8 +47,8 @@ pub(crate) struct Render {
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     size: [u32; 2],
     /// What is drawn: all, what meets the view, or what is seen through portals.
-    #[arg(long, value_enum, default_value_t = Mode::Portals)]
-    mode: Mode,
+    #[arg(long, value_enum, default_value_t = RenderMode::Portals)]
+    mode: RenderMode,
     /// How surfaces are painted: as they look, by cell, or by how often pixels are drawn.
     #[arg(long, value_enum, default_value_t = Colors::Lit)]
     paint: Colors,
@@ -91,13 +91,13 @@ pub(crate) struct Render {
 
 /// What is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Mode {
+pub(crate) enum RenderMode {
     Everything,
     Frustum,
     Portals,
 }
 
-impl Mode {
+impl RenderMode {
     pub(crate) fn culling(self) -> Culling {
         match self {
             Self::Everything => Culling::Everything,

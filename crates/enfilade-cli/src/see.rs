@@ -36,8 +36,8 @@ pub(crate) struct See {
     #[arg(long, value_name = "METERS")]
     far: Option<f32>,
     /// How portals narrow the view: by rectangles, by their outlines, or by outlines of 8 edges.
-    #[arg(long, value_enum, default_value_t = Mode::PolygonK)]
-    mode: Mode,
+    #[arg(long, value_enum, default_value_t = SeeMode::PolygonK)]
+    mode: SeeMode,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -45,13 +45,13 @@ pub(crate) struct See {
 
 /// How portals narrow the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Mode {
+pub(crate) enum SeeMode {
     Rect,
     Polygon,
     PolygonK,
 }
 
-impl Mode {
+impl SeeMode {
     pub(crate) fn narrowing(self) -> Narrowing {
         match self {
             Self::Rect => Narrowing::Rectangle,

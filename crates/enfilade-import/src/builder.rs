@@ -29,12 +29,12 @@ pub(crate) struct Builder<'a> {
     /// Bytes that what was read asks for in memory, here or when it is baked.
     n_held_bytes: u64,
     /// Meshes made from other meshes: which, mirrored or not, which primitives.
-    variants: HashMap<(u32, bool, Part), u32>,
+    variants: HashMap<(u32, bool, MeshPart), u32>,
 }
 
 /// Which primitives of a mesh.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Part {
+enum MeshPart {
     All,
     Opaque,
     SeeThrough,
@@ -357,13 +357,13 @@ impl<'a> Builder<'a> {
         if role == Role::Structural {
             self.charge_memory(placement.place, n_placed_triangles, TRIANGLE_BYTES)?;
         }
-        let parts: &[(Part, Role, &str)] = if is_mixed && role == Role::Structural {
+        let parts: &[(MeshPart, Role, &str)] = if is_mixed && role == Role::Structural {
             &[
-                (Part::Opaque, role, ""),
-                (Part::SeeThrough, Role::Detail, "see-through part of: "),
+                (MeshPart::Opaque, role, ""),
+                (MeshPart::SeeThrough, Role::Detail, "see-through part of: "),
             ]
         } else {
-            &[(Part::All, role, "")]
+            &[(MeshPart::All, role, "")]
         };
         for &transform in placement.transforms {
             let (transform, is_mirrored) = self.unmirrored(placement, transform)?;
@@ -444,10 +444,10 @@ impl<'a> Builder<'a> {
         &mut self,
         placement: &Placement<'_>,
         is_mirrored: bool,
-        part: Part,
+        part: MeshPart,
     ) -> Result<u32, ImportError> {
         let source = placement.mesh;
-        if !is_mirrored && part == Part::All {
+        if !is_mirrored && part == MeshPart::All {
             return Ok(source);
         }
         if let Some(&mesh) = self.variants.get(&(source, is_mirrored, part)) {
@@ -455,9 +455,9 @@ impl<'a> Builder<'a> {
         }
         let original = &self.scene.meshes[source as usize];
         let is_kept = |p: &&Primitive| match part {
-            Part::All => true,
-            Part::Opaque => !self.is_see_through(p),
-            Part::SeeThrough => self.is_see_through(p),
+            MeshPart::All => true,
+            MeshPart::Opaque => !self.is_see_through(p),
+            MeshPart::SeeThrough => self.is_see_through(p),
         };
         let n_vertices: u64 = original
             .primitives
@@ -483,7 +483,7 @@ impl<'a> Builder<'a> {
                 "mirrored placement; its mesh is mirrored and its winding turned round",
             );
         }
-        if part == Part::SeeThrough {
+        if part == MeshPart::SeeThrough {
             self.note(
                 placement.place,
                 "an object of opaque and see-through parts; split in two",

@@ -369,7 +369,7 @@ fn is_collapsed(t: &[u32; 3]) -> bool {
 
 /// One triangle's use of an edge.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Use {
+struct EdgeUse {
     ends: [u32; 2],
     object: u32,
     triangle: u32,
@@ -383,14 +383,14 @@ fn find_odd_edges(
     soup: &Soup,
     options: &CleaningOptions,
 ) {
-    let mut uses: Vec<Use> = Vec::with_capacity(soup.triangles.len() * 3);
+    let mut uses: Vec<EdgeUse> = Vec::with_capacity(soup.triangles.len() * 3);
     for (t, corners) in soup.triangles.iter().enumerate() {
         if is_collapsed(corners) {
             continue;
         }
         for k in 0..3 {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            uses.push(Use {
+            uses.push(EdgeUse {
                 ends: [a.min(b), a.max(b)],
                 object: soup.sources[t].object,
                 triangle: t as u32,
@@ -406,7 +406,7 @@ fn find_odd_edges(
             let [a, b] = edge[0].ends.map(|i| soup.points[i as usize]);
             (a + b) * 0.5
         };
-        let name = |u: &Use| scene.objects[u.object as usize].name.clone();
+        let name = |u: &EdgeUse| scene.objects[u.object as usize].name.clone();
         if edge.len() == 1 {
             open.push(edge[0].ends);
             report.open_edges.add(middle(), || name(&edge[0]));

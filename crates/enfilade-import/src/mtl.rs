@@ -13,15 +13,15 @@ use std::collections::HashMap;
 
 /// A material of which only the name is known.
 pub(crate) fn plain(name: &str) -> Material {
-    Draft {
+    MaterialDraft {
         name: name.to_owned(),
-        ..Draft::default()
+        ..MaterialDraft::default()
     }
     .finish()
 }
 
 #[derive(Default)]
-struct Draft {
+struct MaterialDraft {
     name: String,
     color: Option<[f32; 3]>,
     emissive: Option<[f32; 3]>,
@@ -34,7 +34,7 @@ struct Draft {
     emissive_texture: Option<u32>,
 }
 
-impl Draft {
+impl MaterialDraft {
     fn finish(self) -> Material {
         let alpha = self.opacity.unwrap_or(1.0).clamp(0.0, 1.0);
         let [r, g, b] = self.color.unwrap_or([1.0; 3]);
@@ -114,8 +114,8 @@ pub(crate) fn read_materials(
     library: &mut HashMap<String, u32>,
 ) -> Result<(), ImportError> {
     let mut textures = HashMap::new();
-    let mut draft: Option<Draft> = None;
-    let mut close = |draft: Option<Draft>, builder: &mut Builder<'_>| {
+    let mut draft: Option<MaterialDraft> = None;
+    let mut close = |draft: Option<MaterialDraft>, builder: &mut Builder<'_>| {
         if let Some(draft) = draft {
             let name = draft.name.clone();
             let material = builder.push_material(draft.finish());
@@ -130,9 +130,9 @@ pub(crate) fn read_materials(
             .map_or((line, ""), |(word, rest)| (word, rest.trim()));
         if word == "newmtl" {
             close(draft.take(), builder);
-            draft = Some(Draft {
+            draft = Some(MaterialDraft {
                 name: rest.to_owned(),
-                ..Draft::default()
+                ..MaterialDraft::default()
             });
             continue;
         }

@@ -29,7 +29,7 @@ pub(crate) fn is_obj(bytes: &[u8]) -> bool {
 /// Reads one file into the builder.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     builder.set_format("OBJ");
-    let mut reader = Reader {
+    let mut reader = ObjReader {
         builder,
         positions: Vec::new(),
         colors: Vec::new(),
@@ -68,26 +68,26 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
 /// A corner: position, texture coordinate and normal, counted from 0.
 type Corner = (u32, Option<u32>, Option<u32>);
 
-struct Face {
+struct ObjFace {
     first: usize,
     n: usize,
     line: usize,
 }
 
 /// Faces of one mesh and one material.
-struct Part {
+struct ObjPart {
     material: Option<u32>,
     corners: Vec<Corner>,
-    faces: Vec<Face>,
+    faces: Vec<ObjFace>,
 }
 
 struct MeshDraft {
     names: [String; 2],
-    /// Into [`Reader::parts`].
+    /// Into [`ObjReader::parts`].
     parts: Vec<usize>,
 }
 
-struct Reader<'r, 'a> {
+struct ObjReader<'r, 'a> {
     builder: &'r mut Builder<'a>,
     positions: Vec<[f64; 3]>,
     /// Of the first positions; empty if the file has none.
@@ -99,14 +99,14 @@ struct Reader<'r, 'a> {
     group: String,
     is_group_latest: bool,
     material: Option<u32>,
-    parts: Vec<Part>,
+    parts: Vec<ObjPart>,
     meshes: Vec<MeshDraft>,
     by_name: HashMap<[String; 2], usize>,
     /// Part that the next face joins, until a name or material changes.
     current: Option<usize>,
 }
 
-impl Reader<'_, '_> {
+impl ObjReader<'_, '_> {
     fn read_line(&mut self, line: &str, number: usize) -> Result<(), ImportError> {
         let line = line.split('#').next().unwrap_or("").trim();
         let (word, rest) = line
@@ -267,7 +267,7 @@ impl Reader<'_, '_> {
             );
             return Ok(());
         }
-        self.parts[part].faces.push(Face {
+        self.parts[part].faces.push(ObjFace {
             first,
             n,
             line: number,
@@ -306,7 +306,7 @@ impl Reader<'_, '_> {
             .copied()
             .find(|&p| self.parts[p].material == material);
         let part = known.unwrap_or_else(|| {
-            self.parts.push(Part {
+            self.parts.push(ObjPart {
                 material,
                 corners: Vec::new(),
                 faces: Vec::new(),

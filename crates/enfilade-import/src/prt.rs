@@ -82,7 +82,7 @@ const MAX_COORDINATE: f64 = 1e9;
 ///
 /// The first word that does not fit, with its place.
 pub fn read_prt(text: &str) -> Result<PrtFile, PrtError> {
-    let mut words = Words::new(text);
+    let mut words = PrtWords::new(text);
     let magic = words.next("the magic word `PRT1`, `PRT2` or `PRT1-AM`")?;
     let (mut format, header) = match magic {
         "PRT1" => (PrtFormat::Prt1, 2),
@@ -138,7 +138,7 @@ pub fn read_prt(text: &str) -> Result<PrtFile, PrtError> {
 }
 
 fn read_portal(
-    words: &mut Words<'_>,
+    words: &mut PrtWords<'_>,
     format: PrtFormat,
     n_clusters: u32,
 ) -> Result<PrtPortal, PrtError> {
@@ -161,7 +161,7 @@ fn read_portal(
 }
 
 fn read_leaves(
-    words: &mut Words<'_>,
+    words: &mut PrtWords<'_>,
     format: PrtFormat,
     n_leaves: u32,
     n_clusters: u32,
@@ -286,14 +286,14 @@ fn write_points(out: &mut String, points: &[[f64; 3]]) {
 }
 
 /// The words of a text; brackets are words of their own.
-struct Words<'a> {
+struct PrtWords<'a> {
     text: &'a str,
     at: usize,
     line: usize,
     word: usize,
 }
 
-impl<'a> Words<'a> {
+impl<'a> PrtWords<'a> {
     fn new(text: &'a str) -> Self {
         Self {
             text,

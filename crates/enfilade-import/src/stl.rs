@@ -119,13 +119,13 @@ impl Solid {
 
 /// Vertices of one ASCII solid, not yet rounded.
 #[derive(Default)]
-struct Draft {
+struct SolidDraft {
     name: String,
     corners: Vec<[f64; 3]>,
 }
 
 fn read_ascii(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    let mut drafts: Vec<Draft> = Vec::new();
+    let mut drafts: Vec<SolidDraft> = Vec::new();
     let mut n_in_loop = 0;
     let mut is_open = false;
     let mut n_lines = 0;
@@ -141,7 +141,7 @@ fn read_ascii(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError
         match word.as_str() {
             "solid" => {
                 let name = words.collect::<Vec<_>>().join(" ");
-                drafts.push(Draft {
+                drafts.push(SolidDraft {
                     name,
                     corners: Vec::new(),
                 });

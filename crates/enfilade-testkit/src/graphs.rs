@@ -13,7 +13,7 @@ use enfilade_geom::{Aabb, DMat3, DVec3};
 
 use crate::rng::Rng;
 use grid::{Face, Grid};
-use world::{Hole, world_of};
+use world::{FaceHole, world_of};
 
 /// What grid of rooms to make.
 #[derive(Clone, Debug)]
@@ -119,7 +119,7 @@ pub fn room_grid(params: &GridParams) -> World {
         }
     }
     let outdoors = grid.outdoors;
-    let mut hole = |face: &Face| -> Option<Hole> {
+    let mut hole = |face: &Face| -> Option<FaceHole> {
         let is_outer = outdoors.is_some() && face.cells.contains(&outdoors);
         if face.axis == 1 {
             let (x, z) = (rng.range(0.1, 0.6), rng.range(0.1, 0.6));

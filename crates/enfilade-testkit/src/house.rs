@@ -55,7 +55,7 @@ struct House {
 }
 
 /// A hole in a wall: along the wall, up, its kind, and the rooms in ascending order across it.
-struct Hole {
+struct HouseHole {
     along: [f64; 2],
     up: [f64; 2],
     kind: OpeningKind,
@@ -67,14 +67,14 @@ struct Hole {
 /// A leaf pushed to, and not shut. [Units: degrees]
 const AJAR: f64 = 8.0;
 
-impl Hole {
+impl HouseHole {
     fn swung(self, swing: f64) -> Self {
         Self { swing, ..self }
     }
 }
 
-fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> Hole {
-    Hole {
+fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> HouseHole {
+    HouseHole {
         along,
         up: [floor, floor + 2.05],
         kind: OpeningKind::Door,
@@ -83,8 +83,8 @@ fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> Hole {
     }
 }
 
-fn window(along: [f64; 2], up: [f64; 2], rooms: [Side; 2]) -> Hole {
-    Hole {
+fn window(along: [f64; 2], up: [f64; 2], rooms: [Side; 2]) -> HouseHole {
+    HouseHole {
         along,
         up,
         kind: OpeningKind::Window,
@@ -101,7 +101,7 @@ impl House {
         faces: [f64; 2],
         along: [f64; 2],
         up: [f64; 2],
-        holes: &[Hole],
+        holes: &[HouseHole],
     ) {
         let span = |a: [f64; 2], u: [f64; 2]| {
             if axis == 0 {
@@ -287,7 +287,7 @@ impl House {
             GROUND,
             &[door([3.2, 4.8], 0.0, [rooms.living, rooms.hall])],
         );
-        let passage = Hole {
+        let passage = HouseHole {
             along: [8.2, 9.6],
             up: [0.0, 2.1],
             kind: OpeningKind::Opening,

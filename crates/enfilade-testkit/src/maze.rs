@@ -200,7 +200,7 @@ pub fn dirkse_maze(seed: u64) -> Generated {
     let mut mesh = Interior::default();
     let mut ends: Vec<Ends> = vec![Ends::default(); plots.len()];
     for p in &passages {
-        let tunnel = Tunnel::new(p, &plots);
+        let tunnel = WallPassage::new(p, &plots);
         let axis = if p.axis == 0 { 0 } else { 2 };
         let rooms = [sides[p.from], sides[p.to]];
         site.opening(OpeningKind::Opening, tunnel.hole(), axis, rooms);
@@ -218,13 +218,13 @@ pub fn dirkse_maze(seed: u64) -> Generated {
 
 /// Where a passage ends in a wall: place along it; floor corners and head corners, in the wall's
 /// direction.
-type End = (f64, [u32; 4]);
+type PassageEnd = (f64, [u32; 4]);
 
 /// By wall of a plot.
-type Ends = [Vec<End>; 4];
+type Ends = [Vec<PassageEnd>; 4];
 
 /// A passage through the wall between two plots.
-struct Tunnel {
+struct WallPassage {
     axis: usize,
     /// Where it begins and ends across the wall. [Units: wu]
     across: [f64; 2],
@@ -233,7 +233,7 @@ struct Tunnel {
     along: [f64; 2],
 }
 
-impl Tunnel {
+impl WallPassage {
     fn new(p: &Passage, plots: &[Plot]) -> Self {
         let middle = (p.square as f64 + 0.5) * SQUARE;
         Self {

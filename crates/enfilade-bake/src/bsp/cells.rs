@@ -9,7 +9,7 @@ use super::separator::Separator;
 pub(super) const NO_CELL: u32 = u32::MAX;
 
 /// Leaves by cell, and the separators that were kept.
-pub(super) struct Cells {
+pub(super) struct LeafCells {
     /// Cell of each leaf, or [`NO_CELL`].
     pub(super) of_leaf: Vec<u32>,
     pub(super) n_cells: usize,
@@ -22,7 +22,7 @@ pub(super) struct Cells {
 
 /// Parts the leaves by the separators; of separators that cross, the ones that touch fewest cells go,
 /// largest first among equals, until none cross. Separators with one cell on both sides go, too.
-pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> Cells {
+pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> LeafCells {
     let mut kept = separators;
     let (mut n_crossing, mut n_useless) = (0, 0);
     loop {
@@ -62,7 +62,7 @@ pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> Cells {
         let mut goes = goes.into_iter();
         kept.retain(|_| !goes.next().unwrap_or(false));
         if is_final {
-            return Cells {
+            return LeafCells {
                 of_leaf,
                 n_cells,
                 separators: kept,

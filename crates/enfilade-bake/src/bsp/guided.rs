@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{Aabb, BoxTree, Sets};
 
-use super::cells::{self, Cells, NO_CELL};
+use super::cells::{self, LeafCells, NO_CELL};
 use super::guide::Guide;
 use super::input::BspInput;
 use super::leaves::Bsp;
@@ -34,7 +34,7 @@ pub(super) fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -
 }
 
 /// Parts rooms further by the separators in planes of guides with a round rim.
-pub(super) fn part(bsp: &Bsp, rooms: Cells) -> Cells {
+pub(super) fn part(bsp: &Bsp, rooms: LeafCells) -> LeafCells {
     let found = separator::find_in_guides(bsp);
     if found.is_empty() {
         return rooms;
@@ -75,7 +75,7 @@ pub(super) fn part(bsp: &Bsp, rooms: Cells) -> Cells {
         .collect();
     let mut separators = rooms.separators;
     separators.extend(guides);
-    Cells {
+    LeafCells {
         of_leaf,
         n_cells: number.len(),
         separators,

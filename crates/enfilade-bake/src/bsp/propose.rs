@@ -11,7 +11,7 @@ use crate::proposal::Proposal;
 use crate::structure::{Candidate, OUTDOORS, Structure};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
-use super::cells::{self, Cells, NO_CELL};
+use super::cells::{self, LeafCells, NO_CELL};
 use super::config::{BspConfig, Rooms};
 use super::input::input_of;
 use super::inside::Soup;
@@ -86,7 +86,7 @@ fn label_settings(scene: &Scene) -> LabelSettings {
 
 /// The leaves by cell.
 struct Parted {
-    cells: Cells,
+    cells: LeafCells,
     shapes: Vec<Option<Shape>>,
     /// Whether each leaf is of what is too narrow for a room, where shape tells rooms; a guide's cells are as narrow as it
     /// says.
@@ -173,7 +173,7 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
 }
 
 /// A candidate for each separator whose portals fill their hull, for each portal otherwise.
-fn candidates_of(bsp: &Bsp, cells: &Cells) -> Vec<Candidate> {
+fn candidates_of(bsp: &Bsp, cells: &LeafCells) -> Vec<Candidate> {
     let mut out = Vec::new();
     for s in &cells.separators {
         let plane = bsp.tree.planes[s.plane as usize];

@@ -19,7 +19,7 @@ use crate::complex::poly;
 use crate::complex::region::Shape;
 use crate::structure::{MergeSettings, Mergeable, Pair, join_rooms};
 
-use super::cells::{self, Cells, NO_CELL};
+use super::cells::{self, LeafCells, NO_CELL};
 use super::lattice::{Lattice, NONE};
 use super::leaves::Bsp;
 use super::separator::{self, Separator};
@@ -48,7 +48,7 @@ pub(super) struct Evidence<'a> {
 /// Part of a separator between two cells: the separator, and portals by their places in its list.
 type SeparatorPart = (u32, Vec<u32>);
 
-struct Merger<'a> {
+struct LeafMerger<'a> {
     bsp: &'a Bsp,
     settings: &'a MergeSettings,
     evidence: &'a Evidence<'a>,
@@ -73,7 +73,7 @@ pub(super) fn part(
     separators: Vec<Separator>,
     evidence: &Evidence<'_>,
     settings: &MergeSettings,
-) -> Cells {
+) -> LeafCells {
     let kept: Vec<Separator> = separators
         .into_par_iter()
         .filter(|s| may_be_pinch(bsp, s, settings))
@@ -83,7 +83,7 @@ pub(super) fn part(
         .par_iter()
         .map(|s| Lattice::of(bsp, s, settings))
         .collect();
-    let mut merger = Merger {
+    let mut merger = LeafMerger {
         bsp,
         settings,
         evidence,
@@ -152,7 +152,7 @@ pub(super) fn part(
             }
         })
         .collect();
-    Cells {
+    LeafCells {
         of_leaf,
         n_cells: n as usize,
         separators,
@@ -169,7 +169,7 @@ const MAX_DIRECTIONS: usize = 16;
 ///
 /// Measured across the planes of the tree, those of the largest portals, so that it does not matter how the building is
 /// turned. Errs to a room: a cell is narrow only where it is so between two planes as a whole.
-pub(super) fn narrow_cells(bsp: &Bsp, cells: &Cells, settings: &MergeSettings) -> Vec<bool> {
+pub(super) fn narrow_cells(bsp: &Bsp, cells: &LeafCells, settings: &MergeSettings) -> Vec<bool> {
     let mut by_area: Vec<(f64, DVec3)> = vec![(f64::INFINITY, DVec3::Y)];
     for portal in &bsp.portals {
         let normal = bsp.tree.planes[portal.plane as usize].normal;
@@ -230,7 +230,7 @@ fn closed_shares(
         .collect()
 }
 
-impl Merger<'_> {
+impl LeafMerger<'_> {
     fn find(&self, mut c: u32) -> u32 {
         while self.parent[c as usize] != c {
             c = self.parent[c as usize];
@@ -496,7 +496,7 @@ impl Merger<'_> {
     }
 }
 
-impl Mergeable for Merger<'_> {
+impl Mergeable for LeafMerger<'_> {
     fn pairs(&self) -> Vec<Pair> {
         self.openings.keys().copied().collect()
     }

@@ -16,7 +16,7 @@ pub(super) const MAX_PARTS: usize = 512;
 
 /// Which lengths count as zero when polygons are cut.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tolerance {
+pub(super) struct CutTolerance {
     /// Points this near to a plane lie in it. [Units: wu]
     pub(super) plane: f64,
     /// A piece of a facet that polygons leave is open if it is at least this wide. [Units: wu]
@@ -92,14 +92,14 @@ pub(super) struct CutParts {
 }
 
 /// How polygons cut and cover a tetrahedron.
-pub(super) struct Cutting {
+pub(super) struct TetrahedraCut {
     /// Bit `i`: a polygon lies in facet `i`, in some of it.
     covered: u8,
     /// The parts, if there are several.
     pub(super) parts: Option<Box<CutParts>>,
 }
 
-impl Cutting {
+impl TetrahedraCut {
     pub(super) fn is_covered(&self, facet: usize) -> bool {
         self.covered >> facet & 1 == 1
     }
@@ -125,15 +125,15 @@ pub(super) struct Knife<'a> {
     pub(super) delaunay: &'a Delaunay,
     pub(super) walls: &'a [Triangle],
     pub(super) bvh: &'a Bvh,
-    pub(super) tolerance: Tolerance,
+    pub(super) tolerance: CutTolerance,
 }
 
 impl Knife<'_> {
     /// Cuts a tetrahedron by the walls.
-    pub(super) fn cut(&self, t: u32) -> Cutting {
+    pub(super) fn cut(&self, t: u32) -> TetrahedraCut {
         let corners = self.delaunay.corners(t);
         let near = self.walls_near(&corners);
-        let mut cutting = Cutting {
+        let mut cutting = TetrahedraCut {
             covered: 0,
             parts: None,
         };
@@ -357,7 +357,7 @@ pub(super) fn less(
     open: SmallVec<[Poly; 2]>,
     covers: &[Poly],
     normal: DVec3,
-    tolerance: Tolerance,
+    tolerance: CutTolerance,
 ) -> SmallVec<[Poly; 2]> {
     let mut open = open;
     for cover in covers {
@@ -419,7 +419,7 @@ mod tests {
             let walls: Vec<Triangle> = (0..1 + rng.below(3))
                 .map(|_| std::array::from_fn(|_| random_point(&mut rng)))
                 .collect();
-            let tolerance = Tolerance {
+            let tolerance = CutTolerance {
                 plane: 1e-9,
                 width: 1e-7,
             };

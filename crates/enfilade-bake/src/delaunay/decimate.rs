@@ -244,13 +244,13 @@ impl Rules {
 }
 
 /// A portal in the queue. It is stale if the portal has another version by now.
-struct Candidate {
+struct QueuedPortal {
     weight: f64,
     pair: (u32, u32),
     version: u32,
 }
 
-impl Ord for Candidate {
+impl Ord for QueuedPortal {
     fn cmp(&self, other: &Self) -> Ordering {
         // The heap gives the greatest first; least weight first, then least ids.
         other
@@ -261,19 +261,19 @@ impl Ord for Candidate {
     }
 }
 
-impl PartialOrd for Candidate {
+impl PartialOrd for QueuedPortal {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Candidate {
+impl PartialEq for QueuedPortal {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Candidate {}
+impl Eq for QueuedPortal {}
 
 /// A portal that is still there, merged from one or several.
 #[derive(Clone, Copy)]
@@ -334,7 +334,7 @@ struct Merging<'a> {
     /// Of each slot, the slots that a portal leads to.
     neighbors: Vec<BTreeSet<u32>>,
     portals: BTreeMap<(u32, u32), Live>,
-    queue: BinaryHeap<Candidate>,
+    queue: BinaryHeap<QueuedPortal>,
     /// Of each slot, the original cell id as reported in [`Step`].
     ids: Vec<u32>,
     steps: Vec<Step>,
@@ -402,7 +402,7 @@ impl<'a> Merging<'a> {
         (decimation, self.removed)
     }
 
-    fn candidate(&self, pair: (u32, u32), portal: &Live) -> Candidate {
+    fn candidate(&self, pair: (u32, u32), portal: &Live) -> QueuedPortal {
         let weight = if portal.stays {
             f64::INFINITY
         } else if portal.goes && self.has_joins {
@@ -411,14 +411,14 @@ impl<'a> Merging<'a> {
             let bodies = [pair.0, pair.1].map(|c| &self.bodies[c as usize]);
             self.rules.weigh(portal, bodies)
         };
-        Candidate {
+        QueuedPortal {
             weight,
             pair,
             version: portal.version,
         }
     }
 
-    fn is_stale(&self, candidate: &Candidate) -> bool {
+    fn is_stale(&self, candidate: &QueuedPortal) -> bool {
         let portal = self.portals.get(&candidate.pair);
         portal.is_none_or(|p| p.version != candidate.version)
     }
@@ -431,14 +431,14 @@ impl<'a> Merging<'a> {
         }
         self.has_joins = true;
         let goes = self.portals.iter().filter(|(_, p)| p.goes && !p.stays);
-        let goes: Vec<Candidate> = goes.map(|(&pair, p)| self.candidate(pair, p)).collect();
+        let goes: Vec<QueuedPortal> = goes.map(|(&pair, p)| self.candidate(pair, p)).collect();
         let is_any = !goes.is_empty();
         self.queue.extend(goes);
         is_any
     }
 
     /// Removes a portal: the cells on both sides become one.
-    fn remove(&mut self, candidate: &Candidate) {
+    fn remove(&mut self, candidate: &QueuedPortal) {
         let (a, b) = candidate.pair;
         let degree = |x: u32| self.neighbors[x as usize].len();
         let [into, from] = if degree(a) >= degree(b) {
@@ -460,7 +460,7 @@ impl<'a> Merging<'a> {
         }
     }
 
-    fn record(&mut self, candidate: &Candidate, [into, from]: [u32; 2]) {
+    fn record(&mut self, candidate: &QueuedPortal, [into, from]: [u32; 2]) {
         let portal = &self.portals[&candidate.pair];
         let [one, other] = [into, from].map(|x| self.ids[x as usize]);
         self.steps.push(Step {

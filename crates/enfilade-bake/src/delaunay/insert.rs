@@ -65,7 +65,7 @@ pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
     drop(points);
     let predicates = Predicates::of(&vertices);
     let first = first_four(&vertices, predicates).ok_or(DelaunayError::Flat { n_points })?;
-    let mut builder = Builder::new(vertices, predicates, first);
+    let mut builder = Insertion::new(vertices, predicates, first);
     for v in 0..builder.vertices.len() as u32 {
         if !first.contains(&v) {
             builder.insert(v);
@@ -76,7 +76,7 @@ pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
 
 /// Tetrahedra that more points are added to, round by round.
 pub(super) struct Growing {
-    builder: Builder,
+    builder: Insertion,
     vertex_of_point: Vec<u32>,
 }
 
@@ -86,7 +86,7 @@ impl Growing {
         let d = tetrahedralize(points)?;
         Ok(Self {
             vertex_of_point: d.vertex_of_point,
-            builder: Builder::of(d.vertices, d.tetrahedra, d.predicates),
+            builder: Insertion::of(d.vertices, d.tetrahedra, d.predicates),
         })
     }
 
@@ -186,7 +186,7 @@ struct Fan {
 /// Vertices of a cavity's boundary that the table of edges has room for.
 const TABLE: usize = 64;
 
-struct Builder {
+struct Insertion {
     vertices: Vec<DVec3>,
     predicates: Predicates,
     tets: Vec<Tetrahedron>,
@@ -215,7 +215,7 @@ fn slot_of(v: u32) -> usize {
 /// Marks a slot that holds no tetrahedron.
 const VACANT: u32 = u32::MAX;
 
-impl Builder {
+impl Insertion {
     fn new(vertices: Vec<DVec3>, predicates: Predicates, first: [u32; 4]) -> Self {
         let mut tets = vec![Tetrahedron {
             vertices: first,

@@ -3,7 +3,7 @@
 use enfilade_geom::{DVec3, Plane, Triangle};
 use smallvec::{SmallVec, smallvec};
 
-use super::cut::{Cutting, Knife, less, shared, turned_to};
+use super::cut::{Knife, TetrahedraCut, less, shared, turned_to};
 use crate::complex::poly::{Poly, area_normal};
 
 /// An outline that is less than a facet; `None` for the facet.
@@ -25,7 +25,7 @@ impl Knife<'_> {
     pub(super) fn openings(
         &self,
         (t, i): (u32, usize),
-        pair: [&Cutting; 2],
+        pair: [&TetrahedraCut; 2],
     ) -> SmallVec<[OpenPiece; 2]> {
         let other_facet = (self.delaunay.tetrahedra[t as usize].neighbors[i] & 3) as usize;
         let is_covered = pair[0].is_covered(i) || pair[1].is_covered(other_facet);
@@ -91,7 +91,7 @@ fn is_all_of(open: &[Poly], facet: &Triangle) -> bool {
 /// part, whose face is the facet.
 fn by_part(
     open: SmallVec<[Piece; 4]>,
-    cutting: &Cutting,
+    cutting: &TetrahedraCut,
     facet: usize,
     side: usize,
     normal: DVec3,

@@ -27,7 +27,7 @@ const CLOSE_BY: f64 = 0.15;
 /// Openings smaller than this are left to the complex, which finds them as cracks. [Units: wu²]
 const MIN_AREA: f64 = 0.04;
 /// What the complex makes a world of.
-pub(super) struct Rooms {
+pub(super) struct FoundRooms {
     pub(super) candidates: Vec<Candidate>,
     pub(super) votes: Vec<Vote>,
 }
@@ -39,7 +39,7 @@ fn label(cell: u32) -> u32 {
 
 /// Candidates where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
 /// rooms and are no part of them.
-pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f64) -> Rooms {
+pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f64) -> FoundRooms {
     let Session {
         space,
         cells,
@@ -121,7 +121,7 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
             .filter(|(room, _)| !heard.contains(room))
             .map(|(_, &t)| vote(t)),
     );
-    Rooms {
+    FoundRooms {
         candidates: found.into_iter().filter_map(|f| f.1).collect(),
         votes,
     }

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::balls::{circle, circumsphere, of_air};
-use super::cut::{Cutting, Knife, Part, Tolerance};
+use super::cut::{CutTolerance, Knife, Part, TetrahedraCut};
 use super::openings::Outline;
 use super::refine::refined;
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
@@ -145,7 +145,7 @@ struct Sampled {
     finest: f64,
     /// Vertices of the box.
     box_vertices: BTreeSet<u32>,
-    tolerance: Tolerance,
+    tolerance: CutTolerance,
 }
 
 /// Points on the surfaces, as dense as the air needs, and their tetrahedra.
@@ -171,7 +171,7 @@ fn sample(
     Ok(Sampled {
         finest: refined.down_to,
         box_vertices: box_vertices.copied().collect(),
-        tolerance: Tolerance {
+        tolerance: CutTolerance {
             plane: ON_PLANE * reach,
             width: CLOSED * ON_PLANE * reach,
         },
@@ -216,7 +216,7 @@ impl AllParts {
 
 impl Air<'_> {
     /// How the walls cut each tetrahedron.
-    fn cut_all(&self) -> Vec<Cutting> {
+    fn cut_all(&self) -> Vec<TetrahedraCut> {
         (0..self.knife.delaunay.n_finite as u32)
             .into_par_iter()
             .map(|t| self.knife.cut(t))
@@ -269,7 +269,7 @@ impl Air<'_> {
     }
 
     /// Numbers the parts of all tetrahedra, and measures them.
-    fn measure(&self, cuts: &[Cutting]) -> AllParts {
+    fn measure(&self, cuts: &[TetrahedraCut]) -> AllParts {
         let n = self.knife.delaunay.n_finite;
         let whole = (0..n).into_par_iter().map(|t| self.measure_whole(t));
         let mut all = AllParts {
@@ -297,7 +297,7 @@ impl Air<'_> {
     }
 
     /// All links, each with its outline.
-    fn ways(&self, cuts: &[Cutting], parts: &AllParts) -> Vec<Way> {
+    fn ways(&self, cuts: &[TetrahedraCut], parts: &AllParts) -> Vec<Way> {
         (0..self.knife.delaunay.n_finite)
             .into_par_iter()
             .flat_map_iter(|t| {
@@ -315,7 +315,7 @@ impl Air<'_> {
     fn ways_across(
         &self,
         (t, i): (usize, usize),
-        cuts: &[Cutting],
+        cuts: &[TetrahedraCut],
         parts: &AllParts,
         out: &mut Ways,
     ) {
@@ -352,7 +352,7 @@ type Way = (Link, Outline);
 type Ways = SmallVec<[Way; 4]>;
 
 /// Links between the parts of one tetrahedron.
-fn ways_within(t: usize, cut: &Cutting, parts: &AllParts, out: &mut Ways) {
+fn ways_within(t: usize, cut: &TetrahedraCut, parts: &AllParts, out: &mut Ways) {
     for (pair, outline) in cut.parts.iter().flat_map(|p| &p.inner) {
         let ids = pair.map(|k| parts.id(t, k));
         let are_outdoors = ids.iter().all(|&p| parts.at(p).radius == f64::INFINITY);

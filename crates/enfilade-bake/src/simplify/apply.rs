@@ -102,7 +102,7 @@ fn is_numbered(name: &str) -> bool {
 
 /// Batches under way: one for each list of cells, material and set of attributes, seals apart.
 #[derive(Default)]
-pub(crate) struct Batches(BTreeMap<Key, Primitive>);
+pub(crate) struct Batches(BTreeMap<BatchKey, Primitive>);
 
 impl Batches {
     /// Adds triangles that `cells`, ascending, see.
@@ -113,7 +113,7 @@ impl Batches {
 
     /// The batches in order of cells, material and attributes, seals last.
     pub(crate) fn finish(self) -> Vec<Batch> {
-        let batch = |((is_seal, cells, ..), primitive): (Key, Primitive)| Batch {
+        let batch = |((is_seal, cells, ..), primitive): (BatchKey, Primitive)| Batch {
             cells,
             primitive,
             is_seal,
@@ -124,7 +124,7 @@ impl Batches {
 
 /// Which attributes a primitive has; those that differ cannot share its lists.
 type Layout = (bool, bool, usize, bool);
-type Key = (bool, Vec<CellId>, Option<u32>, Layout);
+type BatchKey = (bool, Vec<CellId>, Option<u32>, Layout);
 
 fn layout_of(p: &Primitive) -> Layout {
     (

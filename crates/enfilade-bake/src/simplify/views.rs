@@ -55,7 +55,7 @@ pub(super) fn merge(graph: &CostGraph, bounds: &Bounds, mut eyes: Eyes) -> Vec<u
         ..*bounds
     };
     let into = merge::merge(graph.clone(), &any_number, &mut eyes);
-    let mut start = Merger::new(graph.contracted(&into), eyes.0, into);
+    let mut start = ViewMerger::new(graph.contracted(&into), eyes.0, into);
     if start.n_too_many(bounds) == 0 {
         return start.into;
     }
@@ -89,14 +89,14 @@ pub(super) fn merge(graph: &CostGraph, bounds: &Bounds, mut eyes: Eyes) -> Vec<u
 type Excess = (usize, f64);
 
 #[derive(Clone)]
-struct Merger {
+struct ViewMerger {
     graph: CostGraph,
     /// For each cell the eyes that see it, as bits.
     sees: Vec<Vec<u64>>,
     /// For each eye the items that it draws, as bits.
     drawn: Vec<Vec<u64>>,
     /// Of each pair of neighbors, the lesser first.
-    pairs: BTreeMap<(u32, u32), Pair>,
+    pairs: BTreeMap<(u32, u32), CellPair>,
     n_portals: usize,
     n_cells: usize,
     /// The cell that each cell is part of.
@@ -104,7 +104,7 @@ struct Merger {
 }
 
 #[derive(Clone, Copy)]
-struct Pair {
+struct CellPair {
     n_portals: usize,
     /// What all views draw more once they are one; stale where it is no number.
     added: f64,
@@ -113,9 +113,9 @@ struct Pair {
 }
 
 /// Whether the outdoors is one of the two, what their merge adds, what drawing both costs.
-type Key = (bool, f64, f64);
+type MergeKey = (bool, f64, f64);
 
-impl Merger {
+impl ViewMerger {
     /// Of a graph that was contracted to the hosts of `into`.
     fn new(graph: CostGraph, sees: Vec<Vec<u64>>, into: Vec<u32>) -> Self {
         let n_eyes = 64 * sees.first().map_or(0, Vec::len);
@@ -191,7 +191,7 @@ impl Merger {
     }
 
     fn join(&mut self, a: u32, b: u32, n_portals: usize) {
-        let stale = Pair {
+        let stale = CellPair {
             n_portals: 0,
             added: f64::NAN,
             both: 0.0,
@@ -220,7 +220,7 @@ impl Merger {
         max_cost: f64,
     ) -> Option<(u32, u32)> {
         self.weigh();
-        let mut best: Option<(Key, (u32, u32))> = None;
+        let mut best: Option<(MergeKey, (u32, u32))> = None;
         for (&(a, b), pair) in &self.pairs {
             if pair.both > max_cost {
                 continue;
@@ -263,7 +263,7 @@ impl Merger {
         for (to, from) in self.sees[k].iter_mut().zip(of_gone) {
             *to |= from;
         }
-        let moved: Vec<((u32, u32), Pair)> = (self.pairs.iter())
+        let moved: Vec<((u32, u32), CellPair)> = (self.pairs.iter())
             .filter(|((a, b), _)| *a == gone || *b == gone)
             .map(|(names, pair)| (*names, *pair))
             .collect();
@@ -331,7 +331,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// What a pair scores, and what its merge makes of all cells.
-    type Found = ((Key, [u32; 2]), Vec<u32>);
+    type Found = ((MergeKey, [u32; 2]), Vec<u32>);
 
     fn items(graph: &CostGraph, into: &[u32], group: u32) -> BTreeSet<u32> {
         let of_group = (0..into.len()).filter(|&c| into[c] == group);
@@ -417,7 +417,7 @@ mod tests {
                 .collect();
             // Whole weights: sums do not depend on their order.
             let bounds = Bounds { min_cost: 0.0, max_cost: max_cost.into(), max_cells, max_portals };
-            let start = Merger::new(graph.clone(), eyes.clone(), (0..graph.items.len() as u32).collect());
+            let start = ViewMerger::new(graph.clone(), eyes.clone(), (0..graph.items.len() as u32).collect());
             let mut least = f64::INFINITY;
             for order in ORDERS {
                 let mut found = start.clone();

@@ -60,7 +60,7 @@ pub(crate) fn fit_candidate(
     bvh.for_each_in_box(&bounds, |t| near.push(t));
     near.sort_unstable();
     let around: Vec<Triangle> = near.iter().map(|&t| triangles[t as usize]).collect();
-    let mut best: Option<Section> = None;
+    let mut best: Option<FreeSection> = None;
     // Wall planes come first; others are asked only when no wall closes the opening.
     for normals in candidate_normals(opening, &around) {
         for normal in normals {
@@ -159,7 +159,7 @@ fn candidate_planes(opening: &Opening, normal: DVec3, around: &[Triangle]) -> Ve
 }
 
 /// What of a plane can be reached from the front without meeting a triangle.
-struct Section {
+struct FreeSection {
     plane: Plane,
     picture: Picture,
     open: Vec<bool>,
@@ -169,7 +169,7 @@ struct Section {
     offset: f64,
 }
 
-impl Section {
+impl FreeSection {
     /// Lower is better: the smallest closed section; near ties go to the plane nearest the front.
     fn cost(&self, opening: &Opening) -> f64 {
         let unbounded = if self.bounded { 1.0 } else { 4.0 };
@@ -211,7 +211,7 @@ impl Section {
     }
 }
 
-fn free_section(plane: &Plane, centers: &[DVec3], around: &[Triangle], voxel: f64) -> Section {
+fn free_section(plane: &Plane, centers: &[DVec3], around: &[Triangle], voxel: f64) -> FreeSection {
     let picture = Picture::around(plane, centers, MARGIN + voxel);
     let blocked = picture.blocked(plane, around);
     let (pieces, found) = picture.pieces(&blocked, centers);
@@ -231,7 +231,7 @@ fn free_section(plane: &Plane, centers: &[DVec3], around: &[Triangle], voxel: f6
         None => (blocked.iter().map(|b| !b).collect(), f64::MAX / 1e6, false),
     };
     let offset: f64 = centers.iter().map(|&c| plane.signed_distance(c)).sum();
-    Section {
+    FreeSection {
         plane: *plane,
         picture,
         open,
@@ -252,7 +252,7 @@ struct Picture {
 }
 
 /// Cells of a picture that hang together.
-struct Piece {
+struct OpenPatch {
     /// Points of the opening that lie in it.
     n_hits: usize,
     n_cells: usize,
@@ -301,9 +301,9 @@ impl Picture {
 
     /// The pieces of the open cells that points lie in: of each cell the number of its piece from 1 on, 0 where there is
     /// none, and the pieces.
-    fn pieces(&self, blocked: &[bool], points: &[DVec3]) -> (Vec<u32>, Vec<Piece>) {
+    fn pieces(&self, blocked: &[bool], points: &[DVec3]) -> (Vec<u32>, Vec<OpenPatch>) {
         let mut piece_of = vec![0_u32; blocked.len()];
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut pieces: Vec<OpenPatch> = Vec::new();
         for &p in points {
             let place = self.place(p);
             let [i, j] = [0, 1].map(|k| (place[k].max(0.0) as usize).min(self.side[k] - 1));
@@ -321,7 +321,7 @@ impl Picture {
     }
 
     /// Marks the open cells that hang together with `start`.
-    fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> Piece {
+    fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> OpenPatch {
         let side = self.side;
         let (mut n_cells, mut meets_border) = (0, false);
         piece_of[start] = id;
@@ -341,7 +341,7 @@ impl Picture {
             visit(j > 0, k.wrapping_sub(side[0]));
             visit(j + 1 < side[1], k + side[0]);
         }
-        Piece {
+        OpenPatch {
             n_hits: 0,
             n_cells,
             meets_border,

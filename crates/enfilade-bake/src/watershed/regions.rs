@@ -48,7 +48,7 @@ pub(crate) fn merge_basins(
     settings: &MergeSettings,
 ) -> Regions {
     let n = flooded.peaks.len();
-    let mut merger = Merger {
+    let mut merger = BasinMerger {
         flooded,
         settings,
         parent: (0..n as u32).collect(),
@@ -75,7 +75,7 @@ pub(crate) fn merge_basins(
     merger.finish()
 }
 
-struct Merger<'a> {
+struct BasinMerger<'a> {
     flooded: Flooded<'a>,
     settings: &'a MergeSettings,
     parent: Vec<u32>,
@@ -89,7 +89,7 @@ struct Merger<'a> {
     storeys_apart: bool,
 }
 
-impl Merger<'_> {
+impl BasinMerger<'_> {
     fn find(&self, mut a: u32) -> u32 {
         while self.parent[a as usize] != a {
             a = self.parent[a as usize];
@@ -242,7 +242,7 @@ impl Merger<'_> {
     }
 }
 
-impl Mergeable for Merger<'_> {
+impl Mergeable for BasinMerger<'_> {
     fn pairs(&self) -> Vec<Pair> {
         self.contacts.keys().copied().collect()
     }

@@ -76,7 +76,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     builder.add_read_bytes(buffers.iter().map(n_own).sum());
     let document = Document { root, buffers };
     let materials = look::read_materials(&document, builder)?;
-    Reader {
+    GltfReader {
         meshes: vec![None; document.root.meshes.len()],
         document: &document,
         materials,
@@ -213,7 +213,7 @@ fn read_buffers<'b>(
     Ok(buffers)
 }
 
-struct Reader<'r, 'a, 'b> {
+struct GltfReader<'r, 'a, 'b> {
     document: &'r Document<'b>,
     /// Scene materials by document material.
     materials: Vec<u32>,
@@ -230,7 +230,7 @@ struct Visit {
     moves: Option<&'static str>,
 }
 
-impl Reader<'_, '_, '_> {
+impl GltfReader<'_, '_, '_> {
     fn read_scene(mut self) -> Result<(), ImportError> {
         let root = &self.document.root;
         let parents = self.parents()?;

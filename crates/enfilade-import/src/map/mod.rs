@@ -63,7 +63,7 @@ fn kind_of_class(class: &str) -> Kind {
 
 /// What a brush is by its sides' textures, whatever entity it is of.
 #[derive(Clone, Copy, PartialEq)]
-enum Matter {
+enum BrushMatter {
     Solid,
     /// Closes the world wherever it is, as compilers have it: also as a detail brush.
     Sky,
@@ -72,7 +72,7 @@ enum Matter {
     Tool,
 }
 
-fn matter_of(brush: &Brush<'_>) -> Matter {
+fn matter_of(brush: &Brush<'_>) -> BrushMatter {
     const TOOLS: [&str; 6] = [
         "clip",
         "hint",
@@ -86,26 +86,26 @@ fn matter_of(brush: &Brush<'_>) -> Matter {
         texture.rsplit('/').next().unwrap_or(texture)
     }
     if brush.sides.iter().any(|s| is(name(s.texture))) {
-        Matter::Tool
+        BrushMatter::Tool
     } else if brush
         .sides
         .iter()
         .any(|s| name(s.texture).starts_with(['*', '!']))
     {
-        Matter::Liquid
+        BrushMatter::Liquid
     } else if brush.sides.iter().any(|s| {
         let head = name(s.texture).get(..3);
         head.is_some_and(|h| h.eq_ignore_ascii_case("sky"))
     }) {
-        Matter::Sky
+        BrushMatter::Sky
     } else {
-        Matter::Solid
+        BrushMatter::Solid
     }
 }
 
 /// What of an entity is one object.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Part {
+enum EntityPart {
     Own,
     Sky,
     Liquid,
@@ -116,7 +116,7 @@ struct Shaped<'t> {
     solid: ConvexSolid,
     textures: Vec<&'t str>,
     entity: usize,
-    matter: Matter,
+    matter: BrushMatter,
 }
 
 /// Reads one file into the builder.
@@ -151,7 +151,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         }
         for brush in &entity.brushes {
             let matter = matter_of(brush);
-            if matter == Matter::Tool {
+            if matter == BrushMatter::Tool {
                 continue;
             }
             let solid = solid_of(brush).map_err(|p| failed(builder, p))?;
@@ -243,7 +243,7 @@ fn snapped(mut solid: ConvexSolid) -> ConvexSolid {
 }
 
 /// By entity and part, and then by texture: what becomes one object each, so that each keeps its identity.
-type Faces<'t> = BTreeMap<(usize, Part), BTreeMap<&'t str, Primitive>>;
+type Faces<'t> = BTreeMap<(usize, EntityPart), BTreeMap<&'t str, Primitive>>;
 
 fn build(
     entities: &[RawEntity<'_>],
@@ -324,12 +324,12 @@ impl<'s, 't> Brushwork<'s, 't> {
     /// Whether a brush is sky that closes the world, though it is detail.
     fn seals(&self, s: &Shaped<'_>) -> bool {
         let class = class_of(&self.entities[s.entity]);
-        s.matter == Matter::Sky && class.starts_with("func_detail")
+        s.matter == BrushMatter::Sky && class.starts_with("func_detail")
     }
 
     fn is_structural(&self, s: &Shaped<'_>) -> bool {
         let is_of_structure = self.roles[s.entity].0 == Role::Structural;
-        s.matter != Matter::Liquid && (is_of_structure || self.seals(s))
+        s.matter != BrushMatter::Liquid && (is_of_structure || self.seals(s))
     }
 
     fn structural(&self) -> Vec<&'s ConvexSolid> {
@@ -349,9 +349,9 @@ impl<'s, 't> Brushwork<'s, 't> {
         for s in self.shaped {
             let visible = self.is_structural(s).then(|| exposed.next()).flatten();
             let part = match s.matter {
-                Matter::Liquid => Part::Liquid,
-                Matter::Sky if self.seals(s) => Part::Sky,
-                _ => Part::Own,
+                BrushMatter::Liquid => EntityPart::Liquid,
+                BrushMatter::Sky if self.seals(s) => EntityPart::Sky,
+                _ => EntityPart::Own,
             };
             let parts = faces.entry((s.entity, part)).or_default();
             for (f, face) in s.solid.faces.iter().enumerate() {
@@ -389,15 +389,17 @@ impl<'s, 't> Brushwork<'s, 't> {
             let class = class_of(&self.entities[e]);
             let (role, reason) = &self.roles[e];
             let (name, role, reason) = match part {
-                Part::Own => (format!("{class} {e}"), *role, reason.as_str()),
-                Part::Sky => (
+                EntityPart::Own => (format!("{class} {e}"), *role, reason.as_str()),
+                EntityPart::Sky => (
                     format!("{class} {e} sky"),
                     Role::Structural,
                     "map: sky closes the world",
                 ),
-                Part::Liquid => (format!("{class} {e} liquid"), Role::Detail, "map: a liquid"),
+                EntityPart::Liquid => {
+                    (format!("{class} {e} liquid"), Role::Detail, "map: a liquid")
+                }
             };
-            let is_liquid = part == Part::Liquid;
+            let is_liquid = part == EntityPart::Liquid;
             let mut primitives = Vec::new();
             for (texture, mut primitive) in parts {
                 let material = *material_of

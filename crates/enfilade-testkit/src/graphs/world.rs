@@ -11,13 +11,13 @@ use enfilade_geom::{Aabb, DVec3};
 use super::grid::{Face, Grid};
 
 /// A hole in a face: `[low, high]` along its two other axes, and what it is.
-pub(super) type Hole = ([f64; 2], [f64; 2], PortalKind);
+pub(super) type FaceHole = ([f64; 2], [f64; 2], PortalKind);
 
 /// Puts a world together from the grid and one choice a face.
 pub(super) fn world_of(
     grid: &Grid,
     furniture: &[(u32, Aabb)],
-    hole: &mut dyn FnMut(&Face) -> Option<Hole>,
+    hole: &mut dyn FnMut(&Face) -> Option<FaceHole>,
 ) -> World {
     let mut walls = Walls::default();
     for face in grid.faces() {
@@ -69,7 +69,7 @@ struct Walls {
 }
 
 impl Walls {
-    fn add(&mut self, grid: &Grid, face: &Face, opening: Option<Hole>) {
+    fn add(&mut self, grid: &Grid, face: &Face, opening: Option<FaceHole>) {
         let mut parts = Vec::new();
         match opening {
             None => parts.push(([0.0; 2], [1.0; 2])),
@@ -108,7 +108,7 @@ impl Walls {
     }
 }
 
-fn portal_of(grid: &Grid, face: &Face, (low, high, kind): Hole) -> Portal {
+fn portal_of(grid: &Grid, face: &Face, (low, high, kind): FaceHole) -> Portal {
     let corners = grid.rectangle(face, low, high);
     let outline: Vec<[f32; 3]> = corners.iter().map(|&p| to_f32(p)).collect();
     let area = (corners[1] - corners[0]).length() * (corners[3] - corners[0]).length();

@@ -32,7 +32,7 @@ pub(super) fn check(
             problem,
         };
         let walls = walls.ok_or(fail("walls are to hide them, and none are known"))?;
-        let mut reader = Reader {
+        let mut reader = BeamReader {
             rest: &tree.bytes,
             walls,
             // Distances below this are rounding.
@@ -56,13 +56,13 @@ pub(super) fn check(
     Ok(())
 }
 
-struct Reader<'a> {
+struct BeamReader<'a> {
     rest: &'a [u8],
     walls: &'a [Triangle],
     apart: f64,
 }
 
-impl Reader<'_> {
+impl BeamReader<'_> {
     fn byte(&mut self) -> Result<u8, &'static str> {
         let (&byte, rest) = self.rest.split_first().ok_or("their tree ends early")?;
         self.rest = rest;

@@ -44,7 +44,7 @@ use super::space::Space;
 use arms::Walls;
 pub(super) use labels::Branches;
 use regions::{NONE, Regions};
-use rule::{Limb, classify};
+use rule::{LimbKind, classify};
 
 /// Finds the branches of rooms, given by the room of each part.
 ///
@@ -98,7 +98,7 @@ fn open_rooms(regions: &mut Regions<'_>) -> Vec<u32> {
 fn settle(regions: &mut Regions<'_>, limb: u32) {
     let mouths = regions.mouths(limb);
     match (classify(&regions.facts(limb, &mouths)), mouths.first()) {
-        (Limb::Branch(mouth), _) => regions.regions[limb as usize].branch = Some(mouth),
+        (LimbKind::Branch(mouth), _) => regions.regions[limb as usize].branch = Some(mouth),
         (_, Some(widest)) => regions.merge(limb, widest.parent),
         (_, None) => {}
     }

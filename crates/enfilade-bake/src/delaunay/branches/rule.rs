@@ -104,7 +104,7 @@ pub(super) struct LimbFacts {
 
 /// What a limb is. All but a branch is merged across its widest mouth, if it has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Limb {
+pub(super) enum LimbKind {
     /// Nothing else is left of its room.
     Whole,
     /// Not as deep as its mouth is wide.
@@ -123,23 +123,23 @@ pub(super) enum Limb {
 
 /// What a limb is. A tube outdoors may have several mouths and doors to rooms, and counts as deep by what it
 /// holds.
-pub(super) fn classify(limb: &LimbFacts) -> Limb {
+pub(super) fn classify(limb: &LimbFacts) -> LimbKind {
     let Some((widest, others)) = limb.mouths.split_first() else {
-        return Limb::Whole;
+        return LimbKind::Whole;
     };
     let Some(body) = limb.body else {
-        return Limb::Bulge;
+        return LimbKind::Bulge;
     };
     let has_two_mouths = others.iter().any(|m| !m.is_chink_beside(widest));
     // Less than the disk of the least ball that is known is a crack.
     let leads_on = limb.exits > PI * limb.finest.powi(2);
     if !limb.is_outdoors && (has_two_mouths || leads_on) {
-        return Limb::Neck;
+        return LimbKind::Neck;
     }
     let radii: Vec<f64> = limb.mouths.iter().map(|m| m.radius).collect();
     let main = &limb.mouths[..n_main_mouths(&radii, limb.is_outdoors)];
     if main.iter().any(MouthFacts::is_slit) {
-        return Limb::Crevice;
+        return LimbKind::Crevice;
     }
     let is_deep = if limb.is_outdoors {
         let needs = |m: &MouthFacts| 2.0 * DEEP * m.radius * m.area;
@@ -148,13 +148,13 @@ pub(super) fn classify(limb: &LimbFacts) -> Limb {
         limb.depth >= 2.0 * DEEP * widest.radius
     };
     if !is_deep {
-        return Limb::Alcove;
+        return LimbKind::Alcove;
     }
     let weight = limb.trunk / body;
     if weight < NARROWS {
-        return Limb::Continuation;
+        return LimbKind::Continuation;
     }
-    Limb::Branch(BranchMouth {
+    LimbKind::Branch(BranchMouth {
         weight,
         radius: body,
     })
@@ -248,7 +248,7 @@ mod tests {
         }
     }
 
-    const BRANCH: Limb = Limb::Branch(BranchMouth {
+    const BRANCH: LimbKind = LimbKind::Branch(BranchMouth {
         weight: 2.0,
         radius: 1.0,
     });
@@ -256,7 +256,7 @@ mod tests {
     type Change = fn(&mut LimbFacts);
 
     /// Changes a tube, row by row, and compares what it is then.
-    fn check(rows: &[(&str, Change, Limb)]) {
+    fn check(rows: &[(&str, Change, LimbKind)]) {
         for (what, change, expected) in rows {
             let mut limb = tube();
             change(&mut limb);
@@ -282,33 +282,45 @@ mod tests {
 
     #[test]
     fn each_rule_for_limbs_has_a_case_on_either_side() {
-        let just_narrow = Limb::Branch(BranchMouth {
+        let just_narrow = LimbKind::Branch(BranchMouth {
             weight: 1.5,
             radius: 1.0,
         });
         check(&[
             ("a tube", |_| {}, BRANCH),
-            ("no way out", |l| l.mouths.clear(), Limb::Whole),
-            ("no ball inside", |l| l.body = None, Limb::Bulge),
+            ("no way out", |l| l.mouths.clear(), LimbKind::Whole),
+            ("no ball inside", |l| l.body = None, LimbKind::Bulge),
             // One mouth.
-            ("a ring", |l| l.mouths.push(mouth(0.9)), Limb::Neck),
-            ("a narrow ring", |l| l.mouths.push(mouth(0.7)), Limb::Neck),
+            ("a ring", |l| l.mouths.push(mouth(0.9)), LimbKind::Neck),
+            (
+                "a narrow ring",
+                |l| l.mouths.push(mouth(0.7)),
+                LimbKind::Neck,
+            ),
             ("a chink beside", |l| l.mouths.push(mouth(0.6)), BRANCH),
             ("a rim beside", |l| l.mouths.push(rim(0.9)), BRANCH),
             // A dead end.
-            ("a door to a hall", |l| l.exits = 2.0, Limb::Neck),
+            ("a door to a hall", |l| l.exits = 2.0, LimbKind::Neck),
             ("a crack to a hall", |l| l.exits = 0.03, BRANCH),
             // No slit.
-            ("under a bed", |l| l.mouths[0] = slit(1.0), Limb::Crevice),
+            (
+                "under a bed",
+                |l| l.mouths[0] = slit(1.0),
+                LimbKind::Crevice,
+            ),
             ("1 : 2", |l| l.mouths[0].spread = 1.3, BRANCH),
             ("a slit beside", |l| l.mouths.push(slit(0.1)), BRANCH),
             // Deep.
-            ("1.9 diameters", |l| l.depth = 3.8, Limb::Alcove),
+            ("1.9 diameters", |l| l.depth = 3.8, LimbKind::Alcove),
             ("2.1 diameters", |l| l.depth = 4.2, BRANCH),
             // Narrow.
-            ("a taper", |l| l.trunk = 1.4, Limb::Continuation),
+            ("a taper", |l| l.trunk = 1.4, LimbKind::Continuation),
             ("just narrow", |l| l.trunk = 1.5, just_narrow),
-            ("wide inside", |l| l.body = Some(1.5), Limb::Continuation),
+            (
+                "wide inside",
+                |l| l.body = Some(1.5),
+                LimbKind::Continuation,
+            ),
         ]);
     }
 
@@ -335,7 +347,7 @@ mod tests {
                     l.is_outdoors = true;
                     l.mouths.push(mouth(1.0));
                 },
-                Limb::Alcove,
+                LimbKind::Alcove,
             ),
             (
                 "a tunnel with a slit as wide at one end",
@@ -343,7 +355,7 @@ mod tests {
                     (l.is_outdoors, l.volume) = (true, 9.0 * PI);
                     l.mouths.push(slit(0.9));
                 },
-                Limb::Crevice,
+                LimbKind::Crevice,
             ),
             (
                 "a tunnel with a narrow slit",
@@ -356,7 +368,7 @@ mod tests {
             (
                 "deep, but holding little",
                 |l| (l.is_outdoors, l.volume) = (true, PI),
-                Limb::Alcove,
+                LimbKind::Alcove,
             ),
         ]);
     }
