@@ -11,6 +11,7 @@ mod floors;
 mod lengths;
 mod messy;
 mod mutual;
+mod names;
 mod score;
 mod tidy;
 

@@ -17,6 +17,7 @@ use enfilade_geom::{Aabb, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
 use rayon::prelude::*;
 
 use crate::complex::{Partition, PartitionPortal};
+use crate::layout::{Layout, layout_of};
 use crate::structure::Candidate;
 
 /// A scene in cells, whatever found them: what the last stage, which all builders share, is made from.
@@ -256,7 +257,9 @@ fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
         return (PortalKind::Crack, false);
     }
-    let closed = p.screen.map_or(0.0, |s| cut.candidates[s as usize].closed);
+    let closed = p
+        .candidate
+        .map_or(0.0, |s| cut.candidates[s as usize].closed);
     let is_closed = closed >= cut.closed_share;
     let is_upright = p.plane.normal.y.abs() < 0.5;
     let up = p.outline.points.iter().map(|q| q.y);
@@ -291,10 +294,6 @@ fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
     drop(1.0).min(drop(-1.0))
 }
 
-/// Which attributes a batch's primitive carries: normals, tangents, sets of texture coordinates,
-/// colors. Primitives that carry different ones cannot share a vertex buffer.
-type Layout = (bool, bool, usize, bool);
-
 #[derive(Default)]
 struct BatchBuilder {
     primitive: Primitive,
@@ -312,17 +311,12 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         }
         let object = &scene.objects[source.object as usize];
         let from = &scene.meshes[object.mesh as usize].primitives[source.primitive as usize];
-        let layout = (
-            !from.normals.is_empty(),
-            !from.tangents.is_empty(),
-            from.uvs.len(),
-            !from.colors.is_empty(),
-        );
         if normal_matrix.is_none_or(|(o, _)| o != source.object) {
             let m = DMat3::from_mat4(object.transform);
             normal_matrix = Some((source.object, m.inverse().transpose()));
         }
         let normals = normal_matrix.map_or(DMat3::IDENTITY, |(_, m)| m);
+        let layout = layout_of(from);
         let builder = builders
             .entry((seen_from, from.material, layout))
             .or_default();

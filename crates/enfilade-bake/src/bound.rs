@@ -245,9 +245,9 @@ impl Cutting<'_> {
         planes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let cut = |plane: &Plane| {
             let section = poly::section_of_box(plane, &around, (1e-9 * extent).max(1e-8))?;
-            let screens = vec![Winding::new(section.to_vec())];
+            let candidates = vec![Winding::new(section.to_vec())];
             let distance = |p: DVec3| plane.signed_distance(p);
-            let added = cut_cell(&self.world, cell, screens, &distance).ok()?;
+            let added = cut_cell(&self.world, cell, candidates, &distance).ok()?;
             let parts = [added.cell, added.new_cell];
             let is_gain = |&c: &CellId| cost_of_cell(&added.world, c, model) <= GAIN * cost;
             // A plane that grazes a portal may leave of it less than rounding does.
@@ -320,8 +320,8 @@ fn cut_outdoors(world: &World, cell: CellId) -> Option<Added> {
     if scene.is_empty() || room.min_element() < 1e-4 * extent.max(1.0) {
         return None;
     }
-    let screens = sides_of_box(&between);
-    let added = cut_cell(world, cell, screens, &|p| {
+    let candidates = sides_of_box(&between);
+    let added = cut_cell(world, cell, candidates, &|p| {
         (p - between.min).min(between.max - p).min_element()
     });
     added

@@ -87,13 +87,13 @@ fn renumber_locator(locator: &mut Locator, number: &[u32]) {
     }
 }
 
-/// Regions that leak into each other over more than this, and over more than their screens cover,
+/// Regions that leak into each other over more than this, and over more than their candidates cover,
 /// have no opening between them. [Units: wu²]
 const MAX_LEAK: f64 = 1.0;
 
 /// Gives regions that no plane parts one label, in the votes and the voids; whether there were any.
 ///
-/// A portal is planar. Where two regions meet in the open, not in their screens (over a flight of
+/// A portal is planar. Where two regions meet in the open, not in their candidates (over a flight of
 /// stairs, say), the border between them would follow whatever planes the cell complex happens to
 /// have: dozens of portals that mean nothing. Such regions are one room.
 pub(crate) fn join_unparted(
@@ -108,14 +108,14 @@ pub(crate) fn join_unparted(
             continue;
         }
         let pair = [labels[0].min(labels[1]), labels[0].max(labels[1])];
-        let (leak, screen) = between.entry(pair).or_default();
-        *if p.is_leak { leak } else { screen } += p.area;
+        let (leak, candidate) = between.entry(pair).or_default();
+        *if p.is_leak { leak } else { candidate } += p.area;
     }
     // The lesser label stands for both; pairs ascend, so chains end in the least of all.
     let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
-    for (pair, (leak, screen)) in between {
+    for (pair, (leak, candidate)) in between {
         // A model full of holes must not lose its rooms to the outdoors.
-        if pair[0] != OUTDOORS && leak > MAX_LEAK && leak > screen {
+        if pair[0] != OUTDOORS && leak > MAX_LEAK && leak > candidate {
             let [a, b] = pair.map(|l| root(&stands_for, l));
             if a != b {
                 stands_for.insert(a.max(b), a.min(b));

@@ -23,6 +23,7 @@ pub mod delaunay;
 pub mod edit;
 mod error;
 mod join;
+mod layout;
 pub mod leak;
 mod method;
 mod output;

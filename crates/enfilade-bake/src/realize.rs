@@ -40,7 +40,7 @@ pub(crate) fn realize(
     let candidates = proposal.candidates.iter();
     let complex = build_complex(&ComplexInput {
         triangles: &structure.triangles,
-        screens: &candidates.map(|c| c.winding.clone()).collect::<Vec<_>>(),
+        candidates: &candidates.map(|c| c.winding.clone()).collect::<Vec<_>>(),
         bounds: proposal.bounds,
         gap: hole.gap(),
         has_seals: hole.has_seals(),

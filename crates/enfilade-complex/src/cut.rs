@@ -4,11 +4,11 @@
 //! into each other, but one made of whatever planes the tree has there: over a flight of stairs that
 //! can be a hundred small portals. Here each such border is moved to the minimum of
 //!
-//! > open area that lies on no screen + [`PER_FACET`] for each piece + [`VOTE`] × volume of votes overruled
+//! > open area that lies on no candidate + [`PER_FACET`] for each piece + [`VOTE`] × volume of votes overruled
 //!
 //! by a minimum cut (Boykov, Veksler & Zabih 2001 move labels in the same way; the flow is Dinic's
-//! 1970) among the leaves around the border. Screens cost next to nothing, so a border that can be
-//! moved into its screen is.
+//! 1970) among the leaves around the border. Candidates cost next to nothing, so a border that can be
+//! moved into its candidate is.
 //!
 //! Time: `O(V²E)` at worst and near-linear in practice for each pair of cells that leak; at most
 //! [`MAX_LEAVES`] leaves take part. Capacities are whole numbers, so no rounding can loop.
@@ -17,15 +17,15 @@ use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use enfilade_geom::Sets;
 
-use super::graph::{LeafGraph, NO_SCREEN};
+use super::graph::{LeafGraph, NO_CANDIDATE};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
 
 /// What a piece of a border costs besides its area. [Units: wu²]
 const PER_FACET: f64 = 0.002;
 /// What it costs to overrule votes. [Units: 1/wu]
 const VOTE: f64 = 0.5;
-/// What a screen costs, per area: so little that it is only a tie-breaker.
-const SCREEN: f64 = 0.01;
+/// What a candidate costs, per area: so little that it is only a tie-breaker.
+const CANDIDATE: f64 = 0.01;
 /// Borders that leak less than this stay as they are. [Units: wu²]
 const MIN_LEAK: f64 = 0.01;
 /// Most leaves that take part in one cut.
@@ -43,7 +43,7 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
     let mut leaks: BTreeMap<[u32; 2], (f64, Vec<u32>)> = BTreeMap::new();
     for (i, f) in graph.facets.iter().enumerate() {
         let [a, b] = f.leaves.map(|l| cells.cell_of_leaf[l as usize]);
-        if f.screen == NO_SCREEN && !f.is_narrow && a != b && a != SOLID && b != SOLID {
+        if f.candidate == NO_CANDIDATE && !f.is_narrow && a != b && a != SOLID && b != SOLID {
             let (area, facets) = leaks.entry([a.min(b), a.max(b)]).or_default();
             *area += f64::from(f.area);
             facets.push(i as u32);
@@ -298,12 +298,12 @@ fn cut(
             } else {
                 f.leaves[0]
             };
-            let cost = units(if f.screen == NO_SCREEN {
+            let cost = units(if f.candidate == NO_CANDIDATE {
                 // A gap makes no portal: a border of many is better than one that shows.
                 let each = if f.is_gap { 0.0 } else { PER_FACET };
                 f64::from(f.area) + each
             } else {
-                f64::from(f.area) * SCREEN
+                f64::from(f.area) * CANDIDATE
             });
             match node_of.get(&other) {
                 Some(&j) if (j as usize) > i => {
@@ -489,7 +489,7 @@ mod tests {
             leaves: [a, b],
             width: area,
             area,
-            screen: NO_SCREEN,
+            candidate: NO_CANDIDATE,
             is_narrow: false,
             is_gap: false,
         };

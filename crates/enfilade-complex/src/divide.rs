@@ -1,8 +1,8 @@
-//! One cell of a finished world, cut in two by a screen.
+//! One cell of a finished world, cut in two by a candidate.
 //!
-//! The complex is built from the cell's own triangles, the new screens (which come first: one in a plane, or the
+//! The complex is built from the cell's own triangles, the new candidates (which come first: one in a plane, or the
 //! sides of a box) and the pieces of the cell's portals (all others). What of the cell hangs together other than
-//! through screens is one part; the two parts that the new screens have most of their opening between are the two new
+//! through candidates is one part; the two parts that the new candidates have most of their opening between are the two new
 //! cells, and whatever else they cut off joins one of them.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -16,56 +16,56 @@ use super::graph::{box_faces, sides_of_border};
 use super::leaf_cells::{LeafCells, SOLID};
 use super::partition::{self, Partition};
 
-/// The cell of [`Complex::divided`] before the screen's plane.
+/// The cell of [`Complex::divided`] before the candidate's plane.
 pub const FRONT: u32 = 0;
 /// The cell of [`Complex::divided`] behind it.
 pub const BACK: u32 = 1;
 
 /// What cuts a cell.
 pub struct Cutter<'a> {
-    /// The screens up to this number are the cutter's.
-    pub n_screens: u32,
+    /// The candidates up to this number are the cutter's.
+    pub n_candidates: u32,
     /// How far a point lies before all of them; less than 0 behind. [Units: wu]
     pub distance: &'a dyn Fn(DVec3) -> f64,
 }
 
 impl Cutter<'_> {
-    fn is_own(&self, screen: Option<u32>) -> bool {
-        screen.is_some_and(|s| s < self.n_screens)
+    fn is_own(&self, candidate: Option<u32>) -> bool {
+        candidate.is_some_and(|s| s < self.n_candidates)
     }
 
-    /// Whether a leaf's middle lies before the screens.
+    /// Whether a leaf's middle lies before the candidates.
     fn is_before(&self, middle: Option<DVec3>) -> bool {
         middle.is_some_and(|p| (self.distance)(p) >= 0.0)
     }
 }
 
-/// Why a screen does not part a cell.
+/// Why a candidate does not part a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Undivided {
-    /// No opening of the screen has the cell on both sides.
+    /// No opening of the candidate has the cell on both sides.
     Aside,
     /// Both sides reach the border of the box, behind which all is one cell.
     Endless,
-    /// Both sides are one: here the screen's plane is passed beside the screen.
+    /// Both sides are one: here the candidate's plane is passed beside the candidate.
     Around(DVec3),
 }
 
 /// An opening between two leaves.
 struct LeafOpening {
     leaves: [u32; 2],
-    screen: Option<u32>,
+    candidate: Option<u32>,
     area: f64,
     at: DVec3,
 }
 
 impl Complex {
-    /// Parts what `is_ours` holds of by the cutter's screens.
+    /// Parts what `is_ours` holds of by the cutter's candidates.
     ///
     /// The partition has two cells, [`FRONT`] and [`BACK`]; all else counts as solid. Linear in leaves and openings.
     ///
     /// # Errors
-    /// When the screens do not part it in two.
+    /// When the candidates do not part it in two.
     pub fn divided(
         &self,
         cutter: &Cutter<'_>,
@@ -76,14 +76,14 @@ impl Complex {
         let is_inner = |o: &&LeafOpening| o.leaves.iter().all(|&l| ours[l as usize]);
         let mut sets = Sets::new(ours.len());
         for o in openings.iter().filter(is_inner) {
-            if o.screen.is_none() {
+            if o.candidate.is_none() {
                 sets.join(o.leaves[0], o.leaves[1]);
             }
         }
-        // Between which parts the new screen lies, and with how much of its opening.
+        // Between which parts the new candidate lies, and with how much of its opening.
         let mut between: BTreeMap<[u32; 2], f64> = BTreeMap::new();
         for o in openings.iter().filter(is_inner) {
-            if cutter.is_own(o.screen) {
+            if cutter.is_own(o.candidate) {
                 let mut pair = o.leaves.map(|l| sets.find(l));
                 if !cutter.is_before(middles[o.leaves[0] as usize]) {
                     pair.swap(0, 1);
@@ -164,12 +164,12 @@ impl Complex {
             if !o.leaves.iter().all(|&l| ours[l as usize]) || sets.find(o.leaves[0]) != part {
                 continue;
             }
-            match o.screen {
+            match o.candidate {
                 None => o
                     .leaves
                     .iter()
                     .for_each(|&l| next[l as usize].push(i as u32)),
-                Some(_) if cutter.is_own(o.screen) && sets.find(o.leaves[1]) == part => {
+                Some(_) if cutter.is_own(o.candidate) && sets.find(o.leaves[1]) == part => {
                     for l in o.leaves {
                         if cutter.is_before(middles[l as usize]) {
                             from[l as usize] = u32::MAX - 1;
@@ -263,16 +263,16 @@ impl FacetSink for OpeningSink<'_> {
             .into_iter()
             .for_each(|l| self.count(l, facet.points));
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
-        for (piece, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+        for (piece, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let at = piece.iter().sum::<DVec3>() / piece.len() as f64;
-            // A piece too narrow for the screen that it lies on goes by none; it must not lead around it.
+            // A piece too narrow for the candidate that it lies on goes by none; it must not lead around it.
             let is_on = |cover: &&Cover| {
                 let outline = Winding::new(cover.points.to_vec());
-                cover.screen.is_some() && outline.contains_in_plane(at, 0.0)
+                cover.candidate.is_some() && outline.contains_in_plane(at, 0.0)
             };
             self.openings.push(LeafOpening {
                 leaves: facet.leaves,
-                screen: screen.or_else(|| facet.covers.iter().find(is_on)?.screen),
+                candidate: candidate.or_else(|| facet.covers.iter().find(is_on)?.candidate),
                 area: poly::area(&piece),
                 at,
             });

@@ -18,8 +18,8 @@ const PARALLEL_LEAVES: u32 = 2048;
 /// The part of a surface that may cover a facet, in the facet's plane.
 #[derive(Clone)]
 pub(super) struct Cover {
-    /// Screen, or `None` for a structural triangle.
-    pub(super) screen: Option<u32>,
+    /// Candidate, or `None` for a structural triangle.
+    pub(super) candidate: Option<u32>,
     /// Where it is, counter-clockwise about the plane's normal.
     pub(super) points: Poly,
     bounds: Aabb,
@@ -133,12 +133,12 @@ impl Visitor<'_> {
                 let surface = &self.surfaces[s as usize];
                 let points = projected(&surface.points, &plane);
                 let bounds = Aabb::of_points(&points);
-                let screen = match surface.source {
-                    Source::Screen(id) => Some(id),
+                let candidate = match surface.source {
+                    Source::Candidate(id) => Some(id),
                     Source::Triangle(_) | Source::Seam => None,
                 };
                 bounds.overlaps(&reach).then_some(Cover {
-                    screen,
+                    candidate,
                     points,
                     bounds,
                 })
@@ -216,18 +216,18 @@ impl Visitor<'_> {
 /// What is open of a facet.
 #[derive(Default)]
 pub(super) struct OpenPieces {
-    /// Convex pieces, with the screen that each lies on.
+    /// Convex pieces, with the candidate that each lies on.
     pub(super) pieces: Vec<(Poly, Option<u32>)>,
 }
 
 impl OpenPieces {
-    /// Subtracts the structural covers and divides the rest by the screens.
+    /// Subtracts the structural covers and divides the rest by the candidates.
     ///
     /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], are closed.
     pub(super) fn of(facet: &RawFacet<'_>, normal: DVec3, tolerance: &Tolerance) -> Self {
         // Beside a triangle that was moved into its plane, a gap may be nothing but that move; away
         // from triangles a sliver is as open as any facet, and closing it would part a cell.
-        let is_bare = facet.covers.iter().all(|c| c.screen.is_some());
+        let is_bare = facet.covers.iter().all(|c| c.candidate.is_some());
         let (min_area, min_width) = if is_bare {
             (0.0, 2.0 * tolerance.cut)
         } else {
@@ -236,7 +236,7 @@ impl OpenPieces {
         let open = |p: &Poly| poly::area(p) >= min_area && poly::width(p) >= min_width;
         let mut rest: Vec<Poly> = vec![facet.points.into()];
         rest.retain(open);
-        for cover in facet.covers.iter().filter(|c| c.screen.is_none()) {
+        for cover in facet.covers.iter().filter(|c| c.candidate.is_none()) {
             let mut outside = Vec::with_capacity(rest.len() + 2);
             for p in &rest {
                 poly::cut_out(p, &cover.points, normal, tolerance.cut, 0.0, &mut outside);
@@ -248,13 +248,13 @@ impl OpenPieces {
             }
         }
         let mut pieces = Vec::new();
-        for cover in facet.covers.iter().filter(|c| c.screen.is_some()) {
+        for cover in facet.covers.iter().filter(|c| c.candidate.is_some()) {
             let mut outside = Vec::with_capacity(rest.len());
             for p in &rest {
                 let width = tolerance.width;
                 let inside =
                     poly::cut_out(p, &cover.points, normal, tolerance.cut, width, &mut outside);
-                pieces.extend(inside.filter(open).map(|p| (p, cover.screen)));
+                pieces.extend(inside.filter(open).map(|p| (p, cover.candidate)));
             }
             outside.retain(open);
             rest = outside;
@@ -292,8 +292,8 @@ mod tests {
         assert_eq!(pieces_of_sliver(&[]), 1);
         let points = Poly::from_slice(&[DVec3::ZERO, DVec3::NEG_Y, DVec3::X]);
         let bounds = Aabb::of_points(&points);
-        let beside = |screen| Cover {
-            screen,
+        let beside = |candidate| Cover {
+            candidate,
             points: points.clone(),
             bounds,
         };

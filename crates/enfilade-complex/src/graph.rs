@@ -13,10 +13,10 @@ use super::tree::{Tree, leaf_index};
 /// Openings up to so many gaps wide are cracks, with the default gap as wide as [`CRACK_WIDTH`](super::CRACK_WIDTH).
 const CRACK_GAPS: f64 = 5.0;
 
-/// No screen.
-pub(super) const NO_SCREEN: u32 = u32::MAX;
+/// No candidate.
+pub(super) const NO_CANDIDATE: u32 = u32::MAX;
 
-/// An opening between two leaves, on one screen or on none.
+/// An opening between two leaves, on one candidate or on none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OpenFacet {
     /// Leaves on the positive and on the negative side of its plane.
@@ -25,8 +25,8 @@ pub(super) struct OpenFacet {
     pub(super) width: f32,
     /// Area of all its pieces.
     pub(super) area: f32,
-    /// The screen that it lies on, or [`NO_SCREEN`].
-    pub(super) screen: u32,
+    /// The candidate that it lies on, or [`NO_CANDIDATE`].
+    pub(super) candidate: u32,
     /// No piece of it is wider than a crack.
     pub(super) is_narrow: bool,
     /// No piece of it lets a ball of the smallest hole pass: it may be sealed.
@@ -237,8 +237,8 @@ impl FacetSink for LeafSink<'_> {
             self.faces[leaf] = self.faces[leaf].max(face);
         }
         let first = self.facets.len();
-        for (piece, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
-            let screen = screen.unwrap_or(NO_SCREEN);
+        for (piece, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+            let candidate = candidate.unwrap_or(NO_CANDIDATE);
             let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
             let is_narrower = |diameter: f64| {
                 let is_whole = f64::from(width) >= diameter;
@@ -247,7 +247,10 @@ impl FacetSink for LeafSink<'_> {
             let hole = self.clearance.hole;
             let is_gap = is_narrower(hole);
             let is_narrow = is_gap || is_narrower(CRACK_GAPS * hole);
-            match self.facets[first..].iter_mut().find(|f| f.screen == screen) {
+            match self.facets[first..]
+                .iter_mut()
+                .find(|f| f.candidate == candidate)
+            {
                 Some(f) => {
                     f.width = f.width.max(width);
                     f.area += area;
@@ -259,7 +262,7 @@ impl FacetSink for LeafSink<'_> {
                         leaves: facet.leaves,
                         width,
                         area,
-                        screen,
+                        candidate,
                         is_narrow,
                         is_gap,
                     });

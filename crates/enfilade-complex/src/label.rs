@@ -1,14 +1,14 @@
 //! From votes to cells: which leaves make up which cell.
 //!
-//! 1. Leaves open to each other other than through screens and gaps form components. A gap is an opening through
+//! 1. Leaves connected without crossing a candidate portal or a gap form components. A gap is an opening through
 //!    which no ball of the smallest hole passes. Where rooms run into each other so, cracks are left out as well, which
 //!    are a few times as wide.
 //! 2. A component in which one label rules belongs to it. One with several strong labels has a
 //!    leak: it is grown together along its openings, widest first, unless that would join two
 //!    labels (Kruskal's forest), so that cells meet at the narrowest places.
-//! 3. Parts of one label that open to each other are one again, screen or not.
+//! 3. Parts of one label that open to each other are one again, candidate or not.
 //! 4. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
-//!    most, through a screen if need be. What opens nowhere but through gaps and nobody votes for is matter.
+//!    most, through a candidate if need be. What opens nowhere but through gaps and nobody votes for is matter.
 //! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the largest gaps to, matter included.
 //!
 //! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
@@ -20,7 +20,7 @@ use enfilade_geom::Sets;
 use rayon::prelude::*;
 
 use super::cut::{absorb_chips, dissolve_slivers, move_borders};
-use super::graph::{LeafGraph, NO_SCREEN};
+use super::graph::{LeafGraph, NO_CANDIDATE};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
 use super::{LabelSettings, Vote};
 
@@ -43,7 +43,7 @@ struct Group {
     volume: f64,
     /// Open area to other groups.
     neighbors: BTreeMap<u32, f64>,
-    /// How much of that lies on no screen.
+    /// How much of that lies on no candidate.
     leak: f64,
 }
 
@@ -138,14 +138,14 @@ fn keep_border_outside(graph: &LeafGraph, cells: &mut LeafCells) {
     }
 }
 
-/// The component of each leaf: what hangs together other than through screens, gaps and, where `parts_cracks` says so of
+/// The component of each leaf: what hangs together other than through candidates, gaps and, where `parts_cracks` says so of
 /// a leaf, cracks.
 fn components(graph: &LeafGraph, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
     let n_leaves = graph.volumes.len() as u32;
     let mut sets = Sets::new(n_leaves as usize);
     for f in &graph.facets {
         let is_crack = f.is_narrow && parts_cracks(f.leaves[0]);
-        if f.screen == NO_SCREEN && !f.is_gap && !is_crack {
+        if f.candidate == NO_CANDIDATE && !f.is_gap && !is_crack {
             sets.join(f.leaves[0], f.leaves[1]);
         }
     }
@@ -196,7 +196,7 @@ fn grow_together(
         .filter(|&i| {
             let f = &graph.facets[i as usize];
             let [a, b] = f.leaves.map(|l| component_of[l as usize]);
-            f.screen == NO_SCREEN && !f.is_gap && a == b && leaked(f.leaves[0])
+            f.candidate == NO_CANDIDATE && !f.is_gap && a == b && leaked(f.leaves[0])
         })
         .collect();
     order.sort_by(|&a, &b| {
@@ -214,8 +214,8 @@ fn grow_together(
     }
 }
 
-/// Joins parts of one region that only a screen parts: a screen reaches beyond its opening, and two
-/// screens of one opening have a slice of a room between them.
+/// Joins parts of one region that only a candidate parts: a candidate reaches beyond its opening, and two
+/// candidates of one opening have a slice of a room between them.
 fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
     for f in &graph.facets {
         let [a, b] = f.leaves.map(|l| sets.find(l));
@@ -270,7 +270,7 @@ fn merge_groups(
             for (from, to) in [(a, b), (b, a)] {
                 if let Some(group) = groups.get_mut(&from) {
                     *group.neighbors.entry(to).or_default() += f64::from(f.area);
-                    if f.screen == NO_SCREEN {
+                    if f.candidate == NO_CANDIDATE {
                         group.leak += f64::from(f.area);
                     }
                 }

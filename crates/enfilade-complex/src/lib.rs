@@ -1,11 +1,11 @@
 //! The exact convex cell complex: the watershed decides where portals are, the complex makes them
 //! exact.
 //!
-//! Structural triangles and *screens* (candidate portals, each a planar convex polygon a bit larger
+//! Structural triangles and *candidate portals* (each a planar convex polygon a bit larger
 //! than its opening) cut a box into convex leaves; what is open between two leaves is known
 //! exactly. Votes from outside (voxel centers with region labels) then say which leaves belong
 //! together, and the openings between leaves of different cells are the portals: the openings
-//! under the screens, and every crack that nobody foresaw.
+//! under the candidates, and every crack that nobody foresaw.
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
@@ -13,7 +13,7 @@
 //! | a tree of planes, leaves convex | `tree` | ibid., §2 step 1, under boxes as the notes suggest |
 //! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., notes after §3.0.2 |
 //! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
-//! | borders without a screen, made small | `cut` | minimum cuts, Boykov, Veksler & Zabih 2001 |
+//! | borders without a candidate, made small | `cut` | minimum cuts, Boykov, Veksler & Zabih 2001 |
 //! | portals, what each cell sees, the locator | `partition`, `pieces`, `seen`, `tagged` | ours |
 //! | later: one cell cut in two by a new portal | `divide` | ours |
 //!
@@ -63,7 +63,7 @@ pub use enfilade_geom::poly;
 pub use partition::{Leak, Partition, PartitionPortal, Seal};
 pub use seen::TriangleCells;
 
-/// Openings narrower than this that no screen foresaw are cracks. [Units: wu]
+/// Openings narrower than this that no candidate foresaw are cracks. [Units: wu]
 pub const CRACK_WIDTH: f64 = 0.05;
 
 /// What the complex is built from.
@@ -74,7 +74,7 @@ pub struct ComplexInput<'a> {
     /// Triangles with coordinates that are not finite block nothing and are seen by nobody.
     pub triangles: &'a [Triangle],
     /// Candidate portals: planar, convex, a bit larger than their openings.
-    pub screens: &'a [Winding],
+    pub candidates: &'a [Winding],
     /// What to partition; grown to hold the triangles with a margin.
     pub bounds: Aabb,
     /// Openings through which no ball of this diameter passes are gaps: they join no cells; 0 where there are none.
@@ -100,7 +100,7 @@ pub struct Vote {
 pub struct LabelSettings {
     /// A smaller part of a region, apart from its main part, joins what it opens to. [Units: wu³]
     pub min_volume: f64,
-    /// A smaller region that opens to others beside its screens, too, is a cavity and joins them.
+    /// A smaller region that opens to others beside its candidates, too, is a cavity and joins them.
     /// [Units: wu³]
     pub min_room: f64,
     /// A part of a region that opens nowhere, apart from its main part, is a cell of its own. Otherwise it is solid: where
@@ -143,7 +143,7 @@ pub struct Complex {
 #[must_use]
 pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
     let mut surfaces: Vec<Surface> =
-        Vec::with_capacity(input.triangles.len() + input.screens.len());
+        Vec::with_capacity(input.triangles.len() + input.candidates.len());
     let mut add = |source, points: &[DVec3]| {
         if points.iter().all(|p| p.is_finite()) {
             surfaces.push(Surface {
@@ -156,8 +156,8 @@ pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
     for (i, t) in input.triangles.iter().enumerate() {
         add(Source::Triangle(i as u32), t);
     }
-    for (i, w) in input.screens.iter().enumerate() {
-        add(Source::Screen(i as u32), &w.points);
+    for (i, w) in input.candidates.iter().enumerate() {
+        add(Source::Candidate(i as u32), &w.points);
     }
     let triangles = surfaces
         .iter()

@@ -33,7 +33,7 @@ pub struct Partition {
     pub hairlines: Vec<PartitionPortal>,
     /// Gaps that are closed: what a bake adds to the model's own surfaces.
     pub seals: Vec<Seal>,
-    /// The portals that lie on no screen: where cells leak into each other.
+    /// The portals that lie on no candidate: where cells leak into each other.
     pub leaks: Vec<Leak>,
     /// The cells that see each triangle.
     pub triangle_cells: TriangleCells,
@@ -52,15 +52,15 @@ pub struct PartitionPortal {
     pub outline: Winding,
     /// The opening itself, as disjoint convex polygons turning as the outline does.
     pub pieces: Vec<Winding>,
-    /// The screen that it, or its largest part on any, lies on.
-    pub screen: Option<u32>,
+    /// The candidate that it, or its largest part on any, lies on.
+    pub candidate: Option<u32>,
     /// Total area of the pieces. [Units: wu²]
     pub area: f64,
     /// Width of the widest piece. [Units: wu]
     pub width: f64,
-    /// [`PortalKind::Open`], or [`PortalKind::Crack`] where narrow and on no screen.
+    /// [`PortalKind::Open`], or [`PortalKind::Crack`] where narrow and on no candidate.
     pub kind: PortalKind,
-    /// It lies on no screen.
+    /// It lies on no candidate.
     pub is_leak: bool,
 }
 
@@ -75,7 +75,7 @@ pub struct Seal {
     pub outline: Winding,
 }
 
-/// A place where two cells meet though no screen is there.
+/// A place where two cells meet though no candidate is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leak {
     /// Index into [`Partition::portals`].
@@ -94,8 +94,8 @@ struct PieceSink<'a> {
     tagged: &'a TaggedTree<'a>,
     visitor: &'a Visitor<'a>,
     has_seals: bool,
-    /// The plane of each screen's surface.
-    plane_of_screen: &'a [u32],
+    /// The plane of each candidate's surface.
+    plane_of_candidate: &'a [u32],
     graph: &'a LeafGraph,
     clearance: Clearance<'a>,
     pieces: Vec<Piece>,
@@ -136,19 +136,19 @@ impl FacetSink for PieceSink<'_> {
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let is_flipped = cells[0] < cells[1];
         let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
-        for (points, screen) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
+        for (points, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let is_narrow = self.clearance.is_gap(&points);
             let (width, hole) = (poly::width(&points), self.graph.hole);
             let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, width, hole);
-            // Where surfaces lie within a tolerance of it, parts of a screen were put into their planes; a portal has one.
-            let own = screen.and_then(|s| self.plane_of_screen.get(s as usize).copied());
+            // Where surfaces lie within a tolerance of it, parts of a candidate were put into their planes; a portal has one.
+            let own = candidate.and_then(|s| self.plane_of_candidate.get(s as usize).copied());
             let plane = own.filter(|&p| p != NO_PLANE).unwrap_or(facet.plane);
             let turns = self.visitor.tree.planes[plane as usize].normal.dot(normal) < 0.0;
             self.pieces.push(Piece {
                 cells,
                 plane,
                 is_flipped: is_flipped != turns,
-                screen,
+                candidate,
                 is_gap: is_narrow || is_rim,
                 is_rim,
                 points,
@@ -161,7 +161,7 @@ impl FacetSink for PieceSink<'_> {
             tagged: self.tagged,
             visitor: self.visitor,
             has_seals: self.has_seals,
-            plane_of_screen: self.plane_of_screen,
+            plane_of_candidate: self.plane_of_candidate,
             graph: self.graph,
             clearance: self.clearance,
             pieces: Vec::new(),
@@ -232,12 +232,12 @@ fn gather_pieces(complex: &Complex, tagged: &TaggedTree<'_>) -> (Vec<Piece>, BTr
         surfaces: &complex.set.surfaces,
         tolerance: complex.tolerance,
     };
-    let plane_of_screen = planes_of_screens(&complex.set.surfaces);
+    let plane_of_candidate = planes_of_candidates(&complex.set.surfaces);
     let mut sink = PieceSink {
         tagged,
         visitor: &visitor,
         has_seals: complex.has_seals,
-        plane_of_screen: &plane_of_screen,
+        plane_of_candidate: &plane_of_candidate,
         graph: &complex.graph,
         clearance: complex.clearance(),
         pieces: Vec::new(),
@@ -256,11 +256,11 @@ fn gather_pieces(complex: &Complex, tagged: &TaggedTree<'_>) -> (Vec<Piece>, BTr
     (sink.pieces, sink.boxes)
 }
 
-/// The plane of each screen's surface, by the screen's index.
-fn planes_of_screens(surfaces: &[Surface]) -> Vec<u32> {
+/// The plane of each candidate's surface, by the candidate's index.
+fn planes_of_candidates(surfaces: &[Surface]) -> Vec<u32> {
     let mut out: Vec<u32> = Vec::new();
     for surface in surfaces {
-        if let Source::Screen(id) = surface.source {
+        if let Source::Candidate(id) = surface.source {
             let n = out.len().max(id as usize + 1);
             out.resize(n, NO_PLANE);
             out[id as usize] = surface.plane;
@@ -271,13 +271,13 @@ fn planes_of_screens(surfaces: &[Surface]) -> Vec<u32> {
 
 /// An opening that is no gap, as a portal.
 fn portal_of(opening: Opening) -> PartitionPortal {
-    let is_leak = opening.screen.is_none();
+    let is_leak = opening.candidate.is_none();
     PartitionPortal {
         cells: opening.cells,
         plane: opening.plane,
         outline: opening.outline,
         pieces: opening.pieces,
-        screen: opening.screen,
+        candidate: opening.candidate,
         area: opening.area,
         width: opening.width,
         kind: if is_leak && opening.width < CRACK_WIDTH {
@@ -289,7 +289,7 @@ fn portal_of(opening: Opening) -> PartitionPortal {
     }
 }
 
-/// Where the portals are that lie on no screen.
+/// Where the portals are that lie on no candidate.
 fn leaks_of(portals: &[PartitionPortal]) -> Vec<Leak> {
     let leaks = (0..).zip(portals).filter(|(_, p)| p.is_leak);
     leaks

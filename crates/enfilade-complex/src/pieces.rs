@@ -3,7 +3,7 @@
 //! The tree cuts an opening wherever its planes happen to run; those cuts mean nothing and are
 //! taken back here.
 //!
-//! What lies beside a screen, and gaps, through which no ball of the smallest hole passes, belong to an opening only where
+//! What lies beside a candidate, and gaps, through which no ball of the smallest hole passes, belong to an opening only where
 //! they hardly widen its outline: the slit under a wall is no part of the door in it. All others are seals. Cracks, and gaps where
 //! nothing is sealed, are one portal a plane and pair of cells.
 
@@ -31,8 +31,8 @@ pub(super) struct Piece {
     pub(super) plane: u32,
     /// The plane's normal points to the first cell, not to the second.
     pub(super) is_flipped: bool,
-    /// The screen that it lies on.
-    pub(super) screen: Option<u32>,
+    /// The candidate that it lies on.
+    pub(super) candidate: Option<u32>,
     /// It is a gap, see [`Clearance`](super::graph::Clearance).
     pub(super) is_gap: bool,
     /// A gap only because it is at the rim of a thin leaf: several together may be wider than a gap.
@@ -47,7 +47,7 @@ pub(super) struct Opening {
     pub(super) plane: Plane,
     pub(super) outline: Winding,
     pub(super) pieces: Vec<Winding>,
-    pub(super) screen: Option<u32>,
+    pub(super) candidate: Option<u32>,
     pub(super) area: f64,
     pub(super) width: f64,
     /// A gap, to be sealed.
@@ -283,13 +283,13 @@ impl<'a> Sheet<'a> {
         hull(points.copied())
     }
 
-    /// Pieces near each other, those on one screen together wherever they are; ordered by their least members.
+    /// Pieces near each other, those on one candidate together wherever they are; ordered by their least members.
     fn clusters(&self, among: &[usize]) -> Vec<Vec<usize>> {
         let mut sets = Sets::new(self.flats.len());
-        let mut first_on_screen = BTreeMap::new();
+        let mut first_on_candidate = BTreeMap::new();
         for &i in among {
-            if let Some(screen) = self.pieces[i].screen {
-                let first = *first_on_screen.entry(screen).or_insert(i);
+            if let Some(candidate) = self.pieces[i].candidate {
+                let first = *first_on_candidate.entry(candidate).or_insert(i);
                 sets.join(first as u32, i as u32);
             }
         }
@@ -354,16 +354,16 @@ impl<'a> Sheet<'a> {
     }
 
     fn opening(&self, members: &[usize], is_seal: bool) -> Opening {
-        let mut on_screen = BTreeMap::new();
+        let mut on_candidate = BTreeMap::new();
         for &i in members {
-            if let Some(screen) = self.pieces[i].screen {
-                *on_screen.entry(screen).or_insert(0.0) += self.flats[i].area;
+            if let Some(candidate) = self.pieces[i].candidate {
+                *on_candidate.entry(candidate).or_insert(0.0) += self.flats[i].area;
             }
         }
-        let screen = on_screen
+        let candidate = on_candidate
             .into_iter()
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
-            .map(|(screen, _)| screen);
+            .map(|(candidate, _)| candidate);
         // No seal is wider than a gap.
         let (apart, together): (Vec<usize>, Vec<usize>) = members
             .iter()
@@ -379,7 +379,7 @@ impl<'a> Sheet<'a> {
             area: merged.iter().map(|f| f.area).sum(),
             width: merged.iter().map(Flat::width).fold(0.0, f64::max),
             pieces: merged.iter().map(|f| self.winding(f)).collect(),
-            screen,
+            candidate,
             is_seal,
         }
     }
@@ -394,9 +394,10 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
         return vec![sheet.opening(&all, true)];
     }
     let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
-    // What lies on screens makes the openings; what is open beside them belongs to them or stands for itself.
-    let (foreseen, beside): (Vec<usize>, Vec<usize>) =
-        wide.into_iter().partition(|&i| group[i].screen.is_some());
+    // What lies on candidates makes the openings; what is open beside them belongs to them or stands for itself.
+    let (foreseen, beside): (Vec<usize>, Vec<usize>) = wide
+        .into_iter()
+        .partition(|&i| group[i].candidate.is_some());
     let mut openings = sheet.clusters(&foreseen);
     let beside = sheet.adopt(&mut openings, sheet.clusters(&beside), WIDENING, rules.hole);
     openings.extend(beside);
@@ -407,7 +408,7 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
     for members in openings {
         let opening = sheet.opening(&members, false);
-        if opening.screen.is_none() && opening.width < CRACK_WIDTH {
+        if opening.candidate.is_none() && opening.width < CRACK_WIDTH {
             cracks.extend(members);
         } else {
             out.push(opening);

@@ -1,4 +1,4 @@
-//! Surfaces (triangles and screens) and the one list of planes that they share.
+//! Surfaces (triangles and candidates) and the one list of planes that they share.
 
 use std::collections::HashSet;
 
@@ -13,13 +13,13 @@ use super::planes::{PlaneList, faces_ahead};
 pub(super) enum Source {
     /// A structural triangle, by its index in the input.
     Triangle(u32),
-    /// A screen, by its index in the input.
-    Screen(u32),
+    /// A candidate, by its index in the input.
+    Candidate(u32),
     /// A seam, see [`seams`]: it blocks and is no part of the scene.
     Seam,
 }
 
-/// A triangle or a screen.
+/// A triangle or a candidate.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     /// What it is.
@@ -82,9 +82,14 @@ pub(super) struct SurfaceSet {
 
 /// Orders by area, then coordinates, so that the input's order has no say.
 fn canonical_order(surfaces: &mut [Surface]) {
-    let key = |s: &Surface| (poly::area(&s.points), matches!(s.source, Source::Screen(_)));
+    let key = |s: &Surface| {
+        (
+            poly::area(&s.points),
+            matches!(s.source, Source::Candidate(_)),
+        )
+    };
     surfaces.sort_by_cached_key(|s| {
-        let (area, screen) = key(s);
+        let (area, candidate) = key(s);
         let mut corners: Vec<[u64; 3]> = s
             .points
             .iter()
@@ -93,7 +98,7 @@ fn canonical_order(surfaces: &mut [Surface]) {
         // Duplicates may start at different corners or turn the other way.
         corners.sort_unstable();
         let by_area = std::cmp::Reverse(ordered_bits(area));
-        (screen, by_area, corners, s.source)
+        (candidate, by_area, corners, s.source)
     });
 }
 

@@ -45,7 +45,7 @@ fn sheet(out: &mut Vec<Triangle>, x: f64, y: [f64; 2], z: [f64; 2]) {
     );
 }
 
-fn screen_at_x(x: f64, y: [f64; 2], z: [f64; 2]) -> Winding {
+fn candidate_at_x(x: f64, y: [f64; 2], z: [f64; 2]) -> Winding {
     Winding::new(vec![
         v(x, y[0], z[0]),
         v(x, y[1], z[0]),
@@ -197,7 +197,7 @@ fn votes(b: &Aabb, step: f64, label: impl Fn(DVec3) -> Option<u32>) -> Vec<Vote>
     out
 }
 
-fn build(triangles: &[Triangle], screens: &[Winding]) -> Complex {
+fn build(triangles: &[Triangle], candidates: &[Winding]) -> Complex {
     let bounds = triangles
         .iter()
         .flatten()
@@ -205,7 +205,7 @@ fn build(triangles: &[Triangle], screens: &[Winding]) -> Complex {
         .expanded(0.3);
     build_complex(&ComplexInput {
         triangles,
-        screens,
+        candidates,
         bounds,
         gap: 0.0,
         has_seals: false,
@@ -251,14 +251,14 @@ fn room_votes(b: &Aabb) -> Vec<Vote> {
 #[test]
 fn a_door_between_two_rooms_is_one_portal_of_the_exact_area() {
     let t = two_rooms(0.0);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
     assert_eq!(p.label_of_cell, [10, 20, 99]);
     assert_eq!(p.outside, Some(2));
     assert_eq!(p.portals.len(), 1);
     let portal = &p.portals[0];
     assert_eq!(
-        (portal.cells, portal.screen, portal.is_leak),
+        (portal.cells, portal.candidate, portal.is_leak),
         ([0, 1], Some(0), false)
     );
     // Corners are f32: 1e-6 of meters times a few meters of edge.
@@ -284,7 +284,7 @@ fn a_door_between_two_rooms_is_one_portal_of_the_exact_area() {
 }
 
 #[test]
-fn a_crooked_screen_seals_as_well() {
+fn a_crooked_candidate_seals_as_well() {
     let t = two_rooms(0.0);
     let crooked = Winding::new(vec![
         v(3.02, -0.1, 0.8),
@@ -302,7 +302,7 @@ fn a_crooked_screen_seals_as_well() {
 #[test]
 fn a_crack_beside_the_door_becomes_a_portal_of_its_own() {
     let t = two_rooms(0.005);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
     assert_eq!(p.label_of_cell, [10, 20, 99]);
     let cracks: Vec<_> = p
@@ -331,9 +331,9 @@ fn a_crack_beside_the_door_becomes_a_portal_of_its_own() {
 }
 
 #[test]
-fn a_screen_that_misses_part_of_the_door_leaves_a_leak_and_no_hole() {
+fn a_candidate_that_misses_part_of_the_door_leaves_a_leak_and_no_hole() {
     let t = two_rooms(0.0);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 1.7], [0.8, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 1.7], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
     assert_eq!(p.label_of_cell, [10, 20, 99]);
     let total: f64 = p.portals.iter().map(|q| q.area).sum();
@@ -349,7 +349,7 @@ fn walls_without_thickness_part_rooms_and_show_both_sides() {
     sheet(&mut t, 3.0, [0.0, 2.5], [0.0, 1.0]);
     sheet(&mut t, 3.0, [2.0, 2.5], [1.0, 2.0]);
     sheet(&mut t, 3.0, [0.0, 2.5], [2.0, 4.0]);
-    let c = build(&t, &[screen_at_x(3.0, [-0.1, 2.1], [0.9, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.0, [-0.1, 2.1], [0.9, 2.1])]);
     let p = c.partition(
         &votes(&c.bounds(), 0.1, |p| {
             if !Aabb::new(DVec3::ZERO, DVec3::new(6.0, 2.5, 4.0)).contains(p) {
@@ -413,7 +413,7 @@ fn slivers_in_an_opening_are_as_open_as_the_rest() {
 #[test]
 fn the_hollow_of_a_wall_is_solid() {
     let t = two_rooms(0.0);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
     assert_eq!(p.locator.locate(DVec3::new(3.1, 1.0, 3.0)), None);
     assert_eq!(p.locator.locate(DVec3::new(3.1, 1.0, 0.5)), None);
@@ -424,7 +424,7 @@ fn the_hollow_of_a_wall_is_solid() {
 fn votes_that_got_into_a_closed_hollow_make_a_cell_of_it_only_if_asked() {
     let mut t = two_rooms(0.0);
     block(&mut t, [1.0, 0.5, 1.0], [2.0, 1.5, 2.0]);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     // Voters of the room see no block.
     let votes = room_votes(&c.bounds());
     let at = |keeps_closed| {
@@ -450,7 +450,7 @@ fn what_rounding_leaves_between_surfaces_is_no_cell() {
     let mut t = two_rooms(0.0);
     block(&mut t, [1.0, 0.5, 1.0], [2.0, 1.0, 2.0]);
     block(&mut t, [1.4, 0.7, 1.4], [1.6, 0.7002, 1.6]);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     let mut votes = room_votes(&c.bounds());
     let between = DVec3::new(1.5, 0.7001, 1.5);
     votes.retain(|v| v.point.distance(between) > 1.0);
@@ -525,7 +525,7 @@ fn a_closed_surface_of_nearly_flat_triangles_lets_nothing_through() {
 fn no_input_at_all_is_one_leaf() {
     let c = build_complex(&ComplexInput {
         triangles: &[],
-        screens: &[],
+        candidates: &[],
         bounds: Aabb::EMPTY,
         gap: 0.0,
         has_seals: false,
@@ -552,7 +552,7 @@ fn hostile_triangles_are_survived() {
     let bounds = c.bounds();
     let d = build_complex(&ComplexInput {
         triangles: &t,
-        screens: &[],
+        candidates: &[],
         bounds,
         gap: 0.0,
         has_seals: false,
@@ -707,8 +707,11 @@ proptest! {
 fn two_regions_at_the_border_are_one_outside() {
     let mut t = two_rooms(0.0);
     sheet(&mut t, 3.1, [2.7, 4.0], [-0.2, 4.2]);
-    let screen = screen_at_x(3.1, [2.7, 6.0], [-2.0, 6.0]);
-    let c = build(&t, &[screen_at_x(3.1, [-0.1, 2.3], [0.8, 2.1]), screen]);
+    let candidate = candidate_at_x(3.1, [2.7, 6.0], [-2.0, 6.0]);
+    let c = build(
+        &t,
+        &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1]), candidate],
+    );
     let sides = votes(&c.bounds(), 0.1, |p| {
         let walls = Aabb::new(DVec3::new(-0.2, -0.2, -0.2), DVec3::new(6.4, 2.7, 4.2));
         (!walls.contains(p)).then_some(if p.x < 3.1 { 98 } else { 99 })

@@ -90,7 +90,7 @@ struct Edges<'a> {
 
 impl FacetSink for Edges<'_> {
     fn take(&mut self, facet: &RawFacet<'_>) {
-        if facet.covers.iter().all(|c| c.screen.is_some()) {
+        if facet.covers.iter().all(|c| c.candidate.is_some()) {
             return;
         }
         let tolerance = &self.visitor.tolerance;

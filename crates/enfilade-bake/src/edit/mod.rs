@@ -141,8 +141,8 @@ fn place(p: DVec3) -> String {
 /// # Errors
 /// When the corners are no convex planar polygon, or it does not part a cell; the world is as it was.
 pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalError> {
-    let (plane, screen) = checked(corners)?;
-    let at = screen.centroid();
+    let (plane, candidate) = checked(corners)?;
+    let at = candidate.centroid();
     let old = &world.graph;
     let cell = old
         .locator
@@ -150,7 +150,7 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         .ok_or(AddPortalError::InSolid { at })?;
 
     let distance = |p: DVec3| plane.signed_distance(p);
-    cut_cell(world, cell, vec![screen], &distance).map_err(|why| match why {
+    cut_cell(world, cell, vec![candidate], &distance).map_err(|why| match why {
         Uncut::Undivided(Undivided::Aside) => AddPortalError::Aside { at, cell },
         Uncut::Undivided(Undivided::Around(at)) => AddPortalError::DoesNotPart { cell, at },
         Uncut::Undivided(Undivided::Endless) => AddPortalError::Endless { at, cell },
@@ -161,22 +161,22 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
 /// Why a cell could not be cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Uncut {
-    /// The screens part nothing.
+    /// The candidates part nothing.
     Undivided(Undivided),
     /// Nothing of the portals would be left in a file.
     TooNarrow,
 }
 
-/// Cuts a cell in two by screens; `distance` tells how far before all of them a point lies.
+/// Cuts a cell in two by candidates; `distance` tells how far before all of them a point lies.
 pub(crate) fn cut_cell(
     world: &World,
     cell: CellId,
-    mut screens: Vec<Winding>,
+    mut candidates: Vec<Winding>,
     distance: &dyn Fn(DVec3) -> f64,
 ) -> Result<Added, Uncut> {
     let old = &world.graph;
     let cutter = Cutter {
-        n_screens: screens.len() as u32,
+        n_candidates: candidates.len() as u32,
         distance,
     };
 
@@ -188,10 +188,10 @@ pub(crate) fn cut_cell(
         .portals
         .iter()
         .flat_map(|p| &old.portals[p.0 as usize].pieces);
-    screens.extend(pieces.map(|piece| winding(piece)));
+    candidates.extend(pieces.map(|piece| winding(piece)));
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
-        screens: &screens,
+        candidates: &candidates,
         // All of the scene's box, so that tolerances are those of the bake.
         bounds: old.locator.bounds,
         gap: 0.0,

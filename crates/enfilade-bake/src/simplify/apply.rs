@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, World};
 use enfilade_geom::scene::Primitive;
 
+use crate::layout::{Layout, layout_of};
+
 /// The world with each cell part of the cell that `into` says, and the new number of each old cell.
 ///
 /// `into` names a cell of each group for all of it. Names such as `cell-3` follow the new numbers, others stay. Linear
@@ -122,18 +124,7 @@ impl Batches {
     }
 }
 
-/// Which attributes a primitive has; those that differ cannot share its lists.
-type Layout = (bool, bool, usize, bool);
 type BatchKey = (bool, Vec<CellId>, Option<u32>, Layout);
-
-fn layout_of(p: &Primitive) -> Layout {
-    (
-        !p.normals.is_empty(),
-        !p.tangents.is_empty(),
-        p.uvs.len(),
-        !p.colors.is_empty(),
-    )
-}
 
 fn append(to: &mut Primitive, from: &Primitive) {
     let first = to.positions.len() as u32;

@@ -372,7 +372,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn batch(&mut self, i: usize, batch: &json::Batch) -> Result<Batch, WireError> {
+    fn batch(&mut self, i: usize, batch: &json::BatchJson) -> Result<Batch, WireError> {
         let cells = batch.cells.iter().copied().map(CellId).collect();
         let primitive = match (batch.mesh, batch.primitive) {
             (None, None) => Primitive::default(),

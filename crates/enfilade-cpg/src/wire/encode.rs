@@ -101,7 +101,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         .sum();
     let portal_corners = layout.view(corners as u64 * 12);
     let locator = lay_out_locator(layout, world);
-    let pvs = world.pvs.as_ref().map(|pvs| json::Pvs {
+    let pvs = world.pvs.as_ref().map(|pvs| json::PvsJson {
         rows: layout.view(pvs.ends.len() as u64 * 4),
         runs: layout.view(pvs.runs.len() as u64 * 8),
     });
@@ -152,11 +152,11 @@ fn lay_out_batches<'a>(
     meshes: &mut Vec<json::Mesh>,
     nodes: &mut Vec<json::Node>,
     top: &mut Vec<u32>,
-) -> Vec<json::Batch> {
-    let mut batches: Vec<json::Batch> = world
+) -> Vec<json::BatchJson> {
+    let mut batches: Vec<json::BatchJson> = world
         .batches
         .iter()
-        .map(|b| json::Batch {
+        .map(|b| json::BatchJson {
             mesh: None,
             primitive: None,
             cells: ids(&b.cells),
@@ -328,10 +328,10 @@ fn lay_out_images(layout: &mut Layout, world: &World) -> Vec<json::Image> {
     world.images.iter().map(image).collect()
 }
 
-fn lay_out_locator(layout: &mut Layout, world: &World) -> json::Locator {
+fn lay_out_locator(layout: &mut Layout, world: &World) -> json::LocatorJson {
     let locator = &world.graph.locator;
     let (min, max) = (locator.bounds.min.to_array(), locator.bounds.max.to_array());
-    json::Locator {
+    json::LocatorJson {
         bounds: (!locator.bounds.is_empty()).then_some([min, max]),
         outside: locator.outside.map(|c| c.0),
         root: locator.root,
@@ -351,9 +351,9 @@ fn asset(world: &World) -> json::Asset {
     }
 }
 
-fn provenance(world: &World) -> json::Provenance {
+fn provenance(world: &World) -> json::ProvenanceJson {
     let provenance = &world.graph.provenance;
-    json::Provenance {
+    json::ProvenanceJson {
         generator: provenance.generator.clone(),
         method: provenance.method.clone(),
         settings: provenance.settings.clone(),
@@ -361,8 +361,8 @@ fn provenance(world: &World) -> json::Provenance {
     }
 }
 
-fn cells(world: &World) -> Vec<json::Cell> {
-    let cell = |(i, cell): (usize, &crate::Cell)| json::Cell {
+fn cells(world: &World) -> Vec<json::CellJson> {
+    let cell = |(i, cell): (usize, &crate::Cell)| json::CellJson {
         name: cell.name.clone(),
         node: i as u32 + 1,
         aabb: cell.aabb.map(|corner| corner.map(f64::from)),
@@ -375,8 +375,8 @@ fn cells(world: &World) -> Vec<json::Cell> {
     world.graph.cells.iter().enumerate().map(cell).collect()
 }
 
-fn portals(world: &World) -> Vec<json::Portal> {
-    let portal = |portal: &crate::Portal| json::Portal {
+fn portals(world: &World) -> Vec<json::PortalJson> {
+    let portal = |portal: &crate::Portal| json::PortalJson {
         cells: portal.cells.map(|c| c.0),
         kind: match portal.kind {
             PortalKind::Open => json::Kind::Open,

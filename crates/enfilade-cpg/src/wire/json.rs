@@ -155,28 +155,28 @@ pub(super) struct RootExtensions {
 #[serde(rename_all = "camelCase")]
 pub(super) struct Graph {
     pub(super) version: u64,
-    pub(super) cells: Vec<Cell>,
-    pub(super) portals: Vec<Portal>,
+    pub(super) cells: Vec<CellJson>,
+    pub(super) portals: Vec<PortalJson>,
     /// Buffer view of all portals' corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) portal_corners: Option<u32>,
-    pub(super) batches: Vec<Batch>,
+    pub(super) batches: Vec<BatchJson>,
     pub(super) details: Vec<Detail>,
     /// glTF mesh by detail mesh; null for a mesh without triangles.
     pub(super) detail_meshes: Vec<Option<u32>>,
-    pub(super) locator: Locator,
+    pub(super) locator: LocatorJson,
     /// Node of the leak path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) leak_path: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) pvs: Option<Pvs>,
-    pub(super) provenance: Provenance,
+    pub(super) pvs: Option<PvsJson>,
+    pub(super) provenance: ProvenanceJson,
     pub(super) statistics: BTreeMap<String, f64>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Cell {
+pub(super) struct CellJson {
     pub(super) name: String,
     pub(super) node: u32,
     pub(super) aabb: [[f64; 3]; 2],
@@ -189,7 +189,7 @@ pub(super) struct Cell {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Portal {
+pub(super) struct PortalJson {
     pub(super) cells: [u32; 2],
     pub(super) kind: Kind,
     pub(super) normal: [f64; 3],
@@ -210,7 +210,7 @@ pub(super) enum Kind {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Batch {
+pub(super) struct BatchJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) mesh: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -229,7 +229,7 @@ pub(super) struct Detail {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Locator {
+pub(super) struct LocatorJson {
     /// Absent for the locator that covers nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) bounds: Option<[[f64; 3]; 2]>,
@@ -245,7 +245,7 @@ pub(super) struct Locator {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Pvs {
+pub(super) struct PvsJson {
     /// Buffer view: by cell, where its runs end. Absent where there is no cell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) rows: Option<u32>,
@@ -256,7 +256,7 @@ pub(super) struct Pvs {
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Provenance {
+pub(super) struct ProvenanceJson {
     pub(super) generator: String,
     pub(super) method: String,
     pub(super) settings: BTreeMap<String, String>,

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 
-use super::regions::Regions;
+use super::regions::TubeRegions;
 use super::rule::{Arm, ArmFacts, classify_arm};
 
 /// Rays about an axis: enough for a polygon of a dozen sides to look round.
@@ -31,7 +31,7 @@ pub(super) struct ArmPiece {
     pub(super) kind: Arm,
 }
 
-impl Regions<'_> {
+impl TubeRegions<'_> {
     /// Measures an arm. `piece` holds its parts, nearest first, with their distances from the middle of the fork, from which
     /// a ball of radius `removed` is removed; `radius` is that of the ball there.
     pub(super) fn arm(

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use super::measure::Mouth;
-use super::regions::{NONE, Regions};
+use super::regions::{NONE, TubeRegions};
 use super::rule::FLARES;
 
-impl Regions<'_> {
+impl TubeRegions<'_> {
     /// Gives the flare of a limb to the regions that the limb leaves. What is left may fall apart into several limbs, as the
     /// legs of a pair of trousers do; they come narrowest first.
     pub(super) fn without_flare(&mut self, limb: u32) -> Vec<u32> {

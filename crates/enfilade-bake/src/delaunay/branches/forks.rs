@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::Sets;
 
 use super::arms::{ArmPiece, Walls};
-use super::regions::{NONE, Regions};
+use super::regions::{NONE, TubeRegions};
 use super::rule::{Arm, DEEP, Meeting, NARROWS, REMOVED, STRIDE, WIDEST, is_fork, meeting};
 
 /// A place where tubes meet.
@@ -79,7 +79,7 @@ pub(super) fn reach(removed: f64, radius: f64) -> f64 {
     removed + 2.0 * DEEP * radius
 }
 
-impl Regions<'_> {
+impl TubeRegions<'_> {
     /// All forks; balls that are removed for two of them do not meet.
     pub(super) fn forks(&self, walls: &Walls<'_>) -> Vec<Fork> {
         let n = self.owner.len();

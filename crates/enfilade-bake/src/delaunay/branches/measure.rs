@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::DVec3;
 
 use super::super::space::connected;
-use super::regions::{NONE, Regions};
+use super::regions::{NONE, TubeRegions};
 use super::rule::{DEEP, LimbFacts, MouthFacts, NARROWS, n_main_mouths};
 
 /// A way out of a region within its room.
@@ -19,7 +19,7 @@ pub(super) struct Mouth {
     pub(super) facts: MouthFacts,
 }
 
-impl Regions<'_> {
+impl TubeRegions<'_> {
     /// The ways out of a region, widest first. Branches that leave the region itself, which are known by then, do not count.
     pub(super) fn mouths(&self, region: u32) -> Vec<Mouth> {
         let mut contacts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();

@@ -43,7 +43,7 @@ use enfilade_geom::{Bvh, Triangle};
 use super::space::Space;
 use arms::Walls;
 pub(super) use labels::Branches;
-use regions::{NONE, Regions};
+use regions::{NONE, TubeRegions};
 use rule::{LimbKind, classify};
 
 /// Finds the branches of rooms, given by the room of each part.
@@ -55,7 +55,7 @@ pub(super) fn find_branches(
     walls: &[Triangle],
     bvh: &Bvh,
 ) -> Branches {
-    let mut regions = Regions::new(space, room_of_part);
+    let mut regions = TubeRegions::new(space, room_of_part);
     let limbs = open_rooms(&mut regions);
     // Narrow ones first: what is no branch is merged into a wider limb, which may be one.
     for limb in limbs.into_iter().rev() {
@@ -71,7 +71,7 @@ pub(super) fn find_branches(
 }
 
 /// Divides rooms into trunks and limbs; gives the limbs, widest first.
-fn open_rooms(regions: &mut Regions<'_>) -> Vec<u32> {
+fn open_rooms(regions: &mut TubeRegions<'_>) -> Vec<u32> {
     let mut has_trunk = BTreeSet::new();
     let (mut limbs, mut seeds) = (Vec::new(), Vec::new());
     for b in regions.by_radius(0..regions.owner.len() as u32) {
@@ -95,7 +95,7 @@ fn open_rooms(regions: &mut Regions<'_>) -> Vec<u32> {
 }
 
 /// Makes a limb a branch, or merges it across its widest mouth.
-fn settle(regions: &mut Regions<'_>, limb: u32) {
+fn settle(regions: &mut TubeRegions<'_>, limb: u32) {
     let mouths = regions.mouths(limb);
     match (classify(&regions.facts(limb, &mouths)), mouths.first()) {
         (LimbKind::Branch(mouth), _) => regions.regions[limb as usize].branch = Some(mouth),

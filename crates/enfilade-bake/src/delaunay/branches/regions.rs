@@ -1,4 +1,4 @@
-//! Regions: connected sets of the parts of a room, grown by balls.
+//! Connected sets of the parts of a room, grown by balls.
 //!
 //! A limb is what a ball a little smaller than the largest free one reaches: a morphological opening (Matheron,
 //! "Random sets and integral geometry", 1975, on size distributions).
@@ -27,7 +27,7 @@ pub(super) struct Region {
 }
 
 /// The parts of all rooms, and which region owns each.
-pub(super) struct Regions<'a> {
+pub(super) struct TubeRegions<'a> {
     pub(super) space: &'a Space,
     pub(super) room_of_part: &'a [u32],
     /// Radius of the largest ball of each room. [Units: wu]
@@ -47,7 +47,7 @@ pub(super) struct Regions<'a> {
     most: f64,
 }
 
-impl<'a> Regions<'a> {
+impl<'a> TubeRegions<'a> {
     pub(super) fn new(space: &'a Space, room_of_part: &'a [u32]) -> Self {
         let n = space.radii.len();
         let mut radius_of_room: BTreeMap<u32, f64> = BTreeMap::new();

@@ -9,10 +9,10 @@ use enfilade_geom::Sets;
 use super::arms::Walls;
 use super::forks::{Fork, reach};
 use super::labels::BranchMouth;
-use super::regions::Regions;
+use super::regions::TubeRegions;
 use super::rule::{ARM_WEIGHS, Arm};
 
-impl Regions<'_> {
+impl TubeRegions<'_> {
     /// Makes the arms of forks regions of their own.
     pub(super) fn separate_forks(&mut self, walls: &Walls<'_>) {
         let forks = self.forks(walls);
