@@ -349,6 +349,7 @@ mod tests {
     }
 
     proptest! {
+        // Covers V2.
         #[test]
         fn distances_equal_those_to_every_occupied_voxel(
             nx in 1usize..90, ny in 1usize..12, nz in 1usize..12,

@@ -166,6 +166,7 @@ fn points(x: impl Strategy<Value = f64> + Clone, n: usize) -> impl Strategy<Valu
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
+    // Covers T1.
     #[test]
     fn random_points_at_any_scale(p in points(-1.0..1.0_f64, 60), scale in -9..7_i32) {
         let p: Vec<DVec3> = p.iter().map(|&p| p * 10_f64.powi(scale)).collect();

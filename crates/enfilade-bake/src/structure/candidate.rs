@@ -414,3 +414,79 @@ fn fill_triangle(blocked: &mut [bool], side: [usize; 2], t: [[f64; 2]; 3]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The faces of a block, two triangles each.
+    fn block(lo: DVec3, hi: DVec3) -> Vec<Triangle> {
+        let corner = |i: usize| {
+            let pick = |k: usize| if i >> k & 1 == 0 { lo[k] } else { hi[k] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        };
+        [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ]
+        .iter()
+        .flat_map(|q| {
+            let p = q.map(corner);
+            [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
+        })
+        .collect()
+    }
+
+    // Covers V4 and V5.
+    #[test]
+    fn a_front_that_stands_askew_before_a_doorway_gets_a_candidate_in_the_wall() {
+        // A wall 0.2 m thick at x = 2 with a doorway of 1 × 2 m, floor and ceiling.
+        let walls = [
+            ([2.0, 0.0, 0.0], [2.2, 2.5, 2.0]),
+            ([2.0, 0.0, 3.0], [2.2, 2.5, 5.0]),
+            ([2.0, 2.0, 2.0], [2.2, 2.5, 3.0]),
+            ([0.0, -0.2, 0.0], [5.0, 0.0, 5.0]),
+            ([0.0, 2.5, 0.0], [5.0, 2.7, 5.0]),
+        ]
+        .map(|(lo, hi): ([f64; 3], [f64; 3])| block(lo.into(), hi.into()))
+        .concat();
+        let bvh = Bvh::build(&walls);
+        // Two floods met 0.15 m before the wall, in a front that leans by 8 degrees.
+        let lean = 0.14;
+        let centers: Vec<DVec3> = (0..10)
+            .flat_map(|j| {
+                (0..20).map(move |i| (2.05 + 0.1 * f64::from(j), 0.05 + 0.1 * f64::from(i)))
+            })
+            .map(|(z, y)| DVec3::new(1.85 + lean * (z - 2.5), y, z))
+            .collect();
+        let center = centers.iter().sum::<DVec3>() / centers.len() as f64;
+        let opening = Opening {
+            plane: Plane::through(center, DVec3::new(1.0, 0.0, -lean).normalize()),
+            center,
+            area: 2.0,
+            closed: 0.25,
+        };
+        let found = fit_candidate(&centers, 0.1, &opening, &walls, &bvh);
+        assert_eq!(found.closed, 0.25);
+        let on = |k: usize| found.winding.points.iter().map(move |p| p[k]);
+        let range = |k: usize| {
+            (
+                on(k).fold(f64::MAX, f64::min),
+                on(k).fold(f64::MIN, f64::max),
+            )
+        };
+        let ((x0, x1), (y0, y1), (z0, z1)) = (range(0), range(1), range(2));
+        assert!(
+            (2.0..=2.2).contains(&x0) && (2.0..=2.2).contains(&x1),
+            "{x0} to {x1}"
+        );
+        // It covers the doorway, and reaches into the walls by a few steps of the picture at most.
+        let near = |at: f64, by: f64| (0.0..0.15).contains(&(at * by));
+        assert!(near(z0 - 2.0, -1.0) && near(z1 - 3.0, 1.0), "{z0} to {z1}");
+        assert!(near(y0, -1.0) && near(y1 - 2.0, 1.0), "{y0} to {y1}");
+    }
+}

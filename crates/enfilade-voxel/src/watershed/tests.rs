@@ -209,6 +209,7 @@ fn noise(n: usize, seed: u64, values: u64) -> impl Iterator<Item = u64> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
+    // Covers V3 and V9.
     /// `base` brings levels close together: above 1,000 they differ by 1 and 2, above 60,000 most
     /// neighbors are level.
     #[test]
