@@ -78,7 +78,7 @@ impl Session {
         Ok(session)
     }
 
-    /// How many rooms are left after the first `n_steps`, which is how many cells indoors [`bake_session`] makes of them,
+    /// How many rooms are left after the first `n_steps`, which is how many cells indoors [`bake_session`](super::bake_session) makes of them,
     /// and how many cells besides: crevices, and the insides of walls, which are dropped.
     ///
     /// `O(n log n)` in the parts of the space; a fraction of a second.

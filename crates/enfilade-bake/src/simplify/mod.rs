@@ -3,7 +3,7 @@
 //! After Lefebvre & Hornus 2003, §3: the cheapest cell first, the worst of its portals removed; the
 //! lower bound is sought, the upper one guaranteed. Where only a number of cells or portals is asked for,
 //! the merge that adds least to what sampled views draw is next, wherever it is (`views.rs`). Works on
-//! any [`World`], whatever built it, since a merge needs nothing but the world: the two cells become one,
+//! any [`World`](enfilade_cpg::World), whatever built it, since a merge needs nothing but the world: the two cells become one,
 //! the portals between them go, what either saw the new one sees.
 //!
 //! **Every promise is kept:** a portal is left out only where both its sides are the same cell.

@@ -5,7 +5,7 @@
 //! (`regions`), and what comes out are not portals but candidates in the real opening, which the cell
 //! complex then realizes exactly.
 //!
-//! Read [`propose`](propose::propose) first: it calls the steps in order.
+//! Read `propose.rs` first: it calls the steps in order.
 
 mod candidates;
 mod flooded;
