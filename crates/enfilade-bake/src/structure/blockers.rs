@@ -155,19 +155,26 @@ fn is_flat(triangles: &[Triangle]) -> bool {
     !triangles.is_empty() && Plate::of(triangles).is_flat()
 }
 
+/// Directions that surfaces are sorted by at most.
+const MAX_DIRECTIONS: usize = 64;
+
 /// The direction that most of the surface faces, up to sign.
+///
+/// The largest triangles say which directions there are: the many small ones of moldings, handles and scanned edges may
+/// face anywhere.
 fn thin_direction(triangles: &[Triangle]) -> DVec3 {
+    let mut normals: Vec<DVec3> = triangles.iter().map(triangle_area_normal).collect();
+    normals.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
     let mut clusters: Vec<(DVec3, f64)> = Vec::new();
-    for t in triangles {
-        let n = triangle_area_normal(t);
+    for n in normals {
         let area = n.length();
         if area < 1e-12 {
-            continue;
+            break;
         }
         let n = n / area;
         if let Some((_, a)) = clusters.iter_mut().find(|(m, _)| m.dot(n).abs() > 0.98) {
             *a += area;
-        } else if clusters.len() < 64 {
+        } else if clusters.len() < MAX_DIRECTIONS {
             clusters.push((n, area));
         }
     }
@@ -237,5 +244,25 @@ mod tests {
         assert!(is_flat(&box_triangles(DVec3::new(0.9, 2.0, 0.04))));
         assert!(!is_flat(&box_triangles(DVec3::new(0.9, 2.0, 0.6))));
         assert!(!is_flat(&box_triangles(DVec3::new(0.05, 2.0, 0.04))));
+    }
+
+    #[test]
+    fn small_triangles_that_face_anywhere_do_not_hide_which_way_a_leaf_faces() {
+        // Moldings whose vertices a scanner has moved come first in the file, in more directions than are told apart.
+        let mut rng = enfilade_testkit::Rng::new(7);
+        let mut within = |size: DVec3| DVec3::new(rng.unit(), rng.unit(), rng.unit()) * size;
+        let mut leaf: Vec<Triangle> = (0..400)
+            .map(|_| {
+                let at = within(DVec3::new(0.88, 1.98, 0.03));
+                [
+                    at,
+                    at + within(DVec3::splat(0.01)),
+                    at + within(DVec3::splat(0.01)),
+                ]
+            })
+            .collect();
+        leaf.extend(box_triangles(DVec3::new(0.9, 2.0, 0.04)));
+        assert!(thin_direction(&leaf).z.abs() > 0.999);
+        assert!(is_flat(&leaf));
     }
 }
