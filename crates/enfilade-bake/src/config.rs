@@ -100,9 +100,9 @@ impl SmallestHole {
 
     /// What it is for a model whose triangles miss each other by `misfit`, nearly all of them. [Units: wu]
     #[must_use]
-    pub(crate) fn resolved(self, misfit: impl FnOnce() -> f64) -> Self {
+    pub(crate) fn resolved(self, misfit: f64) -> Self {
         match self {
-            Self::Auto => Self::Sealed((Self::SPREAD * misfit()).clamp(Self::LEAST, Self::MOST)),
+            Self::Auto => Self::Sealed((Self::SPREAD * misfit).clamp(Self::LEAST, Self::MOST)),
             given => given,
         }
     }

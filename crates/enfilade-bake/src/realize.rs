@@ -9,7 +9,7 @@ use crate::assemble::{Cut, assemble};
 use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex};
 use crate::join::{VOID, join_unparted, join_voids};
 use crate::proposal::Proposal;
-use crate::structure::{Structure, misfit};
+use crate::structure::Structure;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
 
 /// Makes a world of what a method proposes.
@@ -25,9 +25,7 @@ pub(crate) fn realize(
 ) -> Result<BakeOutput, BakeError> {
     context.begin(Stage::Complex)?;
     let structure = structure.into_scene();
-    let hole = config
-        .smallest_hole
-        .resolved(|| misfit(&structure.triangles, &structure.bvh));
+    let hole = config.smallest_hole.resolved(structure.misfit);
     if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
         proposal.notes.push(format!(
             "triangles that should meet miss each other: gaps up to {:.0} mm are closed instead of {:.0} (--smallest-hole)",

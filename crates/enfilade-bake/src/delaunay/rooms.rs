@@ -47,6 +47,7 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
         bvh,
         closures,
         stairs,
+        hole,
         ..
     } = session;
     let Standing {
@@ -63,7 +64,7 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
             if opening.area < MIN_AREA {
                 return (centers, None);
             }
-            let candidate = fit_candidate(&centers, STEP, &opening, walls, bvh);
+            let candidate = fit_candidate(&centers, STEP, &opening, walls, bvh, *hole);
             (centers, Some(candidate))
         })
         .collect();

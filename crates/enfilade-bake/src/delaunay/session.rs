@@ -25,6 +25,8 @@ pub struct Session {
     pub(super) bvh: Bvh,
     pub(super) closures: Vec<Triangle>,
     pub(super) stairs: Bvh,
+    /// The smallest hole. [Units: wu]
+    pub(super) hole: f64,
 }
 
 impl Session {
@@ -73,6 +75,7 @@ impl Session {
             bvh,
             closures,
             stairs: Bvh::build(&structure.stairs),
+            hole: structure.hole(config),
         };
         session.decimate(config);
         Ok(session)

@@ -46,7 +46,8 @@ const MARGIN: f64 = 0.7;
 /// How far from the front's mean plane a candidate may lie. [Units: wu]
 const OFFSET: f64 = 0.6;
 
-/// Fits a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, of which `bvh` is.
+/// Fits a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, of which `bvh` is. Slits
+/// narrower than `hole` count as closed: through them a section would run on into the hollow of a wall.
 #[must_use]
 pub(crate) fn fit_candidate(
     centers: &[DVec3],
@@ -54,6 +55,7 @@ pub(crate) fn fit_candidate(
     opening: &Opening,
     triangles: &[Triangle],
     bvh: &Bvh,
+    hole: f64,
 ) -> Candidate {
     let bounds = Aabb::of_points(centers).expanded(OFFSET + MARGIN);
     let mut near = Vec::new();
@@ -65,7 +67,7 @@ pub(crate) fn fit_candidate(
     for normals in candidate_normals(opening, &around) {
         for normal in normals {
             for plane in candidate_planes(opening, normal, &around) {
-                let section = free_section(&plane, centers, &around, spacing);
+                let section = free_section(&plane, centers, &around, [spacing, hole]);
                 let better = best
                     .as_ref()
                     .is_none_or(|b| section.cost(opening) < b.cost(opening) - 1e-9);
@@ -78,7 +80,8 @@ pub(crate) fn fit_candidate(
             break;
         }
     }
-    let section = best.unwrap_or_else(|| free_section(&opening.plane, centers, &around, spacing));
+    let section =
+        best.unwrap_or_else(|| free_section(&opening.plane, centers, &around, [spacing, hole]));
     Candidate {
         winding: section.winding(),
         closed: opening.closed,
@@ -211,10 +214,17 @@ impl FreeSection {
     }
 }
 
-fn free_section(plane: &Plane, centers: &[DVec3], around: &[Triangle], voxel: f64) -> FreeSection {
-    let picture = Picture::around(plane, centers, MARGIN + voxel);
+fn free_section(
+    plane: &Plane,
+    centers: &[DVec3],
+    around: &[Triangle],
+    [spacing, hole]: [f64; 2],
+) -> FreeSection {
+    let picture = Picture::around(plane, centers, MARGIN + spacing);
     let blocked = picture.blocked(plane, around);
-    let (pieces, found) = picture.pieces(&blocked, centers);
+    // Half a hole from each side; less than half a cell is none.
+    let reach = (0.5 * hole / picture.step).round() as usize;
+    let (pieces, found) = picture.pieces(&picture.grown(&blocked, reach), centers);
     // The piece that most of the front projects onto.
     let main = (0..found.len()).max_by_key(|&i| (found[i].n_hits, usize::MAX - i));
     let (open, area, bounded) = match main {
@@ -222,9 +232,15 @@ fn free_section(plane: &Plane, centers: &[DVec3], around: &[Triangle], voxel: f6
             let main = &found[i];
             // A plane that most of the front misses is no plane of this opening.
             let share = main.n_hits as f64 / centers.len() as f64;
+            let open: Vec<bool> = pieces.iter().map(|&p| p as usize == i + 1).collect();
+            let mut open = picture.grown(&open, reach);
+            for (open, &blocked) in open.iter_mut().zip(&blocked) {
+                *open &= !blocked;
+            }
+            let n_cells = open.iter().filter(|&&o| o).count();
             (
-                pieces.iter().map(|&p| p as usize == i + 1).collect(),
-                main.n_cells as f64 * picture.step * picture.step,
+                open,
+                n_cells as f64 * picture.step * picture.step,
                 !main.meets_border && share > 0.5,
             )
         }
@@ -255,7 +271,6 @@ struct Picture {
 struct OpenPatch {
     /// Points of the opening that lie in it.
     n_hits: usize,
-    n_cells: usize,
     meets_border: bool,
 }
 
@@ -320,14 +335,29 @@ impl Picture {
         (piece_of, pieces)
     }
 
+    /// A set of cells with all that are up to `reach` cells from it, along both sides.
+    fn grown(&self, cells: &[bool], reach: usize) -> Vec<bool> {
+        let [nu, nv] = self.side;
+        let mut out = cells.to_vec();
+        if reach == 0 {
+            return out;
+        }
+        for (k, _) in cells.iter().enumerate().filter(|(_, c)| **c) {
+            let near = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
+            for j in near(k / nu, nv) {
+                out[j * nu..][near(k % nu, nu)].fill(true);
+            }
+        }
+        out
+    }
+
     /// Marks the open cells that hang together with `start`.
     fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> OpenPatch {
         let side = self.side;
-        let (mut n_cells, mut meets_border) = (0, false);
+        let mut meets_border = false;
         piece_of[start] = id;
         let mut stack = vec![start];
         while let Some(k) = stack.pop() {
-            n_cells += 1;
             let (i, j) = (k % side[0], k / side[0]);
             meets_border |= i == 0 || j == 0 || i + 1 == side[0] || j + 1 == side[1];
             let mut visit = |inside: bool, next: usize| {
@@ -343,7 +373,6 @@ impl Picture {
         }
         OpenPatch {
             n_hits: 0,
-            n_cells,
             meets_border,
         }
     }
@@ -470,7 +499,7 @@ mod tests {
             area: 2.0,
             closed: 0.25,
         };
-        let found = fit_candidate(&centers, 0.1, &opening, &walls, &bvh);
+        let found = fit_candidate(&centers, 0.1, &opening, &walls, &bvh, 0.01);
         assert_eq!(found.closed, 0.25);
         let on = |k: usize| found.winding.points.iter().map(move |p| p[k]);
         let range = |k: usize| {
@@ -488,5 +517,55 @@ mod tests {
         let near = |at: f64, by: f64| (0.0..0.15).contains(&(at * by));
         assert!(near(z0 - 2.0, -1.0) && near(z1 - 3.0, 1.0), "{z0} to {z1}");
         assert!(near(y0, -1.0) && near(y1 - 2.0, 1.0), "{y0} to {y1}");
+    }
+
+    #[test]
+    fn a_slit_beside_a_jamb_does_not_lead_a_section_into_the_hollow_of_the_wall() {
+        let quad = |a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]| -> Vec<Triangle> {
+            let [a, b, c, d] = [a, b, c, d].map(DVec3::from);
+            vec![[a, b, c], [a, c, d]]
+        };
+        // Two sheets 0.2 m apart with a doorway of 1 × 2 m, and its lining: the left jamb ends 45 mm below the lintel.
+        let sheet = |x: f64| {
+            [
+                quad([x, 0.0, 0.0], [x, 2.5, 0.0], [x, 2.5, 2.0], [x, 0.0, 2.0]),
+                quad([x, 0.0, 3.0], [x, 2.5, 3.0], [x, 2.5, 5.0], [x, 0.0, 5.0]),
+                quad([x, 2.0, 2.0], [x, 2.5, 2.0], [x, 2.5, 3.0], [x, 2.0, 3.0]),
+            ]
+            .concat()
+        };
+        let across = |y: [f64; 2], z: [f64; 2]| {
+            quad(
+                [2.0, y[0], z[0]],
+                [2.2, y[0], z[0]],
+                [2.2, y[1], z[1]],
+                [2.0, y[1], z[1]],
+            )
+        };
+        let walls = [
+            sheet(2.0),
+            sheet(2.2),
+            across([0.0, 1.955], [2.0, 2.0]),
+            across([0.0, 2.0], [3.0, 3.0]),
+            across([2.0, 2.0], [2.0, 3.0]),
+            block(DVec3::new(0.0, -0.2, 0.0), DVec3::new(5.0, 0.0, 5.0)),
+        ]
+        .concat();
+        let centers: Vec<DVec3> = (0..10)
+            .flat_map(|j| {
+                (0..20).map(move |i| (2.05 + 0.1 * f64::from(j), 0.05 + 0.1 * f64::from(i)))
+            })
+            .map(|(z, y)| DVec3::new(2.1, y, z))
+            .collect();
+        let middle = Plane::through(DVec3::new(2.1, 1.0, 2.5), DVec3::X);
+        let section = |hole: f64| free_section(&middle, &centers, &walls, [0.1, hole]);
+        let closed = section(0.05);
+        // Two steps of the picture around a doorway of 2 m².
+        assert!(
+            closed.bounded && (closed.area - 2.0).abs() < 0.25,
+            "{}",
+            closed.area
+        );
+        assert!(section(0.01).area > 3.0, "{}", section(0.01).area);
     }
 }

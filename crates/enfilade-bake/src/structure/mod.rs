@@ -26,7 +26,6 @@ pub(crate) use blockers::plates;
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
 pub(crate) use lattice::{connected_count, rim_share};
-pub(crate) use misfit::misfit;
 pub(crate) use of::{OUTDOORS, Stairs, Structure, bounds_of, in_own_order, structural_triangles};
 pub use pinch::MergeSettings;
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};

@@ -5,9 +5,10 @@ use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
 
 use super::blockers::{plates, without_open_leaves};
 use super::frame::Frame;
+use super::misfit::misfit;
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
-use crate::BakeError;
+use crate::{BakeConfig, BakeError};
 
 /// Label of the space around the building.
 pub(crate) const OUTDOORS: u32 = 1;
@@ -39,6 +40,8 @@ pub(crate) struct Structure<'a> {
     pub(crate) stairs: Vec<Triangle>,
     /// Of all structural triangles.
     pub(crate) bvh: Bvh,
+    /// How far triangles that should meet miss each other. [Units: wu]
+    pub(crate) misfit: f64,
 }
 
 impl<'a> Structure<'a> {
@@ -75,10 +78,12 @@ impl<'a> Structure<'a> {
         };
         let at = |numbers: &[u32]| numbers.iter().map(|&t| framed[t as usize]).collect();
         let wall_numbers = numbers(false);
+        let bvh = Bvh::build(&framed);
         Ok(Self {
+            misfit: misfit(&framed, &bvh),
             walls: at(&wall_numbers),
             stairs: at(&numbers(true)),
-            bvh: Bvh::build(&framed),
+            bvh,
             frame,
             wall_numbers,
             scene,
@@ -90,6 +95,11 @@ impl<'a> Structure<'a> {
     /// The box around everything structural, in the frame.
     pub(crate) fn bounds(&self) -> Aabb {
         bounds_of(&self.walls).union(bounds_of(&self.stairs))
+    }
+
+    /// The smallest hole of this model. [Units: wu]
+    pub(crate) fn hole(&self, config: &BakeConfig) -> f64 {
+        config.smallest_hole.resolved(self.misfit).gap()
     }
 
     /// Heights at which storeys end, ascending. [Units: wu]

@@ -13,7 +13,7 @@ use crate::voxel::{BitVolume, Grid, Labels};
 const MIN_FACES: usize = 4;
 
 /// Fits a candidate to each opening, among `walls`; `closures` are the voxels that door leaves and panes fill, and
-/// `closed_share` is how much of a front that must be for a pane to be parted at its corners.
+/// `closed_share` is how much of a front that must be for a pane to be parted at its corners. Slits narrower than `hole` count as closed.
 pub(super) fn fit_candidates(
     grid: &Grid,
     labels: &Labels,
@@ -21,7 +21,7 @@ pub(super) fn fit_candidates(
     closures: &BitVolume,
     lids: &Lids,
     walls: &[Triangle],
-    closed_share: f64,
+    [closed_share, hole]: [f64; 2],
 ) -> Vec<Candidate> {
     let bvh = Bvh::build(walls);
     let is_shut = |faces: &[u64]| {
@@ -51,7 +51,7 @@ pub(super) fn fit_candidates(
         let is_lesser = |i: usize| regions.region_of_basin[labels.get(i) as usize] == pair[0];
         let front = front_of(grid, faces, &is_lesser, Some(closures));
         let centers: Vec<DVec3> = front.faces.iter().map(|&f| face_center(grid, f)).collect();
-        fit_candidate(&centers, grid.voxel, &front.opening, walls, &bvh)
+        fit_candidate(&centers, grid.voxel, &front.opening, walls, &bvh, hole)
     };
     openings.into_par_iter().map(candidate).collect()
 }

@@ -82,7 +82,7 @@ pub(crate) fn propose(
         &closures,
         &lids,
         &structure.walls,
-        config.merge.closed_share,
+        [config.merge.closed_share, structure.hole(config)],
     );
     drop((closures, lids));
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh);
