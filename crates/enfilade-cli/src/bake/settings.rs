@@ -320,6 +320,17 @@ impl Resolved {
     }
 }
 
+impl BakeOptions {
+    /// All files that are read, `scene` among them.
+    pub(crate) fn inputs<'a>(&'a self, scene: &'a [PathBuf]) -> impl Iterator<Item = &'a PathBuf> {
+        scene
+            .iter()
+            .chain(&self.detail)
+            .chain(&self.scene.config)
+            .chain(&self.delaunay.choices)
+    }
+}
+
 /// Command line and settings file, resolved.
 pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let file = options.scene.file()?;
