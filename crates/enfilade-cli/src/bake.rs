@@ -8,7 +8,7 @@ pub(crate) mod settings;
 mod values;
 
 use std::io::{self, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use enfilade::bake::bsp::find_leak;
@@ -20,7 +20,7 @@ use enfilade::geom::scene::{Role, Scene};
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
 
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{check_target, write_atomically};
+use crate::output::{Outputs, write_atomically};
 use crate::progress::{BakeBar, StageBar};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
@@ -38,20 +38,12 @@ pub(crate) struct Bake {
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let options = &args.options;
-    let all_inputs = args
-        .inputs
-        .iter()
-        .chain(&options.detail)
-        .chain(&options.scene.config);
-    if let Some(input) = all_inputs.into_iter().find(|p| same_file(p, &args.output)) {
-        bail!(
-            "{} is the input {}; choose another name with -o",
-            args.output.display(),
-            input.display()
-        );
+    let mut outputs = Outputs::reading(options.inputs(&args.inputs));
+    outputs.write("-o", &args.output)?;
+    if let Some(path) = &options.leak {
+        outputs.write("--leak", path)?;
     }
     let settings = settings::resolve(options)?;
-    check_target(&args.output)?;
     let bar = StageBar::new();
     bar.start("reading", 0);
     let imported = import(&args.inputs, &options.detail, &settings.import)?;
@@ -149,10 +141,6 @@ fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result
         return Ok(());
     }
     bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Bakes on a pool of its own, with a progress line; says which method was chosen and why.

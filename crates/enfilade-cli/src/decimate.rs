@@ -16,7 +16,7 @@ use enfilade::import::import;
 
 use crate::bake::delaunay::choices_text;
 use crate::bake::{print_summary, settings};
-use crate::output::{check_target, write_atomically};
+use crate::output::{Outputs, write_atomically};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
 #[derive(clap::Args)]
@@ -40,8 +40,14 @@ pub(crate) struct Decimate {
 }
 
 pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
+    let mut outputs = Outputs::reading(args.options.inputs(&args.inputs));
     if let Some(path) = &args.output {
-        check_target(path)?;
+        outputs.write("-o", path)?;
+    }
+    // Choices that were read are gone on with, and may be saved where they were.
+    let mut choices = Outputs::reading(args.inputs.iter().chain(&args.options.detail));
+    if let Some(path) = &args.output {
+        choices.write("-o", path)?;
     }
     let mut settings = settings::resolve(&args.options)?;
     settings.config.method = Method::Delaunay;
@@ -61,6 +67,8 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         config,
         made: Vec::new(),
         is_saved: true,
+        outputs,
+        choices,
     };
     let mut out = io::stdout().lock();
     if args.steps {
@@ -107,6 +115,9 @@ struct Walk<'a> {
     made: Vec<bool>,
     /// They are in a file.
     is_saved: bool,
+    /// What no world may be written over, and what no choices may.
+    outputs: Outputs,
+    choices: Outputs,
 }
 
 const HELP: &str = "\
@@ -152,7 +163,9 @@ impl Walk<'_> {
                 Err(error) => writeln!(out, "{error:#}")?,
             },
             Some("bake") if words.len() == 2 => {
-                if let Err(error) = self.bake(Path::new(words[1]), out) {
+                let path = Path::new(words[1]);
+                let allowed = self.outputs.clone().write("bake", path);
+                if let Err(error) = allowed.and_then(|()| self.bake(path, out)) {
                     writeln!(out, "{error:#}")?;
                 }
             }
@@ -214,6 +227,7 @@ impl Walk<'_> {
     }
 
     fn save(&mut self, path: &Path) -> anyhow::Result<()> {
+        self.choices.clone().write("save", path)?;
         write_atomically(path, choices_text(&self.config.delaunay.choices).as_bytes())?;
         self.is_saved = true;
         Ok(())
@@ -309,6 +323,8 @@ mod tests {
             at: stop,
             made: Vec::new(),
             is_saved: true,
+            outputs: Outputs::default(),
+            choices: Outputs::default(),
         };
         let n_cells = walk.left()[0];
         assert_eq!(n_cells, 4);

@@ -11,7 +11,7 @@ use enfilade_report::{PlanOptions, plan_svg};
 use enfilade_testkit::furnished_house;
 
 use crate::bake::{bake_scene, print_summary};
-use crate::output::write_atomically;
+use crate::output::{Outputs, write_atomically};
 
 /// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
 #[derive(clap::Args)]
@@ -26,6 +26,10 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
     std::fs::create_dir_all(&args.output)
         .with_context(|| format!("cannot make folder {}", args.output.display()))?;
     let path = |name: &str| args.output.join(name);
+    let mut outputs = Outputs::default();
+    for name in ["house.glb", "world.glb", "plan.svg"] {
+        outputs.write("-o", &path(name))?;
+    }
     write_atomically(&path("house.glb"), &export_glb(&scene))?;
     let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;

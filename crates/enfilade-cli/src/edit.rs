@@ -9,7 +9,7 @@ use enfilade::bake::simplify::{Simplified, delete_portal};
 use enfilade::cpg::{Portal, PortalId, World};
 use enfilade::geom::DVec3;
 
-use crate::output::check_target;
+use crate::output::Outputs;
 use crate::simplify::{cost_line, write};
 use enfilade_cli::world::read_world;
 
@@ -76,7 +76,7 @@ fn parse_polygon(text: &str) -> Result<Polygon, String> {
 }
 
 pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
-    check_target(&args.output)?;
+    Outputs::reading([&args.input]).write("-o", &args.output)?;
     let before = read_world(&args.input)?;
     let mut note = String::new();
     let mut world: Option<World> = None;

@@ -12,7 +12,7 @@ use enfilade_render::{
 use enfilade_testkit::Rng;
 use serde::Serialize;
 
-use crate::output::write_atomically;
+use crate::output::{Outputs, write_atomically};
 use crate::progress::StageBar;
 use enfilade_cli::cameras::random_camera;
 
@@ -26,6 +26,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) size: [u32; 2],
     pub(crate) adapter: &'a AdapterChoice,
     pub(crate) pictures: Option<&'a PathBuf>,
+    /// What the command reads.
+    pub(crate) outputs: Outputs,
     pub(crate) max_listed: usize,
 }
 
@@ -205,7 +207,9 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
                     .push(describe(&studio, world, &camera, view, &lost));
                 if let Some(dir) = asked.pictures {
                     let picture = picture_of_loss(&mut studio, &camera, &lost, asked.size)?;
-                    write_atomically(&dir.join(format!("view-{view}.png")), &picture.to_png()?)?;
+                    let to = dir.join(format!("view-{view}.png"));
+                    asked.outputs.clone().write("--pictures", &to)?;
+                    write_atomically(&to, &picture.to_png()?)?;
                 }
             }
         }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use enfilade_report::{PlanOptions, plan_svg};
 
-use crate::output::write_atomically;
+use crate::output::{Outputs, write_atomically};
 use enfilade_cli::world::read_world;
 
 /// Draws the floor plan of every storey as one SVG: rooms colored, doorways at their width.
@@ -22,6 +22,7 @@ pub(crate) struct Plan {
 }
 
 pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
+    Outputs::reading([&args.world]).write("-o", &args.output)?;
     let world = read_world(&args.world)?;
     if let Err(errors) = world.validate() {
         let first = errors.first().map(ToString::to_string).unwrap_or_default();

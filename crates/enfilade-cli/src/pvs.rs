@@ -15,7 +15,7 @@ use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, se
 use enfilade_verify::structural_triangles;
 
 use self::statistics::Statistics;
-use crate::output::write_atomically;
+use crate::output::{Outputs, is_same_file, write_atomically};
 use crate::progress::StageBar;
 
 mod statistics;
@@ -101,9 +101,9 @@ struct PvsReport {
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
+    let output = output_path(args)?;
     let input = read_input(&args.input)?;
     let graph = &input.graph;
-    let output = output_path(args)?;
     if args.into.is_some() && input.world.is_none() {
         bail!(
             "{} is a portal file: only a world holds an answer (--into)",
@@ -215,22 +215,32 @@ pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
     }
 }
 
+/// Where the answer goes; all that is written is looked at before the work. Only `--into` may be the input itself: the world
+/// stays what it was, with an answer in it.
 fn output_path(args: &Pvs) -> anyhow::Result<PathBuf> {
     let path = args
         .output
         .clone()
         .unwrap_or_else(|| args.input.with_extension("pvs"));
-    if same_file(&path, &args.input) {
-        bail!(
-            "{} is the input; choose another name with -o",
-            path.display()
-        );
+    let mut outputs = Outputs::reading([&args.input]);
+    outputs.write("-o", &path)?;
+    let others = [
+        ("--evidence", &args.evidence),
+        ("--statistics", &args.statistics),
+        ("--mutual", &args.mutual),
+        ("--checkpoint", &args.checkpoint),
+    ];
+    for (option, other) in others {
+        if let Some(other) = other {
+            outputs.write(option, other)?;
+        }
+    }
+    if let Some(into) = &args.into
+        && !is_same_file(into, &args.input)
+    {
+        outputs.write("--into", into)?;
     }
     Ok(path)
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 
 fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {

@@ -12,7 +12,7 @@ use enfilade_render::{
 };
 use serde_json::json;
 
-use crate::output::{check_target, write_atomically};
+use crate::output::{Outputs, write_atomically};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
@@ -148,8 +148,12 @@ pub(crate) fn smooth(
 pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let fov = args.fov.to_radians();
     let is_path = args.path.is_some() || args.walk.is_some();
+    let mut outputs = Outputs::reading([&args.world].into_iter().chain(&args.path));
+    if let Some(record) = &args.record {
+        outputs.write("--record", record)?;
+    }
     if !is_path {
-        check_target(&args.output)?;
+        outputs.write("-o", &args.output)?;
     }
     let given = args
         .path
@@ -177,6 +181,12 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     };
     if cameras.is_empty() {
         bail!("{}: no room to walk in", args.world.display());
+    }
+    if is_path {
+        let pictures: Vec<_> = (1..=cameras.len())
+            .map(|n| numbered(&args.output, n))
+            .collect();
+        outputs.write_all("-o", &pictures)?;
     }
     if args.lod > 0.0 {
         studio.add_levels(&world)?;

@@ -12,7 +12,7 @@ use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, 
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
-use crate::output::{check_target, write_atomically};
+use crate::output::{Outputs, write_atomically};
 use crate::render::{above, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::world::read_world;
@@ -41,7 +41,7 @@ const SIZE: [u32; 2] = [960, 540];
 const BUDGET: Duration = Duration::from_secs(20);
 
 pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
-    check_target(&args.output)?;
+    Outputs::reading([&args.world]).write("-o", &args.output)?;
     let world = read_world(&args.world)?;
     let name = args.world.file_stem().unwrap_or_default().to_string_lossy();
     let mut parts = ReportParts {

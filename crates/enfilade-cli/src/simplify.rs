@@ -11,7 +11,7 @@ use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};
 
-use crate::output::{check_target, write_atomically};
+use crate::output::{Outputs, write_atomically};
 use crate::pvs::sight_graph;
 
 /// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     {
         bail!("--min-cost {min} is above --max-cost {max}; no cell can be within both");
     }
-    check_target(&args.output)?;
+    Outputs::reading([&args.input]).write("-o", &args.output)?;
     let bytes =
         fs::read(&args.input).with_context(|| format!("cannot read {}", args.input.display()))?;
     let settings = SimplifySettings {

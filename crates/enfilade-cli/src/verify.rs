@@ -18,6 +18,7 @@ use enfilade_verify::{
 
 use crate::bake::settings::SceneOptions;
 use crate::exact::{Asked, verify_pictures};
+use crate::output::Outputs;
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
 use enfilade_cli::answers::Answers;
@@ -103,12 +104,15 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         .transpose()?;
     let exact = (args.views > 0)
         .then(|| {
+            let inputs = [&args.world].into_iter().chain(&args.source);
+            let inputs = inputs.chain(&args.detail).chain(&args.scene.config);
             let asked = Asked {
                 views: args.views,
                 seed: args.seed,
                 size: args.view_size,
                 adapter: &args.adapter,
                 pictures: args.pictures.as_ref(),
+                outputs: Outputs::reading(inputs),
                 max_listed: args.list,
             };
             verify_pictures(&world, &asked).with_context(|| args.world.display().to_string())

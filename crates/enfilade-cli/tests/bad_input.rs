@@ -452,6 +452,23 @@ fn outputs_that_cannot_be_are_noticed_before_the_work() {
 }
 
 #[test]
+fn a_scene_reads_files_outside_its_folder_on_request_only() {
+    let folder = Folder::new("outside");
+    let obj = format!("mtllib ../secret.mtl\n{}", obj_cube(&[]));
+    fs::create_dir(folder.0.join("scene")).unwrap();
+    folder.write("secret.mtl", "newmtl secret");
+    folder.write("scene/a.obj", obj);
+    let said = |more: &[&str]| {
+        let args = ["scene/a.obj", "-v", "-o", "out.glb"];
+        let done = folder.bake(&[&args, more].concat());
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    let note = "use --allow-outside";
+    assert!(said(&[]).contains(note), "{}", said(&[]));
+    assert!(!said(&["--allow-outside"]).contains(note));
+}
+
+#[test]
 fn an_old_output_survives_a_bake_that_fails() {
     let folder = Folder::new("old");
     let old = folder.write("out.glb", "the world of yesterday");

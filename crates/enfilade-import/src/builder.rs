@@ -1,7 +1,7 @@
 //! Fills one [`Scene`] from several files: merging, limits, mirrored placements, roles.
 
 use crate::roles::{Facts, Verdict};
-use crate::{ImportError, ImportOptions, ImportReport, Limits};
+use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
     Entity, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
@@ -16,7 +16,7 @@ pub(crate) struct Builder<'a> {
     /// The file being read.
     pub(crate) path: PathBuf,
     /// Where its relative references start; `None` when read from memory.
-    pub(crate) folder: Option<PathBuf>,
+    folder: Option<PathBuf>,
     pub(crate) base: DMat4,
     scene: Scene,
     pub(crate) is_detail_file: bool,
@@ -103,6 +103,12 @@ impl<'a> Builder<'a> {
         let path = std::mem::take(&mut self.path);
         self.report.note(&path, place, text);
         self.path = path;
+    }
+
+    /// Reads a file that the current one refers to.
+    pub(crate) fn read_reference(&self, reference: &str, limit: u64) -> Result<Vec<u8>, String> {
+        let folder = self.folder.as_deref();
+        files::read_reference(folder, reference, self.options.allow_outside, limit)
     }
 
     pub(crate) fn limits(&self) -> &'a Limits {

@@ -3,7 +3,7 @@
 use crate::ImportError;
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Reads a whole regular file of at most `limit` bytes.
 pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
@@ -67,34 +67,106 @@ pub(crate) fn decode_data_uri(uri: &str) -> Option<Result<(String, Vec<u8>), Str
     Some(bytes.map(|bytes| (mime, bytes)))
 }
 
-/// The file that a relative reference means, or why it is refused.
+/// Reads a file that a scene in `folder` refers to, of at most `limit` bytes, or says why it is refused.
 ///
-/// `..` is allowed, as exporters write it; an absolute path or a URL is not.
-pub(crate) fn resolve(folder: Option<&Path>, reference: &str) -> Result<PathBuf, String> {
+/// The one way to such files: whoever wrote the scene chooses the reference, and whoever reads it owns the disk. So the file
+/// must lie in the scene's folder or below, also once links are followed, unless `may_leave` says otherwise.
+pub(crate) fn read_reference(
+    folder: Option<&Path>,
+    reference: &str,
+    may_leave: bool,
+    limit: u64,
+) -> Result<Vec<u8>, String> {
+    let path = resolve(folder, reference, may_leave)?;
+    read_file(&path, limit).map_err(|e| match e {
+        ImportError::Read { .. } => format!("{e}; put the file there"),
+        _ => e.to_string(),
+    })
+}
+
+/// The file that a reference means.
+fn resolve(folder: Option<&Path>, reference: &str, may_leave: bool) -> Result<PathBuf, String> {
     let Some(folder) = folder else {
         return Err(format!(
             "refers to the file '{reference}', but was read from memory"
         ));
     };
+    let here = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let root = here
+        .canonicalize()
+        .map_err(|e| format!("cannot find the folder {}: {e}", here.display()))?;
     let decoded = percent_encoding::percent_decode_str(reference).decode_utf8_lossy();
-    let decoded = decoded.replace('\\', "/");
-    let is_drive = decoded.as_bytes().get(1) == Some(&b':');
-    if decoded.is_empty()
-        || decoded.contains('\0')
-        || decoded.contains("://")
-        || is_drive
-        || decoded.starts_with('/')
-    {
-        return Err(format!(
-            "refers to '{reference}'; only paths relative to the file are followed"
-        ));
-    }
-    let path = folder.join(&decoded);
+    let named = named(&root, &decoded.replace('\\', "/"), reference, may_leave)?;
     // A name may hold a literal percent sign that nobody escaped.
-    if !path.exists() && folder.join(reference).exists() {
-        return Ok(folder.join(reference));
+    let path = if decoded == reference || named.exists() {
+        named
+    } else {
+        self::named(&root, reference, reference, may_leave)
+            .ok()
+            .filter(|p| p.exists())
+            .unwrap_or(named)
+    };
+    // What does not exist is told by whoever reads it.
+    let path = path.canonicalize().unwrap_or(path);
+    if may_leave || path.starts_with(&root) {
+        Ok(path)
+    } else {
+        Err(outside(reference, "by a link "))
     }
-    Ok(path)
+}
+
+/// The path that a decoded reference names, before links: `..` takes back a name, as in every URI.
+///
+/// Refused without a look at the disk, so that no error tells what is there.
+fn named(root: &Path, decoded: &str, reference: &str, may_leave: bool) -> Result<PathBuf, String> {
+    let is_absolute = |path: &str| path.starts_with('/') || path.as_bytes().get(1) == Some(&b':');
+    let path = match decoded.split_once("://") {
+        Some((scheme, path)) if scheme.eq_ignore_ascii_case("file") && may_leave => {
+            // `file:///C:/a` and `file:///a`; a host is not followed.
+            path.strip_prefix('/')
+                .filter(|rest| is_absolute(rest))
+                .unwrap_or(path)
+        }
+        Some((scheme, _)) if !scheme.eq_ignore_ascii_case("file") => {
+            return Err(format!("refers to '{reference}'; only files are read"));
+        }
+        Some(_) => return Err(outside(reference, "")),
+        None => decoded,
+    };
+    if path.is_empty() || path.contains('\0') {
+        return Err(format!("refers to '{reference}', which is no file name"));
+    }
+    let is_absolute = is_absolute(path);
+    if is_absolute && may_leave {
+        return Ok(PathBuf::from(path));
+    }
+    let mut named = root.to_path_buf();
+    for part in Path::new(path).components() {
+        match part {
+            Component::Normal(name) => named.push(name),
+            Component::ParentDir => {
+                named.pop();
+            }
+            Component::CurDir => {}
+            Component::RootDir | Component::Prefix(_) => return Err(outside(reference, "")),
+        }
+    }
+    if may_leave || (!is_absolute && named.starts_with(root)) {
+        Ok(named)
+    } else {
+        Err(outside(reference, ""))
+    }
+}
+
+fn outside(reference: &str, how: &str) -> String {
+    format!(
+        "refers to '{reference}', {how}outside the folder of the scene; keep it beside the scene, or use --allow-outside \
+         (ImportOptions::allow_outside)"
+    )
 }
 
 /// MIME type by the first bytes.
@@ -133,27 +205,39 @@ mod tests {
     }
 
     #[test]
-    fn references_out_of_reach_are_refused() {
-        let here = Some(Path::new("/scene"));
-        assert!(resolve(None, "a.bin").is_err());
+    fn references_stay_in_the_folder_unless_they_may_leave() {
+        let root = std::env::temp_dir().canonicalize().unwrap();
+        let here = Some(root.as_path());
+        let found = |reference| resolve(here, reference, false);
+        assert!(resolve(None, "a.bin", true).is_err());
         for bad in [
             "/etc/passwd",
-            "http://host/a",
+            "file:///etc/passwd",
             "C:/a.png",
             "C:\\a.png",
-            "",
-            "a\0b",
+            "../a.bin",
+            "..\\a.bin",
+            "%2e%2e%2fa.bin",
+            "%2E%2E/a.bin",
+            "t/../../a.bin",
         ] {
-            assert!(resolve(here, bad).is_err(), "{bad}");
+            let problem = found(bad).unwrap_err();
+            assert!(problem.contains("--allow-outside"), "{bad}: {problem}");
+            resolve(here, bad, true).unwrap();
         }
-        assert_eq!(
-            resolve(here, "a%20b.bin").unwrap(),
-            Path::new("/scene/a b.bin")
-        );
-        assert_eq!(
-            resolve(here, "t\\a.png").unwrap(),
-            Path::new("/scene/t/a.png")
-        );
+        for bad in ["http://host/a", "", "a\0b", "a%00b"] {
+            assert!(found(bad).is_err(), "{bad}");
+            assert!(resolve(here, bad, true).is_err(), "{bad}");
+        }
+        for (reference, path) in [
+            ("no%20such.bin", "no such.bin"),
+            ("t\\no-such.png", "t/no-such.png"),
+            ("./t/../no-such.png", "no-such.png"),
+        ] {
+            assert_eq!(found(reference).unwrap(), root.join(path));
+        }
+        let own = format!("../{}/a.bin", root.file_name().unwrap().to_string_lossy());
+        assert_eq!(found(&own).unwrap(), root.join("a.bin"));
     }
 
     #[test]

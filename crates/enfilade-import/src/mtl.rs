@@ -92,9 +92,7 @@ pub(crate) fn read_library(
         .limits()
         .max_json_bytes
         .min(builder.limits().max_file_bytes);
-    let bytes = files::resolve(builder.folder.as_deref(), reference)
-        .and_then(|path| files::read_file(&path, limit).map_err(|e| e.to_string()));
-    match bytes {
+    match builder.read_reference(reference, limit) {
         Ok(bytes) => read_materials(&bytes, reference, builder, library),
         Err(problem) => {
             builder.note(

@@ -29,6 +29,10 @@ pub struct ImportOptions {
     pub limits: Limits,
     /// What is structural and what is detail.
     pub roles: RoleRules,
+    /// Whether a scene may refer to files outside its own folder, as `../textures/wall.png`.
+    ///
+    /// Off, a scene from elsewhere cannot bring a file of the reader's disk into the output.
+    pub allow_outside: bool,
     /// What to put right in structural triangles; nothing if not given.
     pub repair: Option<RepairOptions>,
 }

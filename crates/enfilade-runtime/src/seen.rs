@@ -83,14 +83,17 @@ impl<'a> Seen<'a> {
     ///
     /// For what is not in the world's lists: ask for each object and frame, with the cell of its
     /// [`Follower`](crate::Follower) and those behind portals that its box reaches into. Costs a few box
-    /// tests for each visit of these cells.
+    /// tests for each visit of these cells. A box may be infinite; one with a coordinate that is no number is never seen.
     #[must_use]
     pub fn sees_box(&self, cells: &[CellId], aabb: [[f32; 3]; 2]) -> bool {
         let [low, high] = aabb;
+        if aabb.as_flattened().iter().any(|x| x.is_nan()) {
+            return false;
+        }
         let is_inside = |plane: &[f32; 4]| {
             let far = (0..3).map(|k| plane[k] * if plane[k] >= 0.0 { high[k] } else { low[k] });
             let reach = far.sum::<f32>() + plane[3];
-            // What is no number counts as inside.
+            // Of an infinite box, what is no number counts as inside.
             reach >= 0.0 || reach.is_nan()
         };
         self.visits()

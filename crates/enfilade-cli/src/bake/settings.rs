@@ -39,6 +39,10 @@ pub(crate) struct SceneOptions {
     /// Point of the scene, in meters and with y up, that becomes the origin.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
+    /// Read files that the scene refers to (buffers, pictures, materials) outside its own folder, too; leave it out for scenes
+    /// of strangers.
+    #[arg(long)]
+    allow_outside: bool,
     /// Repair structural triangles: weld corners along open edges within METERS (0.001 if not given), split
     /// T-junctions, turn shells alike, drop what is there twice, fill small holes; each change is counted.
     #[arg(long, value_name = "METERS", num_args = 0..=1, require_equals = true,
@@ -316,6 +320,17 @@ impl Resolved {
     }
 }
 
+impl BakeOptions {
+    /// All files that are read, `scene` among them.
+    pub(crate) fn inputs<'a>(&'a self, scene: &'a [PathBuf]) -> impl Iterator<Item = &'a PathBuf> {
+        scene
+            .iter()
+            .chain(&self.detail)
+            .chain(&self.scene.config)
+            .chain(&self.delaunay.choices)
+    }
+}
+
 /// Command line and settings file, resolved.
 pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let file = options.scene.file()?;
@@ -414,6 +429,7 @@ impl SceneOptions {
                     .unwrap_or(true),
                 ..RoleRules::default()
             },
+            allow_outside: self.allow_outside,
             repair: self.repair_with(file),
             ..ImportOptions::default()
         }

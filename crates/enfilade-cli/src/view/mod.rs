@@ -24,7 +24,7 @@ use winit::window::{Window, WindowId};
 
 use self::panel::{Panel, Shown};
 use self::walker::Walker;
-use crate::output::write_atomically;
+use crate::output::{Outputs, write_atomically};
 use crate::render::portal_marks;
 use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
 use enfilade_cli::values::{point, size};
@@ -56,6 +56,12 @@ pub(crate) struct View {
     /// What draws: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
+}
+
+impl View {
+    fn outputs(&self) -> Outputs {
+        Outputs::reading([&self.world].into_iter().chain(&self.path))
+    }
 }
 
 pub(crate) fn run(args: &View) -> anyhow::Result<()> {
@@ -278,8 +284,18 @@ impl App<'_> {
             KeyCode::F4 => open.recorded = Some(Vec::new()),
             KeyCode::F5 => {
                 if let Some(path) = open.recorded.take() {
-                    write_atomically(&self.args.record, path_text(&path).as_bytes())?;
-                    open.say(format!("wrote {}", self.args.record.display()));
+                    let record = &self.args.record;
+                    match self.args.outputs().write("--record", record) {
+                        Ok(()) => {
+                            write_atomically(record, path_text(&path).as_bytes())?;
+                            open.say(format!("wrote {}", record.display()));
+                        }
+                        // What was walked stays, and so does the window.
+                        Err(why) => {
+                            open.recorded = Some(path);
+                            open.say(format!("{why:#}"));
+                        }
+                    }
                 }
             }
             KeyCode::F12 => open.shot(self.args, &self.world)?,
@@ -483,6 +499,10 @@ impl Open {
         let size = [self.config.width, self.config.height];
         let leaves = self.leaves(world);
         let picture = studio.picture(&camera, self.culling, self.style(), &leaves, size)?;
+        if let Err(why) = args.outputs().write("--screenshot", &to) {
+            self.say(format!("{why:#}"));
+            return Ok(());
+        }
         write_atomically(&to, &picture.to_png()?)?;
         let [drawn, ..] = self.shown.counts;
         self.say(format!("wrote {}, {drawn} triangles", to.display()));

@@ -187,15 +187,10 @@ fn read_image(
 
 /// Reads a picture beside the scene, if it is one.
 pub(crate) fn read_picture_file(uri: &str, builder: &Builder<'_>) -> Result<Vec<u8>, String> {
-    let path = files::resolve(builder.folder.as_deref(), uri)?;
-    let limit = builder.limits().max_image_bytes;
-    let bytes = files::read_file(&path, limit).map_err(|e| e.to_string())?;
+    let bytes = builder.read_reference(uri, builder.limits().max_image_bytes)?;
     // A scene may not carry any file of the reader's disk into its output, only pictures.
     match files::sniff_image(&bytes) {
         Some(_) => Ok(bytes),
-        None => Err(format!(
-            "{} is no picture of a known format",
-            path.display()
-        )),
+        None => Err(format!("'{uri}' is no picture of a known format")),
     }
 }

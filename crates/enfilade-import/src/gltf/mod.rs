@@ -190,11 +190,9 @@ fn read_buffers<'b>(
                 Some(Ok((_, bytes))) => bytes,
                 Some(Err(problem)) => return Err(builder.malformed(place, problem)),
                 None => {
-                    let path = files::resolve(builder.folder.as_deref(), uri)
+                    let bytes = builder
+                        .read_reference(uri, budget)
                         .map_err(|problem| builder.malformed(&place, problem))?;
-                    let bytes = files::read_file(&path, budget).map_err(|e| {
-                        builder.malformed(&place, format!("{e}; put the file there"))
-                    })?;
                     budget -= bytes.len() as u64;
                     bytes
                 }

@@ -1,0 +1,103 @@
+//! No command writes over what it reads, nor two outputs to one file.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use enfilade_testkit::{GridParams, room_grid};
+
+const INPUTS: [&str; 4] = ["w.glb", "s.obj", "c.toml", "p.txt"];
+
+/// A folder with a world, a scene, settings and a path of cameras, and what was in them.
+fn folder(name: &str) -> (PathBuf, Vec<Vec<u8>>) {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("outputs-{name}"));
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(dir.join("sub")).unwrap();
+    enfilade::save(dir.join("w.glb"), &room_grid(&GridParams::offices(3, 1))).unwrap();
+    fs::write(dir.join("s.obj"), "v 0 0 0\nv 4 0 0\nv 0 3 0\nf 1 2 3\n").unwrap();
+    fs::write(dir.join("c.toml"), "voxel = 0.2\n").unwrap();
+    fs::write(dir.join("p.txt"), "1 1 1 2 1 2\n").unwrap();
+    let bytes = INPUTS.map(|f| fs::read(dir.join(f)).unwrap()).to_vec();
+    (dir, bytes)
+}
+
+#[test]
+fn no_command_writes_over_an_input_or_twice() {
+    let (dir, before) = folder("table");
+    let is_input = "is the input";
+    let twice = "is to be written by";
+    let mut cases = vec![
+        ("bake s.obj -o s.obj", is_input),
+        ("bake s.obj -o ./sub/../s.obj", is_input),
+        ("bake s.obj --detail w.glb -o w.glb", is_input),
+        ("bake s.obj --config c.toml -o c.toml", is_input),
+        ("bake s.obj --choices c.toml -o c.toml", is_input),
+        ("bake s.obj -o out.glb --leak s.obj", is_input),
+        ("bake s.obj -o out.glb --leak sub/../out.glb", twice),
+        ("decimate s.obj -o s.obj", is_input),
+        ("decimate s.obj --choices c.toml -o c.toml", is_input),
+        ("edit w.glb --delete-portal 0 -o w.glb", is_input),
+        ("simplify w.glb --max-cells 2 -o w.glb", is_input),
+        ("plan w.glb -o w.glb", is_input),
+        ("report w.glb --no-pictures -o w.glb", is_input),
+        ("render w.glb -o w.glb", is_input),
+        ("render w.glb -o a.png --record w.glb", is_input),
+        ("render w.glb -o a.png --record a.png", twice),
+        (
+            "render w.glb -o a.png --path p.txt --record p.txt",
+            is_input,
+        ),
+        ("pvs w.glb -o w.glb", is_input),
+        ("pvs w.glb --evidence w.glb", is_input),
+        ("pvs w.glb --statistics w.glb", is_input),
+        ("pvs w.glb --mutual w.glb", is_input),
+        ("pvs w.glb --checkpoint w.glb", is_input),
+        ("pvs w.glb --evidence w.pvs", twice),
+        ("pvs w.glb -o a --statistics b --mutual ./b", twice),
+        ("pvs w.glb -o a --into sub/../a", twice),
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("w.glb", dir.join("link.glb")).unwrap();
+        std::os::unix::fs::symlink(".", dir.join("here")).unwrap();
+        cases.push(("plan w.glb -o link.glb", is_input));
+        cases.push(("plan w.glb -o here/w.glb", is_input));
+        cases.push(("plan link.glb -o w.glb", is_input));
+        cases.push(("pvs w.glb -o a --mutual here/a", twice));
+    }
+    let files = || fs::read_dir(&dir).unwrap().count();
+    let n_files = files();
+    for (line, says) in cases {
+        let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(line.split(' '))
+            .current_dir(&dir)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains(says), "{line}: {said}");
+        assert!(
+            said.contains("choose another name with -"),
+            "{line}: {said}"
+        );
+        let after = INPUTS.map(|f| fs::read(dir.join(f)).unwrap()).to_vec();
+        assert!(after == before, "{line}");
+        assert_eq!(files(), n_files, "{line}");
+    }
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn the_next_run_removes_what_a_killed_one_left() {
+    let (dir, _) = folder("left");
+    fs::write(dir.join(".plan.svg.4000000.tmp"), "<svg").unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(["plan", "w.glb", "-o", "plan.svg"])
+        .current_dir(&dir)
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{done:?}");
+    assert!(dir.join("plan.svg").exists());
+    assert!(!dir.join(".plan.svg.4000000.tmp").exists());
+    fs::remove_dir_all(&dir).unwrap();
+}
