@@ -83,9 +83,9 @@ impl std::fmt::Display for SmallestHole {
 impl SmallestHole {
     /// What [`SmallestHole::Auto`] is in a model whose triangles fit. [Units: wu]
     pub const LEAST: f64 = 0.01;
-    /// What it is at most: wider ones are looked through. [Units: wu]
+    /// Upper bound of the automatic width: through wider slits one sees. [Units: wu]
     const MOST: f64 = 0.05;
-    /// How many times as wide as nearly all slits are the widest, where several triangles meet.
+    /// Ratio of the widest slits, which are where several triangles meet, to the width that nearly all stay below.
     const SPREAD: f64 = 3.0;
 
     /// As users say it: 0 leaves gaps open.

@@ -8,8 +8,8 @@
 //!
 //! | step of the paper | file |
 //! | --- | --- |
-//! | 1: the tree, its heuristics, guided beginnings | `tree`, `guide` |
-//! | 1: portals of the leaves | `portals` |
+//! | 1: the tree, its heuristics, guided beginnings | `build`, `tree`, `guide`, `surfaces` |
+//! | 1: the leaves and the portals between them | `leaves`, `portals` |
 //! | 2: separators, valid and invalid | `separator` |
 //! | 3: cells, crossing separators | `cells` |
 //! | separators that the arrangement would have shown (§3.0.2) | `arrange` |

@@ -126,7 +126,7 @@ pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
     }
 }
 
-/// Those of some pairs that are one room.
+/// The pairs, of those given, whose two cells are one room.
 fn weighed<M: Mergeable>(cells: &M, pairs: &[Pair]) -> Vec<Waiting> {
     let weigh = |&pair: &Pair| {
         let openness = cells.openness(pair);
