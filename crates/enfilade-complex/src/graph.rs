@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Bvh, DVec3};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3};
 
 use smallvec::SmallVec;
 
@@ -129,6 +129,8 @@ pub(super) struct Clearance<'a> {
     pub(super) bvh: &'a Bvh,
     /// Diameter of the smallest hole. [Units: wu]
     pub(super) hole: f64,
+    /// What looking may cost.
+    pub(super) allowance: Option<&'a Allowance>,
 }
 
 impl Clearance<'_> {
@@ -158,14 +160,19 @@ impl Clearance<'_> {
         let inner = inner.filter(|_| is_whole);
         // Distances change no faster than places do, so near a point that is known to be close no other is asked.
         let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
-        std::iter::once(middle).chain(inner).all(|p| {
+        let mut n_looked = 0;
+        let is_narrower = std::iter::once(middle).chain(inner).all(|p| {
             if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
                 return true;
             }
-            let distance = self.bvh.any_within(p, reach);
+            let distance = self.bvh.any_within_counted(p, reach, &mut n_looked);
             known.extend(distance.map(|d| (p, reach - d)));
             distance.is_some()
-        })
+        });
+        if let Some(allowance) = self.allowance {
+            allowance.spend(n_looked / 4);
+        }
+        is_narrower
     }
 }
 

@@ -51,7 +51,7 @@ mod tagged;
 mod thin;
 mod tree;
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, Winding};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, Winding};
 
 use facet::Visitor;
 use graph::{Clearance, LeafGraph};
@@ -142,6 +142,12 @@ pub struct Complex {
 /// result is the same for any number of threads.
 #[must_use]
 pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
+    build_complex_within(input, &Allowance::default())
+}
+
+/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used.
+#[must_use]
+pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> Complex {
     let mut surfaces: Vec<Surface> =
         Vec::with_capacity(input.triangles.len() + input.candidates.len());
     let mut add = |source, points: &[DVec3]| {
@@ -179,12 +185,17 @@ pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
         tree,
         surfaces: &set.surfaces,
         tolerance,
+        allowance: Some(allowance),
     };
-    let tree = tree::build(&set, bounds, &tolerance);
+    let tree = tree::build(&set, bounds, &tolerance, allowance);
     let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap);
     let bvh = Bvh::build(input.triangles);
     let hole = input.gap;
-    let clearance = Clearance { bvh: &bvh, hole };
+    let clearance = Clearance {
+        bvh: &bvh,
+        hole,
+        allowance: Some(allowance),
+    };
     let graph = LeafGraph::of(&visitor(&tree), &clearance);
     Complex {
         set,
@@ -220,6 +231,7 @@ impl Complex {
         Clearance {
             bvh: &self.bvh,
             hole: self.graph.hole,
+            allowance: None,
         }
     }
 

@@ -193,6 +193,16 @@ impl Bvh {
         });
     }
 
+    /// [`Bvh::for_each_in_box`], until `is_found` says so of one; whether it did.
+    pub fn any_in_box(&self, query: &Aabb, mut is_found: impl FnMut(u32) -> bool) -> bool {
+        let mut any = false;
+        self.walk_box(query, |i| {
+            any = triangle_touches_box(&self.triangle(i), query) && is_found(self.ids[i]);
+            !any
+        });
+        any
+    }
+
     /// Calls `visit` with the places of triangles whose boxes touch the closed box, until it says no.
     fn walk_box(&self, query: &Aabb, mut visit: impl FnMut(usize) -> bool) {
         if self.nodes.is_empty() || query.is_empty() {
@@ -237,12 +247,19 @@ impl Bvh {
     /// How far some triangle is from `p` that is within `reach`; not the nearest, but the first that is found. [Units: wu]
     #[must_use]
     pub fn any_within(&self, p: DVec3, reach: f64) -> Option<f64> {
+        self.any_within_counted(p, reach, &mut 0)
+    }
+
+    /// [`Bvh::any_within`], and how many triangles were looked at.
+    #[must_use]
+    pub fn any_within_counted(&self, p: DVec3, reach: f64, n_looked: &mut u64) -> Option<f64> {
         let mut found = None;
         if !p.is_finite() {
             return found;
         }
         let reach2 = reach * reach;
         self.walk_box(&Aabb::new(p - reach, p + reach), |i| {
+            *n_looked += 1;
             let t = self.triangle(i);
             let n = (t[1] - t[0]).cross(t[2] - t[0]);
             // Nearly all that the box meets is told by its plane.
@@ -261,6 +278,17 @@ impl Bvh {
     /// Of several at the very same distance, the one with the least index.
     #[must_use]
     pub fn nearest(&self, p: DVec3, max_distance: f64) -> Option<Nearest> {
+        self.nearest_counted(p, max_distance, &mut 0)
+    }
+
+    /// [`Bvh::nearest`], and how many triangles were looked at.
+    #[must_use]
+    pub fn nearest_counted(
+        &self,
+        p: DVec3,
+        max_distance: f64,
+        n_looked: &mut u64,
+    ) -> Option<Nearest> {
         if self.nodes.is_empty() || !p.is_finite() {
             return None;
         }
@@ -280,6 +308,7 @@ impl Bvh {
             }
             if at.count > 0 {
                 let first = at.child as usize;
+                *n_looked += u64::from(at.count);
                 for i in first..first + at.count as usize {
                     let point = closest_point_on_triangle(p, &self.triangle(i));
                     let d2 = point.distance_squared(p);

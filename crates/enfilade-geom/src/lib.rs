@@ -5,6 +5,7 @@
 //! building computes in `f64`, files hold `f32`.
 
 mod aabb;
+mod allowance;
 mod bvh;
 mod plane;
 pub mod poly;
@@ -16,6 +17,7 @@ mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
+pub use allowance::Allowance;
 pub use bvh::{Bvh, Nearest};
 pub use glam::{DMat3, DMat4, DVec2, DVec3};
 pub use plane::Plane;
