@@ -17,7 +17,7 @@ use enfilade_verify::structural_triangles;
 use self::statistics::Statistics;
 use crate::output::{Outputs, is_same_file, write_atomically};
 use crate::progress::StageBar;
-use enfilade_cli::values::bytes;
+use enfilade_cli::values::{bytes, seconds};
 
 mod statistics;
 
@@ -407,13 +407,6 @@ fn print(report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
         writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;
     }
     out.flush().context("cannot write to standard output")
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse()
-        .ok()
-        .and_then(|s| Duration::try_from_secs_f64(s).ok())
-        .ok_or_else(|| "a number of seconds of at least 0 is needed".into())
 }
 
 fn distance(text: &str) -> Result<f64, String> {

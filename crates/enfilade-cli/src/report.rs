@@ -1,5 +1,6 @@
 //! `enfilade report`: one page about a world.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, 
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
-use crate::output::{Outputs, write_atomically};
+use crate::output::{Outputs, Told, write_atomically};
 use crate::render::{above, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::world::read_world;
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         match Gpu::open(&args.adapter) {
             Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
             Err(why @ RenderError::NoAdapter) => {
-                eprintln!("enfilade: the report has no pictures: {why}");
+                let _ = writeln!(Told, "enfilade: the report has no pictures: {why}");
                 parts.notes.push(format!("No pictures: {why}."));
             }
             Err(why) => bail!(why),

@@ -1,5 +1,7 @@
 //! Values of arguments that several commands take.
 
+use std::time::Duration;
+
 /// Reads `x,y,z`. [Units: wu]
 ///
 /// # Errors
@@ -25,6 +27,18 @@ pub fn size(text: &str) -> Result<[u32; 2], String> {
         (w > 0 && h > 0).then_some([w, h])
     };
     parse().ok_or_else(|| "a width and a height are needed, e.g. 1280x720".into())
+}
+
+/// Reads a number of seconds of at least 0.
+///
+/// # Errors
+///
+/// Anything else; the text says what is needed.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse()
+        .ok()
+        .and_then(|s| Duration::try_from_secs_f64(s).ok())
+        .ok_or_else(|| "a number of seconds of at least 0 is needed".into())
 }
 
 /// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. [Units: bytes]
