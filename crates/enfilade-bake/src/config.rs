@@ -201,7 +201,9 @@ impl BakeConfig {
         let most = self.budget.voxels(n_triangles, BYTES_A_VOXEL);
         let most = most.min(self.max_voxels as f64);
         // Growing by a tenth at a time ends close below the budget.
-        while n_voxels(bounds, voxel) > most {
+        // Past the scene's size nothing but padding is left, which may still be too much.
+        let widest = wanted.max(bounds.size().max_element());
+        while n_voxels(bounds, voxel) > most && voxel <= widest.max(self.min_opening) {
             voxel *= 1.1;
         }
         if voxel > wanted && voxel > self.min_opening {
