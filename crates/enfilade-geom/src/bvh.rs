@@ -235,25 +235,41 @@ impl Bvh {
     }
 
     /// How far some triangle is from `p` that is within `reach`; not the nearest, but the first that is found. [Units: wu]
+    ///
+    /// `hint` is where the last query found one, [`usize::MAX`] if none was asked: what holds here mostly holds close by.
     #[must_use]
-    pub fn any_within(&self, p: DVec3, reach: f64) -> Option<f64> {
-        let mut found = None;
+    pub fn any_within(&self, p: DVec3, reach: f64, hint: &mut usize) -> Option<f64> {
         if !p.is_finite() {
-            return found;
+            return None;
         }
-        let reach2 = reach * reach;
+        if *hint < self.ids.len() {
+            let found = self.within(*hint, p, reach);
+            if found.is_some() {
+                return found;
+            }
+        }
+        let mut found = None;
         self.walk_box(&Aabb::new(p - reach, p + reach), |i| {
-            let t = self.triangle(i);
-            let n = (t[1] - t[0]).cross(t[2] - t[0]);
-            // Nearly all that the box meets is told by its plane.
-            let off = n.dot(p - t[0]);
-            if off * off <= reach2 * n.length_squared() {
-                let d2 = closest_point_on_triangle(p, &t).distance_squared(p);
-                found = (d2 <= reach2).then(|| d2.sqrt());
+            found = self.within(i, p, reach);
+            if found.is_some() {
+                *hint = i;
             }
             found.is_none()
         });
         found
+    }
+
+    /// How far `p` is from the triangle at a place, if that is no more than `reach`.
+    fn within(&self, place: usize, p: DVec3, reach: f64) -> Option<f64> {
+        let t = self.triangle(place);
+        let n = (t[1] - t[0]).cross(t[2] - t[0]);
+        // Nearly all that a box meets is told by its plane.
+        let off = n.dot(p - t[0]);
+        if off * off > reach * reach * n.length_squared() {
+            return None;
+        }
+        let d2 = closest_point_on_triangle(p, &t).distance_squared(p);
+        (d2 <= reach * reach).then(|| d2.sqrt())
     }
 
     /// The triangle nearest to `p`, if one is within `max_distance` (infinity allowed).

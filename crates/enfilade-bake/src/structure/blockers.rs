@@ -69,7 +69,10 @@ pub(crate) fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Ve
             let reach = Aabb::new(p, p).expanded(HELD_WITHIN);
             let mut is_near_other = false;
             all.for_each_in_box(&reach, |t| is_near_other |= owner[t as usize] != i);
-            is_near_other || walls.any_within(p, HELD_WITHIN).is_some()
+            is_near_other
+                || walls
+                    .any_within(p, HELD_WITHIN, &mut { usize::MAX })
+                    .is_some()
         };
         let area: f64 = plate
             .iter()
