@@ -24,7 +24,7 @@ pub(super) fn check_cells_in_locator(graph: &CellPortalGraph, found: &mut Findin
     let reach = bounds.expanded(SLACK + RELATIVE_SLACK * bounds.extent());
     for (i, cell) in graph.cells.iter().enumerate().filter(|c| !c.1.outdoor) {
         let b = box_of(cell.aabb);
-        if !(reach.contains(b.min) && reach.contains(b.max)) {
+        if !holds(&reach, &b) {
             found.push(GraphError::FarBox {
                 owner: format!("cell {i}"),
                 of: "the locator's box",
@@ -50,7 +50,7 @@ pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
     }
     let reach = model.expanded(AROUND * model.size().max_element() + AROUND_AT_LEAST);
     let mut check = |owner: String, b: Aabb| {
-        if !b.is_empty() && !(reach.contains(b.min) && reach.contains(b.max)) {
+        if !b.is_empty() && !holds(&reach, &b) {
             found.push(GraphError::FarBox {
                 owner,
                 of: "the model",
@@ -63,6 +63,10 @@ pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
     for (i, cell) in graph.cells.iter().enumerate() {
         check(format!("cell {i}"), box_of(cell.aabb));
     }
+}
+
+fn holds(outer: &Aabb, inner: &Aabb) -> bool {
+    outer.contains(inner.min) && outer.contains(inner.max)
 }
 
 fn box_of([min, max]: [[f32; 3]; 2]) -> Aabb {
