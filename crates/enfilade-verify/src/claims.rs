@@ -1,7 +1,6 @@
 //! What a world says about its cells in numbers: boxes, volumes, counts and names.
 
 use enfilade_cpg::{CellId, Seals, World};
-use enfilade_geom::DVec3;
 
 use crate::locator_cells::measure;
 use crate::subject::to_dvec;
@@ -99,13 +98,12 @@ fn check_extents(world: &World, out: &mut Vec<String>) {
         let is_off = if cell.outdoor {
             // The outdoors goes on beyond the box.
             (min - bounds.min).max_element() > side || (bounds.max - max).max_element() > side
-        } else if found.bounds.is_empty() {
-            false
         } else {
-            let off: DVec3 = (min - found.bounds.min)
-                .abs()
-                .max((max - found.bounds.max).abs());
-            off.max_element() > side
+            // Around all but hairs, and no larger than all.
+            let lacks = (min - found.thick.min).max(found.thick.max - max);
+            let exceeds = (found.bounds.min - min).max(max - found.bounds.max);
+            let is_small = !found.thick.is_empty() && lacks.max_element() > side;
+            is_small || (!found.bounds.is_empty() && exceeds.max_element() > side)
         };
         if is_off {
             let b = if cell.outdoor { bounds } else { found.bounds };

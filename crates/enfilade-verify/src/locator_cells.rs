@@ -8,8 +8,14 @@ use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 #[derive(Clone, Copy)]
 pub(crate) struct Extent {
     pub(crate) volume: f64,
+    /// Around all leaves; some are hairs between planes that nearly coincide, which a builder may give to either side.
     pub(crate) bounds: Aabb,
+    /// Around the leaves that are no hairs.
+    pub(crate) thick: Aabb,
 }
+
+/// Leaves whose volume is less than this times their largest face are hairs. [Units: wu]
+const HAIR: f64 = 1e-3;
 
 /// A tree reaches each node once; by hand some parts may be shared.
 const SHARED: usize = 32;
@@ -26,6 +32,7 @@ pub(crate) fn measure(world: &World) -> Option<Vec<Extent>> {
     let none = Extent {
         volume: 0.0,
         bounds: Aabb::EMPTY,
+        thick: Aabb::EMPTY,
     };
     let mut out = vec![none; world.graph.cells.len()];
     if locator.bounds.is_empty() {
@@ -40,9 +47,14 @@ pub(crate) fn measure(world: &World) -> Option<Vec<Extent>> {
             if at <= -2
                 && let Some(extent) = out.get_mut(cell)
             {
-                extent.volume += volume(&body);
-                let corners = body.iter().flatten().copied();
-                extent.bounds = corners.fold(extent.bounds, Aabb::including);
+                let volume = volume(&body);
+                extent.volume += volume;
+                let around = Aabb::of_points(body.iter().flatten());
+                extent.bounds = extent.bounds.union(around);
+                let face = body.iter().map(|f| poly::area(f)).fold(0.0, f64::max);
+                if volume > HAIR * face {
+                    extent.thick = extent.thick.union(around);
+                }
             }
             continue;
         }

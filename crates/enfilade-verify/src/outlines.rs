@@ -117,20 +117,27 @@ fn overlapping(pieces: &[Vec<DVec3>], normal: DVec3, eps: f64) -> Option<[usize;
     None
 }
 
-/// Whether something of `b` lies deeper than twice the tolerance within all edges of `a`.
+/// Pieces may overlap by so much: a builder's planes nearly coincide there, and each side cuts by its own. [Units: wu]
+const SEAM: f64 = 1e-3;
+/// And by this share of the smaller piece's area: slivers may lie in one another.
+const SEAM_SHARE: f64 = 0.1;
+
+/// Whether something of `b` lies deeper than a seam within all edges of `a`.
 fn is_overlap(a: &[DVec3], b: &[DVec3], normal: DVec3, eps: f64) -> bool {
+    let seam = SEAM.max(2.0 * eps);
     let mut rest: Poly = b.iter().copied().collect();
     for (p, q) in edges(a) {
         let Some(inward) = normal.cross(q - p).try_normalize() else {
             continue;
         };
-        let plane = Plane::through(p + inward * (2.0 * eps), inward);
+        let plane = Plane::through(p + inward * seam, inward);
         match poly::clip(&rest, &plane, 0.0) {
             Some(part) => rest = part,
             None => return false,
         }
     }
-    poly::width(&rest) > 2.0 * eps
+    let smaller = poly::area(a).min(poly::area(b));
+    poly::width(&rest) > seam && poly::area(&rest) > SEAM_SHARE * smaller
 }
 
 fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
