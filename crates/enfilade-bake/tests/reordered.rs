@@ -14,8 +14,11 @@ fn baked(g: &Generated, method: Method) -> World {
 /// The corners of a triangle, by their bits, the least first: where it starts is no matter.
 type Corners = [[u32; 3]; 3];
 
-/// The cells, material and triangles of each batch, in an order of their own.
-fn geometry(world: &World) -> Vec<(Vec<u32>, Option<u32>, bool, Vec<Corners>)> {
+/// The cells of a batch, its material, whether it is of seals, and its triangles.
+type Content = (Vec<u32>, Option<u32>, bool, Vec<Corners>);
+
+/// The batches in an order of their own.
+fn geometry(world: &World) -> Vec<Content> {
     let batches = world.batches.iter().map(|b| {
         let p = &b.primitive;
         let mut triangles: Vec<Corners> = (p.indices.chunks_exact(3))
