@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{CellId, Locator, PortalKind};
+use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::DVec3;
 
-use crate::complex::{Partition, Vote};
+use crate::complex::{Complex, Contact, LeafCells, Partition, Vote};
 use crate::structure::OUTDOORS;
 
 /// Marks the label of a void; the rest of the label is the region that the void belongs to.
@@ -97,25 +97,26 @@ const MAX_LEAK: f64 = 1.0;
 /// stairs, say), the border between them would follow whatever planes the cell complex happens to
 /// have: dozens of portals that mean nothing. Such regions are one room.
 pub(crate) fn join_unparted(
-    partition: &Partition,
+    complex: &Complex,
+    cells: &LeafCells,
     votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],
 ) -> bool {
-    let mut between: BTreeMap<[u32; 2], (f64, f64)> = BTreeMap::new();
-    for p in &partition.portals {
-        let labels = p.cells.map(|c| partition.label_of_cell[c as usize]);
-        if p.kind == PortalKind::Crack || labels[0] == labels[1] || labels.contains(&u32::MAX) {
-            continue;
+    let mut between: BTreeMap<[u32; 2], Contact> = BTreeMap::new();
+    for (pair, contact) in complex.contacts(cells) {
+        let [a, b] = pair.map(|c| cells.label_of_cell[c as usize]);
+        if a != b && ![a, b].contains(&u32::MAX) {
+            let sum = between.entry([a.min(b), a.max(b)]).or_default();
+            sum.on_candidates += contact.on_candidates;
+            sum.beside += contact.beside;
         }
-        let pair = [labels[0].min(labels[1]), labels[0].max(labels[1])];
-        let (leak, candidate) = between.entry(pair).or_default();
-        *if p.is_leak { leak } else { candidate } += p.area;
     }
     // The lesser label stands for both; pairs ascend, so chains end in the least of all.
     let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
-    for (pair, (leak, candidate)) in between {
+    for (pair, contact) in between {
         // A model full of holes must not lose its rooms to the outdoors.
-        if pair[0] != OUTDOORS && leak > MAX_LEAK && leak > candidate {
+        let is_unparted = contact.beside > MAX_LEAK && contact.beside > contact.on_candidates;
+        if pair[0] != OUTDOORS && is_unparted {
             let [a, b] = pair.map(|l| root(&stands_for, l));
             if a != b {
                 stands_for.insert(a.max(b), a.min(b));

@@ -1,6 +1,8 @@
 //! From a proposal to a world: space cut into convex cells, exactly; cells by votes; portals where cells are open to each
 //! other; geometry to the cells that see it. The same for all builders.
 
+use std::collections::BTreeSet;
+
 use enfilade_cpg::{Provenance, Statistics, World};
 use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
@@ -89,14 +91,14 @@ fn part(complex: &Complex, proposal: &mut Proposal) -> Partition {
         joins_unparted,
         ..
     } = proposal;
-    let mut partition = complex.partition(votes, label);
-    while *joins_unparted && join_unparted(&partition, votes, voids) {
-        partition = complex.partition(votes, label);
+    let mut cells = complex.label(votes, label);
+    while *joins_unparted && join_unparted(complex, &cells, votes, voids) {
+        cells = complex.label(votes, label);
     }
     // Voids that rays found above ceilings and no room's votes reached.
     let unreached: Vec<Vote> = std::mem::take(voids)
         .into_iter()
-        .filter(|(p, _)| partition.locator.locate(*p).is_none())
+        .filter(|(p, _)| complex.cell_at(&cells, *p).is_none())
         .map(|(point, region)| Vote {
             point,
             label: VOID | region,
@@ -104,35 +106,28 @@ fn part(complex: &Complex, proposal: &mut Proposal) -> Partition {
         })
         .collect();
     if unreached.is_empty() {
-        return partition;
+        return complex.realize(cells);
     }
     let n = votes.len();
     votes.extend(unreached);
-    partition = complex.partition(votes, label);
+    cells = complex.label(votes, label);
     // What opens to something is a cavity of the construction, not a void: left as it was.
-    let opens = portalled_cells(&partition);
+    let contacts = complex.contacts(&cells);
+    let opening: BTreeSet<u32> = contacts.into_keys().flatten().collect();
     let mut rest = votes.split_off(n);
     let n_voids = rest.len();
     rest.retain(|v| {
-        let cell = partition.locator.locate(v.point);
-        cell.is_none_or(|c| !opens[c.0 as usize])
+        let cell = complex.cell_at(&cells, v.point);
+        cell.is_none_or(|c| !opening.contains(&c))
     });
     let is_final = rest.len() == n_voids;
     votes.extend(rest);
     if !is_final {
-        partition = complex.partition(votes, label);
+        cells = complex.label(votes, label);
     }
+    let mut partition = complex.realize(cells);
     join_voids(&mut partition);
     partition
-}
-
-/// Which cells have a portal.
-fn portalled_cells(partition: &Partition) -> Vec<bool> {
-    let mut opens = vec![false; partition.label_of_cell.len()];
-    for p in &partition.portals {
-        p.cells.iter().for_each(|&c| opens[c as usize] = true);
-    }
-    opens
 }
 
 /// Hands out the geometry, and says how the world came to be.

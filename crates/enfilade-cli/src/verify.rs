@@ -47,8 +47,8 @@ pub(crate) struct Verify {
     #[arg(long, default_value_t = 1_000_000, value_name = "N")]
     rays: u64,
     /// Views tried for *conservative per frame*, with 100 rays in each: what they hit must be in the
-    /// run-time's answer.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    /// run-time's answer. 0: none.
+    #[arg(long, default_value_t = 10_000, value_name = "N")]
     sight: u64,
     /// Views drawn with and without culling by portals, and compared pixel by pixel.
     #[arg(long, default_value_t = 0, value_name = "N")]
@@ -141,10 +141,11 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     out.flush().context("cannot write to standard output")?;
     if !report.holds() {
         bail!(
-            "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} problems",
+            "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} hidden cells seen, {} problems",
             args.world.display(),
             report.unsealed,
             report.incomplete,
+            report.hidden,
             report.problems.len()
         );
     }

@@ -24,8 +24,6 @@ use super::leaf_cells::{LeafCells, SOLID, Tally};
 const PER_FACET: f64 = 0.002;
 /// What it costs to overrule votes. [Units: 1/wu]
 const VOTE: f64 = 0.5;
-/// What a candidate costs, per area: so little that it is only a tie-breaker.
-const CANDIDATE: f64 = 0.01;
 /// Borders that leak less than this stay as they are. [Units: wu²]
 const MIN_LEAK: f64 = 0.01;
 /// Most leaves that take part in one cut.
@@ -116,7 +114,7 @@ pub(super) fn absorb_chips(graph: &LeafGraph, cells: &mut LeafCells, min_volume:
                 && largest[&cell].1 != root
                 && volume[root as usize] < min_volume
             {
-                *opens_to.entry(root).or_default().entry(to).or_default() += f64::from(f.area);
+                *opens_to.entry(root).or_default().entry(to).or_default() += f.cost();
             }
         }
     }
@@ -298,13 +296,10 @@ fn cut(
             } else {
                 f.leaves[0]
             };
-            let cost = units(if f.candidate == NO_CANDIDATE {
-                // A gap makes no portal: a border of many is better than one that shows.
-                let each = if f.is_gap { 0.0 } else { PER_FACET };
-                f64::from(f.area) + each
-            } else {
-                f64::from(f.area) * CANDIDATE
-            });
+            // A gap makes no portal: a border of many is better than one that shows.
+            let shows = f.candidate == NO_CANDIDATE && !f.is_gap;
+            let each = if shows { PER_FACET } else { 0.0 };
+            let cost = units(f.cost() + each);
             match node_of.get(&other) {
                 Some(&j) if (j as usize) > i => {
                     flow.add(i, j as usize, cost, cost);

@@ -273,7 +273,7 @@ impl FacetSink for OpeningSink<'_> {
             };
             self.openings.push(LeafOpening {
                 leaves: facet.leaves,
-                candidate: candidate.or_else(|| facet.covers.iter().find(is_on)?.candidate),
+                candidate: candidate.or_else(|| facet.covers.iter().find(|c| is_on(c))?.candidate),
                 area: poly::area(&piece),
                 at,
             });

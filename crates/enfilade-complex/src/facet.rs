@@ -16,7 +16,6 @@ use super::tree::{Tree, leaf_index};
 const PARALLEL_LEAVES: u32 = 2048;
 
 /// The part of a surface that may cover a facet, in the facet's plane.
-#[derive(Clone)]
 pub(super) struct Cover {
     /// Candidate, or `None` for a structural triangle.
     pub(super) candidate: Option<u32>,
@@ -34,7 +33,31 @@ pub(super) struct RawFacet<'a> {
     /// Counter-clockwise seen from the positive side.
     pub(super) points: &'a [DVec3],
     /// Surfaces in the plane that come near it.
-    pub(super) covers: &'a [Cover],
+    pub(super) covers: Covers<'a>,
+}
+
+/// Some of the surfaces in a plane. What a facet's parts are near is a list of places: surfaces are not copied.
+#[derive(Clone, Copy)]
+pub(super) struct Covers<'a> {
+    all: &'a [Cover],
+    near: &'a [u32],
+}
+
+impl<'a> Covers<'a> {
+    /// Each in turn.
+    pub(super) fn iter(self) -> impl Iterator<Item = &'a Cover> {
+        self.near.iter().map(move |&i| &self.all[i as usize])
+    }
+
+    /// Those that come near a part of the facet.
+    fn near(self, part: &[DVec3], reach: f64) -> SmallVec<[u32; 16]> {
+        if self.near.is_empty() {
+            return SmallVec::new();
+        }
+        let reach = Aabb::of_points(part).expanded(reach);
+        let is_near = |i: &u32| self.all[*i as usize].bounds.overlaps(&reach);
+        self.near.iter().copied().filter(is_near).collect()
+    }
 }
 
 /// What is done with the facets. Forked and joined along the tree, never along threads.
@@ -146,7 +169,12 @@ impl Visitor<'_> {
                 })
             })
             .collect();
-        self.push_down(node.plane, &points, &covers, [f, b], sink);
+        let near: SmallVec<[u32; 16]> = (0..covers.len() as u32).collect();
+        let covers = Covers {
+            all: &covers,
+            near: &near,
+        };
+        self.push_down(node.plane, &points, covers, [f, b], sink);
     }
 
     fn may_spend(&self, work: u64) -> bool {
@@ -155,17 +183,17 @@ impl Visitor<'_> {
 
     fn section(&self, plane: &Plane, region: &CutBox) -> Option<Poly> {
         let mut points = poly::section_of_box(plane, &region.bounds, self.tolerance.cut)?;
-        for cut in &region.cuts {
-            points = poly::clip(&points, cut, self.tolerance.cut)?;
-        }
-        Some(points)
+        let eps = self.tolerance.cut;
+        let mut cuts = region.cuts.iter();
+        let is_left = cuts.all(|cut| poly::clip_in_place(&mut points, cut, eps));
+        is_left.then_some(points)
     }
 
     fn push_down<S: FacetSink>(
         &self,
         plane: u32,
         points: &[DVec3],
-        covers: &[Cover],
+        covers: Covers<'_>,
         children: [i32; 2],
         sink: &mut S,
     ) {
@@ -198,24 +226,15 @@ impl Visitor<'_> {
             }
             Sides::Both(f, b) => {
                 for (child, part) in [(0, f), (1, b)] {
-                    let near = self.near(&part, covers);
-                    self.push_down(plane, &part, &near, with(child), sink);
+                    let near = covers.near(&part, self.tolerance.plane);
+                    let covers = Covers {
+                        near: &near,
+                        ..covers
+                    };
+                    self.push_down(plane, &part, covers, with(child), sink);
                 }
             }
         }
-    }
-
-    /// The covers that come near a part of the facet.
-    fn near(&self, part: &[DVec3], covers: &[Cover]) -> Vec<Cover> {
-        if covers.is_empty() {
-            return Vec::new();
-        }
-        let reach = Aabb::of_points(part).expanded(self.tolerance.plane);
-        covers
-            .iter()
-            .filter(|c| c.bounds.overlaps(&reach))
-            .cloned()
-            .collect()
     }
 }
 
@@ -239,7 +258,7 @@ impl OpenPieces {
         } else {
             (MIN_AREA, tolerance.width)
         };
-        let open = |p: &Poly| poly::area(p) >= min_area && poly::width(p) >= min_width;
+        let open = |p: &Poly| poly::is_larger(p, min_area, min_width);
         let mut rest: Vec<Poly> = vec![facet.points.into()];
         rest.retain(open);
         for cover in facet.covers.iter().filter(|c| c.candidate.is_none()) {
@@ -284,11 +303,15 @@ mod tests {
             DVec3::new(1.0, w, 0.0),
             DVec3::new(0.0, w, 0.0),
         ];
+        let near: Vec<u32> = (0..covers.len() as u32).collect();
         let facet = RawFacet {
             plane: 0,
             leaves: [0, 1],
             points: &points,
-            covers,
+            covers: Covers {
+                all: covers,
+                near: &near,
+            },
         };
         OpenPieces::of(&facet, DVec3::Z, &tolerance).pieces.len()
     }

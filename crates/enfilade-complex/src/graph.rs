@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, NearSeries};
 
 use smallvec::SmallVec;
 
@@ -12,6 +12,9 @@ use super::tree::{Tree, leaf_index};
 
 /// Openings up to so many gaps wide are cracks, with the default gap as wide as [`CRACK_WIDTH`](super::CRACK_WIDTH).
 const CRACK_GAPS: f64 = 5.0;
+
+/// What a border on a candidate costs, per area: so little that it is only a tie-breaker.
+const CANDIDATE: f64 = 0.01;
 
 /// No candidate.
 pub(super) const NO_CANDIDATE: u32 = u32::MAX;
@@ -31,6 +34,19 @@ pub(super) struct OpenFacet {
     pub(super) is_narrow: bool,
     /// No piece of it lets a ball of the smallest hole pass: it may be sealed.
     pub(super) is_gap: bool,
+}
+
+impl OpenFacet {
+    /// What a border between two cells costs here: its area, and next to nothing on a candidate, where it is meant to be.
+    /// [Units: wu²]
+    pub(super) fn cost(&self) -> f64 {
+        let share = if self.candidate == NO_CANDIDATE {
+            1.0
+        } else {
+            CANDIDATE
+        };
+        f64::from(self.area) * share
+    }
 }
 
 /// What the first visit finds out.
@@ -142,17 +158,49 @@ impl Clearance<'_> {
     /// there are wide ones.
     /// One query of the triangles in the open, at most `4n + 1` in a gap.
     pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
-        self.is_narrower(points, self.hole, true)
+        let mut series = NearSeries::default();
+        let is_gap = self.is_narrower(points, self.hole, true, &mut series);
+        self.spend(&series);
+        is_gap
+    }
+
+    /// Whether an opening is narrow, no wider than a crack, and whether it is a gap. Of pieces narrower than what is asked
+    /// for, which cuts of the tree make, the middle alone is looked at.
+    fn narrowness(&self, points: &[DVec3], width: f64) -> [bool; 2] {
+        let (crack, mut series) = (CRACK_GAPS * self.hole, NearSeries::default());
+        // Most are in the open: one query.
+        let in_middle = self.bvh.any_within(middle_of(points), 0.5 * crack, &mut series);
+        let mut is_narrower =
+            |diameter: f64| self.is_narrower(points, diameter, width >= diameter, &mut series);
+        let [mut is_narrow, mut is_gap] = [false; 2];
+        if crack > 0.0 && in_middle.is_some() {
+            is_gap = is_narrower(self.hole);
+            is_narrow = is_gap || is_narrower(crack);
+        }
+        self.spend(&series);
+        [is_narrow, is_gap]
+    }
+
+    /// Takes what queries cost from what may be spent.
+    fn spend(&self, series: &NearSeries) {
+        if let Some(allowance) = self.allowance {
+            allowance.spend(series.n_looked / 4);
+        }
     }
 
     /// Whether an opening lets no ball of so large a diameter pass; by its middle alone where the rest does not count.
-    fn is_narrower(&self, points: &[DVec3], diameter: f64, is_whole: bool) -> bool {
+    fn is_narrower(
+        &self,
+        points: &[DVec3],
+        diameter: f64,
+        is_whole: bool,
+        series: &mut NearSeries,
+    ) -> bool {
         if diameter <= 0.0 {
             return false;
         }
         let reach = 0.5 * diameter;
-        let n = points.len();
-        let middle = points.iter().sum::<DVec3>() / n as f64;
+        let (n, middle) = (points.len(), middle_of(points));
         let between = (0..n).map(|i| points[i].midpoint(points[(i + 1) % n]));
         // Corners are where matter is: a tenth of the way to the middle tells more.
         let inner = points.iter().copied().chain(between);
@@ -160,20 +208,20 @@ impl Clearance<'_> {
         let inner = inner.filter(|_| is_whole);
         // Distances change no faster than places do, so near a point that is known to be close no other is asked.
         let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
-        let mut n_looked = 0;
-        let is_narrower = std::iter::once(middle).chain(inner).all(|p| {
+        std::iter::once(middle).chain(inner).all(|p| {
             if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
                 return true;
             }
-            let distance = self.bvh.any_within_counted(p, reach, &mut n_looked);
+            let distance = self.bvh.any_within(p, reach, series);
             known.extend(distance.map(|d| (p, reach - d)));
             distance.is_some()
-        });
-        if let Some(allowance) = self.allowance {
-            allowance.spend(n_looked / 4);
-        }
-        is_narrower
+        })
     }
+}
+
+/// Mean of the corners.
+fn middle_of(points: &[DVec3]) -> DVec3 {
+    points.iter().sum::<DVec3>() / points.len() as f64
 }
 
 /// Signed volume of the cone from `origin` over a polygon: what divergence sums up.
@@ -247,13 +295,7 @@ impl FacetSink for LeafSink<'_> {
         for (piece, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let candidate = candidate.unwrap_or(NO_CANDIDATE);
             let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
-            let is_narrower = |diameter: f64| {
-                let is_whole = f64::from(width) >= diameter;
-                self.clearance.is_narrower(&piece, diameter, is_whole)
-            };
-            let hole = self.clearance.hole;
-            let is_gap = is_narrower(hole);
-            let is_narrow = is_gap || is_narrower(CRACK_GAPS * hole);
+            let [is_narrow, is_gap] = self.clearance.narrowness(&piece, f64::from(width));
             match self.facets[first..]
                 .iter_mut()
                 .find(|f| f.candidate == candidate)

@@ -7,8 +7,8 @@
 //!    leak: it is grown together along its openings, widest first, unless that would join two
 //!    labels (Kruskal's forest), so that cells meet at the narrowest places.
 //! 3. Parts of one label that open to each other are one again, candidate or not.
-//! 4. What has no label, or too little volume to be a cell, joins the neighbor that it opens to
-//!    most, through a candidate if need be. What opens nowhere but through gaps and nobody votes for is matter.
+//! 4. What has no label, or too little volume to be a cell, joins the neighbor that a border with would cost most: that it
+//!    opens to most, through a candidate if need be. What opens nowhere but through gaps and nobody votes for is matter.
 //! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the largest gaps to, matter included.
 //!
 //! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
@@ -41,8 +41,10 @@ struct Group {
     /// It is a cell whatever happens around it.
     keeps: bool,
     volume: f64,
-    /// Open area to other groups.
+    /// What borders with other groups cost.
     neighbors: BTreeMap<u32, f64>,
+    /// Open area to other groups.
+    open: f64,
     /// How much of that lies on no candidate.
     leak: f64,
 }
@@ -260,6 +262,7 @@ fn merge_groups(
             keeps: false,
             volume: 0.0,
             neighbors: BTreeMap::new(),
+            open: 0.0,
             leak: 0.0,
         });
         group.volume += graph.volumes[leaf as usize];
@@ -269,7 +272,8 @@ fn merge_groups(
         if a != b {
             for (from, to) in [(a, b), (b, a)] {
                 if let Some(group) = groups.get_mut(&from) {
-                    *group.neighbors.entry(to).or_default() += f64::from(f.area);
+                    *group.neighbors.entry(to).or_default() += f.cost();
+                    group.open += f64::from(f.area);
                     if f.candidate == NO_CANDIDATE {
                         group.leak += f64::from(f.area);
                     }
@@ -290,8 +294,7 @@ fn merge_groups(
     }
     for (&id, group) in &mut groups {
         // A closet has a door, a shaft nothing; a hollow in furniture leaks all over.
-        let open: f64 = group.neighbors.values().sum();
-        let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * open;
+        let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * group.open;
         let is_part = group.volume >= settings.min_volume
             && (settings.keeps_closed || !group.neighbors.is_empty());
         group.keeps = !is_cavity && group.label.is_some_and(|l| main[&l].1.0 == id || is_part);
@@ -307,10 +310,10 @@ fn merge_groups(
         let is_current = |g: &&Group| !g.keeps && g.volume.to_bits() == bits;
         let to = groups.get(&id).filter(is_current).and_then(|group| {
             let root = |id: &u32| groups[id].root;
-            let by_area = |a: &(&u32, &f64), b: &(&u32, &f64)| {
+            let by_cost = |a: &(&u32, &f64), b: &(&u32, &f64)| {
                 a.1.total_cmp(b.1).then_with(|| root(b.0).cmp(&root(a.0)))
             };
-            group.neighbors.iter().max_by(by_area)
+            group.neighbors.iter().max_by(by_cost)
         });
         let Some(to) = to.map(|(&to, _)| to) else {
             continue;
@@ -322,11 +325,11 @@ fn merge_groups(
         host.volume += merged.volume;
         host.label = host.label.or(merged.label);
         host.neighbors.remove(&id);
-        for (other, area) in merged.neighbors.into_iter().filter(|n| n.0 != to) {
-            *host.neighbors.entry(other).or_default() += area;
+        for (other, cost) in merged.neighbors.into_iter().filter(|n| n.0 != to) {
+            *host.neighbors.entry(other).or_default() += cost;
             if let Some(n) = groups.get_mut(&other) {
-                let area = n.neighbors.remove(&id).unwrap_or(0.0);
-                *n.neighbors.entry(to).or_default() += area;
+                let cost = n.neighbors.remove(&id).unwrap_or(0.0);
+                *n.neighbors.entry(to).or_default() += cost;
             }
         }
         if !host.keeps {
@@ -432,5 +435,45 @@ fn number_cells(graph: &LeafGraph, sets: &mut Sets, groups: &BTreeMap<u32, Group
             .collect(),
         volumes,
         outside,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::graph::OpenFacet;
+    use super::*;
+
+    /// A band above the floor of one room, which only cracks join to the rest of it, beneath a door to another.
+    #[test]
+    fn what_has_no_label_goes_to_what_it_opens_to_beside_a_candidate() {
+        let facet = |other: u32, candidate: u32, area: f32| OpenFacet {
+            leaves: [other, 2],
+            width: 0.1,
+            area,
+            candidate,
+            is_narrow: candidate == NO_CANDIDATE,
+            is_gap: false,
+        };
+        let graph = LeafGraph {
+            facets: vec![facet(0, NO_CANDIDATE, 0.06), facet(1, 0, 0.1)],
+            volumes: vec![30.0, 20.0, 0.005],
+            faces: vec![10.0, 10.0, 0.1],
+            at_border: vec![false; 3],
+            hole: 0.023,
+            rounding: 1e-5,
+        };
+        let settings = LabelSettings::default();
+        let home = |graph: &LeafGraph| {
+            let mut sets = Sets::new(3);
+            merge_groups(graph, &mut sets, &[10, 20, SOLID], &settings);
+            (0..2).find(|&room| sets.find(room) == sets.find(2))
+        };
+        assert_eq!(home(&graph), Some(0));
+        // Through a candidate only where nothing else is open.
+        let shut = LeafGraph {
+            facets: vec![facet(1, 0, 0.1)],
+            ..graph
+        };
+        assert_eq!(home(&shut), Some(1));
     }
 }

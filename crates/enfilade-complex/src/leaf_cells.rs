@@ -6,11 +6,12 @@ use std::collections::BTreeMap;
 pub(super) const SOLID: u32 = u32::MAX;
 
 /// Leaves by cell.
-pub(super) struct LeafCells {
+#[derive(Clone, Debug)]
+pub struct LeafCells {
     /// Cell of each leaf, or [`SOLID`].
     pub(super) cell_of_leaf: Vec<u32>,
-    /// The vote label of each cell.
-    pub(super) label_of_cell: Vec<u32>,
+    /// The vote label that each cell goes by; several cells may share one.
+    pub label_of_cell: Vec<u32>,
     /// Volume of each cell.
     pub(super) volumes: Vec<f64>,
     /// The cell with most leaves at the border of the box by volume, if any touches it.

@@ -51,6 +51,8 @@ mod tagged;
 mod thin;
 mod tree;
 
+use std::collections::BTreeMap;
+
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, Winding};
 
 use facet::Visitor;
@@ -60,6 +62,7 @@ use tree::Tree;
 
 /// The polygons of the complex.
 pub use enfilade_geom::poly;
+pub use leaf_cells::LeafCells;
 pub use partition::{Leak, Partition, PartitionPortal, Seal};
 pub use seen::TriangleCells;
 
@@ -93,6 +96,15 @@ pub struct Vote {
     pub label: u32,
     /// The volume that it stands for. [Units: wu³]
     pub weight: f32,
+}
+
+/// How much two cells are open to each other, but for cracks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact {
+    /// Area on candidates. [Units: wu²]
+    pub on_candidates: f64,
+    /// Area beside them. [Units: wu²]
+    pub beside: f64,
 }
 
 /// How leaves are divided among cells.
@@ -241,16 +253,53 @@ impl Complex {
         self.tolerance.width
     }
 
-    /// Divides the leaves among cells by votes, and finds the portals between the cells, what each
-    /// triangle is seen from, and the locator.
+    /// Divides the leaves among cells by votes.
     ///
-    /// Time: one look-up a vote, `O(F log F)` for `F` openings, and a visit of the parts of the
-    /// tree where cells meet. Deterministic for any number of threads.
+    /// Time: one look-up a vote, and `O(F log F)` for `F` openings. Deterministic for any number of threads.
+    #[must_use]
+    pub fn label(&self, votes: &[Vote], settings: &LabelSettings) -> LeafCells {
+        let leaf_of = |v: &Vote| self.leaf_of(v.point);
+        label::label_leaves(&self.graph, votes, settings, self.has_seals, leaf_of)
+    }
+
+    /// The cell at a point; `None` in matter. What is outside the box is outdoors.
+    #[must_use]
+    pub fn cell_at(&self, cells: &LeafCells, p: DVec3) -> Option<u32> {
+        let leaf = self.leaf_of(p).map(|l| cells.cell_of_leaf[l as usize]);
+        leaf.map_or(cells.outside, |c| (c != leaf_cells::SOLID).then_some(c))
+    }
+
+    /// How much each two cells are open to each other. What is no wider than a crack does not count.
+    ///
+    /// Time: `O(F log F)` for `F` openings; no polygon is made.
+    #[must_use]
+    pub fn contacts(&self, cells: &LeafCells) -> BTreeMap<[u32; 2], Contact> {
+        let mut contacts: BTreeMap<[u32; 2], Contact> = BTreeMap::new();
+        for facet in self.graph.facets.iter().filter(|f| !f.is_narrow) {
+            let [a, b] = facet.leaves.map(|l| cells.cell_of_leaf[l as usize]);
+            if a != b && ![a, b].contains(&leaf_cells::SOLID) {
+                let contact = contacts.entry([a.min(b), a.max(b)]).or_default();
+                *match facet.candidate {
+                    graph::NO_CANDIDATE => &mut contact.beside,
+                    _ => &mut contact.on_candidates,
+                } += f64::from(facet.area);
+            }
+        }
+        contacts
+    }
+
+    /// Finds the portals between cells, what each triangle is seen from, and the locator.
+    ///
+    /// Time: a visit of the parts of the tree where cells meet. Deterministic for any number of threads.
+    #[must_use]
+    pub fn realize(&self, cells: LeafCells) -> Partition {
+        partition::realize(self, cells)
+    }
+
+    /// Divides the leaves among cells by votes, and realizes them.
     #[must_use]
     pub fn partition(&self, votes: &[Vote], settings: &LabelSettings) -> Partition {
-        let leaf_of = |v: &Vote| self.leaf_of(v.point);
-        let cells = label::label_leaves(&self.graph, votes, settings, self.has_seals, leaf_of);
-        partition::realize(self, cells)
+        self.realize(self.label(votes, settings))
     }
 }
 

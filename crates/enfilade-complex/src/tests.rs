@@ -284,6 +284,43 @@ fn a_door_between_two_rooms_is_one_portal_of_the_exact_area() {
 }
 
 #[test]
+fn what_labels_tell_at_once_is_what_their_cells_come_out_as() {
+    let t = two_rooms(0.3);
+    let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
+    let cells = c.label(&room_votes(&c.bounds()), &LabelSettings::default());
+    let contacts = c.contacts(&cells);
+    let at: Vec<(DVec3, Option<u32>)> = [
+        v(1.0, 1.0, 1.0),
+        v(5.0, 1.0, 1.0),
+        v(3.1, 1.0, 0.2),
+        v(-9.0, 0.0, 0.0),
+    ]
+    .map(|p| (p, c.cell_at(&cells, p)))
+    .to_vec();
+    let p = c.realize(cells);
+    let sum = |is_leak: bool| -> f64 {
+        let of = p
+            .portals
+            .iter()
+            .filter(|q| q.cells == [0, 1] && q.is_leak == is_leak);
+        of.map(|q| q.area).sum()
+    };
+    let contact = contacts[&[0, 1]];
+    // Areas of facets are f32; 0.3 × 2.5 m of slit and a door.
+    assert!(
+        (contact.beside - sum(true)).abs() < 1e-5 && sum(true) > 0.7,
+        "{contact:?}"
+    );
+    assert!(
+        (contact.on_candidates - sum(false)).abs() < 1e-5,
+        "{contact:?}"
+    );
+    for (point, cell) in at {
+        assert_eq!(p.locator.locate(point).map(|c| c.0), cell, "{point}");
+    }
+}
+
+#[test]
 fn a_crooked_candidate_seals_as_well() {
     let t = two_rooms(0.0);
     let crooked = Winding::new(vec![

@@ -5,6 +5,7 @@
 //! size of what is checked, so that a hostile file cannot buy hours with a few bytes.
 
 mod error;
+mod extent;
 mod geometry;
 mod locator;
 mod portal;
@@ -13,6 +14,7 @@ use std::collections::HashMap;
 
 use crate::{CellPortalGraph, PortalId, World};
 use error::Findings;
+use extent::{check_boxes_around_geometry, check_cells_in_locator};
 use geometry::{check_cell_list, check_detail, check_mesh, check_primitive};
 use locator::check_locator;
 use portal::check_portal;
@@ -43,6 +45,8 @@ impl CellPortalGraph {
             check_portal(i as u32, portal, self.cells.len(), found);
         }
         check_locator(&self.locator, self.cells.len(), found);
+        check_outside(self, found);
+        check_cells_in_locator(self, found);
         for (name, &value) in &self.statistics.counts {
             if !value.is_finite() {
                 found.push(GraphError::Statistic {
@@ -66,6 +70,7 @@ impl World {
         let mut found = Findings::default();
         self.graph.check(&mut found);
         let n_cells = self.graph.cells.len();
+        check_boxes_around_geometry(self, &mut found);
         for (i, batch) in self.batches.iter().enumerate() {
             let owner = || format!("batch {i}");
             check_cell_list(owner, &batch.cells, n_cells, &mut found);
@@ -120,6 +125,18 @@ fn check_cells(graph: &CellPortalGraph, found: &mut Findings) {
                 volume,
             });
         }
+    }
+}
+
+/// Beyond the locator's box is the outdoors, if there is one; else nothing.
+fn check_outside(graph: &CellPortalGraph, found: &mut Findings) {
+    let outside = graph.locator.outside.map(|c| c.0);
+    let outdoors = graph.cells.iter().position(|c| c.outdoor);
+    let outdoors = outdoors.map(|i| i as u32);
+    // A graph without a locator says nothing of where its outdoors is.
+    let says = outside.is_some() || !graph.locator.bounds.is_empty();
+    if says && outside != outdoors {
+        found.push(GraphError::OutsideOutdoors { outside, outdoors });
     }
 }
 

@@ -161,6 +161,10 @@ fn the_same_bytes_cannot_be_decoded_a_thousand_times() {
         json!({"bufferView": view, "componentType": 5126, "count": rows, "type": "VEC3"});
     let accessor = push(&mut root["accessors"], accessor);
     root["meshes"][5]["primitives"][0]["attributes"] = json!({"POSITION": accessor});
+    let details = &mut root["extensions"]["ENFILADE_cell_portal_graph"]["details"];
+    for detail in details.as_array_mut().unwrap() {
+        detail.as_object_mut().unwrap().remove("aabb");
+    }
     assert!(decode_glb(&glb(&root.to_string(), &bin)).is_ok());
     for times in [10, 1000] {
         root["extensions"]["ENFILADE_cell_portal_graph"]["detailMeshes"] = json!(vec![5; times]);
@@ -214,6 +218,97 @@ fn a_detail_whose_mesh_is_not_its_nodes_is_an_error() {
         with("\"detailMeshes\":[5]", "\"detailMeshes\":[4]"),
         Err(WireError::Structure { .. })
     ));
+}
+
+#[test]
+fn a_cell_whose_node_has_another_name_is_an_error() {
+    assert!(matches!(
+        with(
+            "{\"name\":\"cell-0\",\"node\"",
+            "{\"name\":\"cell-7\",\"node\""
+        ),
+        Err(WireError::Structure { .. })
+    ));
+}
+
+#[test]
+fn a_detail_that_was_moved_out_of_its_box_is_an_error() {
+    let (json, bin) = parts();
+    let at = json.find("\"matrix\":[").unwrap() + 9;
+    let end = at + json[at..].find(']').unwrap();
+    let numbers: Vec<f64> = json[at + 1..end]
+        .split(',')
+        .map(|n| n.parse().unwrap())
+        .collect();
+    let moved = |by: f64| {
+        let mut m = numbers.clone();
+        m[12] += by;
+        let m: Vec<String> = m.iter().map(f64::to_string).collect();
+        decode_glb(&glb(
+            &format!("{}[{}{}", &json[..at], m.join(","), &json[end..]),
+            &bin,
+        ))
+    };
+    // What rounding may do passes.
+    moved(1e-6).unwrap();
+    for by in [0.001, -0.5, 1e30] {
+        assert!(
+            matches!(moved(by), Err(WireError::Structure { .. })),
+            "{by}"
+        );
+    }
+}
+
+#[test]
+fn a_transform_in_parts_is_read_as_a_matrix_is() {
+    use enfilade_geom::{DMat4, DQuat};
+    let mut world = two_rooms();
+    let turn = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(-0.3);
+    let (scale, to) = ([1.5, 0.5, 2.0], [2.0, 0.25, 1.5]);
+    let whole = DMat4::from_scale_rotation_translation(scale.into(), turn, to.into());
+    for d in &mut world.details {
+        d.transform = whole.to_cols_array().map(|v| v as f32);
+    }
+    let bytes = encode_glb(&world).unwrap();
+    let len = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let (json, bin) = (
+        str::from_utf8(&bytes[20..20 + len]).unwrap(),
+        &bytes[28 + len..],
+    );
+    let in_parts = |turn: [f64; 4], more: &str| {
+        let mut out = String::new();
+        let mut n = 0;
+        for (i, part) in json.split("\"matrix\":[").enumerate() {
+            if i == 0 {
+                out.push_str(part);
+                continue;
+            }
+            n += 1;
+            let rest = &part[part.find(']').unwrap() + 1..];
+            let parts = format!(
+                "\"translation\":{to:?},\"rotation\":{turn:?},\"scale\":{scale:?}{more}{rest}"
+            );
+            out.push_str(&parts);
+        }
+        assert!(n > 0);
+        decode_glb(&glb(&out, bin))
+    };
+    let read = in_parts(turn.to_array(), "").unwrap();
+    for (a, b) in read.details.iter().zip(&world.details) {
+        for (x, y) in a.transform.iter().zip(b.transform) {
+            assert!((x - y).abs() < 1e-6, "{:?}", a.transform);
+        }
+    }
+    for bad in [
+        in_parts([0.0; 4], ""),
+        in_parts([2.0, 0.0, 0.0, 0.0], ""),
+        in_parts(
+            turn.to_array(),
+            ",\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]",
+        ),
+    ] {
+        assert!(matches!(bad, Err(WireError::Structure { .. })));
+    }
 }
 
 #[test]

@@ -108,6 +108,16 @@ breaks! {
         => GraphError::LocatorChild { node: None, child: 2 },
     the_outside_is_a_cell: |w| w.graph.locator.outside = Some(CellId(3))
         => GraphError::LocatorOutside { cell: 3, n_cells: 3 },
+    the_outside_is_the_outdoors: |w| w.graph.locator.outside = Some(CellId(1))
+        => GraphError::OutsideOutdoors { outside: Some(1), outdoors: Some(2) },
+    the_outdoors_is_outside: |w| w.graph.locator.outside = None
+        => GraphError::OutsideOutdoors { outside: None, outdoors: Some(2) },
+    a_room_lies_in_the_locators_box: |w| w.graph.cells[0].aabb[1][1] += 2.0
+        => GraphError::FarBox { .. },
+    the_outdoors_lies_around_the_model: |w| w.graph.cells[2].aabb[1][1] = 1e30
+        => GraphError::FarBox { .. },
+    the_locator_lies_around_the_model: |w| w.graph.locator.bounds.max.x = 1e30
+        => GraphError::FarBox { .. },
     a_count_is_finite: |w| w.graph.statistics.counts = [("n".to_owned(), f64::NAN)].into()
         => GraphError::Statistic { .. },
     a_batchs_cells_ascend: |w| w.batches[2].cells.reverse()

@@ -166,7 +166,7 @@ fn the_schema_names_every_field_that_is_written() {
         ("/cells/2", &["outdoor"]),
         ("/portals/1", &[]),
         ("/batches/0", &[]),
-        ("/details/0", &[]),
+        ("/details/0", &["aabb"]),
         ("/locator", &["bounds", "outside", "planes", "nodes"]),
         ("/provenance", &[]),
         ("/pvs", &[]),

@@ -44,6 +44,15 @@ pub struct Nearest {
     pub point: DVec3,
 }
 
+/// A series of queries of one tree by [`Bvh::any_within`], near each other.
+#[derive(Clone, Debug, Default)]
+pub struct NearSeries {
+    /// Where the last one found a triangle.
+    last: Option<usize>,
+    /// How many triangles all of them looked at.
+    pub n_looked: u64,
+}
+
 impl Bvh {
     /// Builds the tree. O(n log n); 128 bytes a node and 76 a triangle.
     ///
@@ -245,32 +254,40 @@ impl Bvh {
     }
 
     /// How far some triangle is from `p` that is within `reach`; not the nearest, but the first that is found. [Units: wu]
+    ///
+    /// Queries of one series begin with the triangle that the last one found: what holds here mostly holds close by.
     #[must_use]
-    pub fn any_within(&self, p: DVec3, reach: f64) -> Option<f64> {
-        self.any_within_counted(p, reach, &mut 0)
-    }
-
-    /// [`Bvh::any_within`], and how many triangles were looked at.
-    #[must_use]
-    pub fn any_within_counted(&self, p: DVec3, reach: f64, n_looked: &mut u64) -> Option<f64> {
-        let mut found = None;
+    pub fn any_within(&self, p: DVec3, reach: f64, series: &mut NearSeries) -> Option<f64> {
         if !p.is_finite() {
-            return found;
+            return None;
         }
-        let reach2 = reach * reach;
+        let known = series.last.and_then(|at| self.within(at, p, reach));
+        if known.is_some() {
+            return known;
+        }
+        let mut found = None;
         self.walk_box(&Aabb::new(p - reach, p + reach), |i| {
-            *n_looked += 1;
-            let t = self.triangle(i);
-            let n = (t[1] - t[0]).cross(t[2] - t[0]);
-            // Nearly all that the box meets is told by its plane.
-            let off = n.dot(p - t[0]);
-            if off * off <= reach2 * n.length_squared() {
-                let d2 = closest_point_on_triangle(p, &t).distance_squared(p);
-                found = (d2 <= reach2).then(|| d2.sqrt());
+            series.n_looked += 1;
+            found = self.within(i, p, reach);
+            if found.is_some() {
+                series.last = Some(i);
             }
             found.is_none()
         });
         found
+    }
+
+    /// How far `p` is from the triangle at a place, if that is no more than `reach`.
+    fn within(&self, place: usize, p: DVec3, reach: f64) -> Option<f64> {
+        let t = self.triangle(place);
+        let n = (t[1] - t[0]).cross(t[2] - t[0]);
+        // Nearly all that a box meets is told by its plane.
+        let off = n.dot(p - t[0]);
+        if off * off > reach * reach * n.length_squared() {
+            return None;
+        }
+        let d2 = closest_point_on_triangle(p, &t).distance_squared(p);
+        (d2 <= reach * reach).then(|| d2.sqrt())
     }
 
     /// The triangle nearest to `p`, if one is within `max_distance` (infinity allowed).

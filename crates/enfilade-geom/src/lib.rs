@@ -18,8 +18,8 @@ mod winding;
 
 pub use aabb::Aabb;
 pub use allowance::Allowance;
-pub use bvh::{Bvh, Nearest};
-pub use glam::{DMat3, DMat4, DVec2, DVec3};
+pub use bvh::{Bvh, NearSeries, Nearest};
+pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
 pub use plane::Plane;
 pub use ray::{Hit, Ray, closest_point_on_triangle};
 pub use sets::Sets;

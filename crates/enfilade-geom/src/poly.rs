@@ -30,18 +30,19 @@ pub enum Sides {
 #[must_use]
 pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
     let n = points.len();
-    let dist: SmallVec<[f64; 12]> = points.iter().map(|&p| plane.signed_distance(p)).collect();
-    let (mut any_front, mut any_back) = (false, false);
-    for &d in &dist {
-        any_front |= d > eps;
-        any_back |= d < -eps;
+    // Most polygons lie on one side: nothing is kept until one does not.
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for &p in points {
+        let d = plane.signed_distance(p);
+        (least, most) = (least.min(d), most.max(d));
     }
-    match (any_front, any_back) {
+    match (most > eps, least < -eps) {
         (false, false) => return Sides::On,
         (true, false) => return Sides::Front,
         (false, true) => return Sides::Back,
         (true, true) => {}
     }
+    let dist: SmallVec<[f64; 12]> = points.iter().map(|&p| plane.signed_distance(p)).collect();
     let (mut front, mut back) = (Poly::new(), Poly::new());
     for i in 0..n {
         let j = if i + 1 == n { 0 } else { i + 1 };
@@ -77,6 +78,17 @@ pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
     }
 }
 
+/// Leaves the part on the positive side; whether there is any.
+#[must_use]
+pub fn clip_in_place(points: &mut Poly, plane: &Plane, eps: f64) -> bool {
+    match split(points, plane, eps) {
+        Sides::Front => {}
+        Sides::Both(front, _) => *points = front,
+        Sides::On | Sides::Back => return false,
+    }
+    true
+}
+
 /// The part in a box; `None` when no area is left. A polygon in a face of the box counts as in it.
 #[must_use]
 pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
@@ -94,14 +106,13 @@ pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
             }
             let mut normal = DVec3::ZERO;
             normal[axis] = sign;
-            poly = clip(
-                &poly,
-                &Plane {
-                    normal,
-                    d: -sign * limit,
-                },
-                eps,
-            )?;
+            let side = Plane {
+                normal,
+                d: -sign * limit,
+            };
+            if !clip_in_place(&mut poly, &side, eps) {
+                return None;
+            }
         }
     }
     Some(poly)
@@ -185,6 +196,18 @@ pub fn width(points: &[DVec3]) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
+/// Whether both the area and the [`width`] reach a limit; mostly without a search for the width.
+#[must_use]
+pub fn is_larger(points: &[DVec3], min_area: f64, min_width: f64) -> bool {
+    let area = area(points);
+    if area < min_area {
+        return false;
+    }
+    // What is narrow has little area for its length; a thousandth is for rounding.
+    let length = Aabb::of_points(points).size().length();
+    area >= 1.001 * min_width * length || width(points) >= min_width
+}
+
 /// Cuts `poly` by a convex `cover` in the same plane, which turns counter-clockwise about
 /// `normal`: appends what lies outside to `outside` and returns what lies inside.
 ///
@@ -218,7 +241,7 @@ pub fn cut_out(
             Sides::Back | Sides::On => hit = false,
         }
     }
-    if hit && width(&inside) >= min_width {
+    if hit && (min_width <= 0.0 || width(&inside) >= min_width) {
         return Some(inside);
     }
     // No overlap worth the name: keep the polygon in one piece instead of the shreds cut so far.

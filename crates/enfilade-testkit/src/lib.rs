@@ -49,6 +49,6 @@ pub use maze::dirkse_maze;
 pub use rng::Rng;
 pub use site::{Generated, Site};
 pub use tower::{TowerParams, office_tower};
-pub use transform::{rotated, scaled, shuffled, transformed};
+pub use transform::{reordered, rotated, scaled, shuffled, transformed};
 pub use truth::{Convex, Opening, OpeningKind, Room, Side, Truth};
 pub use tubes::{Tube, tubes};

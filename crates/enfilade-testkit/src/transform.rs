@@ -52,3 +52,36 @@ pub fn shuffled(mut generated: Generated, seed: u64) -> Generated {
     }
     generated
 }
+
+/// [`shuffled`], and the vertices of each part in another order, too: the same scene as another program might write it.
+#[must_use]
+pub fn reordered(generated: Generated, seed: u64) -> Generated {
+    let mut generated = shuffled(generated, seed);
+    let mut rng = Rng::new(seed ^ 0x5eed);
+    let meshes = generated.scene.meshes.iter_mut();
+    for p in meshes.flat_map(|m| &mut m.primitives) {
+        // By new number the old one, and the other way round.
+        let mut old: Vec<usize> = (0..p.positions.len()).collect();
+        rng.shuffle(&mut old);
+        let mut new = vec![0; old.len()];
+        for (i, &o) in old.iter().enumerate() {
+            new[o] = i as u32;
+        }
+        fn moved<T: Copy>(list: &mut Vec<T>, old: &[usize]) {
+            if !list.is_empty() {
+                *list = old.iter().map(|&o| list[o]).collect();
+            }
+        }
+        moved(&mut p.positions, &old);
+        moved(&mut p.normals, &old);
+        moved(&mut p.tangents, &old);
+        moved(&mut p.colors, &old);
+        for uvs in &mut p.uvs {
+            moved(uvs, &old);
+        }
+        for i in &mut p.indices {
+            *i = new[*i as usize];
+        }
+    }
+    generated
+}

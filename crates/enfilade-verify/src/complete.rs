@@ -1,14 +1,16 @@
 //! *Complete*: a triangle is listed in every cell from which it can be seen without passing a
 //! portal.
 
+use enfilade_cpg::CellId;
 use enfilade_geom::{DVec3, Ray};
 
 use crate::report::{Break, Failure, FailureKind, Tally};
 use crate::rng::Rng;
 use crate::sealed::follow;
-use crate::subject::Subject;
+use crate::subject::{Subject, point_of_triangle};
 
-/// Casts ray number `i` from a random point of a random cell and judges what it meets.
+/// Casts ray number `i` from a random point of a random cell, or every other time towards a random triangle, and judges
+/// what it meets.
 ///
 /// A ray that crosses portals on its way judges the cell in which it arrives: from the last portal
 /// on it is a sight line of that cell.
@@ -19,15 +21,19 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
         counts.on_surface += 1;
         return;
     }
-    let start = subject.sampled[rng.below(subject.sampled.len())];
-    let a = subject.point_in_cell(rng, start);
+    let is_aimed = i % 2 == 1 && !subject.triangles.is_empty();
+    let aimed = is_aimed.then(|| aim_at_triangle(subject, rng)).flatten();
+    let (start, a, direction) = aimed.unwrap_or_else(|| {
+        let start = subject.sampled[rng.below(subject.sampled.len())];
+        (start, subject.point_in_cell(rng, start), rng.direction())
+    });
     if subject.is_close_to_surface(a) {
         counts.on_surface += 1;
         return;
     }
     let ray = Ray {
         origin: a,
-        direction: rng.direction(),
+        direction,
         t_max: f64::INFINITY,
     };
     let Some(hit) = subject.blockers.closest_hit(&ray, |_| false) else {
@@ -104,6 +110,19 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
             ..failure
         },
     );
+}
+
+/// Draws before a ray is no longer aimed: many triangles are inside walls.
+const DRAWS: usize = 4;
+
+/// A point of air from which a ray leads towards a point of any triangle: the small get as many as the large.
+fn aim_at_triangle(subject: &Subject, rng: &mut Rng) -> Option<(CellId, DVec3, DVec3)> {
+    (0..DRAWS).find_map(|_| {
+        let t = &subject.triangles[rng.below(subject.triangles.len())];
+        let (p, away) = (point_of_triangle(rng, t), rng.direction());
+        let a = p + away * rng.log_range(10.0 * subject.eps, 10.0);
+        Some((subject.locator.locate(a)?, a, -away))
+    })
 }
 
 /// How steeply the ray meets the triangle: 1 head-on, 0 along it.

@@ -7,7 +7,8 @@
 //! | --- | --- |
 //! | sealed | segments that no structural triangle and no seal blocks; the portals crossed must lead, one by one, from the cell of the start to the cell of the end; and no seal closes more than a gap |
 //! | complete | rays to the first structural triangle; its batch must list the cell that the ray arrives in |
-//! | planar, convex outline | every portal, directly; and `validate()` of the world |
+//! | planar, convex outline | every portal, directly, with its pieces apart from each other and between its two cells; and `validate()` of the world |
+//! | true to itself | names, counts, boxes and volumes of cells, and the cells of details, against geometry and locator; a source against the triangles |
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -31,15 +32,20 @@
 //! Everything else is judged. Sampling finds breaks, it does not prove their absence; the report
 //! therefore always says how much was judged.
 
+mod claims;
 mod complete;
+mod details;
 mod evidence;
+mod locator_cells;
 mod options;
 mod outlines;
+mod portal_sides;
 mod report;
 mod rng;
 mod sample;
 mod sealed;
 mod seals;
+mod source;
 mod subject;
 mod views;
 
@@ -97,6 +103,14 @@ pub fn verify_world_with_progress(
     let subject = Subject::new(world, source, options);
     problems.extend(outlines::check(world, subject.eps));
     problems.extend(seals::check(world, source));
+    problems.extend(claims::check(world));
+    problems.extend(details::check(world));
+    problems.extend(portal_sides::check(&subject, options.seed));
+    if let Some(source) = source {
+        let not_seal = |t: &&(Triangle, u32)| !world.batches[t.1 as usize].is_seal;
+        let own: Vec<Triangle> = subject.own.iter().filter(not_seal).map(|t| t.0).collect();
+        problems.extend(source::problem(&own, source, 4.0 * subject.eps));
+    }
 
     let n_chunks = options.rays.div_ceil(CHUNK);
     let done = AtomicU64::new(0);
@@ -143,5 +157,7 @@ fn is_harmless_to_rays(error: &GraphError) -> bool {
             | GraphError::Statistic { .. }
             | GraphError::Detail { .. }
             | GraphError::Look { .. }
+            | GraphError::OutsideOutdoors { .. }
+            | GraphError::FarBox { .. }
     )
 }

@@ -1,8 +1,9 @@
 //! *Planar, convex outline*: every portal, straight from its corners.
 
 use enfilade_cpg::{PortalId, World};
+use enfilade_geom::poly::{self, Poly};
 use enfilade_geom::ray::closest_point_on_segment;
-use enfilade_geom::{DVec3, Plane, Winding};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use crate::subject::to_dvec;
 
@@ -66,6 +67,12 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
                 say(format!("{name} reaches out of the outline by {out:.2e} m"));
             }
         }
+        let polygons: Vec<Vec<DVec3>> = (portal.pieces.iter())
+            .map(|p| p.iter().copied().map(to_dvec).collect())
+            .collect();
+        if let Some([j, k]) = overlapping(&polygons, normal, eps) {
+            say(format!("pieces {j} and {k} overlap"));
+        }
         // Each corner may be off by eps, which moves the area by the circumference times that.
         let circumference: f64 = portal
             .pieces
@@ -82,6 +89,55 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
         }
     }
     problems
+}
+
+/// Two pieces that overlap by more than rounding may make of them.
+///
+/// Pieces are swept along the axis in which they spread most; time near-linear where few lie side by side.
+fn overlapping(pieces: &[Vec<DVec3>], normal: DVec3, eps: f64) -> Option<[usize; 2]> {
+    let boxes: Vec<Aabb> = pieces.iter().map(Aabb::of_points).collect();
+    let size = boxes.iter().fold(Aabb::EMPTY, |a, &b| a.union(b)).size();
+    let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j]))?;
+    let mut order: Vec<usize> = (0..pieces.len()).collect();
+    order.sort_by(|&i, &j| {
+        boxes[i].min[axis]
+            .total_cmp(&boxes[j].min[axis])
+            .then(i.cmp(&j))
+    });
+    for (n, &i) in order.iter().enumerate() {
+        let besides = order[n + 1..].iter();
+        let mut besides = besides.take_while(|&&j| boxes[j].min[axis] < boxes[i].max[axis]);
+        let overlaps = |&&j: &&usize| {
+            boxes[i].overlaps(&boxes[j]) && is_overlap(&pieces[i], &pieces[j], normal, eps)
+        };
+        if let Some(&j) = besides.find(overlaps) {
+            return Some([i.min(j), i.max(j)]);
+        }
+    }
+    None
+}
+
+/// Pieces may overlap by so much: a builder's planes nearly coincide there, and each side cuts by its own. [Units: wu]
+const SEAM: f64 = 1e-3;
+/// And by this share of the smaller piece's area: slivers may lie in one another.
+const SEAM_SHARE: f64 = 0.1;
+
+/// Whether something of `b` lies deeper than a seam within all edges of `a`.
+fn is_overlap(a: &[DVec3], b: &[DVec3], normal: DVec3, eps: f64) -> bool {
+    let seam = SEAM.max(2.0 * eps);
+    let mut rest: Poly = b.iter().copied().collect();
+    for (p, q) in edges(a) {
+        let Some(inward) = normal.cross(q - p).try_normalize() else {
+            continue;
+        };
+        let plane = Plane::through(p + inward * seam, inward);
+        match poly::clip(&rest, &plane, 0.0) {
+            Some(part) => rest = part,
+            None => return false,
+        }
+    }
+    let smaller = poly::area(a).min(poly::area(b));
+    poly::width(&rest) > seam && poly::area(&rest) > SEAM_SHARE * smaller
 }
 
 fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {

@@ -37,8 +37,8 @@ pub struct SealedCounts {
     pub grazing: u64,
     /// Both ends in solid matter.
     pub solid: u64,
-    /// One end in a cell, the other in what the locator calls solid, and nothing in between: not
-    /// against the promise, but a hole in the model or in the locator.
+    /// One end in a cell, the other in what the locator calls solid, and nothing in between: a hole in
+    /// the walls, or in the locator. Each breaks the promise.
     pub cell_to_solid: u64,
     /// An end lay on a surface in every draw.
     pub on_surface: u64,
@@ -77,6 +77,8 @@ pub enum FailureKind {
     EndMismatch,
     /// *Sealed*: between two points of air, the locator says solid.
     InSolid,
+    /// *Sealed*: nothing is between a point of a cell and what the locator says is solid.
+    IntoSolid,
     /// *Complete*: the batch of a triangle does not list a cell that sees it.
     Unlisted,
     /// *Complete*: no batch holds the triangle of the source that was met.
@@ -103,6 +105,7 @@ impl FailureKind {
             Self::WrongWay => "a portal faces the wrong way",
             Self::EndMismatch => "the portals lead to another cell",
             Self::InSolid => "the locator says solid in open air",
+            Self::IntoSolid => "nothing closes the way from a cell into solid",
             Self::Unlisted => "a triangle's batch lacks a cell that sees it",
             Self::MissingTriangle => "a triangle of the source is in no batch",
             Self::Hidden => "a cell is seen that the world's set of what is seen lacks",
@@ -263,6 +266,8 @@ pub struct VerifyReport {
     pub unsealed: u64,
     /// Rays that break *complete*.
     pub incomplete: u64,
+    /// Segments that lead to a cell which the world's own potentially visible set hides from their start.
+    pub hidden: u64,
     /// Failures by likeness, the most frequent first; a list of limited length.
     pub failures: Vec<Failure>,
     /// How many kinds of failure there are in all.
@@ -276,7 +281,7 @@ impl VerifyReport {
     /// Whether no promise was seen broken. Says nothing where nothing was judged.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.problems.is_empty() && self.unsealed == 0 && self.incomplete == 0
+        self.problems.is_empty() && self.unsealed == 0 && self.incomplete == 0 && self.hidden == 0
     }
 
     pub(crate) fn unshot(world: &World, options: &VerifyOptions, problems: Vec<String>) -> Self {
@@ -298,6 +303,7 @@ impl VerifyReport {
             unsampled_cells: Vec::new(),
             unsealed: 0,
             incomplete: 0,
+            hidden: 0,
             failures: Vec::new(),
             failure_groups: 0,
             names: world.graph.cells.iter().map(|c| c.name.clone()).collect(),
@@ -374,6 +380,7 @@ impl VerifyReport {
                 .sum()
         };
         let (unsealed, incomplete) = (total("sealed"), total("complete"));
+        let hidden = total("conservative");
         // Stable: ties stay in the order of the keys.
         failures.sort_by_key(|f| std::cmp::Reverse(f.count));
         let failure_groups = failures.len();
@@ -390,6 +397,7 @@ impl VerifyReport {
                 .collect(),
             unsealed,
             incomplete,
+            hidden,
             failures,
             failure_groups,
             ..Self::unshot(subject.world, options, problems)
@@ -434,7 +442,7 @@ impl fmt::Display for VerifyReport {
              {:>10} met nothing, {} grazing, {} on a surface, {} unresolved",
             c.judged, self.incomplete, c.escaped, c.grazing, c.on_surface, c.unresolved
         )?;
-        writeln!(f, "outlines  {:>10} problems", self.problems.len())?;
+        writeln!(f, "outlines, numbers {:>3} problems", self.problems.len())?;
         for problem in &self.problems {
             writeln!(f, "  {problem}")?;
         }

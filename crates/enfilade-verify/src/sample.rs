@@ -8,15 +8,18 @@ use crate::subject::{Subject, point_in, point_of_triangle};
 /// Farthest that aimed segments reach from what they aim at. [Units: wu]
 const REACH: f64 = 10.0;
 
+/// Ways to draw a segment.
+const KINDS: u64 = 10;
+
 /// Draws the two ends of segment number `i`; the number picks the way to draw.
 pub(crate) fn draw_segment(subject: &Subject, rng: &mut Rng, i: u64) -> (DVec3, DVec3) {
     let near = 3.0 * subject.eps;
     let has_portals = !subject.crossable.is_empty();
-    match i % 8 {
+    match i % KINDS {
         1 | 2 if !subject.sampled.is_empty() => {
             let cell = subject.sampled[rng.below(subject.sampled.len())];
             let a = subject.point_in_cell(rng, cell);
-            let b = if i % 8 == 1 {
+            let b = if i % KINDS == 1 {
                 let other = subject.sampled[rng.below(subject.sampled.len())];
                 subject.point_in_cell(rng, other)
             } else {
@@ -50,6 +53,14 @@ pub(crate) fn draw_segment(subject: &Subject, rng: &mut Rng, i: u64) -> (DVec3, 
                 p - d * rng.log_range(near, REACH),
                 p + d * rng.log_range(near, REACH),
             )
+        }
+        // Past the edge of a surface: where a triangle or a seal is missing, others end.
+        8 | 9 if !subject.triangles.is_empty() => {
+            let t = &subject.triangles[rng.below(subject.triangles.len())];
+            let k = rng.below(3);
+            let p = t[k].lerp(t[(k + 1) % 3], rng.unit());
+            let p = p + rng.direction() * rng.log_range(near, 0.05);
+            around(rng, p, near)
         }
         // Through two portals at once.
         7 if has_portals => {

@@ -30,18 +30,25 @@ pub(crate) fn try_segment(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut 
         counts.blocked += 1;
         return;
     }
-    let [Some(start), Some(_)] = ends else {
-        if ends == [None, None] {
-            counts.solid += 1;
-        } else {
-            counts.cell_to_solid += 1;
-        }
+    if ends == [None, None] {
+        counts.solid += 1;
         return;
-    };
+    }
     if subject.is_grazing(a, b) {
         counts.grazing += 1;
         return;
     }
+    let start = match ends {
+        [Some(start), Some(_)] => start,
+        [one, other] => {
+            counts.cell_to_solid += 1;
+            let ends = if one.is_some() { [a, b] } else { [b, a] };
+            if let Some(cell) = one.or(other) {
+                tally.add_failure(subject, into_solid(subject, i, ends, cell));
+            }
+            return;
+        }
+    };
     counts.judged += 1;
     let mut crossings = Vec::new();
     subject.crossings(a, b, &mut crossings);
@@ -49,6 +56,17 @@ pub(crate) fn try_segment(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut 
     if let Err(wrong) = follow(subject, rng, a, b, start, &mut crossings) {
         tally.add_failure(subject, Failure::of_break(&wrong, i, [a, b], &crossings));
     }
+}
+
+/// A segment from a cell into solid that nothing blocks.
+fn into_solid(subject: &Subject, i: u64, [a, b]: [DVec3; 2], cell: CellId) -> Failure {
+    let mut crossings = Vec::new();
+    subject.crossings(a, b, &mut crossings);
+    let wrong = Break {
+        kind: FailureKind::IntoSolid,
+        ..locate_change(subject, a, b, [0.0, 1.0], cell, None)
+    };
+    Failure::of_break(&wrong, i, [a, b], &crossings)
 }
 
 /// Follows the segment through `crossings`; ends in the cell of `b`, or says where it does not.

@@ -222,6 +222,10 @@ impl<'a> Subject<'a> {
         }
     }
 
+    pub(crate) fn cell_name(&self, cell: CellId) -> &str {
+        &self.world.graph[cell].name
+    }
+
     /// A point of a cell in `sampled`.
     pub(crate) fn point_in_cell(&self, rng: &mut Rng, cell: CellId) -> DVec3 {
         let view = &self.cells[cell.0 as usize];

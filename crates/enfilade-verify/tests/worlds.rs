@@ -266,6 +266,9 @@ fn the_source_blocks_even_where_the_batches_are_cut_finer() {
             p.indices.extend([t[0], t[1], m, t[1], t[2], m]);
         }
     }
+    for c in &mut cut.graph.cells {
+        c.n_triangles *= 2;
+    }
     let turn = DMat4::from_axis_angle(DVec3::new(0.2, 1.0, 0.1).normalize(), 0.7);
     let source = triangles(&moved(with_triangles(&cut, &source), &turn));
     let options = VerifyOptions {

@@ -30,6 +30,7 @@ mod output;
 mod planes;
 mod prove;
 mod rays;
+mod recheck;
 mod rng;
 mod search;
 mod sheets;
@@ -94,7 +95,12 @@ pub fn see_all(
         Some(VisCheckpoint {
             resume: Some(bytes),
             ..
-        }) if config.mode == VisMode::Exact => Some(checkpoint::decode(bytes, &mut search, key)?),
+        }) if config.mode == VisMode::Exact => {
+            let base = search.might.clone();
+            let rest = checkpoint::decode(bytes, &mut search, key)?;
+            recheck::check(&search, &rest, &base, config.max_pieces)?;
+            Some(rest)
+        }
         _ => None,
     };
     if resumed.is_none() {

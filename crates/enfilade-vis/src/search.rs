@@ -341,6 +341,32 @@ impl<'a> Search<'a> {
         self.effort.steps = steps;
     }
 
+    /// Whether a line shows that each cell on its way sees the others: finite, of openings that follow each other, and neither
+    /// solid nor too long in between.
+    pub(crate) fn is_proof(&self, line: &Line) -> bool {
+        let all = &self.dirs.all;
+        let is_chain = !line.chain.is_empty()
+            && (line.chain.windows(2)).all(|d| all[d[0] as usize].to == all[d[1] as usize].from);
+        is_chain
+            && line.origin.is_finite()
+            && line.direction.is_finite()
+            && self.dirs.is_crossed(line, self.tolerance.rounding * 8.0)
+            && self.is_free(line)
+    }
+
+    /// Whether nothing solid is between the first and the last opening of a line, and they are not too far apart.
+    fn is_free(&self, line: &Line) -> bool {
+        let cross = |d: &u32| (self.dirs).crossing(*d as usize, line.origin, line.direction);
+        let ts: Vec<f64> = line.chain.iter().map(cross).collect();
+        let at = |t: f64| line.origin + line.direction * t;
+        let most = self.far.unwrap_or(f64::INFINITY) * FAR_KEPT / line.direction.length();
+        let is_near = ts.last().zip(ts.first()).is_none_or(|(b, a)| b - a <= most);
+        is_near
+            && self
+                .blocker
+                .is_none_or(|is_blocked| ts.windows(2).all(|t| !is_blocked(at(t[0]), at(t[1]))))
+    }
+
     fn merge(&mut self, found: &Found, next: &mut Next) {
         next.hide(self.dirs, &mut self.might, found.source, &found.hidden);
         bits::unite(self.settled.row_mut(found.source), &found.hidden);

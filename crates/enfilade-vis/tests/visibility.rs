@@ -269,6 +269,61 @@ fn checkpoints_that_do_not_fit_are_refused() {
     }
 }
 
+/// A checkpoint with one bit of its body changed, and its sum made to fit.
+fn tampered(saved: &[u8], change: impl FnOnce(&mut [u8])) -> Vec<u8> {
+    use std::io::{Read, Write};
+    let mut body = Vec::new();
+    let mut decoder = flate2::read::ZlibDecoder::new(&saved[24..]);
+    decoder.read_to_end(&mut body).unwrap();
+    change(&mut body);
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(&body).unwrap();
+    let packed = encoder.finish().unwrap();
+    let sum = packed
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+    [&saved[..16], &sum.to_le_bytes(), &packed].concat()
+}
+
+#[test]
+fn a_checkpoint_that_lies_never_hides_what_is_seen() {
+    let graph = Grid::new(6, 5).graph();
+    let config = with_evidence();
+    let whole = see(&graph, &config);
+    let (_, saved) = see_in_parts(&graph, &config, None, 1);
+    let resumed = |bytes: Vec<u8>| see_in_parts(&graph, &config, Some(bytes), 100).0;
+    assert_eq!(resumed(tampered(&saved, |_| ())), Ok(whole.clone()));
+    let mut n_body = 0;
+    tampered(&saved, |body| n_body = body.len());
+    let (mut n_refused, mut n_harmless) = (0, 0);
+    for bit in (0..8 * n_body).step_by(8 * n_body / 400 + 1) {
+        match resumed(tampered(&saved, |body| body[bit / 8] ^= 1 << (bit % 8))) {
+            Err(VisError::Checkpoint { .. }) => n_refused += 1,
+            Err(error) => panic!("bit {bit}: {error}"),
+            Ok(vis) => {
+                n_harmless += 1;
+                // Work counted wrongly, or an opening not searched: never less than can be seen.
+                verify_evidence(&graph, &vis.evidence.unwrap(), None).unwrap();
+                let mut rows = vis
+                    .cells
+                    .iter()
+                    .zip(whole.cells.iter().zip(&whole.undecided));
+                let is_seen = rows.all(|(found, (all, undecided))| {
+                    all.iter()
+                        .all(|c| undecided.contains(c) || found.contains(c))
+                });
+                assert!(is_seen, "bit {bit}");
+            }
+        }
+    }
+    assert!(
+        n_refused > 100 && n_harmless > 0,
+        "{n_refused} {n_harmless}"
+    );
+}
+
 #[test]
 fn broken_graphs_are_named_and_odd_ones_are_answered() {
     let good = Grid::new(3, 1).graph();

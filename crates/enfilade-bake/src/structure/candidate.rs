@@ -15,6 +15,8 @@
 
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
 
+use super::picture::Picture;
+
 /// An opening between two cells, as a builder knows it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Opening {
@@ -37,10 +39,6 @@ pub(crate) struct Candidate {
     pub(crate) closed: f64,
 }
 
-/// Most lattice points along one side of a section's picture.
-const MAX_SIDE: usize = 320;
-/// Finest lattice spacing of a section's picture. [Units: wu]
-const FINEST: f64 = 0.02;
 /// How far around the front's extent a section may reach before it counts as unbounded. [Units: wu]
 const MARGIN: f64 = 0.7;
 /// How far from the front's mean plane a candidate may lie. [Units: wu]
@@ -66,7 +64,7 @@ pub(crate) fn fit_candidate(
     // Wall planes come first; others are asked only when no wall closes the opening.
     for normals in candidate_normals(opening, &around) {
         for normal in normals {
-            for plane in candidate_planes(opening, normal, &around) {
+            for plane in candidate_planes(opening, normal, &around, hole) {
                 let section = free_section(&plane, centers, &around, [spacing, hole]);
                 let better = best
                     .as_ref()
@@ -92,21 +90,21 @@ pub(crate) fn fit_candidate(
 /// front's own, and tilted ones.
 fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] {
     let own = opening.plane.normal;
-    let mut normals: Vec<(DVec3, f64)> = Vec::new();
+    let mut faces: Vec<(DVec3, f64)> = Vec::new();
     for t in around {
         let area_normal = triangle_area_normal(t);
         let area = area_normal.length();
-        if area < 1e-9 {
-            continue;
-        }
-        let mut n = area_normal / area;
-        if n.dot(own) < 0.0 {
-            n = -n;
-        }
+        let facing = area_normal * area_normal.dot(own).signum();
         // At a door in the corner of a room the front runs askew, by up to half a right angle.
-        if n.dot(own) < 0.65 {
-            continue;
+        if area > 1e-9 && facing.dot(own) > 0.65 * area {
+            faces.push((facing / area, area));
         }
+    }
+    // The largest stand for what is about parallel to them: small triangles lean where vertices were moved.
+    let order = |n: DVec3| n.to_array().map(f64::to_bits);
+    faces.sort_by(|a, b| b.1.total_cmp(&a.1).then(order(a.0).cmp(&order(b.0))));
+    let mut normals: Vec<(DVec3, f64)> = Vec::new();
+    for (n, area) in faces {
         // Large walls far off count no more than what stands right at the opening.
         let weight = area.min(opening.area);
         match normals.iter_mut().find(|(m, _)| m.dot(n) > 0.9998) {
@@ -134,23 +132,30 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
     [walls, fronts, tilted.to_vec()]
 }
 
-/// Planes with this normal worth trying: those of walls, those midway between two, and a sweep.
-fn candidate_planes(opening: &Opening, normal: DVec3, around: &[Triangle]) -> Vec<Plane> {
+/// Planes with this normal worth trying: those of walls, those midway between two, and a sweep. `hole` is the smallest hole.
+fn candidate_planes(
+    opening: &Opening,
+    normal: DVec3,
+    around: &[Triangle],
+    hole: f64,
+) -> Vec<Plane> {
+    // Steps within a surface are no wider than what is closed anyway.
+    let step = 0.2 * hole;
     let middle = Plane::through(opening.center, normal);
     let mut offsets: Vec<f64> = Vec::new();
     for t in around {
         let d = t.map(|p| middle.signed_distance(p));
         let (lo, hi) = (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2]));
-        if hi - lo < 2e-3 && hi > -OFFSET && lo < OFFSET && triangle_area_normal(t).length() > 1e-4
+        if hi - lo < step && hi > -OFFSET && lo < OFFSET && triangle_area_normal(t).length() > 1e-4
         {
             offsets.push((lo + hi) * 0.5);
         }
     }
     offsets.sort_by(f64::total_cmp);
-    offsets.dedup_by(|a, b| (*a - *b).abs() < 2e-3);
+    offsets.dedup_by(|a, b| (*a - *b).abs() < step);
     let mut tries: Vec<f64> = offsets
         .windows(2)
-        .filter(|w| w[1] - w[0] > 4e-3)
+        .filter(|w| w[1] - w[0] > 2.0 * step)
         .map(|w| (w[0] + w[1]) * 0.5)
         .collect();
     tries.extend(&offsets);
@@ -257,193 +262,6 @@ fn free_section(
     }
 }
 
-/// A lattice of cells in a plane around an opening.
-#[derive(Clone, Copy)]
-struct Picture {
-    origin: DVec3,
-    u: DVec3,
-    v: DVec3,
-    step: f64,
-    side: [usize; 2],
-}
-
-/// Cells of a picture that hang together.
-struct OpenPatch {
-    /// Points of the opening that lie in it.
-    n_hits: usize,
-    meets_border: bool,
-}
-
-impl Picture {
-    fn around(plane: &Plane, centers: &[DVec3], margin: f64) -> Self {
-        let (u, v) = plane.basis();
-        let base = plane.project(centers[0]);
-        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for &c in centers {
-            for (k, t) in [u.dot(c - base), v.dot(c - base)].into_iter().enumerate() {
-                lo[k] = lo[k].min(t);
-                hi[k] = hi[k].max(t);
-            }
-        }
-        let extent = (hi[0] - lo[0]).max(hi[1] - lo[1]) + 2.0 * margin;
-        let step = (extent / MAX_SIDE as f64).max(FINEST);
-        Self {
-            origin: base + u * (lo[0] - margin) + v * (lo[1] - margin),
-            u,
-            v,
-            step,
-            side: [0, 1].map(|k| (((hi[k] - lo[k] + 2.0 * margin) / step).ceil() as usize).max(1)),
-        }
-    }
-
-    fn place(&self, p: DVec3) -> [f64; 2] {
-        [self.u, self.v].map(|d| d.dot(p - self.origin) / self.step)
-    }
-
-    /// The cells that triangles lie in or cross.
-    fn blocked(&self, plane: &Plane, around: &[Triangle]) -> Vec<bool> {
-        let mut blocked = vec![false; self.side[0] * self.side[1]];
-        for t in around {
-            let d = t.map(|p| plane.signed_distance(p));
-            if d.iter().all(|d| d.abs() < 1e-3) {
-                fill_triangle(&mut blocked, self.side, t.map(|p| self.place(p)));
-            } else if let Some([p, q]) = crossing(t, d) {
-                draw_segment(&mut blocked, self.side, self.place(p), self.place(q));
-            }
-        }
-        blocked
-    }
-
-    /// The pieces of the open cells that points lie in: of each cell the number of its piece from 1 on, 0 where there is
-    /// none, and the pieces.
-    fn pieces(&self, blocked: &[bool], points: &[DVec3]) -> (Vec<u32>, Vec<OpenPatch>) {
-        let mut piece_of = vec![0_u32; blocked.len()];
-        let mut pieces: Vec<OpenPatch> = Vec::new();
-        for &p in points {
-            let place = self.place(p);
-            let [i, j] = [0, 1].map(|k| (place[k].max(0.0) as usize).min(self.side[k] - 1));
-            let at = j * self.side[0] + i;
-            if blocked[at] {
-                continue;
-            }
-            if piece_of[at] == 0 {
-                let id = pieces.len() as u32 + 1;
-                pieces.push(self.fill(at, id, blocked, &mut piece_of));
-            }
-            pieces[piece_of[at] as usize - 1].n_hits += 1;
-        }
-        (piece_of, pieces)
-    }
-
-    /// A set of cells with all that are up to `reach` cells from it, along both sides.
-    fn grown(&self, cells: &[bool], reach: usize) -> Vec<bool> {
-        let [nu, nv] = self.side;
-        let mut out = cells.to_vec();
-        if reach == 0 {
-            return out;
-        }
-        for (k, _) in cells.iter().enumerate().filter(|(_, c)| **c) {
-            let near = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
-            for j in near(k / nu, nv) {
-                out[j * nu..][near(k % nu, nu)].fill(true);
-            }
-        }
-        out
-    }
-
-    /// Marks the open cells that hang together with `start`.
-    fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> OpenPatch {
-        let side = self.side;
-        let mut meets_border = false;
-        piece_of[start] = id;
-        let mut stack = vec![start];
-        while let Some(k) = stack.pop() {
-            let (i, j) = (k % side[0], k / side[0]);
-            meets_border |= i == 0 || j == 0 || i + 1 == side[0] || j + 1 == side[1];
-            let mut visit = |inside: bool, next: usize| {
-                if inside && !blocked[next] && piece_of[next] == 0 {
-                    piece_of[next] = id;
-                    stack.push(next);
-                }
-            };
-            visit(i > 0, k.wrapping_sub(1));
-            visit(i + 1 < side[0], k + 1);
-            visit(j > 0, k.wrapping_sub(side[0]));
-            visit(j + 1 < side[1], k + side[0]);
-        }
-        OpenPatch {
-            n_hits: 0,
-            meets_border,
-        }
-    }
-}
-
-/// Where a triangle crosses a plane, given the distances `d` of its vertices from it.
-fn crossing(t: &Triangle, d: [f64; 3]) -> Option<[DVec3; 2]> {
-    if !(d.iter().any(|&d| d <= 0.0) && d.iter().any(|&d| d >= 0.0)) {
-        return None;
-    }
-    let mut ends: [Option<DVec3>; 2] = [None, None];
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if (d[i] < 0.0) != (d[j] < 0.0) {
-            let cut = t[i] + (t[j] - t[i]) * (d[i] / (d[i] - d[j]));
-            let slot = usize::from(ends[0].is_some());
-            ends[slot] = Some(cut);
-        }
-    }
-    match ends {
-        [Some(p), Some(q)] => Some([p, q]),
-        _ => None,
-    }
-}
-
-/// Marks the lattice cells along a segment, so that no step between edge neighbors crosses it.
-fn draw_segment(blocked: &mut [bool], side: [usize; 2], p: [f64; 2], q: [f64; 2]) {
-    let length = (q[0] - p[0]).abs().max((q[1] - p[1]).abs());
-    let n = ((length * 2.0).ceil() as usize).clamp(1, 4 * MAX_SIDE * 8);
-    for k in 0..=n {
-        let t = k as f64 / n as f64;
-        let (x, y) = (p[0] + (q[0] - p[0]) * t, p[1] + (q[1] - p[1]) * t);
-        if x >= 0.0 && y >= 0.0 && (x as usize) < side[0] && (y as usize) < side[1] {
-            blocked[y as usize * side[0] + x as usize] = true;
-        }
-    }
-}
-
-/// Marks the lattice cells whose centers a triangle of the plane covers.
-fn fill_triangle(blocked: &mut [bool], side: [usize; 2], t: [[f64; 2]; 3]) {
-    for i in 0..3 {
-        draw_segment(blocked, side, t[i], t[(i + 1) % 3]);
-    }
-    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
-    let range = |k: usize| {
-        let lo = t.iter().map(|p| p[k]).fold(f64::MAX, f64::min).max(0.0);
-        let hi = t
-            .iter()
-            .map(|p| p[k])
-            .fold(f64::MIN, f64::max)
-            .min(side[k] as f64);
-        (lo as usize, hi.max(0.0) as usize)
-    };
-    let ((x0, x1), (y0, y1)) = (range(0), range(1));
-    for y in y0..y1.min(side[1]) {
-        for x in x0..x1.min(side[0]) {
-            let c = [x as f64 + 0.5, y as f64 + 0.5];
-            let s = [
-                cross(t[0], t[1], c),
-                cross(t[1], t[2], c),
-                cross(t[2], t[0], c),
-            ];
-            if s.iter().all(|&s| s >= 0.0) || s.iter().all(|&s| s <= 0.0) {
-                blocked[y * side[0] + x] = true;
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -517,6 +335,31 @@ mod tests {
         let near = |at: f64, by: f64| (0.0..0.15).contains(&(at * by));
         assert!(near(z0 - 2.0, -1.0) && near(z1 - 3.0, 1.0), "{z0} to {z1}");
         assert!(near(y0, -1.0) && near(y1 - 2.0, 1.0), "{y0} to {y1}");
+    }
+
+    #[test]
+    fn the_largest_surface_stands_for_a_direction_whatever_the_order() {
+        let wall = [
+            DVec3::ZERO,
+            DVec3::new(0.0, 3.0, 0.0),
+            DVec3::new(0.0, 0.0, 5.0),
+        ];
+        // A short piece of the wall, its vertices moved by 2 mm: it leans by 0.6 degrees.
+        let small = [
+            DVec3::new(0.0, 0.0, 5.0),
+            DVec3::new(0.0, 0.2, 5.0),
+            DVec3::new(0.002, 0.0, 5.2),
+        ];
+        let opening = Opening {
+            plane: Plane::through(DVec3::ZERO, DVec3::X),
+            center: DVec3::ZERO,
+            area: 2.0,
+            closed: 0.0,
+        };
+        for around in [[wall, small], [small, wall]] {
+            let [walls, ..] = candidate_normals(&opening, &around);
+            assert_eq!(walls, [DVec3::X]);
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! | how badly triangles fit together | `misfit` |
 //! | which side of a surface is matter | `backs` |
 //! | where cells are one room | `pinch`, `lattice` |
-//! | which plane an opening lies in | `candidate` |
+//! | which plane an opening lies in | `candidate`, `picture` |
 
 mod backs;
 mod blockers;
@@ -17,6 +17,7 @@ mod frame;
 mod lattice;
 mod misfit;
 mod of;
+mod picture;
 mod pinch;
 mod slabs;
 mod stairs;

@@ -189,6 +189,26 @@ pub enum GraphError {
         /// How many there are.
         n_cells: usize,
     },
+    /// What lies beyond the locator's box is not the outdoors, or the outdoors does not lie there.
+    #[error("the locator's outside is {}, the outdoors {}; they must be the same", cell_name(*.outside), cell_name(*.outdoors))]
+    OutsideOutdoors {
+        /// The cell beyond the locator's box.
+        outside: Option<u32>,
+        /// The cell that is marked as the outdoors.
+        outdoors: Option<u32>,
+    },
+    /// A box lies, or reaches, where nothing of the world can be.
+    #[error("{owner}: the box {min:?} to {max:?} reaches out of {of}")]
+    FarBox {
+        /// Whose box it is, e.g. `cell 3`, `the locator`.
+        owner: String,
+        /// What it should lie in or around.
+        of: &'static str,
+        /// Least corner. [Units: wu]
+        min: [f64; 3],
+        /// Greatest corner. [Units: wu]
+        max: [f64; 3],
+    },
     /// A count in the statistics is not finite.
     #[error("statistic {name:?} is {value}, not a finite number")]
     Statistic {
@@ -237,6 +257,10 @@ pub enum GraphError {
 
 fn polygon_name(piece: Option<u32>) -> String {
     piece.map_or_else(|| "outline".into(), |i| format!("piece {i}"))
+}
+
+fn cell_name(cell: Option<u32>) -> String {
+    cell.map_or_else(|| "no cell".into(), |i| format!("cell {i}"))
 }
 
 fn node_name(node: Option<u32>) -> String {

@@ -11,7 +11,9 @@ use enfilade_geom::{Aabb, DVec3};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
+use super::boxes;
 use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
+use super::rows::{Row, eight, four};
 use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError};
 use crate::look::material_of_text;
 use crate::{
@@ -111,35 +113,6 @@ fn check_version(text: &str) -> Result<(), WireError> {
     }
 }
 
-/// A row of an accessor.
-trait Row: Sized {
-    const KIND: &'static str;
-    const SIZE: usize;
-    fn of_bytes(bytes: &[u8]) -> Self;
-}
-
-macro_rules! float_rows {
-    ($($n:literal $kind:literal),*) => {$(
-        impl Row for [f32; $n] {
-            const KIND: &'static str = $kind;
-            const SIZE: usize = 4 * $n;
-            fn of_bytes(bytes: &[u8]) -> Self {
-                std::array::from_fn(|i| f32::from_le_bytes(four(bytes, 4 * i)))
-            }
-        }
-    )*};
-}
-float_rows!(2 "VEC2", 3 "VEC3", 4 "VEC4");
-
-/// Four bytes from `at` on. Callers hand in slices of checked length.
-fn four(bytes: &[u8], at: usize) -> [u8; 4] {
-    std::array::from_fn(|i| bytes[at + i])
-}
-
-fn eight(bytes: &[u8], at: usize) -> [u8; 8] {
-    std::array::from_fn(|i| bytes[at + i])
-}
-
 struct Reader<'a> {
     root: &'a json::Root,
     bin: &'a [u8],
@@ -168,12 +141,10 @@ impl<'a> Reader<'a> {
             Some(mesh) => self.mesh(*mesh),
             None => Ok(Mesh::default()),
         });
-        let detail_meshes = detail_meshes.collect::<Result<_, _>>()?;
-        let details = graph
-            .details
-            .iter()
-            .enumerate()
-            .map(|(i, d)| self.detail(i, d));
+        let detail_meshes = detail_meshes.collect::<Result<Vec<Mesh>, _>>()?;
+        let boxes = detail_meshes.iter().map(|m| boxes::of_mesh(&m.primitives));
+        let boxes: Vec<Aabb> = boxes.collect();
+        let details = (graph.details.iter().enumerate()).map(|(i, d)| self.detail(i, d, &boxes));
         let details = details.collect::<Result<_, _>>()?;
         let materials = self.root.materials.iter().enumerate().map(|(i, text)| {
             material_of_text(text.get()).map_err(|why| broken(format!("material {i}"), why))
@@ -252,13 +223,15 @@ impl<'a> Reader<'a> {
 
     fn graph(&mut self) -> Result<CellPortalGraph, WireError> {
         let graph = &self.root.extensions.graph;
-        let n_nodes = self.root.nodes.len();
+        let nodes = &self.root.nodes;
         let cells = graph.cells.iter().enumerate().map(|(i, c)| {
-            if c.node as usize >= n_nodes {
-                return Err(broken(
-                    format!("cell {i}"),
-                    format!("node {} of {n_nodes}", c.node),
-                ));
+            let at = || format!("cell {i}");
+            let Some(node) = nodes.get(c.node as usize) else {
+                return Err(broken(at(), format!("node {} of {}", c.node, nodes.len())));
+            };
+            if node.name != c.name {
+                let names = format!("is called {:?}, its node {:?}", c.name, node.name);
+                return Err(broken(at(), names));
             }
             Ok(Cell {
                 name: c.name.clone(),
@@ -414,7 +387,13 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn detail(&self, i: usize, detail: &json::Detail) -> Result<DetailObject, WireError> {
+    /// `boxes` are those of the meshes.
+    fn detail(
+        &self,
+        i: usize,
+        detail: &json::Detail,
+        boxes: &[Aabb],
+    ) -> Result<DetailObject, WireError> {
         let at = || format!("detail {i}");
         let node = self.root.nodes.get(detail.node as usize);
         let node = node.ok_or_else(|| broken(at(), format!("no node {}", detail.node)))?;
@@ -422,11 +401,19 @@ impl<'a> Reader<'a> {
         if meshes.get(detail.mesh as usize) != Some(&node.mesh) {
             return Err(broken(at(), "its mesh is not its node's"));
         }
-        let identity = super::transform::IDENTITY;
+        let transform = super::transform::of_node(node).map_err(|why| broken(at(), why))?;
+        if let Some(said) = &detail.aabb
+            && !boxes::agree(said, &boxes[detail.mesh as usize], &transform)
+        {
+            return Err(broken(
+                at(),
+                "does not fill its box: one of the two was changed",
+            ));
+        }
         Ok(DetailObject {
             name: node.name.clone(),
             mesh: detail.mesh,
-            transform: node.matrix.map_or(identity, |m| m.map(|v| v as f32)),
+            transform,
             cells: detail.cells.iter().copied().map(CellId).collect(),
         })
     }

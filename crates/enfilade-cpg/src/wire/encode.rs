@@ -6,9 +6,11 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use enfilade_geom::Aabb;
 use enfilade_geom::scene::{Image, Mesh};
 use serde_json::value::RawValue;
 
+use super::boxes;
 use super::buffer::{Layout, image_bytes, mime};
 use super::json::{self, TEXTURE_EXTENSIONS};
 use super::transform::{IDENTITY, is_trs, transformed};
@@ -232,13 +234,19 @@ fn lay_out_details<'a>(
             meshes.len() as u32 - 1
         }));
     }
+    let boxes: Vec<Aabb> = (world.detail_meshes.iter())
+        .map(|mesh| boxes::of_mesh(drawn(mesh)))
+        .collect();
     let (mut details, mut children) = (Vec::new(), Vec::new());
     for detail in &world.details {
+        let mut local = boxes[detail.mesh as usize];
         let mut mesh = detail.mesh;
         let mut transform = detail.transform;
         if detail_meshes[mesh as usize].is_some() && !is_trs(&transform) {
             let source = &world.detail_meshes[mesh as usize];
-            let moved = drawn(source).map(|p| Cow::Owned(transformed(p, &transform)));
+            let moved: Vec<_> = drawn(source).map(|p| transformed(p, &transform)).collect();
+            local = boxes::of_mesh(&moved);
+            let moved = moved.into_iter().map(Cow::Owned);
             meshes.push(layout.push_mesh(&source.name, moved));
             layout.n_flattened += 1;
             mesh = detail_meshes.len() as u32;
@@ -257,6 +265,7 @@ fn lay_out_details<'a>(
             node,
             mesh,
             cells: ids(&detail.cells),
+            aabb: boxes::placed(&local, &transform),
         });
     }
     push_parent(nodes, top, "details", children);

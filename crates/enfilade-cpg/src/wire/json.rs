@@ -62,6 +62,13 @@ pub(super) struct Node {
     pub(super) mesh: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) matrix: Option<[f64; 16]>,
+    /// Instead of a matrix, as other programs write; we only read these.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) translation: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) rotation: Option<[f64; 4]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) scale: Option<[f64; 3]>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -226,6 +233,9 @@ pub(super) struct Detail {
     /// Index into `detailMeshes`.
     pub(super) mesh: u32,
     pub(super) cells: Vec<u32>,
+    /// Absent for a mesh without vertices, and in files of before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) aabb: Option<[[f64; 3]; 2]>,
 }
 
 #[derive(Serialize, Deserialize)]

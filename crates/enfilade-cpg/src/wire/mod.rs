@@ -29,10 +29,12 @@
 //!   transformed copy of its mesh, counted as `flattened_details`.
 //! - an image without bytes (its file was missing) becomes one white pixel.
 
+mod boxes;
 mod buffer;
 mod decode;
 mod encode;
 mod json;
+mod rows;
 mod transform;
 
 pub use decode::decode_glb;

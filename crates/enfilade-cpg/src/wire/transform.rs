@@ -1,12 +1,40 @@
 //! Transforms of placed objects, within what glTF nodes can express.
 
 use enfilade_geom::scene::Primitive;
-use enfilade_geom::{DMat3, DMat4, DVec3};
+use enfilade_geom::{DMat3, DMat4, DQuat, DVec3};
+
+use super::json::Node;
 
 /// Stays where it is.
 pub(super) const IDENTITY: [f32; 16] = [
     1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
 ];
+
+/// The transform of a node: its matrix, or its translation, rotation (x, y, z, w) and scale.
+///
+/// # Errors
+///
+/// A node that has both, which glTF forbids, and a rotation that is no unit quaternion.
+pub(super) fn of_node(node: &Node) -> Result<[f32; 16], &'static str> {
+    let has_parts = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
+    if !has_parts {
+        return Ok(node.matrix.map_or(IDENTITY, |m| m.map(|v| v as f32)));
+    }
+    if node.matrix.is_some() {
+        return Err("has a matrix and a translation, rotation or scale");
+    }
+    let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    // Quaternions rounded to a few digits are common; what is farther off turns nothing.
+    if (rotation.length() - 1.0).abs() > 1e-2 || !rotation.is_finite() {
+        return Err("its rotation is not of unit length");
+    }
+    let whole = DMat4::from_scale_rotation_translation(
+        node.scale.unwrap_or([1.0; 3]).into(),
+        rotation.normalize(),
+        node.translation.unwrap_or_default().into(),
+    );
+    Ok(whole.to_cols_array().map(|v| v as f32))
+}
 
 /// Whether a transform is translation, rotation and scale, as glTF demands of a node's matrix.
 ///

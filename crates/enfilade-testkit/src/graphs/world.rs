@@ -154,6 +154,9 @@ fn cells_of(grid: &Grid) -> Vec<Cell> {
     if let Some(outdoors) = grid.outdoors {
         let all = boxes.iter().fold(Aabb::EMPTY, |b, &c| b.union(c));
         boxes[outdoors as usize] = all.expanded(5.0);
+        // All of the locator's box that is no room.
+        let rooms: f32 = cells.iter().map(|c| c.volume).sum();
+        cells[outdoors as usize].volume = (all.volume() as f32 - rooms).max(0.0);
     }
     for (cell, b) in cells.iter_mut().zip(&boxes) {
         cell.aabb = [

@@ -206,11 +206,23 @@ pub(crate) fn house_with_locator_plane(door_x: f64) -> World {
             ],
         ),
     ];
-    let cells = vec![
+    let mut cells = vec![
         cell("cell-0", [0.0; 3], [4.125, 3.0, 4.0], &[0, 1], false),
         cell("cell-1", [4.125, 0.0, 0.0], [8.25, 3.0, 4.0], &[0], false),
         cell("outdoors", [-2.0; 3], [10.25, 5.0, 6.0], &[1], true),
     ];
+    // The rooms with half of the doorway each; the rest of the box but the house is outdoors.
+    let doorway = |width: f64| (48.0 + 2.0 * width) as f32;
+    cells[0].volume = doorway(door_x - 4.0);
+    cells[1].volume = doorway(4.25 - door_x);
+    cells[2].volume = 12.25 * 7.0 * 8.0 - 8.25 * 3.0 * 4.0;
+    cells[0].aabb[1][0] = door_x as f32;
+    cells[1].aabb[0][0] = door_x as f32;
+    for batch in &batches {
+        for c in &batch.cells {
+            cells[c.0 as usize].n_triangles += batch.primitive.indices.len() as u32 / 3;
+        }
+    }
     let graph = CellPortalGraph {
         cells,
         portals,
@@ -259,13 +271,27 @@ pub(crate) fn moved(mut world: World, by: &DMat4) -> World {
         }
         b
     };
-    for c in &mut world.graph.cells {
-        let [min, max] = c.aabb.map(|p| DVec3::from_array(p.map(f64::from)));
-        let b = box_of(min, max);
+    let rooms = [
+        [
+            ([0.0, 0.0, 0.0], [4.0, 3.0, 4.0]),
+            ([4.0, 0.0, 1.0], [DOOR_X, 2.0, 2.0]),
+        ],
+        [
+            ([4.25, 0.0, 0.0], [8.25, 3.0, 4.0]),
+            ([DOOR_X, 0.0, 1.0], [4.25, 2.0, 2.0]),
+        ],
+    ];
+    for (c, parts) in world.graph.cells.iter_mut().zip(rooms) {
+        let b = parts.map(|(min, max)| box_of(min.into(), max.into()));
+        let b = b[0].union(b[1]);
         c.aabb = [b.min.as_vec3().to_array(), b.max.as_vec3().to_array()];
     }
     let locator = &mut world.graph.locator;
+    let before = locator.bounds.volume();
     locator.bounds = box_of(locator.bounds.min, locator.bounds.max);
+    let outdoors = &mut world.graph.cells[2];
+    outdoors.volume += (locator.bounds.volume() - before) as f32;
+    outdoors.aabb = [locator.bounds.min, locator.bounds.max].map(|p| p.as_vec3().to_array());
     for p in &mut locator.planes {
         let plane = Plane {
             normal: DVec3::new(p[0], p[1], p[2]),

@@ -1,0 +1,74 @@
+//! Are boxes where the geometry is? Who reads a world sizes pictures and grids by them.
+
+use enfilade_geom::{Aabb, DVec3};
+
+use super::error::{Findings, GraphError};
+use crate::{CellPortalGraph, World};
+
+/// What a box may stick out by: corners are rounded to `f32`, outwards by some builders, and cells that end at
+/// the locator's border end within its planes' rounding. [Units: wu] Relative to the largest coordinate below.
+const SLACK: f64 = 1e-3;
+const RELATIVE_SLACK: f64 = 1e-5;
+
+/// How far the space around a model may reach beyond it: so many times its largest side, and so many meters more.
+/// Builders leave meters; a thousand times as much is an error or an attack.
+const AROUND: f64 = 10.0;
+const AROUND_AT_LEAST: f64 = 100.0;
+
+/// A room lies in the locator's box: beyond it, all is outside.
+pub(super) fn check_cells_in_locator(graph: &CellPortalGraph, found: &mut Findings) {
+    let bounds = graph.locator.bounds;
+    if bounds.is_empty() {
+        return;
+    }
+    let reach = bounds.expanded(SLACK + RELATIVE_SLACK * bounds.extent());
+    for (i, cell) in graph.cells.iter().enumerate().filter(|c| !c.1.outdoor) {
+        let b = box_of(cell.aabb);
+        if !holds(&reach, &b) {
+            found.push(GraphError::FarBox {
+                owner: format!("cell {i}"),
+                of: "the locator's box",
+                min: b.min.into(),
+                max: b.max.into(),
+            });
+        }
+    }
+}
+
+/// The locator's box and the outdoors' lie around the model. A world without triangles says nothing.
+pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
+    let graph = &world.graph;
+    let corners = world.batches.iter().flat_map(|b| &b.primitive.positions);
+    let portals = graph.portals.iter().flat_map(|p| &p.outline);
+    let model = corners
+        .chain(portals)
+        .map(|&p| DVec3::from(p.map(f64::from)))
+        .filter(|p| p.is_finite())
+        .fold(Aabb::EMPTY, Aabb::including);
+    if model.is_empty() {
+        return;
+    }
+    let reach = model.expanded(AROUND * model.size().max_element() + AROUND_AT_LEAST);
+    let mut check = |owner: String, b: Aabb| {
+        if !b.is_empty() && !holds(&reach, &b) {
+            found.push(GraphError::FarBox {
+                owner,
+                of: "the model",
+                min: b.min.into(),
+                max: b.max.into(),
+            });
+        }
+    };
+    check("the locator".into(), graph.locator.bounds);
+    for (i, cell) in graph.cells.iter().enumerate() {
+        check(format!("cell {i}"), box_of(cell.aabb));
+    }
+}
+
+fn holds(outer: &Aabb, inner: &Aabb) -> bool {
+    outer.contains(inner.min) && outer.contains(inner.max)
+}
+
+fn box_of([min, max]: [[f32; 3]; 2]) -> Aabb {
+    Aabb::new(min.map(f64::from).into(), max.map(f64::from).into())
+}

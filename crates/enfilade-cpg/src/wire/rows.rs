@@ -1,0 +1,30 @@
+//! Rows of numbers as they lie in a buffer: little-endian, tightly packed.
+
+/// A row of an accessor.
+pub(super) trait Row: Sized {
+    const KIND: &'static str;
+    const SIZE: usize;
+    fn of_bytes(bytes: &[u8]) -> Self;
+}
+
+macro_rules! float_rows {
+    ($($n:literal $kind:literal),*) => {$(
+        impl Row for [f32; $n] {
+            const KIND: &'static str = $kind;
+            const SIZE: usize = 4 * $n;
+            fn of_bytes(bytes: &[u8]) -> Self {
+                std::array::from_fn(|i| f32::from_le_bytes(four(bytes, 4 * i)))
+            }
+        }
+    )*};
+}
+float_rows!(2 "VEC2", 3 "VEC3", 4 "VEC4");
+
+/// Four bytes from `at` on. Callers hand in slices of checked length.
+pub(super) fn four(bytes: &[u8], at: usize) -> [u8; 4] {
+    std::array::from_fn(|i| bytes[at + i])
+}
+
+pub(super) fn eight(bytes: &[u8], at: usize) -> [u8; 8] {
+    std::array::from_fn(|i| bytes[at + i])
+}

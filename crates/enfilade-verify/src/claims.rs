@@ -1,0 +1,120 @@
+//! What a world says about its cells in numbers: boxes, volumes, counts and names.
+
+use enfilade_cpg::{CellId, Seals, World};
+
+use crate::locator_cells::measure;
+use crate::subject::to_dvec;
+
+/// Greatest share by which a volume may be off: builders sum up the same leaves, and slivers go to one side or the other.
+const VOLUME_SHARE: f64 = 1e-3;
+/// What a volume may be off in any case, and by each square meter of its box: planes may be snapped by a tolerance. [Units: wu]
+const VOLUME_SKIN: f64 = 1e-4;
+/// What a side of a box may be off. [Units: wu]
+const SIDE: f64 = 1e-3;
+
+/// Problems, a line each.
+pub(crate) fn check(world: &World) -> Vec<String> {
+    let mut out = Vec::new();
+    check_names(world, &mut out);
+    check_counts(world, &mut out);
+    check_extents(world, &mut out);
+    out
+}
+
+/// A cell called by a number is called by its own.
+fn check_names(world: &World, out: &mut Vec<String>) {
+    for (i, cell) in world.graph.cells.iter().enumerate() {
+        let number = cell.name.strip_prefix("cell-");
+        let number = number.and_then(|n| n.parse::<usize>().ok());
+        if number.is_some_and(|n| n != i) {
+            out.push(format!("cell {i} is called {:?}", cell.name));
+        }
+    }
+}
+
+/// Triangles are counted by who lists a cell, and seals of the bake are still there.
+fn check_counts(world: &World, out: &mut Vec<String>) {
+    let n_cells = world.graph.cells.len();
+    let (mut structural, mut detail) = (vec![0; n_cells], vec![0; n_cells]);
+    for batch in world.batches.iter().filter(|b| !b.is_seal) {
+        add(&mut structural, &batch.cells, batch.primitive.indices.len());
+    }
+    for object in &world.details {
+        let mesh = &world.detail_meshes[object.mesh as usize];
+        let n = mesh.primitives.iter().map(|p| p.indices.len()).sum();
+        add(&mut detail, &object.cells, n);
+    }
+    for (i, cell) in world.graph.cells.iter().enumerate() {
+        let pairs = [
+            ("triangles", cell.n_triangles, structural[i]),
+            ("triangles of details", cell.n_detail_triangles, detail[i]),
+        ];
+        for (what, said, found) in pairs {
+            if said as usize != found / 3 {
+                let found = found / 3;
+                out.push(format!(
+                    "{}: says {said} {what}, {found} list it",
+                    cell.name
+                ));
+            }
+        }
+    }
+    // Later work may cut a seal in two, but never takes one away.
+    let said = world.graph.statistics.counts.get("seals");
+    let found = Seals::of(world).count;
+    if let Some(said) = said.filter(|&&said| said > found as f64) {
+        out.push(format!("{said} seals were made, {found} are there"));
+    }
+}
+
+fn add(sums: &mut [usize], cells: &[CellId], n: usize) {
+    for c in cells {
+        sums[c.0 as usize] += n;
+    }
+}
+
+/// Boxes and volumes are those of the locator's leaves.
+fn check_extents(world: &World, out: &mut Vec<String>) {
+    let bounds = world.graph.locator.bounds;
+    if bounds.is_empty() {
+        return;
+    }
+    let Some(extents) = measure(world) else {
+        out.push("the locator is no tree: parts of it are shared too often to be measured".into());
+        return;
+    };
+    let side = SIDE + 1e-6 * bounds.extent();
+    for (cell, found) in world.graph.cells.iter().zip(extents) {
+        let [min, max] = cell.aabb.map(to_dvec);
+        let name = &cell.name;
+        let mut skin = found.bounds.surface_area().max(0.0) * VOLUME_SKIN + VOLUME_SKIN;
+        if cell.outdoor {
+            // What the rooms leave of the whole: a difference of numbers in `f32`.
+            skin += 1e-6 * bounds.volume();
+        }
+        let off = (f64::from(cell.volume) - found.volume).abs();
+        if off > VOLUME_SHARE * found.volume + skin {
+            let (said, found) = (cell.volume, found.volume);
+            out.push(format!(
+                "{name}: says {said} m³, the locator has {found:.4} m³ of it"
+            ));
+        }
+        let is_off = if cell.outdoor {
+            // The outdoors goes on beyond the box.
+            (min - bounds.min).max_element() > side || (bounds.max - max).max_element() > side
+        } else {
+            // Around all but hairs, and no larger than all.
+            let lacks = (min - found.thick.min).max(found.thick.max - max);
+            let exceeds = (found.bounds.min - min).max(max - found.bounds.max);
+            let is_small = !found.thick.is_empty() && lacks.max_element() > side;
+            is_small || (!found.bounds.is_empty() && exceeds.max_element() > side)
+        };
+        if is_off {
+            let b = if cell.outdoor { bounds } else { found.bounds };
+            out.push(format!(
+                "{name}: says the box {min:.4} to {max:.4}, it fills {:.4} to {:.4}",
+                b.min, b.max
+            ));
+        }
+    }
+}

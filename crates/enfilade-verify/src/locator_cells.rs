@@ -1,0 +1,150 @@
+//! What the locator's cells are like: the convex leaves of its tree, cut out of its box one by one.
+
+use enfilade_cpg::{Locator, World};
+use enfilade_geom::poly::{self, Poly, Sides};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding};
+
+/// Volume and box of a cell, as the locator has it.
+#[derive(Clone, Copy)]
+pub(crate) struct Extent {
+    pub(crate) volume: f64,
+    /// Around all leaves; some are hairs between planes that nearly coincide, which a builder may give to either side.
+    pub(crate) bounds: Aabb,
+    /// Around the leaves that are no hairs.
+    pub(crate) thick: Aabb,
+}
+
+/// Leaves whose volume is less than this times their largest face are hairs. [Units: wu]
+const HAIR: f64 = 1e-3;
+
+/// A tree reaches each node once; by hand some parts may be shared.
+const SHARED: usize = 32;
+
+/// A convex body by its faces, corners counter-clockwise seen from outside.
+type Body = Vec<Poly>;
+
+/// Volume and box of each cell within the locator's box.
+///
+/// Time: leaves times faces of a leaf. `None` where nodes are reached so often that parts of the locator must be shared
+/// many times over: its leaves may be more than anyone can count.
+pub(crate) fn measure(world: &World) -> Option<Vec<Extent>> {
+    let locator = &world.graph.locator;
+    let none = Extent {
+        volume: 0.0,
+        bounds: Aabb::EMPTY,
+        thick: Aabb::EMPTY,
+    };
+    let mut out = vec![none; world.graph.cells.len()];
+    if locator.bounds.is_empty() {
+        return Some(out);
+    }
+    let eps = 1e-10 * locator.bounds.extent().max(1.0);
+    let mut visits = 0;
+    let mut stack = vec![(locator.root, box_body(&locator.bounds))];
+    while let Some((at, body)) = stack.pop() {
+        if at < 0 {
+            let cell = (-2 - i64::from(at)) as usize;
+            if at <= -2
+                && let Some(extent) = out.get_mut(cell)
+            {
+                let volume = volume(&body);
+                extent.volume += volume;
+                let around = Aabb::of_points(body.iter().flatten());
+                extent.bounds = extent.bounds.union(around);
+                let face = body.iter().map(|f| poly::area(f)).fold(0.0, f64::max);
+                if volume > HAIR * face {
+                    extent.thick = extent.thick.union(around);
+                }
+            }
+            continue;
+        }
+        visits += 1;
+        if visits > SHARED * locator.nodes.len() {
+            return None;
+        }
+        let plane = plane_of(locator, at as usize);
+        let (front, back) = split(body, &plane, eps);
+        let parts = locator.nodes[at as usize].children.into_iter();
+        stack.extend(parts.zip([front, back]).filter(|(_, body)| body.len() > 3));
+    }
+    Some(out)
+}
+
+/// The plane of a node, of unit normal.
+pub(crate) fn plane_of(locator: &Locator, node: usize) -> Plane {
+    let [x, y, z, d] = locator.planes[locator.nodes[node].plane as usize];
+    let normal = DVec3::new(x, y, z);
+    let length = normal.length();
+    Plane {
+        normal: normal / length,
+        d: d / length,
+    }
+}
+
+fn box_body(b: &Aabb) -> Body {
+    let corner = |k: usize| {
+        let pick = |axis: usize| {
+            if k >> axis & 1 == 0 {
+                b.min[axis]
+            } else {
+                b.max[axis]
+            }
+        };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    // Bit 0 is x, bit 1 is y, bit 2 is z.
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let face = |f: [usize; 4]| f.map(corner).into_iter().collect();
+    faces.into_iter().map(face).collect()
+}
+
+/// The parts before and behind a plane; a part without faces is empty.
+fn split(body: Body, plane: &Plane, eps: f64) -> (Body, Body) {
+    let heights = body.iter().flatten().map(|p| plane.signed_distance(*p));
+    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), d| (l.min(d), h.max(d)));
+    if low >= -eps {
+        return (body, Vec::new());
+    }
+    if high <= eps {
+        return (Vec::new(), body);
+    }
+    let (mut front, mut back) = (Vec::new(), Vec::new());
+    let mut rim = Vec::new();
+    for face in body {
+        match poly::split(&face, plane, eps) {
+            Sides::Front => front.push(face),
+            Sides::Back => back.push(face),
+            // Flat in the plane, though the body is on both sides of it: a hair that rounding left.
+            Sides::On => {}
+            Sides::Both(f, b) => {
+                rim.extend(
+                    f.iter()
+                        .filter(|p| plane.signed_distance(**p).abs() <= 2.0 * eps),
+                );
+                front.push(f);
+                back.push(b);
+            }
+        }
+    }
+    let cap = Winding::hull_in_plane(plane, &rim).points;
+    if cap.len() >= 3 {
+        back.push(cap.iter().copied().collect());
+        front.push(cap.iter().rev().copied().collect());
+    }
+    (front, back)
+}
+
+fn volume(body: &Body) -> f64 {
+    let Some(&o) = body.first().and_then(|f| f.first()) else {
+        return 0.0;
+    };
+    let cone = |f: &Poly| (f[0] - o).dot(poly::area_normal(f)) / 6.0;
+    body.iter().map(cone).sum()
+}
