@@ -124,13 +124,12 @@ impl Renderer {
                 layout: &self.layouts.world,
                 entries: &[
                     bound(0, &self.globals),
-                    bound(1, &world.cell_colors),
                     wgpu::BindGroupEntry {
-                        binding: 2,
+                        binding: 1,
                         resource: wgpu::BindingResource::TextureView(&self.shadow_map),
                     },
                     wgpu::BindGroupEntry {
-                        binding: 3,
+                        binding: 2,
                         resource: wgpu::BindingResource::Sampler(&self.shadow_sampler),
                     },
                 ],
