@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::pipelines::{COLOR, DEPTH, ID};
+use crate::formats::{COLOR, DEPTH, ID};
 
 /// Why something cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -4,10 +4,10 @@
 //! drawn. Two layers: surfaces that hide what is behind them, and the nearest that is seen through.
 
 use crate::camera::Projection;
+use crate::formats::ID;
 use crate::frame::Style;
 use crate::gpu::{Gpu, RenderError};
 use crate::list::DrawList;
-use crate::pipelines::ID;
 use crate::renderer::{Renderer, Stage};
 use crate::resources::{bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;

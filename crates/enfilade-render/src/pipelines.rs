@@ -3,12 +3,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::formats::{COLOR, DEPTH, ID};
 use crate::gpu::Gpu;
 use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
-
-pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-pub(crate) const ID: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
@@ -225,10 +222,18 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
 
 const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
 
-impl Pipelines {
-    pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, output: wgpu::TextureFormat) -> Self {
-        let writes_depth = gpu.writes_depth();
-        let drawn = if writes_depth {
+/// The shaders.
+struct Modules {
+    surface: wgpu::ShaderModule,
+    ids: wgpu::ShaderModule,
+    depth: wgpu::ShaderModule,
+    post: wgpu::ShaderModule,
+    lines: wgpu::ShaderModule,
+}
+
+impl Modules {
+    fn new(gpu: &Gpu) -> Self {
+        let drawn = if gpu.writes_depth() {
             include_str!("shaders/depth_written.wgsl")
         } else {
             include_str!("shaders/depth_drawn.wgsl")
@@ -252,6 +257,26 @@ impl Pipelines {
         let sky = include_str!("shaders/sky.wgsl");
         let post = module("post", &[sky, include_str!("shaders/post.wgsl")]);
         let lines = module("lines", &[include_str!("shaders/lines.wgsl")]);
+        Self {
+            surface,
+            ids,
+            depth,
+            post,
+            lines,
+        }
+    }
+}
+
+impl Pipelines {
+    pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, output: wgpu::TextureFormat) -> Self {
+        let writes_depth = gpu.writes_depth();
+        let Modules {
+            surface,
+            ids,
+            depth,
+            post,
+            lines,
+        } = Modules::new(gpu);
         let surfaces = [CORNER_LAYOUT, INSTANCE_LAYOUT];
         let at_least = wgpu::CompareFunction::GreaterEqual;
         let base = Kind {

@@ -5,8 +5,8 @@
 use enfilade_cpg::{DetailObject, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Gpu, Mark, Oracle, Paint, Picture, RenderError, Shape, Studio,
-    Style,
+    AdapterChoice, Camera, Culling, Gpu, Mark, Oracle, Paint, Picture, RenderError, Shape, Shown,
+    Studio, Style,
 };
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
@@ -208,5 +208,44 @@ fn opengl_asked_about_portals_loses_no_pixel() {
             assert!(n < 8, "{n} pixels, {counts:?}");
             assert!(counts.n_rounds >= 1 && counts.n_cells >= 1);
         }
+    }
+}
+
+#[test]
+fn by_opengl_too_surfaces_a_hand_apart_stay_apart_far_away() {
+    let mut world = World::default();
+    // The one behind first: of two that tie, that is shown.
+    for (i, z) in (0..).zip([-60.1, -60.0]) {
+        let positions = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]];
+        world.detail_meshes.push(Mesh {
+            primitives: vec![Primitive {
+                positions: positions.map(|[x, y]| [x, y, z]).to_vec(),
+                indices: vec![0, 1, 2, 0, 2, 3],
+                ..Primitive::default()
+            }],
+            ..Mesh::default()
+        });
+        world.details.push(DetailObject {
+            name: String::new(),
+            mesh: i,
+            transform: glam::Mat4::IDENTITY.to_cols_array(),
+            cells: Vec::new(),
+        });
+    }
+    // A little aslant, so that depths are not the same all over.
+    let camera = Camera::looking_at([1.0, 2.0, 0.0], [0.0, 0.0, -60.0]);
+    for gl in by_opengl() {
+        let mut studio = Studio::new(gl, &world).unwrap();
+        let [solid, _] = studio.ids(&camera, Culling::Everything, SIZE).unwrap();
+        let of = |n: u32| {
+            let is = |s: &Shown| matches!(s, Shown::Detail { detail, .. } if *detail == n);
+            solid.pixels.iter().filter(|p| is(&p.0)).count()
+        };
+        assert!(
+            of(1) > 100 && of(0) < 40,
+            "{} behind, {} before",
+            of(0),
+            of(1)
+        );
     }
 }
