@@ -1,7 +1,7 @@
 // What surfaces draw on OpenGL: depth as well.
 //
 // There, clip space runs from -1 to 1, and what is far away, at 0 here, would be at -1, where floats are
-// coarse: at 50 m, surfaces half a meter apart would tie. So the depth is computed again, exactly.
+// coarse: at 600 m, surfaces half a meter apart tie. So the depth is computed again, exactly.
 
 struct Drawn {
     @location(0) color: vec4<f32>,
