@@ -14,7 +14,7 @@ use enfilade::runtime::Sight;
 use enfilade_cli::cameras::{FOV, walk_cameras};
 use enfilade_cli::values::size;
 use enfilade_cli::world::read_world;
-use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Sparing, Studio, Style};
+use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Paint, Sparing, Studio, Style};
 use enfilade_testkit::{TowerParams, clinic, office_tower};
 
 use crate::table::Table;
@@ -103,8 +103,8 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
         if let Some(rings) = &rings {
             rings.place(&mut world);
         }
-        let mut studio =
-            Studio::new(Gpu::open(&args.adapter)?, &world).with_context(|| name.clone())?;
+        let mut studio = Studio::new(enfilade_cli::adapter::open(&args.adapter)?, &world)
+            .with_context(|| name.clone())?;
         adapter = studio.gpu.name();
         let cameras = walk_cameras(&world, &studio.sight, args.frames, FOV);
         if cameras.is_empty() {

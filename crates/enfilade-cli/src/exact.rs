@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use enfilade::cpg::{CellId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Gpu, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio,
-    Style,
+    AdapterChoice, Camera, Culling, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio, Style,
 };
 use enfilade_testkit::Rng;
 use serde::Serialize;
@@ -135,7 +134,7 @@ fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) 
 }
 
 pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Result<Exactness> {
-    let mut studio = Studio::new(Gpu::open(asked.adapter)?, world)?;
+    let mut studio = Studio::new(enfilade_cli::adapter::open(asked.adapter)?, world)?;
     let bounds = studio.world.bounds();
     let margin = 0.05;
     let bounds = [bounds[0].map(|x| x - margin), bounds[1].map(|x| x + margin)];

@@ -2,6 +2,7 @@
 //!
 //! A tool's own library, without promises to others; programs use the crate `enfilade`.
 
+pub mod adapter;
 pub mod answers;
 pub mod cameras;
 pub mod values;

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Picture, Projection, Shape, Sparing,
+    AdapterChoice, Camera, Culling, Frame, Mark, Paint, Picture, Projection, Shape, Sparing,
     Studio, Style,
 };
 use serde_json::json;
@@ -124,8 +124,8 @@ fn angle(text: &str) -> Result<f32, String> {
 /// Reads a world and puts it on an adapter.
 pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
     let world = read_world(path)?;
-    let studio =
-        Studio::new(Gpu::open(adapter)?, &world).with_context(|| path.display().to_string())?;
+    let studio = Studio::new(enfilade_cli::adapter::open(adapter)?, &world)
+        .with_context(|| path.display().to_string())?;
     let n = studio.world.n_missing_pictures();
     if n > 0 {
         writeln!(

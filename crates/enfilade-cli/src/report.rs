@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         parts.tables.push(on_a_walk(&sight, &steps));
     }
     if !args.no_pictures {
-        match Gpu::open(&args.adapter) {
+        match enfilade_cli::adapter::open(&args.adapter) {
             Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
             Err(why @ RenderError::NoAdapter) => {
                 let _ = writeln!(Told, "enfilade: the report has no pictures: {why}");

@@ -169,3 +169,33 @@ fn what_cannot_be_drawn_is_said() {
     ];
     refused(&nowhere, 1, "direction");
 }
+
+#[test]
+fn the_environment_tells_how_adapters_are_spoken_to() {
+    let world = grid("backend.glb");
+    let out = place("backend.png");
+    let by = |backend: &str| {
+        Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(["render", &world, "-o", out.to_str().unwrap()])
+            .args(["--size", "64x36", "--adapter", "software"])
+            .env("WGPU_BACKEND", backend)
+            .output()
+            .unwrap()
+    };
+    let none = by("nonsense");
+    let said = text(&none.stderr);
+    assert_eq!(none.status.code(), Some(1), "{said}");
+    assert!(said.contains("WGPU_BACKEND=nonsense"), "{said}");
+    let mut n = 0;
+    for backend in ["vulkan", "gl"] {
+        let done = by(backend);
+        if done.status.code() == Some(1) {
+            eprintln!("no software by {backend}: not tried");
+            continue;
+        }
+        let said = text(&done.stdout);
+        assert!(said.contains(&format!("({backend})")), "{said}");
+        n += 1;
+    }
+    assert!(n > 0, "neither Vulkan nor OpenGL draws here");
+}

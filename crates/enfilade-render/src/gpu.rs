@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::formats::{COLOR, DEPTH, ID};
+
 /// Why something cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -115,6 +117,10 @@ impl fmt::Debug for Gpu {
     }
 }
 
+fn named(info: &wgpu::AdapterInfo) -> String {
+    format!("{} ({})", info.name, info.backend)
+}
+
 fn rank(info: &wgpu::AdapterInfo) -> u32 {
     let kind = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -139,6 +145,21 @@ fn fits(choice: &AdapterChoice, info: &wgpu::AdapterInfo) -> bool {
     }
 }
 
+/// What an adapter lacks that drawing needs.
+fn lacking(adapter: &wgpu::Adapter) -> Option<String> {
+    let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
+    let read = drawn | wgpu::TextureUsages::TEXTURE_BINDING;
+    for (format, usages) in [(COLOR, read), (DEPTH, read), (ID, drawn)] {
+        let features = adapter.get_texture_format_features(format);
+        if !features.allowed_usages.contains(usages) {
+            return Some(format!("pictures of {format:?}"));
+        }
+    }
+    let flags = adapter.get_downlevel_capabilities().flags;
+    let compares = flags.contains(wgpu::DownlevelFlags::COMPARISON_SAMPLERS);
+    (!compares).then(|| "samplers that compare".into())
+}
+
 impl Gpu {
     /// Opens an adapter; no display is needed.
     ///
@@ -148,6 +169,13 @@ impl Gpu {
     pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         Self::open_with(&instance, choice, None)
+    }
+
+    /// The adapters of an instance, and how each is spoken to, e.g. `llvmpipe (vulkan)`.
+    #[must_use]
+    pub fn names(instance: &wgpu::Instance) -> Vec<String> {
+        let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        adapters.iter().map(|a| named(&a.get_info())).collect()
     }
 
     /// Opens an adapter of `instance` that can draw to `surface`.
@@ -166,7 +194,7 @@ impl Gpu {
         if adapters.is_empty() {
             return Err(RenderError::NoAdapter);
         }
-        let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
+        let names: Vec<String> = adapters.iter().map(|a| named(&a.get_info())).collect();
         let mut failed = None;
         for adapter in adapters {
             if !fits(choice, &adapter.get_info()) {
@@ -191,10 +219,8 @@ impl Gpu {
             adapter: name.clone(),
             why,
         };
-        if limits.max_storage_buffers_per_shader_stage < 2 {
-            return Err(broken(
-                "its shaders read no storage buffers, which drawing needs".into(),
-            ));
+        if let Some(what) = lacking(&adapter) {
+            return Err(broken(format!("it has no {what}, which drawing needs")));
         }
         let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::INDIRECT_FIRST_INSTANCE;
         let descriptor = wgpu::DeviceDescriptor {
@@ -213,11 +239,23 @@ impl Gpu {
         })
     }
 
-    /// The adapter's name, and how it is spoken to, e.g. `llvmpipe (Vulkan)`.
+    /// Whether vertex shaders read storage buffers: where they do not, as on WebGL 2, a world takes 36
+    /// bytes more for each triangle.
+    pub(crate) fn fetches(&self) -> bool {
+        let flags = self.adapter.get_downlevel_capabilities().flags;
+        flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE)
+            && self.device.limits().max_storage_buffers_per_shader_stage >= 2
+    }
+
+    /// Whether shaders have to write depths themselves, as on OpenGL: see `depth_written.wgsl`.
+    pub(crate) fn writes_depth(&self) -> bool {
+        self.adapter.get_info().backend == wgpu::Backend::Gl
+    }
+
+    /// The adapter's name, and how it is spoken to, e.g. `llvmpipe (vulkan)`.
     #[must_use]
     pub fn name(&self) -> String {
-        let info = self.adapter.get_info();
-        format!("{} ({})", info.name, info.backend)
+        named(&self.adapter.get_info())
     }
 
     /// Whether software stands in for a card: what it takes says little of cards.

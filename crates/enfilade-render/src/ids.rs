@@ -4,10 +4,10 @@
 //! drawn. Two layers: surfaces that hide what is behind them, and the nearest that is seen through.
 
 use crate::camera::Projection;
+use crate::formats::ID;
 use crate::frame::Style;
 use crate::gpu::{Gpu, RenderError};
 use crate::list::DrawList;
-use crate::pipelines::ID;
 use crate::renderer::{Renderer, Stage};
 use crate::resources::{bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
@@ -119,14 +119,19 @@ impl Renderer {
         self.resize(gpu, size)?;
         self.write_globals(gpu, stage, projection, &Style::default(), size);
         self.write_instances(gpu, world, list);
+        let entries = [
+            bound(0, &self.globals),
+            bound(1, &world.corners),
+            bound(2, &world.indices),
+        ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("ids"),
             layout: &self.layouts.ids,
-            entries: &[
-                bound(0, &self.globals),
-                bound(1, &world.corners),
-                bound(2, &world.indices),
-            ],
+            entries: if world.listed.is_some() {
+                &entries[..1]
+            } else {
+                &entries
+            },
         });
         let target = || texture(gpu, "ids", size, ID, wgpu::TextureUsages::COPY_SRC);
         let layers = [target(), target()];
@@ -150,6 +155,9 @@ impl Renderer {
                 pass.set_pipeline(&self.pipelines.id);
                 pass.set_bind_group(0, &group, &[]);
                 pass.set_vertex_buffer(0, self.instances.buffer.slice(..));
+                if let Some(listed) = &world.listed {
+                    pass.set_vertex_buffer(1, listed.slice(..));
+                }
                 for run in runs {
                     let [x, y, w, h] = run.scissor.unwrap_or([0, 0, size[0], size[1]]);
                     pass.set_scissor_rect(x, y, w, h);

@@ -10,6 +10,7 @@
 //! light and dark corners. Metal, roughness and normal maps are not drawn.
 
 mod camera;
+mod formats;
 mod frame;
 mod gpu;
 mod ids;

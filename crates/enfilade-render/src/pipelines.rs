@@ -3,21 +3,18 @@
 
 use std::collections::BTreeMap;
 
+use crate::formats::{COLOR, DEPTH, ID};
 use crate::gpu::Gpu;
 use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
-
-pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-pub(crate) const ID: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
 pub(crate) struct Layouts {
-    /// Globals, cell colors by part, shadow map and its sampler.
+    /// Globals, shadow map and its sampler.
     pub(crate) world: wgpu::BindGroupLayout,
     /// A base color texture.
     texture: wgpu::BindGroupLayout,
-    /// Globals, corners, indices.
+    /// Globals; corners and indices where shaders fetch them.
     pub(crate) ids: wgpu::BindGroupLayout,
     /// Globals.
     pub(crate) globals: wgpu::BindGroupLayout,
@@ -126,15 +123,18 @@ impl Layouts {
                 "world",
                 &[
                     uniform(0),
-                    storage(1),
-                    texture(2, depth),
-                    entry(3, wgpu::ShaderStages::FRAGMENT, compare),
+                    texture(1, depth),
+                    entry(2, wgpu::ShaderStages::FRAGMENT, compare),
                 ],
             ),
             texture: texture_layout(gpu),
-            ids: layout("ids", &[uniform(0), storage(1), storage(2)]),
+            ids: if gpu.fetches() {
+                layout("ids", &[uniform(0), storage(1), storage(2)])
+            } else {
+                layout("ids", &[uniform(0)])
+            },
             globals: layout("globals", &[uniform(0)]),
-            post: layout("post", &[texture(0, unfiltered), texture(1, depth)]),
+            post: layout("post", &[texture(0, unfiltered), texture(1, unfiltered)]),
         }
     }
 }
@@ -144,6 +144,9 @@ const MARK_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout 
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4],
 };
+
+/// Corners of triangles, listed: where shaders cannot fetch them.
+const LISTED_LAYOUT: wgpu::VertexBufferLayout<'static> = OUTLINE_LAYOUT;
 
 /// Corners of outlines, relative to nothing: the world's. [Units: wu]
 const OUTLINE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
@@ -219,10 +222,24 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
 
 const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
 
-impl Pipelines {
-    pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, output: wgpu::TextureFormat) -> Self {
+/// The shaders.
+struct Modules {
+    surface: wgpu::ShaderModule,
+    ids: wgpu::ShaderModule,
+    depth: wgpu::ShaderModule,
+    post: wgpu::ShaderModule,
+    lines: wgpu::ShaderModule,
+}
+
+impl Modules {
+    fn new(gpu: &Gpu) -> Self {
+        let drawn = if gpu.writes_depth() {
+            include_str!("shaders/depth_written.wgsl")
+        } else {
+            include_str!("shaders/depth_drawn.wgsl")
+        };
         let module = |label, source: &[&str]| {
-            let source = [&[COMMON], source].concat().concat();
+            let source = [&[COMMON, drawn], source].concat().concat();
             gpu.device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
                     label: Some(label),
@@ -230,20 +247,45 @@ impl Pipelines {
                 })
         };
         let surface = module("surface", &[include_str!("shaders/surface.wgsl")]);
-        let ids = module("ids", &[include_str!("shaders/ids.wgsl")]);
+        let corner = if gpu.fetches() {
+            include_str!("shaders/ids_fetched.wgsl")
+        } else {
+            include_str!("shaders/ids_listed.wgsl")
+        };
+        let ids = module("ids", &[include_str!("shaders/ids.wgsl"), corner]);
         let depth = module("depth", &[include_str!("shaders/depth.wgsl")]);
         let sky = include_str!("shaders/sky.wgsl");
         let post = module("post", &[sky, include_str!("shaders/post.wgsl")]);
         let lines = module("lines", &[include_str!("shaders/lines.wgsl")]);
-        let drawn = [CORNER_LAYOUT, INSTANCE_LAYOUT];
+        Self {
+            surface,
+            ids,
+            depth,
+            post,
+            lines,
+        }
+    }
+}
+
+impl Pipelines {
+    pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, output: wgpu::TextureFormat) -> Self {
+        let writes_depth = gpu.writes_depth();
+        let Modules {
+            surface,
+            ids,
+            depth,
+            post,
+            lines,
+        } = Modules::new(gpu);
+        let surfaces = [CORNER_LAYOUT, INSTANCE_LAYOUT];
         let at_least = wgpu::CompareFunction::GreaterEqual;
         let base = Kind {
             label: "depth",
             module: &depth,
             vertex: "from_eye",
-            fragment: None,
+            fragment: writes_depth.then_some("only_depth"),
             layouts: &[&layouts.globals],
-            buffers: &drawn,
+            buffers: &surfaces,
             target: None,
             depth: Some((true, NEARER)),
             constants: &[],
@@ -277,13 +319,19 @@ impl Pipelines {
                 vertex: "corner",
                 fragment: Some("id"),
                 layouts: &[&layouts.ids],
-                buffers: &[INSTANCE_LAYOUT],
+                buffers: if gpu.fetches() {
+                    &[INSTANCE_LAYOUT]
+                } else {
+                    &[INSTANCE_LAYOUT, LISTED_LAYOUT]
+                },
                 target: Some((ID, None)),
                 ..base
             }),
             shadow: make(Kind {
                 label: "shadow",
                 vertex: "from_sun",
+                // Parallel light: its depths are as fine as they need be.
+                fragment: None,
                 depth: Some((true, wgpu::CompareFunction::Less)),
                 ..base
             }),

@@ -5,12 +5,13 @@ use std::ops::Range;
 use glam::{Mat4, Vec3};
 
 use crate::camera::Projection;
+use crate::formats::{COLOR, DEPTH};
 use crate::frame::{Frame, Paint, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::list::{DrawList, Run};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::pipelines::{COLOR, DEPTH, Layouts, Pipelines};
+use crate::pipelines::{Layouts, Pipelines};
 use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::{GpuWorld, Instance};
 use crate::shadings::{Shadings, draw_runs, set_buffers};
@@ -124,13 +125,12 @@ impl Renderer {
                 layout: &self.layouts.world,
                 entries: &[
                     bound(0, &self.globals),
-                    bound(1, &world.cell_colors),
                     wgpu::BindGroupEntry {
-                        binding: 2,
+                        binding: 1,
                         resource: wgpu::BindingResource::TextureView(&self.shadow_map),
                     },
                     wgpu::BindGroupEntry {
-                        binding: 3,
+                        binding: 2,
                         resource: wgpu::BindingResource::Sampler(&self.shadow_sampler),
                     },
                 ],

@@ -30,8 +30,8 @@ pub(crate) use textures::texture_layout;
 pub struct GpuWorld {
     pub(crate) corners: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
-    /// By part: the color of its cell.
-    pub(crate) cell_colors: wgpu::Buffer,
+    /// Where the corners of all triangles are, three to each: where shaders cannot fetch them.
+    pub(crate) listed: Option<wgpu::Buffer>,
     /// By number of an instance: 0 for structure, then objects.
     pub(crate) instances: Vec<Instance>,
     /// Base color textures; the first is white.
@@ -92,7 +92,6 @@ impl GpuWorld {
             texture_of,
             corners: Vec::new(),
             indices: Vec::new(),
-            cell_colors: Vec::new(),
         };
         let batches = filling.add_batches(sight);
         let meshes = filling.add_meshes(has_levels);
@@ -107,14 +106,37 @@ impl GpuWorld {
             })
             .collect();
         let bounds = bounds_of(world, &details);
-        let storage = wgpu::BufferUsages::STORAGE;
+        // What draws ids fetches corners from these buffers.
+        let fetched = if gpu.fetches() {
+            wgpu::BufferUsages::STORAGE
+        } else {
+            wgpu::BufferUsages::empty()
+        };
         let buffer = |what, bytes: &[u8], usage| make_buffer(gpu, what, bytes, usage);
         let corners = bytemuck::cast_slice(&filling.corners);
         let indices = bytemuck::cast_slice(&filling.indices);
         Ok(Self {
-            corners: buffer("the world's corners", corners, wgpu::BufferUsages::VERTEX)?,
-            indices: buffer("the world's indices", indices, wgpu::BufferUsages::INDEX)?,
-            cell_colors: buffer("parts", bytemuck::cast_slice(&filling.cell_colors), storage)?,
+            corners: buffer(
+                "the world's corners",
+                corners,
+                wgpu::BufferUsages::VERTEX | fetched,
+            )?,
+            indices: buffer(
+                "the world's indices",
+                indices,
+                wgpu::BufferUsages::INDEX | fetched,
+            )?,
+            listed: if gpu.fetches() {
+                None
+            } else {
+                let listed = filling.listed();
+                let listed = bytemuck::cast_slice(&listed);
+                Some(buffer(
+                    "the triangles' corners",
+                    listed,
+                    wgpu::BufferUsages::VERTEX,
+                )?)
+            },
             instances,
             textures,
             chunks,
@@ -212,11 +234,13 @@ fn make_buffer(
 ) -> Result<wgpu::Buffer, RenderError> {
     let limits = gpu.device.limits();
     Gpu::check(what, bytes.len() as u64, limits.max_buffer_size)?;
-    Gpu::check(
-        what,
-        bytes.len() as u64,
-        limits.max_storage_buffer_binding_size,
-    )?;
+    if usage.contains(wgpu::BufferUsages::STORAGE) {
+        Gpu::check(
+            what,
+            bytes.len() as u64,
+            limits.max_storage_buffer_binding_size,
+        )?;
+    }
     // A buffer must not be empty; 64 bytes are as large as the largest element.
     let empty = [0; 64];
     let contents = if bytes.is_empty() { &empty } else { bytes };
@@ -225,6 +249,6 @@ fn make_buffer(
         .create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some(what),
             contents,
-            usage: usage | wgpu::BufferUsages::STORAGE,
+            usage,
         }))
 }

@@ -13,9 +13,7 @@ use anyhow::{Context, anyhow};
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
-use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Gpu, Mark, Paint, Shape, Studio, Style,
-};
+use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Mark, Paint, Shape, Studio, Style};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, KeyEvent, MouseButton, WindowEvent};
@@ -27,6 +25,7 @@ use self::panel::{Panel, Shown};
 use self::walker::Walker;
 use crate::output::{Outputs, write_atomically};
 use crate::render::portal_marks;
+use enfilade_cli::adapter;
 use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
@@ -195,9 +194,11 @@ impl App<'_> {
             .with_title(format!("enfilade: {}", self.args.world.display()))
             .with_inner_size(PhysicalSize::new(w, h));
         let window = Arc::new(events.create_window(attributes)?);
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let display = Box::new(events.owned_display_handle());
+        let asked = wgpu::InstanceDescriptor::new_with_display_handle_from_env(display);
+        let instance = wgpu::Instance::new(asked);
         let surface = instance.create_surface(window.clone())?;
-        let gpu = Gpu::open_with(&instance, &self.args.adapter, Some(&surface))?;
+        let gpu = adapter::open_with(&instance, &self.args.adapter, Some(&surface))?;
         let size = window.inner_size();
         let mut config = surface
             .get_default_config(&gpu.adapter, size.width.max(1), size.height.max(1))
@@ -493,7 +494,7 @@ impl Open {
             .with_file_name(format!("{stem}-{}.png", self.n_shots));
         let camera = self.camera();
         // In a studio of its own: a window's pictures do not come back.
-        let mut studio = Studio::new(Gpu::open(&args.adapter)?, world)?;
+        let mut studio = Studio::new(adapter::open(&args.adapter)?, world)?;
         for &p in &self.closed {
             studio.state.close(p);
         }

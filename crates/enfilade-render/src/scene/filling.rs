@@ -9,7 +9,7 @@ use super::color::color_of;
 use crate::levels::coarser;
 use crate::materials::Look;
 
-/// A corner of a triangle, 40 bytes. The shader that draws ids reads it as ten words.
+/// A corner of a triangle, 40 bytes. The shader that draws ids reads it as ten words where it can.
 ///
 /// What a material says comes with each corner: to look it up by pixel costs software more than light
 /// does.
@@ -23,7 +23,8 @@ pub(crate) struct Corner {
     color: [u16; 4],
     /// Light of its own, and the least alpha that is drawn.
     emissive: [u8; 4],
-    part: u32,
+    /// Color of the cell that it belongs to, of structure.
+    cell: u32,
 }
 
 pub(crate) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
@@ -73,7 +74,6 @@ pub(super) struct Filling<'w> {
     pub(super) texture_of: Vec<u32>,
     pub(super) corners: Vec<Corner>,
     pub(super) indices: Vec<u32>,
-    pub(super) cell_colors: Vec<u32>,
 }
 
 impl Filling<'_> {
@@ -85,10 +85,8 @@ impl Filling<'_> {
     }
 
     /// Adds a primitive's triangles, by `order` of its positions; returns where they stand.
-    fn add(&mut self, primitive: &Primitive, order: &[u32], color: u32) -> Span {
+    fn add(&mut self, primitive: &Primitive, order: &[u32], cell: u32) -> Span {
         let look = self.look(primitive);
-        let part = self.cell_colors.len() as u32;
-        self.cell_colors.push(color);
         let [r, g, b] = look.emissive;
         let emissive = [r, g, b, look.cutoff].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
         let uvs = primitive.uvs.get(look.uv_set);
@@ -108,7 +106,7 @@ impl Filling<'_> {
                     (c.clamp(0.0, 1.0) * 65535.0).round() as u16
                 }),
                 emissive,
-                part,
+                cell,
             });
         }
         let first = self.indices.len() as u32;
@@ -134,6 +132,13 @@ impl Filling<'_> {
             is_transparent: look.is_transparent,
         }
     }
+
+    /// Where the corners of all triangles are, three to each.
+    pub(super) fn listed(&self) -> Vec<[f32; 3]> {
+        let position = |&i: &u32| self.corners[i as usize].position;
+        self.indices.iter().map(position).collect()
+    }
+
     pub(super) fn add_batches(&mut self, sight: &Sight) -> Vec<Span> {
         let batches = &self.world.batches;
         batches

@@ -1,11 +1,12 @@
 // From surfaces to the picture where that takes all of them: dark corners, heat of overdraw.
 
 @group(1) @binding(0) var color: texture_2d<f32>;
-@group(1) @binding(1) var depth: texture_depth_2d;
+// Numbers, not a depth texture: of those, GLSL loads no texels.
+@group(1) @binding(1) var depth: texture_2d<f32>;
 
 fn depth_at(p: vec2<i32>) -> f32 {
     let limit = vec2<i32>(globals.size.xy) - 1;
-    return textureLoad(depth, clamp(p, vec2(0), limit), 0);
+    return textureLoad(depth, clamp(p, vec2(0), limit), 0).x;
 }
 
 const SAMPLES: i32 = 20;

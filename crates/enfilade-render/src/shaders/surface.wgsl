@@ -10,10 +10,8 @@ override IS_SMOOTH: bool = false;
 // Whether cells, or the reasons why something is drawn, may give the color.
 override EXPLAINS: bool = false;
 
-// By part: the color of its cell.
-@group(0) @binding(1) var<storage, read> cell_colors: array<u32>;
-@group(0) @binding(2) var shadow_map: texture_depth_2d;
-@group(0) @binding(3) var shadow_sampler: sampler_comparison;
+@group(0) @binding(1) var shadow_map: texture_depth_2d;
+@group(0) @binding(2) var shadow_sampler: sampler_comparison;
 @group(1) @binding(0) var base_texture: texture_2d<f32>;
 @group(1) @binding(1) var base_sampler: sampler;
 
@@ -25,7 +23,8 @@ struct Corner {
     @location(3) color: vec4<f32>,
     // w: least alpha that is drawn.
     @location(4) emissive: vec4<f32>,
-    @location(5) part: u32,
+    // Color of the cell that it belongs to, of structure.
+    @location(5) cell: u32,
     // Rows of the map from mesh to world.
     @location(6) row_x: vec4<f32>,
     @location(7) row_y: vec4<f32>,
@@ -65,7 +64,7 @@ fn corner(in: Corner) -> Surface {
     out.emissive = in.emissive;
     if EXPLAINS {
         let is_structure = (in.key.x & INSTANCE_MASK) == 0u;
-        let cell = select(in.key.y, cell_colors[in.part], is_structure);
+        let cell = select(in.key.y, in.cell, is_structure);
         out.explained = vec2(cell, in.key.x >> 28u);
     }
     return out;
@@ -151,37 +150,37 @@ fn cut(in: Surface, texel: vec4<f32>) {
 // texture costs software as much as all else.
 
 @fragment
-fn plain(in: Surface) -> @location(0) vec4<f32> {
-    return vec4(toned(shaded(in, vec4(1.0)).rgb), 1.0);
+fn plain(in: Surface) -> Drawn {
+    return drawn(in.clip, vec4(toned(shaded(in, vec4(1.0)).rgb), 1.0));
 }
 
 @fragment
-fn textured(in: Surface) -> @location(0) vec4<f32> {
+fn textured(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
-    return vec4(toned(shaded(in, texel).rgb), 1.0);
+    return drawn(in.clip, vec4(toned(shaded(in, texel).rgb), 1.0));
 }
 
 @fragment
-fn masked(in: Surface) -> @location(0) vec4<f32> {
-    let texel = textureSample(base_texture, base_sampler, in.uv);
-    let c = shaded(in, texel);
-    cut(in, texel);
-    return vec4(toned(c.rgb), 1.0);
-}
-
-@fragment
-fn glass(in: Surface) -> @location(0) vec4<f32> {
+fn masked(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let c = shaded(in, texel);
     cut(in, texel);
-    return vec4(toned(c.rgb), c.a);
+    return drawn(in.clip, vec4(toned(c.rgb), 1.0));
+}
+
+@fragment
+fn glass(in: Surface) -> Drawn {
+    let texel = textureSample(base_texture, base_sampler, in.uv);
+    let c = shaded(in, texel);
+    cut(in, texel);
+    return drawn(in.clip, vec4(toned(c.rgb), c.a));
 }
 
 // A step of brightness for each time that a pixel is drawn.
 @fragment
-fn count(in: Surface) -> @location(0) vec4<f32> {
+fn count(in: Surface) -> Drawn {
     if is_above_cut(in) {
         discard;
     }
-    return vec4(8.0 / 255.0);
+    return drawn(in.clip, vec4(8.0 / 255.0));
 }
