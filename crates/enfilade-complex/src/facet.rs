@@ -197,7 +197,9 @@ impl Visitor<'_> {
         children: [i32; 2],
         sink: &mut S,
     ) {
-        if !sink.wants_pair(children[0], children[1]) || !self.may_spend(1 + covers.len() as u64) {
+        if !sink.wants_pair(children[0], children[1])
+            || !self.may_spend(1 + covers.near.len() as u64)
+        {
             return;
         }
         let Some(at) = (0..2).find(|&i| children[i] >= 0) else {

@@ -169,7 +169,9 @@ impl Clearance<'_> {
     fn narrowness(&self, points: &[DVec3], width: f64) -> [bool; 2] {
         let (crack, mut series) = (CRACK_GAPS * self.hole, NearSeries::default());
         // Most are in the open: one query.
-        let in_middle = self.bvh.any_within(middle_of(points), 0.5 * crack, &mut series);
+        let in_middle = self
+            .bvh
+            .any_within(middle_of(points), 0.5 * crack, &mut series);
         let mut is_narrower =
             |diameter: f64| self.is_narrower(points, diameter, width >= diameter, &mut series);
         let [mut is_narrow, mut is_gap] = [false; 2];

@@ -306,13 +306,10 @@ fn a_checkpoint_that_lies_never_hides_what_is_seen() {
                 n_harmless += 1;
                 // Work counted wrongly, or an opening not searched: never less than can be seen.
                 verify_evidence(&graph, &vis.evidence.unwrap(), None).unwrap();
-                let mut rows = vis
-                    .cells
-                    .iter()
-                    .zip(whole.cells.iter().zip(&whole.undecided));
-                let is_seen = rows.all(|(found, (all, undecided))| {
-                    all.iter()
-                        .all(|c| undecided.contains(c) || found.contains(c))
+                let mut cells = (0..whole.cells.n_cells() as u32).map(CellId);
+                let is_seen = cells.all(|from| {
+                    let is_kept = |to| whole.undecided.sees(from, to) || vis.cells.sees(from, to);
+                    whole.cells.visible_from(from).all(is_kept)
                 });
                 assert!(is_seen, "bit {bit}");
             }
