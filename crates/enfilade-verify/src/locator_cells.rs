@@ -116,18 +116,20 @@ fn split(body: Body, plane: &Plane, eps: f64) -> (Body, Body) {
         return (Vec::new(), body);
     }
     let (mut front, mut back) = (Vec::new(), Vec::new());
+    // Faces that only touch the plane bound the section, too: it may run along edges all around.
+    let is_near = |p: &DVec3| plane.signed_distance(*p).abs() <= 2.0 * eps;
     let mut rim = Vec::new();
     for face in body {
         match poly::split(&face, plane, eps) {
-            Sides::Front => front.push(face),
+            Sides::Front => {
+                rim.extend(face.iter().copied().filter(is_near));
+                front.push(face);
+            }
             Sides::Back => back.push(face),
             // Flat in the plane, though the body is on both sides of it: a hair that rounding left.
             Sides::On => {}
             Sides::Both(f, b) => {
-                rim.extend(
-                    f.iter()
-                        .filter(|p| plane.signed_distance(**p).abs() <= 2.0 * eps),
-                );
+                rim.extend(f.iter().copied().filter(is_near));
                 front.push(f);
                 back.push(b);
             }
@@ -147,4 +149,29 @@ fn volume(body: &Body) -> f64 {
     };
     let cone = |f: &Poly| (f[0] - o).dot(poly::area_normal(f)) / 6.0;
     body.iter().map(cone).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_along_edges_all_around_halves_a_body() {
+        let mut octahedron = Body::new();
+        for k in 0..8 {
+            let sign = |axis: usize| if k >> axis & 1 == 0 { 1.0 } else { -1.0 };
+            let mut face = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
+            if sign(0) * sign(1) * sign(2) < 0.0 {
+                face.swap(0, 1);
+            }
+            octahedron.push(face.into_iter().collect());
+        }
+        let whole = volume(&octahedron);
+        assert!((whole - 4.0 / 3.0).abs() < 1e-12, "{whole}");
+        let equator = Plane::through(DVec3::ZERO, DVec3::Y);
+        let (front, back) = split(octahedron, &equator, 1e-9);
+        for half in [front, back] {
+            assert!((volume(&half) - 2.0 / 3.0).abs() < 1e-12);
+        }
+    }
 }
