@@ -58,7 +58,7 @@ fn what_cannot_be_done_within_a_budget_is_refused_with_a_way_out() {
 #[test]
 fn a_coarser_answer_says_so_and_voxels_are_told_before() {
     let dir = folder("coarse");
-    let (done, said) = bake(&dir, &["--max-memory", "800K", "--max-time", "600"]);
+    let (done, said) = bake(&dir, &["--max-memory", "15M", "--max-time", "600"]);
     assert!(done.status.success(), "{said}");
     assert!(said.contains("voxels of 0.1"), "{said}");
     assert!(said.contains("not the 0.1 m that were wanted"), "{said}");
