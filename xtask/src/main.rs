@@ -14,6 +14,7 @@ mod mutual;
 mod names;
 mod score;
 mod tidy;
+mod trust;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -26,6 +27,7 @@ usage: cargo xtask test
        cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
+       cargo xtask bench trust [--json] [--rows ROW,...]
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
@@ -36,6 +38,7 @@ usage: cargo xtask test
           messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
           choose by how names begin;
+          trust: hostile and huge input, a row a figure; --rows (case, nasty, large) chooses;
           any other NAME (bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 
@@ -54,6 +57,7 @@ fn main() -> ExitCode {
             score::run(RELEASE, &dirs, is_written).and_then(|rows| floors::check(&rows))
         }
         Task::Messy(options) => messy::run(&options),
+        Task::Trust(options) => trust::run(&options),
         Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
         Task::Measure(args) => return bench::measure(&args),
     };
@@ -79,6 +83,7 @@ enum Task {
         peers: Option<PathBuf>,
     },
     Messy(messy::Options),
+    Trust(trust::TrustOptions),
     /// Arguments of `enfilade-bench`.
     Measure(Vec<String>),
 }
@@ -90,6 +95,9 @@ impl Task {
         let (mut is_written, mut dirs, mut peers) = (false, Vec::new(), None);
         let mut messy: Option<messy::Options> = None;
         while let Some(arg) = args.next() {
+            if name == "bench" && arg == "trust" && messy.is_none() {
+                return Self::trust(args);
+            }
             let is_name = arg != "messy" && !arg.starts_with('-');
             let asks_help = ["--help", "-h"].contains(&arg.as_str());
             if name == "bench" && messy.is_none() && (is_name || asks_help) {
@@ -125,6 +133,20 @@ impl Task {
             "bench" => Some(Self::Bench { is_written, peers }),
             _ => None,
         }
+    }
+}
+
+impl Task {
+    fn trust(mut args: impl Iterator<Item = String>) -> Option<Self> {
+        let mut options = trust::TrustOptions::default();
+        while let Some(arg) = args.next() {
+            match arg.as_str() {
+                "--json" => options.is_json = true,
+                "--rows" => options.rows = args.next()?.split(',').map(str::to_owned).collect(),
+                _ => return None,
+            }
+        }
+        Some(Self::Trust(options))
     }
 }
 

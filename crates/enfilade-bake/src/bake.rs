@@ -6,6 +6,7 @@
 use enfilade_geom::scene::Scene;
 
 use crate::bound::keep_costs;
+use crate::budget::n_structural;
 use crate::realize::realize;
 use crate::vessel::is_vessel;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, bsp, delaunay, watershed};
@@ -24,6 +25,7 @@ pub fn bake(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     config.costs.cost.check(&scene.materials)?;
+    let context = &context.within(&config.budget, n_structural(scene));
     let (method, reason) = config.method.choose(scene);
     let mut baked = bake_by(method, &reason, scene, config, context)?;
     let finds_little = method == Method::Watershed && baked.n_indoors() <= 1;

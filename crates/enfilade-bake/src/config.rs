@@ -9,7 +9,7 @@ use crate::delaunay::DelaunayConfig;
 use crate::simplify::SimplifySettings;
 use crate::structure::MergeSettings;
 use crate::voxel::Grid;
-use crate::{BakeError, Method};
+use crate::{BakeError, Budget, Method};
 
 /// Settings of a bake. The defaults are meant for everything; none is tuned to a scene.
 #[derive(Clone, Debug)]
@@ -30,6 +30,8 @@ pub struct BakeConfig {
     /// Watershed: most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
     /// beyond that an error. About 3 bytes each. [Limit: at least 1,000]
     pub max_voxels: usize,
+    /// What a bake may take.
+    pub budget: Budget,
     /// Watershed: basins shallower than this are noise. [Units: wu]
     pub noise: f64,
     /// What only the binary space partition asks.
@@ -48,6 +50,7 @@ impl Default for BakeConfig {
             costs: SimplifySettings::default(),
             voxel: None,
             max_voxels: 1_600_000_000,
+            budget: Budget::default(),
             noise: 0.015,
             bsp: BspConfig::default(),
             delaunay: DelaunayConfig::default(),
@@ -179,11 +182,11 @@ impl BakeConfig {
         positive("min_opening", self.min_opening).map(|_| ())
     }
 
-    /// The grid for a scene of these bounds. All checks of settings live here.
+    /// The grid for a scene of so many triangles within these bounds. All checks of settings live here.
     ///
     /// # Errors
     /// When a setting is out of its limits, or the budget leaves voxels that no opening fits.
-    pub(crate) fn grid(&self, bounds: &Aabb) -> Result<Grid, BakeError> {
+    pub(crate) fn grid(&self, bounds: &Aabb, n_triangles: usize) -> Result<Grid, BakeError> {
         positive("min_opening", self.min_opening)?;
         self.smallest_hole.check()?;
         let wanted = positive("voxel", self.voxel.unwrap_or(self.min_opening / 6.0))?;
@@ -195,8 +198,12 @@ impl BakeConfig {
             });
         }
         let mut voxel = wanted;
+        let most = self.budget.voxels(n_triangles, BYTES_A_VOXEL);
+        let most = most.min(self.max_voxels as f64);
         // Growing by a tenth at a time ends close below the budget.
-        while n_voxels(bounds, voxel) > self.max_voxels as f64 {
+        // Past the scene's size nothing but padding is left, which may still be too much.
+        let widest = wanted.max(bounds.size().max_element());
+        while n_voxels(bounds, voxel) > most && voxel <= widest.max(self.min_opening) {
             voxel *= 1.1;
         }
         if voxel > wanted && voxel > self.min_opening {
@@ -205,7 +212,7 @@ impl BakeConfig {
                 voxel,
                 wanted,
                 bytes: BYTES_A_VOXEL * n_voxels(bounds, wanted),
-                max_voxels: self.max_voxels,
+                max_voxels: most as usize,
                 min_opening: self.min_opening,
             });
         }
@@ -225,7 +232,7 @@ fn positive(name: &'static str, value: f64) -> Result<f64, BakeError> {
 }
 
 /// Peak memory of a bake, rounded from `docs/benchmarks/growth.md`.
-const BYTES_A_VOXEL: f64 = 3.0;
+pub(crate) const BYTES_A_VOXEL: f64 = 3.0;
 
 fn n_voxels(bounds: &Aabb, voxel: f64) -> f64 {
     let n = (bounds.size() / voxel).ceil() + 2.0 * PADDING as f64;
@@ -244,11 +251,11 @@ mod tests {
             ..BakeConfig::default()
         };
         let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
-        let grid = config.grid(&bounds).unwrap();
+        let grid = config.grid(&bounds, 100_000).unwrap();
         assert!(grid.n_voxels() <= 20_000_000);
         assert!(grid.voxel > 0.1);
         let small = Aabb::new(DVec3::ZERO, DVec3::splat(5.0));
-        assert!((config.grid(&small).unwrap().voxel - 0.1).abs() < 1e-12);
+        assert!((config.grid(&small, 12).unwrap().voxel - 0.1).abs() < 1e-12);
     }
 
     #[test]
@@ -258,14 +265,14 @@ mod tests {
             ..BakeConfig::default()
         };
         let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
-        let error = config.grid(&bounds).unwrap_err();
+        let error = config.grid(&bounds, 100_000).unwrap_err();
         assert!(matches!(error, BakeError::TooLarge { .. }), "{error}");
         let said = error.to_string();
         for word in ["200 x 30 x 200 m", "--unit", "max_voxels", "4 GB"] {
             assert!(said.contains(word), "{word}: {said}");
         }
         config.min_opening = 10.0;
-        config.grid(&bounds).unwrap();
+        config.grid(&bounds, 100_000).unwrap();
     }
 
     #[test]
@@ -275,7 +282,7 @@ mod tests {
             ..BakeConfig::default()
         };
         let error = config
-            .grid(&Aabb::new(DVec3::ZERO, DVec3::ONE))
+            .grid(&Aabb::new(DVec3::ZERO, DVec3::ONE), 12)
             .unwrap_err();
         assert!(error.to_string().contains("voxel"));
     }

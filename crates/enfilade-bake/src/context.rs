@@ -4,7 +4,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::{BakeError, Method, Stage};
+use enfilade_geom::Allowance;
+
+use crate::{BakeError, Budget, Method, Resolution, Stage};
 
 /// Hears of a bake's progress.
 pub trait Progress: Sync {
@@ -13,6 +15,9 @@ pub trait Progress: Sync {
 
     /// A stage begins.
     fn stage(&self, stage: Stage);
+
+    /// How fine the scene will be looked at, and the memory that this takes; told before it is taken. [Units: bytes]
+    fn resolution(&self, _resolution: Resolution, _memory: f64) {}
 }
 
 /// Nobody listens.
@@ -28,6 +33,9 @@ pub struct BakeContext<'a> {
     cancel: Option<&'a AtomicBool>,
     times: Mutex<Vec<(Stage, Duration)>>,
     running: Mutex<Option<(Stage, Instant)>>,
+    allowance: Allowance,
+    budget: Budget,
+    n_triangles: usize,
 }
 
 /// Tells nobody, and is not stopped.
@@ -46,7 +54,47 @@ impl<'a> BakeContext<'a> {
             cancel,
             times: Mutex::default(),
             running: Mutex::default(),
+            allowance: Allowance::default(),
+            budget: Budget::default(),
+            n_triangles: 0,
         }
+    }
+
+    /// A context of its own for a bake of so many triangles, within a budget.
+    pub(crate) fn within(&self, budget: &Budget, n_triangles: usize) -> Self {
+        Self {
+            allowance: budget.allowance(n_triangles),
+            budget: *budget,
+            n_triangles,
+            ..Self::new(self.progress, self.cancel)
+        }
+    }
+
+    /// What long loops may spend; once it is over, the next stage does not begin.
+    pub(crate) fn allowance(&self) -> &Allowance {
+        &self.allowance
+    }
+
+    /// Whether to go on with what is under way.
+    ///
+    /// # Errors
+    /// When the caller cancels, and when the budget is spent.
+    pub(crate) fn check(&self) -> Result<(), BakeError> {
+        if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            return Err(BakeError::Cancelled);
+        }
+        if !self.allowance.is_over() {
+            return Ok(());
+        }
+        let running = *self.running.lock().expect("no panic holds it");
+        let stage = running.map_or(Stage::Structure, |(stage, _)| stage);
+        Err(match self.budget.time {
+            Some(time) => BakeError::TimeIsUp { stage, time },
+            None => BakeError::TooMuchWork {
+                stage,
+                n_triangles: self.n_triangles,
+            },
+        })
     }
 
     /// Begins a method with its first stage.
@@ -55,12 +103,15 @@ impl<'a> BakeContext<'a> {
         self.begin(Stage::Structure)
     }
 
+    /// Tells how fine the scene will be looked at.
+    pub(crate) fn tell(&self, resolution: Resolution, memory: f64) {
+        self.progress.resolution(resolution, memory);
+    }
+
     /// Ends the stage under way and begins the next.
     pub(crate) fn begin(&self, stage: Stage) -> Result<(), BakeError> {
+        self.check()?;
         self.end_stage();
-        if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
-            return Err(BakeError::Cancelled);
-        }
         self.progress.stage(stage);
         *self.running.lock().expect("no panic holds it") = Some((stage, Instant::now()));
         Ok(())

@@ -1,5 +1,9 @@
 //! Why a bake could not be done.
 
+use std::time::Duration;
+
+use crate::Stage;
+
 /// Why a bake could not be done.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -27,7 +31,7 @@ pub enum BakeError {
     #[error(
         "the scene is {:.0} x {:.0} x {:.0} m large: the {max_voxels} voxels that are allowed would be {voxel:.2} m \
          wide, wider than the narrowest opening that must be found ({min_opening} m); if it is that large, \
-         ask for less with a wider --voxel or --min-opening, or raise max_voxels (the {wanted:.2} m wanted take about \
+         ask for less with a wider --voxel or --min-opening, or allow more with --max-memory and max_voxels (the {wanted:.2} m wanted take about \
          {:.0} GB of memory); if it is not, give the right --unit",
         .size[0], .size[1], .size[2], .bytes / 1e9
     )]
@@ -44,6 +48,31 @@ pub enum BakeError {
         max_voxels: usize,
         /// Width of the narrowest opening that must be found. [Units: wu]
         min_opening: f64,
+    },
+    /// More work than the scene's triangles are worth, see [`crate::Budget`].
+    #[error(
+        "the stage '{}' has more to do than {n_triangles} triangles are worth: they cross each other, or lie so close, all \
+         over; mark as detail what bounds no room, ask for less with a wider --min-opening, or give it as long as it takes with \
+         --max-time 3600",
+        .stage.name()
+    )]
+    TooMuchWork {
+        /// The stage that was under way.
+        stage: Stage,
+        /// Structural triangles.
+        n_triangles: usize,
+    },
+    /// The time is up.
+    #[error(
+        "{} s were allowed (--max-time), and they ended in the stage '{}'; give it more, or ask for less with a wider \
+         --min-opening or --voxel",
+        .time.as_secs_f64(), .stage.name()
+    )]
+    TimeIsUp {
+        /// The stage that was under way.
+        stage: Stage,
+        /// What was allowed.
+        time: Duration,
     },
     /// A cost is given for a material that the scene has not.
     #[error(transparent)]

@@ -123,7 +123,7 @@ pub fn find_leak_trail(
         }));
     }
     let frame = Frame::of(&matter);
-    let grid = config.grid(&bounds_of(&frame.triangles_to_grid(&matter)))?;
+    let grid = config.grid(&bounds_of(&frame.triangles_to_grid(&matter)), matter.len())?;
     // Leaves that stand open, too: a room ends at its doorways.
     matter.extend(plates(scene).concat());
     let matter = frame.triangles_to_grid(&matter);

@@ -16,6 +16,7 @@ mod assemble;
 mod bake;
 pub mod bound;
 pub mod bsp;
+mod budget;
 pub use enfilade_complex as complex;
 mod config;
 mod context;
@@ -37,6 +38,7 @@ pub use enfilade_voxel as voxel;
 pub mod watershed;
 
 pub use bake::bake;
+pub use budget::Budget;
 pub use config::{BakeConfig, SmallestHole};
 pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;

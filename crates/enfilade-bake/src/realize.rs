@@ -8,7 +8,7 @@ use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
 
 use crate::assemble::{Cut, assemble};
-use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex};
+use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex_within};
 use crate::join::{VOID, join_unparted, join_voids};
 use crate::proposal::Proposal;
 use crate::structure::Structure;
@@ -37,14 +37,19 @@ pub(crate) fn realize(
     }
     let settings = &mut proposal.settings;
     settings.insert("smallest_hole".to_owned(), hole.to_string());
-    let candidates = proposal.candidates.iter();
-    let complex = build_complex(&ComplexInput {
+    let windings: Vec<_> = proposal
+        .candidates
+        .iter()
+        .map(|c| c.winding.clone())
+        .collect();
+    let input = ComplexInput {
         triangles: &structure.triangles,
-        candidates: &candidates.map(|c| c.winding.clone()).collect::<Vec<_>>(),
+        candidates: &windings,
         bounds: proposal.bounds,
         gap: hole.gap(),
         has_seals: hole.has_seals(),
-    });
+    };
+    let complex = build_complex_within(&input, context.allowance());
     context.begin(Stage::Partition)?;
     let partition = part(&complex, &mut proposal);
     proposal.counts.push(("leaves", complex.n_leaves() as f64));
@@ -65,6 +70,7 @@ pub(crate) fn realize(
         closed_share: config.merge.closed_share,
     };
     let world = world_of(&cut, method, &proposal);
+    context.check()?;
     context.end_stage();
     Ok(BakeOutput {
         world,

@@ -20,7 +20,7 @@ use enfilade::geom::scene::{Role, Scene};
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
 
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{Outputs, write_atomically};
+use crate::output::{Outputs, Told, write_atomically};
 use crate::progress::{BakeBar, StageBar};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
@@ -48,6 +48,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     bar.start("reading", 0);
     let imported = import(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
+    outputs.read(&imported.report.references)?;
     report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
     let config = &settings.config_for(scene);
@@ -77,13 +78,13 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     write_atomically(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
     if let Some(path) = &leak_path {
-        path.write(&mut io::stderr().lock())?;
+        path.write(&mut Told)?;
     }
     if baked.world.graph.statistics.counts.get("separators") == Some(&0.0)
         && baked.world.graph.cells.len() > 1
     {
         writeln!(
-            io::stderr(),
+            Told,
             "no separator parts the scene: its openings lie in no plane of its surfaces, if it has rooms; \
              --method watershed or delaunay needs no planes"
         )?;
@@ -137,7 +138,7 @@ fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result
         },
     );
     if options.allow_leak {
-        writeln!(io::stderr(), "{text}")?;
+        writeln!(Told, "{text}")?;
         return Ok(());
     }
     bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
@@ -159,7 +160,7 @@ pub(crate) fn bake_scene(
 }
 
 fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow::Result<()> {
-    let mut err = io::stderr().lock();
+    let mut err = Told;
     if verbose {
         writeln!(err, "{report}")?;
         for o in &scene.objects {
@@ -190,22 +191,8 @@ fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow:
 const LEAKS_SHOWN: usize = 10;
 
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
-    let mut err = io::stderr().lock();
+    let mut err = Told;
     match baked.resolution {
-        Resolution::Voxels { edge, dims } => {
-            let [nx, ny, nz] = dims;
-            writeln!(err, "voxels of {edge:.3} m, {nx} × {ny} × {nz}")?;
-            let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
-            // The grid grows its voxels by tenths, if at all.
-            if edge > wanted * 1.05 {
-                writeln!(
-                    err,
-                    "not the {wanted:.3} m that were wanted: those would be more than {} voxels \
-                     (max_voxels in a --config file)",
-                    config.max_voxels
-                )?;
-            }
-        }
         Resolution::Balls { radius } => {
             writeln!(
                 err,
@@ -220,7 +207,8 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
                 )?;
             }
         }
-        Resolution::Planes => {}
+        // Told before the work.
+        Resolution::Voxels { .. } | Resolution::Planes => {}
     }
     for note in &baked.notes {
         writeln!(err, "{note}")?;

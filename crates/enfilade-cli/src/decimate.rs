@@ -16,7 +16,7 @@ use enfilade::import::import;
 
 use crate::bake::delaunay::choices_text;
 use crate::bake::{print_summary, settings};
-use crate::output::{Outputs, write_atomically};
+use crate::output::{Outputs, Told, write_atomically};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
 #[derive(clap::Args)]
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         }
         if !walk.is_saved {
             writeln!(
-                io::stderr(),
+                Told,
                 "the last decisions were not saved; `save FILE.toml` before the end does"
             )?;
         }

@@ -22,10 +22,12 @@ mod verify;
 #[cfg(feature = "view")]
 mod view;
 
-use std::io;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use output::Told;
 
 /// Finds the rooms and doorways of a 3D scene; answers what can be seen from where.
 #[derive(Parser)]
@@ -80,7 +82,7 @@ fn main() -> ExitCode {
         // The reader of our output has seen enough, as in `enfilade inspect X.glb | head`.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("enfilade: {error:#}");
+            let _ = writeln!(Told, "enfilade: {error:#}");
             ExitCode::FAILURE
         }
     }

@@ -22,6 +22,21 @@ pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> 
     })
 }
 
+/// Standard error, for what is said beside the work. Where nobody reads it any more, as in `enfilade bake … 2>&1 | head -2`,
+/// the work goes on.
+pub(crate) struct Told;
+
+impl Write for Told {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let _ = io::stderr().write_all(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// What a command reads and what it will write: no file is both, and none is written twice.
 #[derive(Clone, Default)]
 pub(crate) struct Outputs {
@@ -42,6 +57,21 @@ impl Outputs {
         Self {
             known: inputs.into_iter().map(known).collect(),
         }
+    }
+
+    /// Takes down what the inputs turned out to refer to. Refused where one of these is an output.
+    pub(crate) fn read(&mut self, references: &[PathBuf]) -> anyhow::Result<()> {
+        for path in references {
+            let resolved = resolved(path);
+            if let Some(Known::Output(option)) = self.known.get(&resolved) {
+                bail!(
+                    "the scene refers to {}, so that is the input, too; choose another name with {option}",
+                    path.display()
+                );
+            }
+            self.known.insert(resolved, Known::Input(path.clone()));
+        }
+        Ok(())
     }
 
     /// Takes down that `option` names a file to write. Refused where that is an input or another output, or cannot be

@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write as _, stderr};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use enfilade::bake::{BakeConfig, Method, Progress, Stage};
+use enfilade::bake::{BakeConfig, Method, Progress, Resolution, Stage};
 use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -150,6 +150,8 @@ pub(crate) struct BakeBar {
     state: Arc<Mutex<Clock>>,
     /// Voxels and triangles that there are to do with.
     work: (f64, f64),
+    /// Edge of a voxel as asked for. [Units: wu]
+    wanted: f64,
 }
 
 struct Clock {
@@ -173,11 +175,7 @@ impl BakeBar {
     pub(crate) fn new(scene: &Scene, config: &BakeConfig) -> Self {
         let now = Instant::now();
         let is_shown = stderr().is_terminal();
-        let work = if is_shown {
-            work_of(scene, config)
-        } else {
-            (0.0, 0.0)
-        };
+        let work = work_of(scene, config);
         let state = Arc::new(Mutex::new(Clock {
             stages: &[],
             left: TimeLeft::new(&[], work.0, work.1),
@@ -224,7 +222,13 @@ impl BakeBar {
         if is_shown {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Self { bar, state, work }
+        let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
+        Self {
+            bar,
+            state,
+            work,
+            wanted,
+        }
     }
 }
 
@@ -253,6 +257,44 @@ impl Progress for BakeBar {
         self.bar
             .set_message(format!("{}/{count} {name}", index + 1));
     }
+
+    fn resolution(&self, resolution: Resolution, memory: f64) {
+        let Resolution::Voxels { edge, dims } = resolution else {
+            return;
+        };
+        let n_voxels = dims.map(|n| n as f64).iter().product::<f64>();
+        let seconds = {
+            let mut clock = self.state.lock().expect("no panic holds it");
+            clock.left = TimeLeft::new(clock.stages, n_voxels, self.work.1);
+            clock.left.expected.iter().sum::<f64>()
+        };
+        self.bar.suspend(|| {
+            let _ = write!(
+                stderr(),
+                "{}",
+                plan(edge, dims, memory, seconds, self.wanted)
+            );
+        });
+    }
+}
+
+/// What will be done, before it is done.
+fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64, wanted: f64) -> String {
+    let n = (nx * ny * nz) as f64 / 1e6;
+    let memory = memory / 1e6;
+    let mut text = format!(
+        "voxels of {edge:.3} m, {nx} × {ny} × {nz}: {n:.1} million, about {memory:.0} MB and {}\n",
+        clock(seconds)
+    );
+    // The grid grows its voxels by tenths, if at all.
+    if edge > wanted * 1.05 {
+        text += &format!(
+            "not the {} m that were wanted: those would be more voxels than are allowed (--max-memory, \
+             and max_voxels in a --config file)\n",
+            (wanted * 1e9).round() / 1e9
+        );
+    }
+    text
 }
 
 impl Drop for BakeBar {

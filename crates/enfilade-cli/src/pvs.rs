@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
-use enfilade::cpg::{CellId, CellSet, SightGraph, SightPortal, World};
+use enfilade::cpg::{CellId, SightGraph, SightPortal, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
 use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
@@ -17,6 +17,7 @@ use enfilade_verify::structural_triangles;
 use self::statistics::Statistics;
 use crate::output::{Outputs, is_same_file, write_atomically};
 use crate::progress::StageBar;
+use enfilade_cli::values::{bytes, seconds};
 
 mod statistics;
 
@@ -38,6 +39,9 @@ pub(crate) struct Pvs {
     /// Stop searching after this long; the answer is then larger than need be, and no less right.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     budget: Option<Duration>,
+    /// Refuse a graph that is estimated to take more, before anything is allocated: a number and K, M, G or T.
+    #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = bytes)]
+    max_memory: u64,
     /// Nothing farther than this is seen.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     far: Option<f64>,
@@ -113,7 +117,8 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     let start = Instant::now();
     let vis = compute(args, &input)?;
     let report = report(&input, &vis, start.elapsed());
-    let rows = vis.cells.iter().map(CellSet::ranges).collect();
+    let ranges = |c| vis.cells.runs_from(CellId(c)).iter().map(|&[a, b]| (a, b));
+    let rows = (0..graph.n_cells).map(|c| ranges(c).collect()).collect();
     let text = write_pvs_text(&PvsText {
         notes: notes(&report, args.mode),
         rows,
@@ -132,7 +137,7 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         write_atomically(path, text.as_bytes())?;
     }
     if let (Some(path), Some(world)) = (&args.into, input.world) {
-        let pvs = Some(enfilade::cpg::Pvs::of_rows(&vis.cells));
+        let pvs = Some(vis.cells);
         let bytes = encode_glb(&World { pvs, ..world })?;
         write_atomically(path, &bytes)?;
     }
@@ -250,6 +255,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
             PvsMode::Exact => VisMode::Exact,
         },
         far: args.far,
+        max_memory: args.max_memory,
         has_evidence: args.evidence.is_some(),
         ..VisConfig::default()
     };
@@ -317,10 +323,12 @@ fn read_checkpoint(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
 }
 
 fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
-    let cells = vis.cells.len();
-    let pairs: usize = vis.cells.iter().map(CellSet::len).sum();
-    let undecided: usize = vis.undecided.iter().map(CellSet::len).sum();
-    let visible_cells: Vec<usize> = vis.cells.iter().map(CellSet::len).collect();
+    let cells = vis.cells.n_cells();
+    let pairs = vis.cells.n_pairs();
+    let undecided = vis.undecided.n_pairs();
+    let visible_cells: Vec<usize> = (0..cells as u32)
+        .map(|c| vis.cells.n_visible_from(CellId(c)))
+        .collect();
     let mut worst: Vec<usize> = (0..cells).collect();
     worst.sort_by_key(|&c| (std::cmp::Reverse(visible_cells[c]), c));
     worst.truncate(10);
@@ -399,13 +407,6 @@ fn print(report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
         writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;
     }
     out.flush().context("cannot write to standard output")
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse()
-        .ok()
-        .and_then(|s| Duration::try_from_secs_f64(s).ok())
-        .ok_or_else(|| "a number of seconds of at least 0 is needed".into())
 }
 
 fn distance(text: &str) -> Result<f64, String> {

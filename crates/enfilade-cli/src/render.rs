@@ -12,7 +12,7 @@ use enfilade_render::{
 };
 use serde_json::json;
 
-use crate::output::{Outputs, write_atomically};
+use crate::output::{Outputs, Told, write_atomically};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
@@ -128,7 +128,10 @@ pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(Worl
         .with_context(|| path.display().to_string())?;
     let n = studio.world.n_missing_pictures();
     if n > 0 {
-        eprintln!("enfilade: {n} pictures of textures are missing or damaged; drawn without");
+        writeln!(
+            Told,
+            "enfilade: {n} pictures of textures are missing or damaged; drawn without"
+        )?;
     }
     Ok((world, studio))
 }

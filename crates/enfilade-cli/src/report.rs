@@ -1,10 +1,11 @@
 //! `enfilade report`: one page about a world.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::cpg::{CellSet, SightGraph, World};
+use enfilade::cpg::{CellId, Pvs, SightGraph, World};
 use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};
 use enfilade::vis::{VisConfig, VisContext, see_all};
@@ -12,7 +13,7 @@ use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, 
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
-use crate::output::{Outputs, write_atomically};
+use crate::output::{Outputs, Told, write_atomically};
 use crate::render::{above, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::world::read_world;
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         match enfilade_cli::adapter::open(&args.adapter) {
             Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
             Err(why @ RenderError::NoAdapter) => {
-                eprintln!("enfilade: the report has no pictures: {why}");
+                let _ = writeln!(Told, "enfilade: the report has no pictures: {why}");
                 parts.notes.push(format!("No pictures: {why}."));
             }
             Err(why) => bail!(why),
@@ -70,7 +71,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     write_atomically(&args.output, report_html(&world, &parts).as_bytes())
 }
 
-fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Vec<CellSet>> {
+fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
     let start = Instant::now();
     let mut on_round = |_, _| start.elapsed() < BUDGET;
     let walls: Vec<Triangle> = structural_triangles(world)
@@ -134,7 +135,7 @@ fn row(cells: &[&str]) -> Vec<String> {
 }
 
 /// The counts that the papers give of their scenes.
-fn in_numbers(world: &World, sight: &Sight, visible: &[CellSet]) -> Table {
+fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
     let graph = &world.graph;
     let (n_cells, n_portals) = (graph.cells.len(), graph.portals.len());
     let structure: usize = world
@@ -149,8 +150,9 @@ fn in_numbers(world: &World, sight: &Sight, visible: &[CellSet]) -> Table {
         .max()
         .unwrap_or(0);
     let mean = |sum: usize| format!("{:.2}", sum as f64 / n_cells.max(1) as f64);
-    let seen: usize = visible.iter().map(CellSet::len).sum();
-    let most_seen = visible.iter().map(CellSet::len).max().unwrap_or(0);
+    let seen = visible.n_pairs();
+    let by_cell = (0..visible.n_cells() as u32).map(|c| visible.n_visible_from(CellId(c)));
+    let most_seen = by_cell.max().unwrap_or(0);
     Table {
         title: "In numbers".into(),
         note: "As the sources describe their scenes.".into(),

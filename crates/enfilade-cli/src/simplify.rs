@@ -11,7 +11,7 @@ use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};
 
-use crate::output::{Outputs, write_atomically};
+use crate::output::{Outputs, Told, write_atomically};
 use crate::pvs::sight_graph;
 
 /// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
@@ -127,7 +127,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         &costs_text(bounded.costs),
     )?;
     if let Some(note) = bounded.note() {
-        writeln!(io::stderr(), "{note}")?;
+        writeln!(Told, "{note}")?;
     }
     Ok(())
 }
@@ -135,7 +135,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
 fn warn_of_costs(args: &Simplify, max_cost: f64) -> anyhow::Result<()> {
     if let Some(max) = args.max_cost.filter(|m| max_cost > *m) {
         writeln!(
-            io::stderr(),
+            Told,
             "a cell costs {max_cost:.0}, more than {max}, and did before; only a bake can cut it"
         )?;
     }

@@ -1,5 +1,7 @@
 //! Values of arguments that several commands take.
 
+use std::time::Duration;
+
 /// Reads `x,y,z`. [Units: wu]
 ///
 /// # Errors
@@ -25,4 +27,52 @@ pub fn size(text: &str) -> Result<[u32; 2], String> {
         (w > 0 && h > 0).then_some([w, h])
     };
     parse().ok_or_else(|| "a width and a height are needed, e.g. 1280x720".into())
+}
+
+/// Reads a number of seconds of at least 0.
+///
+/// # Errors
+///
+/// Anything else; the text says what is needed.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse()
+        .ok()
+        .and_then(|s| Duration::try_from_secs_f64(s).ok())
+        .ok_or_else(|| "a number of seconds of at least 0 is needed".into())
+}
+
+/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. [Units: bytes]
+///
+/// # Errors
+///
+/// Anything else, and a number without a unit; the text says what is needed.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let parse = || {
+        let split = text.find(|c: char| c.is_ascii_alphabetic())?;
+        let number: f64 = text[..split].trim().parse().ok()?;
+        let unit = text[split..].to_ascii_uppercase();
+        let unit = unit.trim_end_matches("IB").trim_end_matches('B');
+        let power = ["", "K", "M", "G", "T"].iter().position(|&u| u == unit)?;
+        let value = number * 1024f64.powi(power as i32);
+        (value >= 1.0 && value < 2f64.powi(63)).then_some(value as u64)
+    };
+    parse().ok_or_else(|| "an amount of memory with its unit is needed, e.g. 4G or 800M".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_amount_of_memory_has_a_unit() {
+        assert_eq!(bytes("4G"), Ok(4 << 30));
+        assert_eq!(bytes("1.5 GiB"), Ok(3 << 29));
+        assert_eq!(bytes("800m"), Ok(800 << 20));
+        assert_eq!(bytes("12B"), Ok(12));
+        for bad in [
+            "", "4", "G", "-1G", "0G", "nanG", "infG", "1e30T", "4X", "4GG",
+        ] {
+            assert!(bytes(bad).is_err(), "{bad}");
+        }
+    }
 }

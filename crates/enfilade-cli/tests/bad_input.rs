@@ -529,7 +529,11 @@ fn a_settings_file_is_understood_or_its_line_is_shown() {
     // Too few for voxels that a door would fit.
     folder.write("e.toml", "max_voxels = 10000");
     let args = ["in.glb", "-o", "out.glb", "--config", "e.toml"];
-    folder.refused(1, &args, &["--unit", "--voxel", "raise max_voxels"]);
+    folder.refused(
+        1,
+        &args,
+        &["--unit", "--voxel", "--max-memory and max_voxels"],
+    );
     folder.write("e.toml", [0xff, 0xfe, 0x00]);
     let args = ["in.glb", "-o", "out.glb", "--config", "e.toml"];
     folder.refused(1, &args, &["cannot read settings e.toml"]);

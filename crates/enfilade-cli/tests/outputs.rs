@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use enfilade_testkit::{GridParams, room_grid};
 
@@ -99,5 +99,53 @@ fn the_next_run_removes_what_a_killed_one_left() {
     assert!(done.status.success(), "{done:?}");
     assert!(dir.join("plan.svg").exists());
     assert!(!dir.join(".plan.svg.4000000.tmp").exists());
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn what_a_scene_refers_to_is_an_input() {
+    let (dir, _) = folder("refers");
+    let corners: Vec<u8> = [0.0f32, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 3.0, 0.0]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    fs::write(dir.join("a.bin"), &corners).unwrap();
+    let scene = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"a.bin","byteLength":36}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[4,3,0]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]}"#;
+    fs::write(dir.join("a.gltf"), scene).unwrap();
+    let bake = |output: &str| {
+        Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(["bake", "a.gltf", "-o", output])
+            .current_dir(&dir)
+            .output()
+            .unwrap()
+    };
+    for output in ["a.bin", "sub/../a.bin"] {
+        let done = bake(output);
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(1), "{said}");
+        assert!(said.contains("the scene refers to"), "{said}");
+        assert!(said.contains("choose another name with -o"), "{said}");
+        assert_eq!(fs::read(dir.join("a.bin")).unwrap(), corners);
+    }
+    assert!(bake("b.glb").status.success());
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn a_bake_that_nobody_listens_to_writes_its_world() {
+    let (dir, _) = folder("deaf");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(["bake", "w.glb", "-v", "-o", "out.glb"])
+        .current_dir(&dir)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop((child.stdout.take(), child.stderr.take()));
+    assert!(child.wait().unwrap().success());
+    enfilade::open(dir.join("out.glb")).unwrap();
     fs::remove_dir_all(&dir).unwrap();
 }

@@ -216,6 +216,7 @@ impl Complex {
             tree: &self.tree,
             surfaces: &self.set.surfaces,
             tolerance: self.tolerance,
+            allowance: None,
         };
         let n = self.tree.n_leaves as usize;
         let mut sink = OpeningSink {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Bvh, DVec3};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, NearSeries};
 
 use smallvec::SmallVec;
 
@@ -145,6 +145,8 @@ pub(super) struct Clearance<'a> {
     pub(super) bvh: &'a Bvh,
     /// Diameter of the smallest hole. [Units: wu]
     pub(super) hole: f64,
+    /// What looking may cost.
+    pub(super) allowance: Option<&'a Allowance>,
 }
 
 impl Clearance<'_> {
@@ -156,35 +158,45 @@ impl Clearance<'_> {
     /// there are wide ones.
     /// One query of the triangles in the open, at most `4n + 1` in a gap.
     pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
-        self.is_narrower(points, self.hole, true, &mut { usize::MAX })
+        let mut series = NearSeries::default();
+        let is_gap = self.is_narrower(points, self.hole, true, &mut series);
+        self.spend(&series);
+        is_gap
     }
 
     /// Whether an opening is narrow, no wider than a crack, and whether it is a gap. Of pieces narrower than what is asked
     /// for, which cuts of the tree make, the middle alone is looked at.
     fn narrowness(&self, points: &[DVec3], width: f64) -> [bool; 2] {
-        let (crack, mut hint) = (CRACK_GAPS * self.hole, usize::MAX);
+        let (crack, mut series) = (CRACK_GAPS * self.hole, NearSeries::default());
         // Most are in the open: one query.
         let in_middle = self
             .bvh
-            .any_within(middle_of(points), 0.5 * crack, &mut hint);
-        if crack <= 0.0 || in_middle.is_none() {
-            return [false; 2];
-        }
+            .any_within(middle_of(points), 0.5 * crack, &mut series);
         let mut is_narrower =
-            |diameter: f64| self.is_narrower(points, diameter, width >= diameter, &mut hint);
-        let is_gap = is_narrower(self.hole);
-        [is_gap || is_narrower(crack), is_gap]
+            |diameter: f64| self.is_narrower(points, diameter, width >= diameter, &mut series);
+        let [mut is_narrow, mut is_gap] = [false; 2];
+        if crack > 0.0 && in_middle.is_some() {
+            is_gap = is_narrower(self.hole);
+            is_narrow = is_gap || is_narrower(crack);
+        }
+        self.spend(&series);
+        [is_narrow, is_gap]
+    }
+
+    /// Takes what queries cost from what may be spent.
+    fn spend(&self, series: &NearSeries) {
+        if let Some(allowance) = self.allowance {
+            allowance.spend(series.n_looked / 4);
+        }
     }
 
     /// Whether an opening lets no ball of so large a diameter pass; by its middle alone where the rest does not count.
-    ///
-    /// `hint` is where a triangle was found last.
     fn is_narrower(
         &self,
         points: &[DVec3],
         diameter: f64,
         is_whole: bool,
-        hint: &mut usize,
+        series: &mut NearSeries,
     ) -> bool {
         if diameter <= 0.0 {
             return false;
@@ -202,7 +214,7 @@ impl Clearance<'_> {
             if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
                 return true;
             }
-            let distance = self.bvh.any_within(p, reach, hint);
+            let distance = self.bvh.any_within(p, reach, series);
             known.extend(distance.map(|d| (p, reach - d)));
             distance.is_some()
         })

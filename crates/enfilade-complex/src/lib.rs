@@ -53,7 +53,7 @@ mod tree;
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, Winding};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, Winding};
 
 use facet::Visitor;
 use graph::{Clearance, LeafGraph};
@@ -154,6 +154,12 @@ pub struct Complex {
 /// result is the same for any number of threads.
 #[must_use]
 pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
+    build_complex_within(input, &Allowance::default())
+}
+
+/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used.
+#[must_use]
+pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> Complex {
     let mut surfaces: Vec<Surface> =
         Vec::with_capacity(input.triangles.len() + input.candidates.len());
     let mut add = |source, points: &[DVec3]| {
@@ -191,12 +197,17 @@ pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
         tree,
         surfaces: &set.surfaces,
         tolerance,
+        allowance: Some(allowance),
     };
-    let tree = tree::build(&set, bounds, &tolerance);
+    let tree = tree::build(&set, bounds, &tolerance, allowance);
     let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap);
     let bvh = Bvh::build(input.triangles);
     let hole = input.gap;
-    let clearance = Clearance { bvh: &bvh, hole };
+    let clearance = Clearance {
+        bvh: &bvh,
+        hole,
+        allowance: Some(allowance),
+    };
     let graph = LeafGraph::of(&visitor(&tree), &clearance);
     Complex {
         set,
@@ -232,6 +243,7 @@ impl Complex {
         Clearance {
             bvh: &self.bvh,
             hole: self.graph.hole,
+            allowance: None,
         }
     }
 

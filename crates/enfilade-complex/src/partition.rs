@@ -231,6 +231,7 @@ fn gather_pieces(complex: &Complex, tagged: &TaggedTree<'_>) -> (Vec<Piece>, BTr
         tree,
         surfaces: &complex.set.surfaces,
         tolerance: complex.tolerance,
+        allowance: None,
     };
     let plane_of_candidate = planes_of_candidates(&complex.set.surfaces);
     let mut sink = PieceSink {

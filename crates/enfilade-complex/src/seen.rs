@@ -95,16 +95,16 @@ pub(super) fn cells_of_triangles(
     tolerance: &Tolerance,
     n_triangles: usize,
 ) -> TriangleCells {
-    let mut surface_of: Vec<u32> = vec![u32::MAX; n_triangles];
-    for (i, s) in set.surfaces.iter().enumerate() {
-        if let Source::Triangle(t) = s.source {
-            surface_of[t as usize] = i as u32;
+    let mut surface_of: Vec<Option<&Surface>> = vec![None; n_triangles];
+    for surface in set.surfaces.iter().chain(&set.copies) {
+        if let Source::Triangle(t) = surface.source {
+            surface_of[t as usize] = Some(surface);
         }
     }
     let lists: Vec<Sides2> = surface_of
         .par_iter()
         .with_min_len(64)
-        .map(|&i| match set.surfaces.get(i as usize) {
+        .map(|&surface| match surface {
             Some(surface) => Descent::of(tagged, surface, tolerance),
             None => Sides2::default(),
         })

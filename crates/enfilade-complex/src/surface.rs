@@ -78,7 +78,13 @@ pub(super) struct SurfaceSet {
     pub(super) surfaces: Vec<Surface>,
     /// Distinct planes.
     pub(super) planes: Vec<Plane>,
+    /// Triangles left out of `surfaces` because others are the very same, with the planes of these.
+    pub(super) copies: Vec<Surface>,
 }
+
+/// Most triangles with the very same corners that are cut with. Doubled faces are ordinary, and where the tree is cut takes
+/// account of them; more only cost.
+const MOST_COPIES: usize = 4;
 
 /// Orders by area, then coordinates, so that the input's order has no say.
 fn canonical_order(surfaces: &mut [Surface]) {
@@ -142,9 +148,13 @@ pub(super) fn gather(
     tolerance: &Tolerance,
 ) -> SurfaceSet {
     canonical_order(&mut surfaces);
+    let mut copies = take_copies(&mut surfaces);
     let mut planes = PlaneList::new(bounds.center(), tolerance.plane);
     for s in &mut surfaces {
         s.plane = plane_of(&s.points, &mut planes, tolerance);
+    }
+    for copy in &mut copies {
+        copy.plane = plane_of(&copy.points, &mut planes, tolerance);
     }
     for mut seam in seams(&surfaces, planes.planes(), tolerance) {
         seam.plane = plane_of(&seam.points, &mut planes, tolerance);
@@ -153,7 +163,37 @@ pub(super) fn gather(
     SurfaceSet {
         surfaces,
         planes: planes.into_planes(),
+        copies,
     }
+}
+
+/// Takes out triangles of which there are [`MOST_COPIES`] before them, in canonical order.
+fn take_copies(surfaces: &mut Vec<Surface>) -> Vec<Surface> {
+    let corners = |s: &Surface| {
+        let mut bits: Vec<[u64; 3]> = s
+            .points
+            .iter()
+            .map(|p| p.to_array().map(ordered_bits))
+            .collect();
+        bits.sort_unstable();
+        bits
+    };
+    let mut copies = Vec::new();
+    let mut kept: Vec<Surface> = Vec::with_capacity(surfaces.len());
+    let mut n_alike = 0;
+    for surface in surfaces.drain(..) {
+        let is_alike = kept.last().is_some_and(|last| {
+            matches!(surface.source, Source::Triangle(_)) && corners(last) == corners(&surface)
+        });
+        n_alike = if is_alike { n_alike + 1 } else { 0 };
+        if n_alike < MOST_COPIES {
+            kept.push(surface);
+        } else {
+            copies.push(surface);
+        }
+    }
+    *surfaces = kept;
+    copies
 }
 
 /// The plane in the list of a polygon; [`NO_PLANE`] where it is too thin to have one.

@@ -8,7 +8,7 @@
 //! where there is one, as that surface then needs no split of its own.
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, DVec3, Plane};
+use enfilade_geom::{Aabb, Allowance, DVec3, Plane};
 
 use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
@@ -150,7 +150,12 @@ impl Part {
 
 /// Builds the tree. Near-linear in fragments for scenes whose surfaces are spread out; a knot of
 /// `k` surfaces through one point makes up to `k²` leaves.
-pub(super) fn build(set: &SurfaceSet, bounds: Aabb, tolerance: &Tolerance) -> Tree {
+pub(super) fn build(
+    set: &SurfaceSet,
+    bounds: Aabb,
+    tolerance: &Tolerance,
+    allowance: &Allowance,
+) -> Tree {
     let fragments: Vec<Fragment> = (0..set.surfaces.len() as u32)
         .filter_map(|surface| {
             let s = &set.surfaces[surface as usize];
@@ -170,6 +175,7 @@ pub(super) fn build(set: &SurfaceSet, bounds: Aabb, tolerance: &Tolerance) -> Tr
         set,
         axis_of,
         tolerance: *tolerance,
+        allowance,
     };
     let mut part = Part::default();
     let root = builder.split_box(fragments, bounds, &mut part);
@@ -208,6 +214,7 @@ struct Builder<'a> {
     set: &'a SurfaceSet,
     axis_of: Vec<Option<u8>>,
     tolerance: Tolerance,
+    allowance: &'a Allowance,
 }
 
 /// How a box is to be split.
@@ -224,6 +231,9 @@ impl Builder<'_> {
 
     fn split_box(&self, fragments: Vec<Fragment>, bounds: Aabb, out: &mut Part) -> i32 {
         let n = fragments.len();
+        if !self.allowance.spend(2 * n as u64) {
+            return out.leaf();
+        }
         let split = if n > MAX_BOX_FRAGMENTS {
             self.choose_box_split(&fragments, &bounds)
         } else {
@@ -447,6 +457,10 @@ impl Builder<'_> {
             return out.leaf();
         }
         let fragments = bounded(fragments);
+        // Choosing a plane looks at most of them several times.
+        if !self.allowance.spend(3 * fragments.len() as u64) {
+            return out.leaf();
+        }
         let plane = self.choose_plane(&fragments);
         let node = out.nodes.len();
         out.nodes.push(Node {

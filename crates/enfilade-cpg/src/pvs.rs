@@ -30,6 +30,23 @@ impl Pvs {
         pvs
     }
 
+    /// The set of a graph in which cell `c` may see the cells of `rows[c]`: ascending, none twice. Takes no more memory than
+    /// the runs that they make.
+    pub fn of_ascending<R: IntoIterator<Item = u32>>(rows: impl IntoIterator<Item = R>) -> Self {
+        let mut pvs = Self::default();
+        for row in rows {
+            let first = pvs.runs.len();
+            for cell in row {
+                match pvs.runs[first..].last_mut() {
+                    Some(run) if run[1] == cell => run[1] += 1,
+                    _ => pvs.runs.push([cell, cell + 1]),
+                }
+            }
+            pvs.ends.push(pvs.runs.len() as u32);
+        }
+        pvs
+    }
+
     /// Number of cells of its graph.
     #[must_use]
     pub fn n_cells(&self) -> usize {
@@ -53,6 +70,26 @@ impl Pvs {
     pub fn visible_from(&self, cell: CellId) -> impl Iterator<Item = CellId> + Clone + '_ {
         let cells = self.row(cell).iter().flat_map(|&[a, b]| a..b);
         cells.map(CellId)
+    }
+
+    /// How many cells may be seen from a cell. O(runs).
+    #[must_use]
+    pub fn n_visible_from(&self, cell: CellId) -> usize {
+        let lengths = self.row(cell).iter().map(|&[a, b]| (b - a) as usize);
+        lengths.sum()
+    }
+
+    /// Ordered pairs of cells that may see each other, each with itself among them.
+    #[must_use]
+    pub fn n_pairs(&self) -> usize {
+        self.runs.iter().map(|&[a, b]| (b - a) as usize).sum()
+    }
+
+    /// The cells that may be seen from a cell as runs of neighboring ids, the end not included; ascending, with a gap between
+    /// any two. None for a cell that its graph does not have.
+    #[must_use]
+    pub fn runs_from(&self, cell: CellId) -> &[[u32; 2]] {
+        self.row(cell)
     }
 
     /// The runs of a cell; none for one that is not there.
@@ -114,7 +151,11 @@ mod tests {
         let pvs = Pvs::of_rows(&sets);
         assert_eq!(pvs.n_cells(), 5);
         assert_eq!(pvs.problem(5), None);
+        let ids = |set: &CellSet| set.iter().map(|c| c.0).collect::<Vec<_>>();
+        assert_eq!(Pvs::of_ascending(sets.iter().map(ids)), pvs);
+        assert_eq!(pvs.n_pairs(), 12);
         for (from, set) in (0..).map(CellId).zip(&sets) {
+            assert_eq!(pvs.n_visible_from(from), set.len());
             assert!(pvs.visible_from(from).eq(set.iter()));
             for to in (0..7).map(CellId) {
                 assert_eq!(pvs.sees(from, to), set.contains(to), "{from} {to}");

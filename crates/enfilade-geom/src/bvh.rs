@@ -44,6 +44,15 @@ pub struct Nearest {
     pub point: DVec3,
 }
 
+/// A series of queries of one tree by [`Bvh::any_within`], near each other.
+#[derive(Clone, Debug, Default)]
+pub struct NearSeries {
+    /// Where the last one found a triangle.
+    last: Option<usize>,
+    /// How many triangles all of them looked at.
+    pub n_looked: u64,
+}
+
 impl Bvh {
     /// Builds the tree. O(n log n); 128 bytes a node and 76 a triangle.
     ///
@@ -193,6 +202,16 @@ impl Bvh {
         });
     }
 
+    /// [`Bvh::for_each_in_box`], until `is_found` says so of one; whether it did.
+    pub fn any_in_box(&self, query: &Aabb, mut is_found: impl FnMut(u32) -> bool) -> bool {
+        let mut any = false;
+        self.walk_box(query, |i| {
+            any = triangle_touches_box(&self.triangle(i), query) && is_found(self.ids[i]);
+            !any
+        });
+        any
+    }
+
     /// Calls `visit` with the places of triangles whose boxes touch the closed box, until it says no.
     fn walk_box(&self, query: &Aabb, mut visit: impl FnMut(usize) -> bool) {
         if self.nodes.is_empty() || query.is_empty() {
@@ -236,23 +255,22 @@ impl Bvh {
 
     /// How far some triangle is from `p` that is within `reach`; not the nearest, but the first that is found. [Units: wu]
     ///
-    /// `hint` is where the last query found one, [`usize::MAX`] if none was asked: what holds here mostly holds close by.
+    /// Queries of one series begin with the triangle that the last one found: what holds here mostly holds close by.
     #[must_use]
-    pub fn any_within(&self, p: DVec3, reach: f64, hint: &mut usize) -> Option<f64> {
+    pub fn any_within(&self, p: DVec3, reach: f64, series: &mut NearSeries) -> Option<f64> {
         if !p.is_finite() {
             return None;
         }
-        if *hint < self.ids.len() {
-            let found = self.within(*hint, p, reach);
-            if found.is_some() {
-                return found;
-            }
+        let known = series.last.and_then(|at| self.within(at, p, reach));
+        if known.is_some() {
+            return known;
         }
         let mut found = None;
         self.walk_box(&Aabb::new(p - reach, p + reach), |i| {
+            series.n_looked += 1;
             found = self.within(i, p, reach);
             if found.is_some() {
-                *hint = i;
+                series.last = Some(i);
             }
             found.is_none()
         });
@@ -277,6 +295,17 @@ impl Bvh {
     /// Of several at the very same distance, the one with the least index.
     #[must_use]
     pub fn nearest(&self, p: DVec3, max_distance: f64) -> Option<Nearest> {
+        self.nearest_counted(p, max_distance, &mut 0)
+    }
+
+    /// [`Bvh::nearest`], and how many triangles were looked at.
+    #[must_use]
+    pub fn nearest_counted(
+        &self,
+        p: DVec3,
+        max_distance: f64,
+        n_looked: &mut u64,
+    ) -> Option<Nearest> {
         if self.nodes.is_empty() || !p.is_finite() {
             return None;
         }
@@ -296,6 +325,7 @@ impl Bvh {
             }
             if at.count > 0 {
                 let first = at.child as usize;
+                *n_looked += u64::from(at.count);
                 for i in first..first + at.count as usize {
                     let point = closest_point_on_triangle(p, &self.triangle(i));
                     let d2 = point.distance_squared(p);

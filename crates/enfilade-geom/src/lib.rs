@@ -5,6 +5,7 @@
 //! building computes in `f64`, files hold `f32`.
 
 mod aabb;
+mod allowance;
 mod bvh;
 mod plane;
 pub mod poly;
@@ -16,7 +17,8 @@ mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
-pub use bvh::{Bvh, Nearest};
+pub use allowance::Allowance;
+pub use bvh::{Bvh, NearSeries, Nearest};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
 pub use plane::Plane;
 pub use ray::{Hit, Ray, closest_point_on_triangle};

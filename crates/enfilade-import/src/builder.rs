@@ -106,9 +106,18 @@ impl<'a> Builder<'a> {
     }
 
     /// Reads a file that the current one refers to.
-    pub(crate) fn read_reference(&self, reference: &str, limit: u64) -> Result<Vec<u8>, String> {
+    pub(crate) fn read_reference(
+        &mut self,
+        reference: &str,
+        limit: u64,
+    ) -> Result<Vec<u8>, String> {
         let folder = self.folder.as_deref();
-        files::read_reference(folder, reference, self.options.allow_outside, limit)
+        let may_leave = self.options.allow_outside;
+        let (path, bytes) = files::read_reference(folder, reference, may_leave, limit)?;
+        if !self.report.references.contains(&path) {
+            self.report.references.push(path);
+        }
+        Ok(bytes)
     }
 
     pub(crate) fn limits(&self) -> &'a Limits {

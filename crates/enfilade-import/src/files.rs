@@ -67,7 +67,7 @@ pub(crate) fn decode_data_uri(uri: &str) -> Option<Result<(String, Vec<u8>), Str
     Some(bytes.map(|bytes| (mime, bytes)))
 }
 
-/// Reads a file that a scene in `folder` refers to, of at most `limit` bytes, or says why it is refused.
+/// Reads a file that a scene in `folder` refers to, of at most `limit` bytes, and where it is, or says why it is refused.
 ///
 /// The one way to such files: whoever wrote the scene chooses the reference, and whoever reads it owns the disk. So the file
 /// must lie in the scene's folder or below, also once links are followed, unless `may_leave` says otherwise.
@@ -76,12 +76,13 @@ pub(crate) fn read_reference(
     reference: &str,
     may_leave: bool,
     limit: u64,
-) -> Result<Vec<u8>, String> {
+) -> Result<(PathBuf, Vec<u8>), String> {
     let path = resolve(folder, reference, may_leave)?;
-    read_file(&path, limit).map_err(|e| match e {
+    let bytes = read_file(&path, limit).map_err(|e| match e {
         ImportError::Read { .. } => format!("{e}; put the file there"),
         _ => e.to_string(),
-    })
+    })?;
+    Ok((path, bytes))
 }
 
 /// The file that a reference means.

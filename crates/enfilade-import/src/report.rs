@@ -31,6 +31,8 @@ pub struct ImportReport {
     pub crossing_polygons: Finding,
     /// Polygons split into triangles.
     pub n_polygons: u64,
+    /// Files that the scene refers to and that were read: buffers, pictures, materials. Each once.
+    pub references: Vec<PathBuf>,
     /// What was put right, if that was asked for.
     pub repair: Option<crate::RepairReport>,
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use enfilade_cpg::{CellSet, PortalKind, World};
+use enfilade_cpg::{PortalKind, Pvs, World};
 use enfilade_geom::DVec2;
 
 use crate::plan::{PlanOptions, plan_svg};
@@ -42,7 +42,7 @@ pub struct ReportParts {
     /// The title, e.g. the file's name.
     pub title: String,
     /// By cell: what can be seen from it, as `enfilade pvs` finds it.
-    pub visible: Vec<CellSet>,
+    pub visible: Pvs,
     /// Tables of measurements.
     pub tables: Vec<Table>,
     /// Pictures.
@@ -78,7 +78,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
          plan, storeys side by side; a line for each doorway.</p><div class=\"drawing\">{}</div></section>\n",
         graph_svg(world)
     );
-    if !parts.visible.is_empty() {
+    if parts.visible.n_cells() > 0 {
         matrix(&mut out, world, &parts.visible);
     }
     for t in &parts.tables {
@@ -304,8 +304,8 @@ fn graph_svg(world: &World) -> String {
 }
 
 /// Which room can be seen from which, as a square of dots.
-fn matrix(out: &mut String, world: &World, visible: &[CellSet]) {
-    let mut cells: Vec<usize> = (0..visible.len().min(world.graph.cells.len())).collect();
+fn matrix(out: &mut String, world: &World, visible: &Pvs) {
+    let mut cells: Vec<usize> = (0..visible.n_cells().min(world.graph.cells.len())).collect();
     if cells.len() > MAX_MATRIX {
         cells.sort_by(|&a, &b| {
             let volume = |i: usize| world.graph.cells[i].volume;
@@ -315,8 +315,8 @@ fn matrix(out: &mut String, world: &World, visible: &[CellSet]) {
         cells.sort_unstable();
     }
     let n = cells.len();
-    let pairs: usize = visible.iter().map(CellSet::len).sum();
-    let all = visible.len() * visible.len();
+    let pairs = visible.n_pairs();
+    let all = visible.n_cells() * visible.n_cells();
     let _ = write!(
         out,
         "<section><h2>Visibility</h2><p>A dark square where something of the column's room can be seen from somewhere in \
@@ -324,8 +324,8 @@ fn matrix(out: &mut String, world: &World, visible: &[CellSet]) {
          viewBox=\"-1 -1 {} {}\" style=\"max-width:520px\" role=\"img\" aria-label=\"visibility matrix\">\
          <rect width=\"{n}\" height=\"{n}\" fill=\"#f1f1ee\"/><path fill=\"#1c3d5a\" d=\"",
         100.0 * pairs as f64 / all.max(1) as f64,
-        if n < visible.len() {
-            format!("; the {n} largest of {} rooms", visible.len())
+        if n < visible.n_cells() {
+            format!("; the {n} largest of {} rooms", visible.n_cells())
         } else {
             String::new()
         },
@@ -333,7 +333,12 @@ fn matrix(out: &mut String, world: &World, visible: &[CellSet]) {
         n + 2
     );
     for (y, &from) in cells.iter().enumerate() {
-        let sees = |x: usize| visible[from].contains(enfilade_cpg::CellId(cells[x] as u32));
+        let sees = |x: usize| {
+            visible.sees(
+                enfilade_cpg::CellId(from as u32),
+                enfilade_cpg::CellId(cells[x] as u32),
+            )
+        };
         let mut x = 0;
         while x < n {
             let start = x;
@@ -363,11 +368,11 @@ mod tests {
             volume: 60.0,
             ..Cell::default()
         });
-        let mut seen = CellSet::new(1);
+        let mut seen = enfilade_cpg::CellSet::new(1);
         seen.insert(CellId(0));
         let parts = ReportParts {
             title: "a \"house\" & <b>".into(),
-            visible: vec![seen],
+            visible: Pvs::of_rows(&[seen]),
             figures: vec![Figure {
                 caption: "'\">".into(),
                 png: vec![1, 2, 3],

@@ -8,6 +8,8 @@ use enfilade_geom::Triangle;
 /// Share of the clearance that the search itself uses; a checker's sums may differ in the last digits.
 pub(crate) const KEPT: f64 = 0.9;
 
+const GIB: f64 = (1u64 << 30) as f64;
+
 /// How thoroughly to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum VisMode {
@@ -34,6 +36,8 @@ pub struct VisConfig {
     pub max_pieces: u32,
     /// Write down proofs: [`crate::VisOutput::evidence`]. Costs about as much again.
     pub has_evidence: bool,
+    /// Graphs that are estimated to take more than this are refused before anything is allocated. [Units: bytes]
+    pub max_memory: u64,
 }
 
 impl Default for VisConfig {
@@ -45,6 +49,7 @@ impl Default for VisConfig {
             n_rays: 12,
             max_pieces: 64,
             has_evidence: false,
+            max_memory: 8 << 30,
         }
     }
 }
@@ -62,6 +67,20 @@ pub enum VisError {
         name: &'static str,
         /// What it is.
         value: f64,
+    },
+    /// The graph would take more memory than is allowed.
+    #[error(
+        "{n_portals} portals would take about {:.1} GiB, more than the {:.1} GiB that are allowed; allow more with \
+         --max-memory (max_memory), or make fewer and larger portals (detail brushes take no part in them)",
+        *.estimate as f64 / GIB, *.limit as f64 / GIB
+    )]
+    TooLarge {
+        /// How many portals there are.
+        n_portals: usize,
+        /// What they would take. [Units: bytes]
+        estimate: u64,
+        /// What is allowed. [Units: bytes]
+        limit: u64,
     },
     /// A checkpoint does not fit.
     #[error("the checkpoint cannot be used: {problem}; delete it to start anew")]

@@ -34,7 +34,13 @@ pub(crate) struct Dir {
 /// All directions.
 #[derive(Debug)]
 pub(crate) struct Dirs {
+    /// Number of cells that have a portal. Only these count here, in the graph's order: tables of cells go by what can be
+    /// seen, not by what a file says there is.
     pub(crate) n_cells: usize,
+    /// By cell, its number in the graph.
+    pub(crate) cells: Vec<u32>,
+    /// Number of cells of the graph.
+    pub(crate) n_all_cells: usize,
     pub(crate) all: Vec<Dir>,
     /// The same portal the other way.
     pub(crate) reverse: Vec<u32>,
@@ -63,6 +69,9 @@ const FEW: usize = 4;
 impl Dirs {
     /// Takes time and memory linear in the corners, but for a sort of the portals.
     pub(crate) fn new(graph: &SightGraph) -> Self {
+        let mut cells: Vec<u32> = graph.portals.iter().flat_map(|p| p.cells).collect();
+        cells.sort_unstable();
+        cells.dedup();
         let mut points = Vec::new();
         let mut edges = Vec::new();
         let mut pieces = Vec::new();
@@ -86,6 +95,10 @@ impl Dirs {
                 pieces.push(corners.clone());
             }
             pieces.extend(portal.pieces.iter().map(|piece| add(piece)));
+            // Each is there.
+            let [a, b] = portal
+                .cells
+                .map(|c| cells.partition_point(|&other| other < c) as u32);
             let center = portal.winding.iter().sum::<DVec3>() / n as f64;
             let radius = portal
                 .winding
@@ -96,8 +109,8 @@ impl Dirs {
                 let normal = if side == 0 { turn } else { -turn };
                 let heights = portal.winding.iter().map(|&p| normal.dot(p));
                 all.push(Dir {
-                    from: portal.cells[side],
-                    to: portal.cells[1 - side],
+                    from: [a, b][side],
+                    to: [b, a][side],
                     id: (2 * i + side) as u32,
                     normal,
                     low: heights.clone().fold(f64::INFINITY, f64::min),
@@ -111,7 +124,7 @@ impl Dirs {
             }
         }
         all.sort_by_key(|dir| (dir.from, dir.id));
-        let n_cells = graph.n_cells as usize;
+        let n_cells = cells.len();
         let mut out_of = vec![0u32; n_cells + 1];
         for dir in &all {
             out_of[dir.from as usize + 1] += 1;
@@ -139,6 +152,8 @@ impl Dirs {
             .fold(1e-300, f64::max);
         Self {
             n_cells,
+            cells,
+            n_all_cells: graph.n_cells as usize,
             all,
             reverse,
             portals,
@@ -156,6 +171,11 @@ impl Dirs {
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.all.len()
+    }
+
+    /// Number of cells without a portal. Each sees itself.
+    pub(crate) fn n_alone(&self) -> u64 {
+        (self.n_all_cells - self.n_cells) as u64
     }
 
     /// The directions out of a cell.

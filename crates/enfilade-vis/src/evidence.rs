@@ -33,7 +33,7 @@ pub(crate) fn encode(
     let claims = prove::claims(&shared, &search.settled);
     let trace = prove::traces(&shared, &claims).ok_or(VisError::Evidence)?;
     let visible = search.visible();
-    let n_visible = visible.count_all();
+    let n_visible = visible.count_all() + search.dirs.n_alone();
     let n_proved = n_visible - n_undecided(search, &visible);
 
     let mut body = Vec::new();

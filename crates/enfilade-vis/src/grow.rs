@@ -44,7 +44,8 @@ impl Search<'_> {
         n_rounds: u64,
         on_round: &mut dyn FnMut(u64, u64) -> bool,
     ) {
-        let n = self.dirs.n_cells;
+        let dirs = self.dirs;
+        let n = dirs.n_cells;
         for a in 0..n {
             let undecided: Vec<usize> = bits::ones(self.undecided.row(a)).collect();
             for b in undecided {
@@ -63,7 +64,8 @@ impl Search<'_> {
                 .map(|a| {
                     let unseen = bits::ones(visible.row(a)).filter(|&b| b > a);
                     let unseen = unseen.filter(|&b| !self.seen.get(a, b));
-                    let mut rng = Rng::new(round * n as u64 + a as u64);
+                    let mut rng =
+                        Rng::new(round * dirs.n_all_cells as u64 + u64::from(dirs.cells[a]));
                     unseen
                         .filter_map(|b| self.line_between(a, b, n_lines, &mut rng))
                         .collect()

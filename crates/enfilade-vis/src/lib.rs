@@ -39,7 +39,7 @@ mod tolerance;
 
 use std::time::Instant;
 
-use enfilade_cpg::{CellId, CellSet, SightGraph};
+use enfilade_cpg::{Pvs, SightGraph};
 use enfilade_geom::{Bvh, DVec3};
 
 use config::KEPT;
@@ -57,12 +57,12 @@ const INSIST_ROUNDS: u64 = 2;
 
 /// Finds what can be seen from every cell.
 ///
-/// Memory: a bit for each pair of directions, three times over for short. Time grows with what is to be
-/// told apart: a map of 3,000 portals takes a second, one of 10,000 a minute.
+/// Memory: a bit for each pair of directions, three times over for short; cells without a portal take none. Time grows with
+/// what is to be told apart: a map of 3,000 portals takes a second, one of 10,000 a minute.
 ///
 /// # Errors
 ///
-/// A broken graph, a setting that is negative or no number, or a checkpoint that does not fit.
+/// A broken graph, one whose tables would be larger than [`VisConfig::max_memory`], a setting that is negative or no number, or a checkpoint that does not fit.
 pub fn see_all(
     graph: &SightGraph,
     config: &VisConfig,
@@ -72,6 +72,14 @@ pub fn see_all(
     check("clearance", config.clearance)?;
     check("the far plane", config.far)?;
     let dirs = Dirs::new(graph);
+    let estimate = estimate(&dirs, config.has_evidence);
+    if estimate > config.max_memory {
+        return Err(VisError::TooLarge {
+            n_portals: graph.portals.len(),
+            estimate,
+            limit: config.max_memory,
+        });
+    }
     let clearance = config.clearance.unwrap_or(1e-8 * dirs.scale);
     // The search keeps more than it promises, so that a checker that rounds otherwise still closes every chain.
     let bvh = context.walls.map(Bvh::build);
@@ -80,7 +88,7 @@ pub fn see_all(
         .map(|bvh| move |a: DVec3, b: DVec3| bvh.any_hit(a, b, |_| false));
     let blocker = is_blocked.as_ref().map(|f| f as Blocker<'_>);
     let mut search = Search::new(&dirs, KEPT * clearance, config.far, blocker);
-    let n_base = search.visible().count_all();
+    let n_base = search.visible().count_all() + dirs.n_alone();
     let salt = context.checkpoint.as_ref().map_or(0, |c| c.salt);
     let key = checkpoint::key(graph, config, salt);
     let resumed = match &context.checkpoint {
@@ -135,6 +143,14 @@ pub fn see_all(
     })
 }
 
+/// What the tables of a search take. [Units: bytes]
+fn estimate(dirs: &Dirs, has_evidence: bool) -> u64 {
+    let square = |n: usize| (n as u64).saturating_mul(n as u64);
+    let n_tables = if has_evidence { 5 } else { 3 };
+    let bits = square(dirs.len()).saturating_mul(n_tables);
+    bits.saturating_add(square(dirs.n_cells).saturating_mul(4)) / 8
+}
+
 /// Searches, and saves what was found now and then, and when told to stop.
 fn run(
     search: &mut Search<'_>,
@@ -169,19 +185,25 @@ fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
 }
 
 fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
-    let n = search.dirs.n_cells;
     let visible = search.visible();
-    let mut cells = vec![CellSet::new(n); n];
-    let mut undecided = cells.clone();
-    for a in 0..n {
-        for b in bits::ones(visible.row(a)) {
-            let id = CellId(b as u32);
-            cells[a].insert(id);
-            if !search.seen.get(a, b) || search.undecided.get(a, b) {
-                undecided[a].insert(id);
+    let names = &search.dirs.cells;
+    let is_undecided = |a: usize, b: usize| !search.seen.get(a, b) || search.undecided.get(a, b);
+    // A cell without a portal sees itself alone.
+    let rows = |is_alone_in: bool, keep: &dyn Fn(usize, usize) -> bool| {
+        let mut next = 0;
+        let rows = (0..search.dirs.n_all_cells as u32).map(|name| {
+            if names.get(next) != Some(&name) {
+                return if is_alone_in { vec![name] } else { Vec::new() };
             }
-        }
-    }
+            let a = next;
+            next += 1;
+            let seen = bits::ones(visible.row(a)).filter(|&b| keep(a, b));
+            seen.map(|b| names[b]).collect()
+        });
+        Pvs::of_ascending(rows)
+    };
+    let cells = rows(true, &|_, _| true);
+    let undecided = rows(false, &is_undecided);
     let n_steps = search.effort.steps;
     let id = |d: u32| search.dirs.all[d as usize].id;
     let witnesses = search

@@ -1,6 +1,6 @@
 //! What is found out.
 
-use enfilade_cpg::CellSet;
+use enfilade_cpg::Pvs;
 use enfilade_geom::DVec3;
 
 /// A line that proves cells to see each other.
@@ -18,9 +18,9 @@ pub struct Witness {
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisOutput {
     /// By cell: the cells that might be seen from it, itself included. Symmetric.
-    pub cells: Vec<CellSet>,
+    pub cells: Pvs,
     /// By cell: those of `cells` that no line proves; none of the rest is in doubt.
-    pub undecided: Vec<CellSet>,
+    pub undecided: Pvs,
     /// Lines that together prove everything else in `cells`.
     pub witnesses: Vec<Witness>,
     /// Whether the search ended by itself; if not, the answer is larger than need be.

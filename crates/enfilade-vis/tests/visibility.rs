@@ -6,7 +6,7 @@ use std::io::Read;
 use std::time::Duration;
 
 use common::pack;
-use enfilade_cpg::{CellId, SightGraph, SightGraphError, SightPortal};
+use enfilade_cpg::{CellId, Pvs, SightGraph, SightGraphError, SightPortal};
 use enfilade_geom::DVec3;
 use enfilade_testkit::Rng;
 use enfilade_verify::verify_evidence;
@@ -105,6 +105,12 @@ fn see(graph: &SightGraph, config: &VisConfig) -> VisOutput {
     see_all(graph, config, &mut context).unwrap()
 }
 
+/// Whether one answer has nothing that another has not.
+fn is_subset(one: &VisOutput, other: &VisOutput) -> bool {
+    let mut cells = (0..one.cells.n_cells() as u32).map(CellId);
+    cells.all(|a| one.cells.visible_from(a).all(|b| other.cells.sees(a, b)))
+}
+
 fn with_evidence() -> VisConfig {
     VisConfig {
         has_evidence: true,
@@ -113,7 +119,7 @@ fn with_evidence() -> VisConfig {
 }
 
 fn sees(vis: &VisOutput, a: usize, b: usize) -> bool {
-    vis.cells[a].contains(CellId(b as u32))
+    vis.cells.sees(CellId(a as u32), CellId(b as u32))
 }
 
 proptest! {
@@ -136,11 +142,9 @@ proptest! {
                 prop_assert!(sees(&exact, a, b) && sees(&exact, b, a), "{} {}", p, q);
             }
         }
-        for (a, b) in exact.cells.iter().zip(&fast.cells) {
-            prop_assert!(a.is_subset(b));
-        }
+        prop_assert!(is_subset(&exact, &fast));
         let report = verify_evidence(&graph, exact.evidence.as_deref().unwrap(), None).unwrap();
-        prop_assert_eq!(&report.cells, &exact.cells);
+        prop_assert_eq!(Pvs::of_rows(&report.cells), exact.cells);
     }
 }
 
@@ -170,7 +174,7 @@ fn windows_in_line_are_seen_through_and_windows_out_of_line_are_not() {
         },
     );
     // Neighbors share an opening, so nothing is too far for them.
-    assert!(sees(&near, 0, 1) && near.cells[0].len() <= vis.cells[0].len());
+    assert!(sees(&near, 0, 1) && near.cells.n_pairs() <= vis.cells.n_pairs());
 }
 
 #[test]
@@ -193,12 +197,7 @@ fn threads_and_an_early_stop_change_what_they_should() {
     };
     let stopped = see_all(&graph, &with_evidence(), &mut context).unwrap();
     assert!(!stopped.is_complete && one.is_complete);
-    assert!(
-        one.cells
-            .iter()
-            .zip(&stopped.cells)
-            .all(|(a, b)| a.is_subset(b))
-    );
+    assert!(is_subset(&one, &stopped));
     verify_evidence(&graph, &stopped.evidence.unwrap(), None).unwrap();
 }
 
@@ -307,13 +306,10 @@ fn a_checkpoint_that_lies_never_hides_what_is_seen() {
                 n_harmless += 1;
                 // Work counted wrongly, or an opening not searched: never less than can be seen.
                 verify_evidence(&graph, &vis.evidence.unwrap(), None).unwrap();
-                let mut rows = vis
-                    .cells
-                    .iter()
-                    .zip(whole.cells.iter().zip(&whole.undecided));
-                let is_seen = rows.all(|(found, (all, undecided))| {
-                    all.iter()
-                        .all(|c| undecided.contains(c) || found.contains(c))
+                let mut cells = (0..whole.cells.n_cells() as u32).map(CellId);
+                let is_seen = cells.all(|from| {
+                    let is_kept = |to| whole.undecided.sees(from, to) || vis.cells.sees(from, to);
+                    whole.cells.visible_from(from).all(is_kept)
                 });
                 assert!(is_seen, "bit {bit}");
             }
@@ -362,7 +358,7 @@ fn broken_graphs_are_named_and_odd_ones_are_answered() {
             portals: Vec::new(),
         };
         let vis = see(&graph, &with_evidence());
-        assert!(vis.cells.iter().all(|set| set.len() == 1));
+        assert!(vis.cells.n_pairs() == n_cells as usize);
         verify_evidence(&graph, &vis.evidence.unwrap(), None).unwrap();
     }
     let mut flat = good.clone();
@@ -503,7 +499,7 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
     let graph = there_and_back();
     let vis = see(&graph, &with_evidence());
     assert!(!sees(&vis, 0, 2) && sees(&vis, 0, 1) && sees(&vis, 1, 2));
-    assert!(vis.undecided.iter().all(enfilade_cpg::CellSet::is_empty));
+    assert!(vis.undecided.n_pairs() == 0);
     let bytes = vis.evidence.unwrap();
     let report = verify_evidence(&graph, &bytes, None).unwrap();
     let mut body = Vec::new();
@@ -541,4 +537,62 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
         bad[start + 10 * i + 2..start + 10 * i + 10].fill(0);
     }
     assert!(verify_evidence(&graph, &pack(&bad), None).is_err());
+}
+
+#[test]
+fn cells_without_portals_cost_nothing() {
+    // A million cells, of which a few in the middle have portals: tables of all pairs would be 137 GB.
+    let few = Grid::new(3, 2).graph();
+    let first = 500_000;
+    let mut many = SightGraph {
+        n_cells: 1 << 20,
+        portals: few.portals.clone(),
+    };
+    for portal in &mut many.portals {
+        portal.cells = portal.cells.map(|c| first + c * 7);
+    }
+    let (few, many) = (
+        see(&few, &with_evidence()),
+        see(&many, &VisConfig::default()),
+    );
+    let n = few.cells.n_cells() as u32;
+    for (a, b) in (0..n).flat_map(|a| (0..n).map(move |b| (a, b))) {
+        let [x, y] = [a, b].map(|c| CellId(first + c * 7));
+        assert_eq!(
+            many.cells.sees(x, y),
+            few.cells.sees(CellId(a), CellId(b)),
+            "{a} {b}"
+        );
+        assert!(!many.cells.sees(x, CellId(y.0 + 1)));
+    }
+    assert_eq!(
+        many.cells.n_pairs(),
+        few.cells.n_pairs() + (1 << 20) - n as usize
+    );
+    assert_eq!(many.n_base, few.n_base + (1 << 20) - u64::from(n));
+}
+
+#[test]
+fn a_graph_too_large_for_the_memory_allowed_is_refused_before_it_is_taken() {
+    let graph = Grid::new(8, 8).graph();
+    let see = |max_memory| {
+        let mut context = VisContext {
+            on_round: &mut |_, _| true,
+            walls: None,
+            checkpoint: None,
+        };
+        let config = VisConfig {
+            max_memory,
+            ..VisConfig::default()
+        };
+        see_all(&graph, &config, &mut context)
+    };
+    let Err(VisError::TooLarge { estimate, .. }) = see(1000) else {
+        panic!("a table of all directions does not fit");
+    };
+    assert!(see(estimate).is_ok());
+    let error = see(estimate - 1).unwrap_err().to_string();
+    for word in ["portals", "GiB", "--max-memory"] {
+        assert!(error.contains(word), "{error}");
+    }
 }

@@ -1,6 +1,7 @@
 //! From surfaces to leaves: gathers, cuts, settles what is matter, and drops what is not reached from inside.
 
-use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3};
+use enfilade_geom::{Aabb, Allowance, BoxTree, ConvexSolid, DVec3};
+use rayon::prelude::*;
 
 use super::guide::Guide;
 use super::input::BspInput;
@@ -8,6 +9,9 @@ use super::leaves::Bsp;
 use super::tolerance::Tolerance;
 use super::tree::{self, Content, Heuristic, Tree};
 use super::{inside, leak, portals, shape, surfaces};
+
+/// What it costs to find out whether a leaf is matter, in units of [`Allowance`].
+const WORK_A_LEAF: u64 = 100;
 
 /// How many different numbers there are; equal ones stand side by side.
 fn n_distinct(numbers: &[u32]) -> usize {
@@ -21,7 +25,7 @@ impl Bsp {
     /// inside, and once of those. Time near-linear in surfaces that are spread out; deterministic.
     #[must_use]
     pub fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -> Self {
-        Self::build_of(input, heuristic, guide, true)
+        Self::build_of(input, heuristic, guide, true, &Allowance::default())
     }
 
     /// The same; where triangles bound no matter there is air on both sides of them.
@@ -30,6 +34,7 @@ impl Bsp {
         heuristic: Heuristic,
         guide: &Guide,
         has_matter: bool,
+        allowance: &Allowance,
     ) -> Self {
         let surfaces::Gathered {
             planes,
@@ -51,10 +56,11 @@ impl Bsp {
                 heuristic,
                 guide,
                 &tolerance,
+                allowance,
             );
             if !boxes.is_empty() {
                 // A middle on the border of two solids is in matter.
-                settle(&mut tree, &tolerance, has_void, &|p| {
+                settle(&mut tree, &tolerance, has_void, allowance, &|p| {
                     let mut is_inside = false;
                     solids.for_each_in_box(&Aabb::new(p, p), |i| {
                         is_inside |= input.solids[i as usize].contains(p, -10.0 * tolerance.cut);
@@ -63,7 +69,7 @@ impl Bsp {
                 });
             } else if !input.triangles.is_empty() {
                 let soup = inside::Soup::of(input.triangles, input.objects);
-                settle(&mut tree, &tolerance, true, &|p| {
+                settle(&mut tree, &tolerance, true, allowance, &|p| {
                     has_matter && soup.is_inside(p)
                 });
             }
@@ -124,10 +130,15 @@ fn settle(
     tree: &mut Tree,
     tolerance: &Tolerance,
     has_void: bool,
-    is_inside: &dyn Fn(DVec3) -> bool,
+    allowance: &Allowance,
+    is_inside: &(dyn Fn(DVec3) -> bool + Sync),
 ) {
-    for (leaf, shape) in shape::shapes(tree, tolerance).iter().enumerate() {
-        let content = &mut tree.contents[leaf];
+    let shapes = shape::shapes(tree, tolerance);
+    let contents = tree.contents.par_iter_mut().zip(&shapes);
+    contents.for_each(|(content, shape)| {
+        if !allowance.spend(WORK_A_LEAF) {
+            return;
+        }
         match shape {
             // No room for anything.
             None => *content = Content::Solid,
@@ -135,5 +146,5 @@ fn settle(
             Some(_) if has_void => *content = Content::Empty,
             Some(_) => {}
         }
-    }
+    });
 }

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, BoxTree, Sets};
+use enfilade_geom::{Aabb, Allowance, BoxTree, Sets};
 
 use super::cells::{self, LeafCells, NO_CELL};
 use super::guide::Guide;
@@ -23,8 +23,13 @@ const FLAT: f64 = 1.0 / 3.0;
 
 /// The tree of a scene. Where a guide is given and matter leaves no air but the outdoors, the scene is nothing but a shell,
 /// which somebody wants the inside of, whichever way it faces: then there is no matter.
-pub(super) fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -> Bsp {
-    let build = |has_matter| Bsp::build_of(input, heuristic, guide, has_matter);
+pub(super) fn build(
+    input: &BspInput<'_>,
+    heuristic: Heuristic,
+    guide: &Guide,
+    allowance: &Allowance,
+) -> Bsp {
+    let build = |has_matter| Bsp::build_of(input, heuristic, guide, has_matter, allowance);
     let bsp = build(true);
     let is_shell = || input.solids.is_empty() && cells::components(&bsp, &[]).1 <= 1;
     if !guide.is_empty() && is_shell() {

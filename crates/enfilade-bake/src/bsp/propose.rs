@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Bvh, DVec3, Plane, Winding};
+use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Winding};
 
 use crate::complex::region::Shape;
 use crate::complex::{LabelSettings, Vote};
@@ -30,10 +30,11 @@ pub(crate) fn propose(
 ) -> Result<Proposal, BakeError> {
     let scene = structure.scene;
     context.begin(Stage::Tree)?;
-    let mut bsp = tree_of(structure, &config.bsp);
+    let mut bsp = tree_of(structure, &config.bsp, context.allowance());
     let counts = bsp.counts();
     context.begin(Stage::Separators)?;
-    let parted = Parted::of(structure, &mut bsp, config);
+    let parted = Parted::of(structure, &mut bsp, config, context.allowance());
+    context.check()?;
     let mut votes = parted.votes(&bsp);
     if !structure.stairs.is_empty() {
         let matter = Soup::of(&structure.stairs, &[]);
@@ -60,14 +61,14 @@ pub(crate) fn propose(
     })
 }
 
-fn tree_of(structure: &Structure<'_>, config: &BspConfig) -> Bsp {
+fn tree_of(structure: &Structure<'_>, config: &BspConfig, allowance: &Allowance) -> Bsp {
     let numbers = structure.wall_numbers.iter();
     let objects: Vec<u32> = numbers
         .map(|&t| structure.sources[t as usize].object)
         .collect();
     let inside = leak::inside_of(structure.scene);
     let input = input_of(structure.scene, &structure.walls, &objects, &inside);
-    guided::build(&input, config.heuristic, &config.guide)
+    guided::build(&input, config.heuristic, &config.guide, allowance)
 }
 
 fn label_settings(scene: &Scene) -> LabelSettings {
@@ -94,7 +95,12 @@ struct Parted {
 }
 
 impl Parted {
-    fn of(structure: &Structure<'_>, bsp: &mut Bsp, config: &BakeConfig) -> Self {
+    fn of(
+        structure: &Structure<'_>,
+        bsp: &mut Bsp,
+        config: &BakeConfig,
+        allowance: &Allowance,
+    ) -> Self {
         let by_shape = match config.bsp.rooms {
             Rooms::Auto => structure.scene.solids.is_empty(),
             rooms => rooms == Rooms::Always,
@@ -113,6 +119,7 @@ impl Parted {
             shapes: &shapes,
             closures: &Bvh::build(&structure.blockers(&Bvh::build(&structure.walls))),
             slabs: &structure.slabs(),
+            allowance,
         };
         let rooms = rooms::part(bsp, separator::find_in_walls(bsp), &evidence, settings);
         let narrow = rooms::narrow_cells(bsp, &rooms, settings);

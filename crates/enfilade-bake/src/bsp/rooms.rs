@@ -12,7 +12,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-use enfilade_geom::{Aabb, Bvh, DVec3};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3};
 use rayon::prelude::*;
 
 use crate::complex::poly;
@@ -43,7 +43,11 @@ pub(super) struct Evidence<'a> {
     pub(super) closures: &'a Bvh,
     /// Heights at which storeys end, ascending. [Units: wu]
     pub(super) slabs: &'a [f64],
+    pub(super) allowance: &'a Allowance,
 }
+
+/// What weighing an opening costs, in units of [`Allowance`].
+const WORK: u64 = 200;
 
 /// Part of a separator between two cells: the separator, and portals by their places in its list.
 type SeparatorPart = (u32, Vec<u32>);
@@ -497,6 +501,10 @@ impl LeafMerger<'_> {
 }
 
 impl Mergeable for LeafMerger<'_> {
+    fn may_go_on(&self) -> bool {
+        self.evidence.allowance.spend(WORK)
+    }
+
     fn pairs(&self) -> Vec<Pair> {
         self.openings.keys().copied().collect()
     }

@@ -1,6 +1,6 @@
 //! The tree: space cut by the planes of its surfaces until no leaf holds any.
 
-use enfilade_geom::{Aabb, DVec3, Plane};
+use enfilade_geom::{Aabb, Allowance, DVec3, Plane};
 use rayon::prelude::*;
 
 use crate::complex::poly::{self, Poly, Sides};
@@ -149,6 +149,7 @@ pub(super) fn build(
     heuristic: Heuristic,
     guide: &Guide,
     tolerance: &Tolerance,
+    allowance: &Allowance,
 ) -> Tree {
     let mut builder = Builder {
         tree: Tree {
@@ -164,6 +165,7 @@ pub(super) fn build(
         tolerance: *tolerance,
         n_own_planes: 0,
         guide_ids: Vec::new(),
+        allowance,
     };
     builder.n_own_planes = builder.tree.planes.len() as u32;
     for plane in guide.planes(&bounds) {
@@ -187,12 +189,13 @@ pub(super) fn build(
     tree
 }
 
-struct Builder {
+struct Builder<'a> {
     tree: Tree,
     heuristic: Heuristic,
     tolerance: Tolerance,
     n_own_planes: u32,
     guide_ids: Vec<u32>,
+    allowance: &'a Allowance,
 }
 
 /// Numbers that choose a splitter.
@@ -213,7 +216,7 @@ const SAMPLE: usize = 2048;
 /// With more trials of a fragment than this, candidates are tried in parallel.
 const PARALLEL: usize = 20_000;
 
-impl Builder {
+impl Builder<'_> {
     fn leaf(&mut self, content: Content) -> i32 {
         self.tree.contents.push(content);
         -(self.tree.contents.len() as i32)
@@ -265,7 +268,7 @@ impl Builder {
     }
 
     fn split(&mut self, fragments: Vec<Fragment>, content: Content) -> i32 {
-        if fragments.is_empty() {
+        if fragments.is_empty() || !self.allowance.spend(fragments.len() as u64) {
             return self.leaf(content);
         }
         let plane = self.choose(&fragments);
@@ -360,6 +363,9 @@ impl Builder {
             Heuristic::Default => fragments.len().div_ceil(SAMPLE),
             _ => 1,
         };
+        // Two trials take as long as a cut.
+        let n_trials = by_plane.len() * fragments.len().div_ceil(stride);
+        self.allowance.spend(n_trials as u64 / 2);
         let score = |id: u32, area: f64| {
             let c = self.count(fragments, stride, id, area);
             match self.heuristic {

@@ -92,6 +92,7 @@ pub(super) struct CutParts {
 }
 
 /// How polygons cut and cover a tetrahedron.
+#[derive(Default)]
 pub(super) struct TetrahedraCut {
     /// Bit `i`: a polygon lies in facet `i`, in some of it.
     covered: u8,

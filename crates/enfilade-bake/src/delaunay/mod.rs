@@ -24,6 +24,7 @@ mod config;
 mod cut;
 mod decimate;
 mod insert;
+mod limits;
 mod openings;
 mod order;
 mod predicate;

@@ -14,17 +14,21 @@
 
 use std::collections::HashMap;
 
-use enfilade_geom::{Aabb, Bvh, DVec3};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3};
 use rayon::prelude::*;
 
 use super::balls::{ENTERS, circle, circumsphere};
 use super::insert::Growing;
+use super::limits::Limits;
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
 
 /// No two points that are added in one round are nearer to each other than this share of the ball's radius.
 const APART: f64 = 0.4;
 /// More rounds of a pass than any scene took. After that, points count as having run out.
 const MAX_ROUNDS: usize = 100;
+/// What it costs to look at a tetrahedron and to add a point, in units of [`enfilade_geom::Allowance`].
+const WORK_A_LOOK: u64 = 5;
+const WORK_A_POINT: u64 = 100;
 
 /// Tetrahedra whose balls are balls of air.
 pub(super) struct Refined {
@@ -43,13 +47,13 @@ struct Wanted {
 
 /// Adds points of `surfaces` to `points` until no ball wider than `least` has a surface in it.
 ///
-/// `O(n log n)` in the points that come out, of which there are `max_points` at most.
+/// `O(n log n)` in the points that come out, of which there are no more than the limits say.
 pub(super) fn refined(
     points: &[DVec3],
     surfaces: &Bvh,
     bounds: &Aabb,
     least: f64,
-    max_points: usize,
+    limits: &Limits<'_>,
 ) -> Result<Refined, DelaunayError> {
     let mut growing = Growing::begin(points)?;
     let mut down_to = bounds.size().max_element();
@@ -60,14 +64,20 @@ pub(super) fn refined(
         for n_rounds in 0.. {
             let wanted: Vec<Wanted> = fresh
                 .par_iter()
-                .flat_map_iter(|&t| wanted_by(&growing, t, surfaces, bounds, pass))
+                .flat_map_iter(|&t| {
+                    wanted_by(&growing, t, surfaces, bounds, pass, limits.allowance)
+                })
                 .collect();
             let round = thinned(wanted);
             if round.is_empty() {
                 break;
             }
-            let is_full = growing.vertices().len() + round.len() > max_points;
-            if is_full || n_rounds == MAX_ROUNDS {
+            let is_full = growing.vertices().len() + round.len() > limits.n_points;
+            // Measured: to look for a point, and to put it in.
+            let may_go_on = limits
+                .allowance
+                .spend(WORK_A_LOOK * fresh.len() as u64 + WORK_A_POINT * round.len() as u64);
+            if is_full || n_rounds == MAX_ROUNDS || !may_go_on {
                 return Ok(Refined {
                     delaunay: growing.finished(),
                     down_to,
@@ -92,17 +102,19 @@ fn wanted_by(
     surfaces: &Bvh,
     bounds: &Aabb,
     (least, air): (f64, f64),
+    allowance: &Allowance,
 ) -> impl Iterator<Item = Wanted> + use<> {
     let vertices = growing.vertices();
     let corners = |t: u32| {
         let tet = growing.tetrahedron(t);
         tet.vertices.map(|v| vertices[v as usize])
     };
-    let entered = |center: DVec3, radius: f64| -> Option<Wanted> {
+    let mut n_looked = 0;
+    let mut entered = |center: DVec3, radius: f64| -> Option<Wanted> {
         if radius <= least || !bounds.contains(center) {
             return None;
         }
-        let near = surfaces.nearest(center, radius * (1.0 - ENTERS))?;
+        let near = surfaces.nearest_counted(center, radius * (1.0 - ENTERS), &mut n_looked)?;
         (near.distance > air).then_some(Wanted {
             point: near.point,
             radius,
@@ -150,6 +162,7 @@ fn wanted_by(
             }
         }
     }
+    allowance.spend(n_looked / 4);
     out.into_iter().flatten()
 }
 

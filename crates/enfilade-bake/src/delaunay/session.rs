@@ -6,7 +6,8 @@ use enfilade_geom::{Bvh, Triangle};
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
 use super::decimate::{Choices, Decimation, Weight, decimate, default_stop};
-use super::space::{Space, divide};
+use super::limits::{BYTES_A_POINT, Limits};
+use super::space::{Space, divide_within};
 use super::standing::count_rooms;
 use crate::structure::{Structure, in_own_order};
 use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
@@ -54,7 +55,16 @@ impl Session {
         let walls = in_own_order(&structure.walls);
         let bvh = Bvh::build(&walls);
         let closures = in_own_order(&structure.blockers(&bvh));
-        let space = divide(&walls, &closures, &bvh, config.min_opening)?;
+        let space = divide_within(
+            &walls,
+            &closures,
+            &bvh,
+            config.min_opening,
+            &Limits {
+                n_points: config.budget.points(BYTES_A_POINT),
+                allowance: context.allowance(),
+            },
+        )?;
         context.begin(Stage::Decimation)?;
         let cells = with_branches(
             &space,

@@ -13,19 +13,23 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Sets, Triangle};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets, Triangle};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::balls::{circle, circumsphere, of_air};
 use super::cut::{CutTolerance, Knife, Part, TetrahedraCut};
+use super::limits::Limits;
 use super::openings::Outline;
 use super::refine::refined;
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
 use crate::complex::poly::{area, area_normal, width};
 
-/// Most points added to surfaces. Each takes up to 4 kB of memory while tetrahedra become cells.
+/// Most points added to surfaces.
 const MAX_POINTS: usize = 300_000;
+/// What a tetrahedron and a part of one that is cut cost from there to rooms, in units of [`Allowance`].
+const WORK_A_TETRAHEDRON: u64 = 30;
+const WORK_A_PART: u64 = 100;
 /// Distance between the scene and the box around it, in addition to a quarter of the scene's size. [Units: narrowest openings]
 const MARGIN: f64 = 4.0;
 /// Points along each edge of the box around the scene.
@@ -108,7 +112,22 @@ pub fn divide(
     bvh: &Bvh,
     narrowest: f64,
 ) -> Result<Space, DelaunayError> {
-    let sampled = sample(walls, closures, narrowest)?;
+    let limits = Limits {
+        n_points: MAX_POINTS,
+        allowance: &Allowance::default(),
+    };
+    divide_within(walls, closures, bvh, narrowest, &limits)
+}
+
+/// [`divide`], as far as limits go: once the allowance is over, the space is not to be used.
+pub(super) fn divide_within(
+    walls: &[Triangle],
+    closures: &[Triangle],
+    bvh: &Bvh,
+    narrowest: f64,
+    limits: &Limits<'_>,
+) -> Result<Space, DelaunayError> {
+    let sampled = sample(walls, closures, narrowest, limits)?;
     let air = Air {
         knife: Knife {
             delaunay: &sampled.delaunay,
@@ -119,7 +138,7 @@ pub fn divide(
         box_vertices: &sampled.box_vertices,
         narrowest,
     };
-    let cuts = air.cut_all();
+    let cuts = air.cut_all(limits.allowance);
     let parts = air.measure(&cuts);
     let ways = air.ways(&cuts, &parts);
     let (links, vertices) = with_outlines(ways);
@@ -153,6 +172,7 @@ fn sample(
     walls: &[Triangle],
     closures: &[Triangle],
     narrowest: f64,
+    limits: &Limits<'_>,
 ) -> Result<Sampled, DelaunayError> {
     let all: Vec<Triangle> = walls.iter().chain(closures).copied().collect();
     let all_bvh = Bvh::build(&all);
@@ -163,8 +183,11 @@ fn sample(
     let around = bounds.expanded(MARGIN * narrowest + 0.25 * bounds.size().max_element());
     points.extend(box_points(&around));
     let least = narrowest * LEAST_BALL;
-    let max_points = points.len() + MAX_POINTS;
-    let refined = refined(&points, &all_bvh, &around, least, max_points)?;
+    let within = Limits {
+        n_points: points.len() + limits.n_points.min(MAX_POINTS),
+        ..*limits
+    };
+    let refined = refined(&points, &all_bvh, &around, least, &within)?;
     let delaunay = refined.delaunay;
     let box_vertices = delaunay.vertex_of_point[n_surface..].iter();
     let reach = around.min.abs().max(around.max.abs()).max_element();
@@ -216,10 +239,18 @@ impl AllParts {
 
 impl Air<'_> {
     /// How the walls cut each tetrahedron.
-    fn cut_all(&self) -> Vec<TetrahedraCut> {
+    fn cut_all(&self, allowance: &Allowance) -> Vec<TetrahedraCut> {
         (0..self.knife.delaunay.n_finite as u32)
             .into_par_iter()
-            .map(|t| self.knife.cut(t))
+            .map(|t| {
+                if !allowance.spend(WORK_A_TETRAHEDRON) {
+                    return TetrahedraCut::default();
+                }
+                let cut = self.knife.cut(t);
+                let n_parts = cut.parts.as_ref().map_or(0, |p| p.parts.len());
+                allowance.spend(WORK_A_PART * n_parts as u64);
+                cut
+            })
             .collect()
     }
 

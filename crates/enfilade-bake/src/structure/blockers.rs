@@ -8,7 +8,7 @@
 //! two rooms, so it changes nothing.
 
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Triangle, triangle_area_normal};
 
 /// Flat means thinner than this. [Units: wu] A door with its frame and handles is about 0.3.
 const MAX_THICKNESS: f64 = 0.4;
@@ -71,7 +71,7 @@ pub(crate) fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Ve
             all.for_each_in_box(&reach, |t| is_near_other |= owner[t as usize] != i);
             is_near_other
                 || walls
-                    .any_within(p, HELD_WITHIN, &mut { usize::MAX })
+                    .any_within(p, HELD_WITHIN, &mut NearSeries::default())
                     .is_some()
         };
         let area: f64 = plate

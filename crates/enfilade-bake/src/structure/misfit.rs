@@ -72,7 +72,8 @@ fn gap(triangles: &[Triangle], bvh: &Bvh, t: usize, k: usize) -> f64 {
     let [a, b] = [triangles[t][k], triangles[t][(k + 1) % 3]];
     let middle = a.midpoint(b);
     let mut nearest = f64::INFINITY;
-    bvh.for_each_in_box(&Aabb::new(middle, middle).expanded(RIM), |other| {
+    // Nothing is nearer than one that has the same edge.
+    bvh.any_in_box(&Aabb::new(middle, middle).expanded(RIM), |other| {
         if other as usize != t {
             let other = &triangles[other as usize];
             let has = |p: DVec3| other.contains(&p);
@@ -83,6 +84,7 @@ fn gap(triangles: &[Triangle], bvh: &Bvh, t: usize, k: usize) -> f64 {
             };
             nearest = nearest.min(distance);
         }
+        nearest == 0.0
     });
     nearest
 }

@@ -68,6 +68,8 @@ pub(crate) type Pair = (u32, u32);
 
 /// Cells that may be joined across the openings between them.
 pub(crate) trait Mergeable: Sync {
+    /// Whether there is work to be spent; if not, what was joined so far is all.
+    fn may_go_on(&self) -> bool;
     /// All pairs of cells with an opening between them.
     fn pairs(&self) -> Vec<Pair>;
     /// Whether there still is an opening between the two.
@@ -114,6 +116,9 @@ impl Ord for Waiting {
 pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
     let mut queue: BinaryHeap<Waiting> = weighed(cells, &cells.pairs()).into();
     while let Some(top) = queue.pop() {
+        if !cells.may_go_on() {
+            return;
+        }
         if !cells.is_pair(top.pair) {
             continue; // one of them was joined to a third; that pair has its own entry
         }
@@ -129,6 +134,9 @@ pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
 /// The pairs, of those given, whose two cells are one room.
 fn weighed<M: Mergeable>(cells: &M, pairs: &[Pair]) -> Vec<Waiting> {
     let weigh = |&pair: &Pair| {
+        if !cells.may_go_on() {
+            return None;
+        }
         let openness = cells.openness(pair);
         (openness >= 1.0).then(|| Waiting {
             openness,

@@ -1,6 +1,6 @@
 //! A candidate portal in each opening between two regions.
 
-use enfilade_geom::{Bvh, DVec3, Triangle};
+use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 use rayon::prelude::*;
 
 use super::fronts::{Faces, connected_patches, face_center, front_of, is_in, without_corners};
@@ -12,16 +12,20 @@ use crate::voxel::{BitVolume, Grid, Labels};
 /// Openings smaller than this many voxel faces are left to the complex, which finds them as cracks.
 const MIN_FACES: usize = 4;
 
+/// What fitting a candidate costs, in units of [`Allowance`], and each face of its opening more.
+const WORK: u64 = 15_000;
+const WORK_A_FACE: u64 = 150;
+
 /// Fits a candidate to each opening, among `walls`; `closures` are the voxels that door leaves and panes fill, and
 /// `closed_share` is how much of a front that must be for a pane to be parted at its corners. Slits narrower than `hole` count as closed.
 pub(super) fn fit_candidates(
     grid: &Grid,
     labels: &Labels,
     regions: &Regions,
-    closures: &BitVolume,
-    lids: &Lids,
+    (closures, lids): (&BitVolume, &Lids),
     walls: &[Triangle],
     [closed_share, hole]: [f64; 2],
+    allowance: &Allowance,
 ) -> Vec<Candidate> {
     let bvh = Bvh::build(walls);
     let is_shut = |faces: &[u64]| {
@@ -45,13 +49,20 @@ pub(super) fn fit_candidates(
         .flat_map(|(&(a, b), faces)| patches(faces).into_iter().map(move |patch| ([a, b], patch)))
         .collect();
     let candidate = |(pair, faces): ([u32; 2], Faces)| {
+        // Measured: a picture of the opening, many times finer than its faces.
+        if !allowance.spend(WORK + WORK_A_FACE * faces.len() as u64) {
+            return None;
+        }
         if let Some(lid) = lids.candidate_of(grid, &faces) {
-            return lid;
+            return Some(lid);
         }
         let is_lesser = |i: usize| regions.region_of_basin[labels.get(i) as usize] == pair[0];
         let front = front_of(grid, faces, &is_lesser, Some(closures));
         let centers: Vec<DVec3> = front.faces.iter().map(|&f| face_center(grid, f)).collect();
-        fit_candidate(&centers, grid.voxel, &front.opening, walls, &bvh, hole)
+        let opening = &front.opening;
+        Some(fit_candidate(
+            &centers, grid.voxel, opening, walls, &bvh, hole,
+        ))
     };
-    openings.into_par_iter().map(candidate).collect()
+    openings.into_par_iter().filter_map(candidate).collect()
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{Allowance, DVec3};
 
 use super::candidates::fit_candidates;
 use super::flooded::Flooded;
@@ -15,6 +15,7 @@ use super::rims::rim_caps;
 use super::slabs::cut_at_slabs;
 use super::voids::shallow_voids;
 use super::votes::{Ballots, inside_of};
+use crate::config::BYTES_A_VOXEL;
 use crate::proposal::Proposal;
 use crate::structure::Structure;
 use crate::voxel::{
@@ -33,7 +34,9 @@ pub(crate) fn propose(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Proposal, BakeError> {
-    let grid = config.grid(&structure.bounds())?;
+    let grid = config.grid(&structure.bounds(), structure.triangles.len())?;
+    let resolution = resolution_of(&grid);
+    context.tell(resolution, BYTES_A_VOXEL * grid.n_voxels() as f64);
     context.begin(Stage::Voxelize)?;
     let solid = Solid::of(structure, &grid, config);
     let mut notes = solid.lids.notes(&grid);
@@ -53,7 +56,8 @@ pub(crate) fn propose(
     } = solid;
 
     context.begin(Stage::Rooms)?;
-    let mut regions = basins.merge(&grid, &shut, &slabs, config);
+    let mut regions = basins.merge(&grid, &shut, &slabs, config, context.allowance());
+    context.check()?;
     split_limbs(
         &grid,
         &mut basins.labels,
@@ -79,10 +83,10 @@ pub(crate) fn propose(
         &grid,
         &labels,
         &regions,
-        &closures,
-        &lids,
+        (&closures, &lids),
         &structure.walls,
         [config.merge.closed_share, structure.hole(config)],
+        context.allowance(),
     );
     drop((closures, lids));
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh);
@@ -116,15 +120,19 @@ pub(crate) fn propose(
         counts,
         notes,
         settings: config.watershed_settings(),
-        resolution: Resolution::Voxels {
-            edge: grid.voxel,
-            dims: grid.dims,
-        },
+        resolution,
         ..Proposal::new(
             frame.aabb_to_scene(&grid.aabb()),
             ballots.count(&grid, frame),
         )
     })
+}
+
+fn resolution_of(grid: &Grid) -> Resolution {
+    Resolution::Voxels {
+        edge: grid.voxel,
+        dims: grid.dims,
+    }
 }
 
 /// The region of a point, 0 where there is none.
@@ -212,7 +220,14 @@ impl Basins {
         }
     }
 
-    fn merge(&self, grid: &Grid, shut: &BitVolume, slabs: &[f64], config: &BakeConfig) -> Regions {
+    fn merge(
+        &self,
+        grid: &Grid,
+        shut: &BitVolume,
+        slabs: &[f64],
+        config: &BakeConfig,
+        allowance: &Allowance,
+    ) -> Regions {
         let flooded = Flooded {
             grid,
             labels: &self.labels,
@@ -220,6 +235,6 @@ impl Basins {
             closures: Some(shut),
             slabs,
         };
-        merge_basins(flooded, &self.saddles, &config.merge)
+        merge_basins(flooded, &self.saddles, &config.merge, allowance)
     }
 }

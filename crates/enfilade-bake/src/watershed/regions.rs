@@ -23,6 +23,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::flooded::{Flooded, contact_faces};
@@ -46,6 +47,7 @@ pub(crate) fn merge_basins(
     flooded: Flooded<'_>,
     saddles: &BTreeMap<(u32, u32), f32>,
     settings: &MergeSettings,
+    allowance: &Allowance,
 ) -> Regions {
     let n = flooded.peaks.len();
     let mut merger = BasinMerger {
@@ -58,6 +60,7 @@ pub(crate) fn merge_basins(
         contacts: contact_faces(flooded.grid.dims, flooded.labels),
         saddles: saddles.clone(),
         storeys_apart: true,
+        allowance,
     };
     merger.peak[OUTDOORS as usize] = f32::INFINITY;
     for &(a, b) in merger.contacts.keys() {
@@ -75,6 +78,9 @@ pub(crate) fn merge_basins(
     merger.finish()
 }
 
+/// What weighing an opening costs, in units of [`Allowance`], and each face of it more.
+const WORK: u64 = 2_000;
+
 struct BasinMerger<'a> {
     flooded: Flooded<'a>,
     settings: &'a MergeSettings,
@@ -87,6 +93,7 @@ struct BasinMerger<'a> {
     saddles: BTreeMap<(u32, u32), f32>,
     /// Whether openings that lie in a slab count as shut for now.
     storeys_apart: bool,
+    allowance: &'a Allowance,
 }
 
 impl BasinMerger<'_> {
@@ -243,6 +250,10 @@ impl BasinMerger<'_> {
 }
 
 impl Mergeable for BasinMerger<'_> {
+    fn may_go_on(&self) -> bool {
+        self.allowance.spend(1)
+    }
+
     fn pairs(&self) -> Vec<Pair> {
         self.contacts.keys().copied().collect()
     }
@@ -273,6 +284,7 @@ impl Mergeable for BasinMerger<'_> {
         if low < 1.0 {
             return low;
         }
+        self.allowance.spend(WORK + faces.len() as u64);
         let side = |i: usize| self.find(self.flooded.labels.get(i)) == a;
         let fronts = group_faces(self.flooded.grid, faces, &side, self.flooded.closures);
         // The two largest are enough: a third opening between the same two is smaller still.

@@ -3,6 +3,7 @@
 //! Every value is checked where it is read, so that a wrong one is shown at its place.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::Context;
 use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
@@ -99,6 +100,13 @@ pub(crate) struct BakeOptions {
     /// 0.01, and more where triangles that should meet miss each other by more].
     #[arg(long, value_name = "METERS", value_parser = parse_hole, allow_hyphen_values = true)]
     smallest_hole: Option<f64>,
+    /// Memory to take at most, a number and K, M, G or T: voxels and points are as many as fit [default: 8G, and less for few
+    /// triangles].
+    #[arg(long, value_name = "BYTES", value_parser = enfilade_cli::values::bytes)]
+    max_memory: Option<u64>,
+    /// End without a world after this long; if not given, where the work is out of all proportion to the triangles.
+    #[arg(long, value_name = "SECONDS", value_parser = enfilade_cli::values::seconds)]
+    max_time: Option<Duration>,
     /// Threads to use; as many as there are cores if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) threads: Option<u16>,
@@ -370,6 +378,10 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
         MethodName::Watershed => Method::Watershed,
         MethodName::Bsp => Method::Bsp,
         MethodName::Delaunay => Method::Delaunay,
+    };
+    config.budget = enfilade::bake::Budget {
+        memory: options.max_memory,
+        time: options.max_time,
     };
     config.costs = resolve_costs(options, &file.bsp)?;
     config.delaunay = options.delaunay.resolve()?;

@@ -6,7 +6,7 @@
 use std::cmp::Reverse;
 use std::fmt::Write;
 
-use enfilade::cpg::{CellId, CellSet, SightGraph, World};
+use enfilade::cpg::{CellId, Pvs, SightGraph, World};
 use enfilade::geom::DVec3;
 
 /// What can be seen from each cell.
@@ -42,11 +42,9 @@ struct Viewpoint {
 
 impl Statistics {
     /// Time: cells times batches and objects.
-    pub(super) fn new(visible: &[CellSet], world: Option<&World>, graph: &SightGraph) -> Self {
-        let cells: Vec<FromCell> = visible
-            .iter()
-            .enumerate()
-            .map(|(c, set)| from_cell(c, set, world))
+    pub(super) fn new(visible: &Pvs, world: Option<&World>, graph: &SightGraph) -> Self {
+        let cells: Vec<FromCell> = (0..visible.n_cells())
+            .map(|c| from_cell(c, visible, world))
             .collect();
         let mut order: Vec<usize> = (0..cells.len()).collect();
         order.sort_by_key(|&c| (Reverse((cells[c].triangles, cells[c].cells)), c));
@@ -65,16 +63,20 @@ impl Statistics {
     }
 }
 
-fn from_cell(c: usize, visible: &CellSet, world: Option<&World>) -> FromCell {
+fn from_cell(c: usize, visible: &Pvs, world: Option<&World>) -> FromCell {
     let mut from = FromCell {
         name: String::new(),
-        cells: visible.len(),
+        cells: visible.n_visible_from(CellId(c as u32)),
         objects: 0,
         visible_objects: Vec::new(),
         triangles: 0,
     };
     let Some(world) = world else { return from };
-    let is_seen = |cells: &[CellId]| cells.iter().any(|&cell| visible.contains(cell));
+    let is_seen = |cells: &[CellId]| {
+        cells
+            .iter()
+            .any(|&cell| visible.sees(CellId(c as u32), cell))
+    };
     from.name.clone_from(&world.graph.cells[c].name);
     let batches = world.batches.iter().filter(|batch| is_seen(&batch.cells));
     from.triangles = batches.map(|batch| batch.primitive.indices.len() / 3).sum();
@@ -111,15 +113,16 @@ fn viewpoint(c: usize, world: Option<&World>, graph: &SightGraph) -> DVec3 {
 /// sees, as ranges; with a world, the same for its batches of structural triangles.
 ///
 /// Two surfaces may see each other where a cell of one sees a cell of the other.
-pub(super) fn mutual(visible: &[CellSet], world: Option<&World>) -> String {
+pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
     let mut out = String::from("MUT1\n");
-    let _ = writeln!(out, "cells {}", visible.len());
-    for (a, set) in visible.iter().enumerate() {
-        put_greater(&mut out, a, set.iter().map(|b| b.0));
+    let _ = writeln!(out, "cells {}", visible.n_cells());
+    for a in 0..visible.n_cells() {
+        let set = visible.visible_from(CellId(a as u32));
+        put_greater(&mut out, a, set.map(|b| b.0));
     }
     let Some(world) = world else { return out };
     let n = world.batches.len();
-    let mut by_cell = vec![Vec::new(); visible.len()];
+    let mut by_cell = vec![Vec::new(); visible.n_cells()];
     for (i, batch) in world.batches.iter().enumerate() {
         for cell in &batch.cells {
             by_cell[cell.0 as usize].push(i as u32);
@@ -127,10 +130,7 @@ pub(super) fn mutual(visible: &[CellSet], world: Option<&World>) -> String {
     }
     let _ = writeln!(out, "surfaces {n}");
     for (i, batch) in world.batches.iter().enumerate() {
-        let cells = batch
-            .cells
-            .iter()
-            .flat_map(|c| visible[c.0 as usize].iter());
+        let cells = batch.cells.iter().flat_map(|&c| visible.visible_from(c));
         let mut seen: Vec<u32> = cells
             .flat_map(|c| by_cell[c.0 as usize].iter().copied())
             .collect();
@@ -163,6 +163,8 @@ fn put_greater(out: &mut String, a: usize, seen: impl Iterator<Item = u32>) {
 
 #[cfg(test)]
 mod tests {
+    use enfilade::cpg::CellSet;
+
     use super::*;
 
     #[test]
@@ -176,7 +178,7 @@ mod tests {
             set.insert(CellId(c as u32));
         }
         assert_eq!(
-            mutual(&sets, None),
+            mutual(&Pvs::of_rows(&sets), None),
             "MUT1\ncells 5\n0: 1-2 4\n1: 2\n2:\n3:\n4:\n"
         );
     }

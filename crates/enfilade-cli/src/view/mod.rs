@@ -4,6 +4,7 @@ mod panel;
 mod walker;
 
 use std::collections::{BTreeSet, VecDeque};
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -361,7 +362,7 @@ impl App<'_> {
 impl Open {
     /// In the window, and on standard error for who comes back to the terminal.
     fn say(&mut self, message: String) {
-        eprintln!("enfilade: {message}");
+        let _ = writeln!(crate::output::Told, "enfilade: {message}");
         self.shown.message = message;
     }
 

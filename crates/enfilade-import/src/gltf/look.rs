@@ -186,8 +186,9 @@ fn read_image(
 }
 
 /// Reads a picture beside the scene, if it is one.
-pub(crate) fn read_picture_file(uri: &str, builder: &Builder<'_>) -> Result<Vec<u8>, String> {
-    let bytes = builder.read_reference(uri, builder.limits().max_image_bytes)?;
+pub(crate) fn read_picture_file(uri: &str, builder: &mut Builder<'_>) -> Result<Vec<u8>, String> {
+    let limit = builder.limits().max_image_bytes;
+    let bytes = builder.read_reference(uri, limit)?;
     // A scene may not carry any file of the reader's disk into its output, only pictures.
     match files::sniff_image(&bytes) {
         Some(_) => Ok(bytes),

@@ -177,7 +177,7 @@ fn check_version(root: &Root, builder: &Builder<'_>) -> Result<(), ImportError> 
 fn read_buffers<'b>(
     root: &Root,
     bin: Option<&'b [u8]>,
-    builder: &Builder<'_>,
+    builder: &mut Builder<'_>,
 ) -> Result<Vec<Option<Cow<'b, [u8]>>>, ImportError> {
     let mut buffers = Vec::new();
     let mut budget = builder.limits().max_file_bytes;

@@ -1,0 +1,136 @@
+//! What a bake may take, and how much work a scene is worth.
+
+use std::time::{Duration, Instant};
+
+use enfilade_geom::Allowance;
+use enfilade_geom::scene::{Role, Scene};
+
+/// What a bake may take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Budget {
+    /// Memory. Voxels and points are as many as fit; a bake that cannot do with that is refused before it begins. If not
+    /// given, 8 GiB, and less for few triangles: those of 2,000 get no more voxels than fit 1 GiB. [Units: bytes]
+    pub memory: Option<u64>,
+    /// Time, after which a bake is refused. Without it, a bake ends where its work is out of all proportion to its
+    /// triangles, which depends on no clock: about 20 seconds for a small scene, and a hundred times what ordinary scenes take for a
+    /// large one.
+    pub time: Option<Duration>,
+}
+
+/// Memory that a bake may take if nothing is said. [Units: bytes]
+const MEMORY: u64 = 8 << 30;
+
+/// Work that any scene is worth, and each triangle of it more. In units of [`Allowance`]. Ordinary scenes take less than a
+/// hundredth of it.
+const WORK: u64 = 80_000_000;
+const WORK_A_TRIANGLE: u64 = 20_000;
+
+/// Voxels that any scene is worth, and each triangle of it more: a few triangles far apart are not worth gigabytes.
+const VOXELS: f64 = 120e6;
+const VOXELS_A_TRIANGLE: f64 = 50e3;
+
+impl Budget {
+    /// What a bake of so many triangles that begins now may spend.
+    pub(crate) fn allowance(&self, n_triangles: usize) -> Allowance {
+        match self.time {
+            None => Allowance::new(WORK + WORK_A_TRIANGLE * n_triangles as u64, None),
+            // What is too long to be counted is no bound.
+            Some(time) => Allowance::new(u64::MAX, Instant::now().checked_add(time)),
+        }
+    }
+
+    /// Most voxels of `bytes_each` for so many triangles.
+    pub(crate) fn voxels(&self, n_triangles: usize, bytes_each: f64) -> f64 {
+        let worth = VOXELS + VOXELS_A_TRIANGLE * n_triangles as f64;
+        match self.memory {
+            Some(bytes) => bytes as f64 / bytes_each,
+            None => worth.min(MEMORY as f64 / bytes_each),
+        }
+    }
+
+    /// Most points of `bytes_each` on surfaces, but for corners.
+    pub(crate) fn points(&self, bytes_each: u64) -> usize {
+        (self.memory.unwrap_or(MEMORY) / bytes_each) as usize
+    }
+}
+
+/// Structural triangles of a scene.
+pub(crate) fn n_structural(scene: &Scene) -> usize {
+    let structural = scene.objects.iter().filter(|o| o.role == Role::Structural);
+    let of_object = |o: &enfilade_geom::scene::Object| {
+        let primitives = scene.meshes[o.mesh as usize].primitives.iter();
+        primitives.map(|p| p.indices.len() / 3).sum::<usize>()
+    };
+    structural.map(of_object).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use enfilade_testkit::furnished_house;
+
+    use super::*;
+    use crate::{BakeConfig, BakeContext, BakeError, Method, Resolution, bake};
+
+    fn baked(method: Method, budget: Budget) -> Result<Resolution, BakeError> {
+        let config = BakeConfig {
+            budget,
+            ..BakeConfig::of(method)
+        };
+        let scene = furnished_house().scene;
+        bake(&scene, &config, &BakeContext::default()).map(|baked| baked.resolution)
+    }
+
+    #[test]
+    fn a_bake_ends_when_its_time_is_up() {
+        for method in [Method::Watershed, Method::Bsp, Method::Delaunay] {
+            let budget = Budget {
+                time: Some(Duration::ZERO),
+                ..Budget::default()
+            };
+            let error = baked(method, budget).unwrap_err();
+            assert!(matches!(error, BakeError::TimeIsUp { .. }), "{error}");
+            assert!(error.to_string().contains("--max-time"), "{error}");
+            let budget = Budget {
+                time: Some(Duration::MAX),
+                ..Budget::default()
+            };
+            baked(method, budget).unwrap();
+        }
+    }
+
+    #[test]
+    fn voxels_are_as_many_as_fit_memory_and_too_few_are_refused() {
+        let with = |memory| {
+            baked(
+                Method::Watershed,
+                Budget {
+                    memory: Some(memory),
+                    ..Budget::default()
+                },
+            )
+        };
+        let edge = |resolution| match resolution {
+            Resolution::Voxels { edge, dims } => {
+                assert!(dims.iter().product::<usize>() > 0);
+                edge
+            }
+            other => panic!("{other:?}"),
+        };
+        let fine = edge(with(8 << 30).unwrap());
+        let coarse = edge(with(4_000_000).unwrap());
+        assert!(coarse > 1.2 * fine, "{coarse} {fine}");
+        let error = with(1000).unwrap_err();
+        assert!(error.to_string().contains("--max-memory"), "{error}");
+    }
+
+    #[test]
+    fn what_a_scene_is_worth_grows_with_its_triangles() {
+        let budget = Budget::default();
+        // Those of 2,000 triangles fit a gibibyte.
+        assert!(budget.voxels(2000, 3.0) * 3.0 < f64::from(1 << 30));
+        assert!(budget.voxels(50_000, 3.0) > 1.6e9);
+        assert!(budget.points(4000) >= 300_000);
+        let small = budget.allowance(2000);
+        assert!(!small.spend(u64::MAX / 2) && small.is_over());
+    }
+}

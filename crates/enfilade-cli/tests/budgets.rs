@@ -1,0 +1,74 @@
+//! What a bake may take: said before the work, and held.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use enfilade_testkit::furnished_house;
+
+fn folder(name: &str) -> PathBuf {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("budgets-{name}"));
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(&dir).unwrap();
+    let scene = furnished_house().scene;
+    fs::write(dir.join("house.glb"), enfilade::import::export_glb(&scene)).unwrap();
+    fs::write(dir.join("w.glb"), "old").unwrap();
+    dir
+}
+
+fn bake(dir: &Path, more: &[&str]) -> (Output, String) {
+    let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(["bake", "house.glb", "-o", "w.glb"])
+        .args(more)
+        .current_dir(dir)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    (done, said)
+}
+
+#[test]
+fn what_cannot_be_done_within_a_budget_is_refused_with_a_way_out() {
+    let dir = folder("refused");
+    for (args, words) in [
+        (["--max-time", "0"], ["0 s were allowed", "--max-time"]),
+        (
+            ["--max-memory", "10K"],
+            ["voxels that are allowed", "--max-memory"],
+        ),
+    ] {
+        let (done, said) = bake(&dir, &args);
+        assert_eq!(done.status.code(), Some(1), "{said}");
+        for word in words {
+            assert!(said.contains(word), "{word}: {said}");
+        }
+        assert_eq!(fs::read(dir.join("w.glb")).unwrap(), b"old");
+    }
+    for wrong in [
+        ["--max-time", "-1"],
+        ["--max-memory", "4"],
+        ["--max-memory", "much"],
+    ] {
+        let (done, said) = bake(&dir, &wrong);
+        assert_eq!(done.status.code(), Some(2), "{said}");
+    }
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn a_coarser_answer_says_so_and_voxels_are_told_before() {
+    let dir = folder("coarse");
+    let (done, said) = bake(&dir, &["--max-memory", "15M", "--max-time", "600"]);
+    assert!(done.status.success(), "{said}");
+    assert!(said.contains("voxels of 0.1"), "{said}");
+    assert!(said.contains("not the 0.1 m that were wanted"), "{said}");
+    let (done, said) = bake(&dir, &[]);
+    assert!(done.status.success(), "{said}");
+    assert!(said.contains("voxels of 0.100 m"), "{said}");
+    assert!(
+        said.contains("about") && said.contains(" MB and "),
+        "{said}"
+    );
+    assert!(!said.contains("wanted"), "{said}");
+    fs::remove_dir_all(&dir).unwrap();
+}
