@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use enfilade_cpg::{Provenance, Statistics, World};
-use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
+use enfilade_geom::{DVec3, Triangle};
 
 use crate::assemble::{Cut, assemble};
 use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex_within};
@@ -26,6 +26,13 @@ pub(crate) fn realize(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin(Stage::Complex)?;
+    // What a method has found of them, these are exact.
+    let to_scene = |p: DVec3| structure.frame.to_scene(p);
+    let missing: Vec<Triangle> = structure
+        .missing(config)
+        .into_iter()
+        .map(|t| t.map(to_scene))
+        .collect();
     let structure = structure.into_scene();
     let hole = config.smallest_hole.resolved(structure.misfit);
     if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
@@ -45,6 +52,7 @@ pub(crate) fn realize(
     let input = ComplexInput {
         triangles: &structure.triangles,
         candidates: &windings,
+        missing: &missing,
         bounds: proposal.bounds,
         gap: hole.gap(),
         has_seals: hole.has_seals(),

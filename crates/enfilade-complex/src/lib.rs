@@ -78,6 +78,8 @@ pub struct ComplexInput<'a> {
     pub triangles: &'a [Triangle],
     /// Candidate portals: planar, convex, a bit larger than their openings.
     pub candidates: &'a [Winding],
+    /// Triangles that are missing in the structure: they part cells as candidates do, but what opens there was not meant to.
+    pub missing: &'a [Triangle],
     /// What to partition; grown to hold the triangles with a margin.
     pub bounds: Aabb,
     /// Openings through which no ball of this diameter passes are gaps: they join no cells; 0 where there are none.
@@ -143,6 +145,8 @@ pub struct Complex {
     graph: LeafGraph,
     tolerance: Tolerance,
     n_triangles: usize,
+    /// Those after them stand for triangles that are missing.
+    n_candidates: u32,
     bvh: Bvh,
     /// Whether narrow openings are closed by seals.
     has_seals: bool,
@@ -161,7 +165,7 @@ pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
 #[must_use]
 pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> Complex {
     let mut surfaces: Vec<Surface> =
-        Vec::with_capacity(input.triangles.len() + input.candidates.len());
+        Vec::with_capacity(input.triangles.len() + input.candidates.len() + input.missing.len());
     let mut add = |source, points: &[DVec3]| {
         if points.iter().all(|p| p.is_finite()) {
             surfaces.push(Surface {
@@ -176,6 +180,10 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
     }
     for (i, w) in input.candidates.iter().enumerate() {
         add(Source::Candidate(i as u32), &w.points);
+    }
+    let n_candidates = input.candidates.len() as u32;
+    for (i, t) in input.missing.iter().enumerate() {
+        add(Source::Candidate(n_candidates + i as u32), t);
     }
     let triangles = surfaces
         .iter()
@@ -215,6 +223,7 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
         graph,
         tolerance,
         n_triangles: input.triangles.len(),
+        n_candidates,
         bvh,
         has_seals: input.has_seals,
     }

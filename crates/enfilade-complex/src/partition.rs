@@ -188,6 +188,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         planes: &complex.tree.planes,
         hole: complex.graph.hole,
         has_seals: complex.has_seals,
+        n_candidates: complex.n_candidates,
     };
     let (gaps, openings): (Vec<Opening>, Vec<Opening>) = pieces::group(pieces, &rules)
         .into_iter()

@@ -61,6 +61,8 @@ pub(super) struct Rules<'a> {
     pub(super) hole: f64,
     /// Whether gaps are closed by seals.
     pub(super) has_seals: bool,
+    /// Candidates from this number on stand for triangles that are missing.
+    pub(super) n_candidates: u32,
 }
 
 /// Groups pieces into openings, ordered by cells, then plane, then the order of the tree.
@@ -283,8 +285,9 @@ impl<'a> Sheet<'a> {
         hull(points.copied())
     }
 
-    /// Pieces near each other, those on one candidate together wherever they are; ordered by their least members.
-    fn clusters(&self, among: &[usize]) -> Vec<Vec<usize>> {
+    /// Pieces near each other, those on one candidate together wherever they are; what is missing in a wall is no part of an
+    /// opening beside it. Ordered by their least members.
+    fn clusters(&self, among: &[usize], n_candidates: u32) -> Vec<Vec<usize>> {
         let mut sets = Sets::new(self.flats.len());
         let mut first_on_candidate = BTreeMap::new();
         for &i in among {
@@ -296,13 +299,15 @@ impl<'a> Sheet<'a> {
         let mut order = among.to_vec();
         let left = |i: usize| self.flats[i].min.x;
         order.sort_by(|&a, &b| left(a).total_cmp(&left(b)).then(a.cmp(&b)));
+        let is_missing = |i: usize| self.pieces[i].candidate.is_some_and(|c| c >= n_candidates);
         for (k, &i) in order.iter().enumerate() {
             for &j in &order[k + 1..] {
                 if left(j) > self.flats[i].max.x + TOGETHER {
                     break;
                 }
                 let is_apart = sets.find(i as u32) != sets.find(j as u32);
-                if is_apart && self.flats[i].is_near(&self.flats[j]) {
+                let may_join = is_apart && is_missing(i) == is_missing(j);
+                if may_join && self.flats[i].is_near(&self.flats[j]) {
                     sets.join(i as u32, j as u32);
                 }
             }
@@ -353,10 +358,11 @@ impl<'a> Sheet<'a> {
         parts
     }
 
-    fn opening(&self, members: &[usize], is_seal: bool) -> Opening {
+    fn opening(&self, members: &[usize], rules: &Rules<'_>, is_seal: bool) -> Opening {
         let mut on_candidate = BTreeMap::new();
         for &i in members {
-            if let Some(candidate) = self.pieces[i].candidate {
+            let candidate = self.pieces[i].candidate;
+            if let Some(candidate) = candidate.filter(|&c| c < rules.n_candidates) {
                 *on_candidate.entry(candidate).or_insert(0.0) += self.flats[i].area;
             }
         }
@@ -391,15 +397,20 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     let all: Vec<usize> = (0..group.len()).collect();
     // Whatever opens to matter is to be closed, but for what nothing could close.
     if group[0].cells[1] == SOLID {
-        return vec![sheet.opening(&all, true)];
+        return vec![sheet.opening(&all, rules, true)];
     }
     let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
     // What lies on candidates makes the openings; what is open beside them belongs to them or stands for itself.
     let (foreseen, beside): (Vec<usize>, Vec<usize>) = wide
         .into_iter()
         .partition(|&i| group[i].candidate.is_some());
-    let mut openings = sheet.clusters(&foreseen);
-    let beside = sheet.adopt(&mut openings, sheet.clusters(&beside), WIDENING, rules.hole);
+    let mut openings = sheet.clusters(&foreseen, rules.n_candidates);
+    let beside = sheet.adopt(
+        &mut openings,
+        sheet.clusters(&beside, rules.n_candidates),
+        WIDENING,
+        rules.hole,
+    );
     openings.extend(beside);
     let gaps = gaps.into_iter().map(|i| vec![i]).collect();
     // A gap beside a door can be as large as the wall: the sliver between two triangles of it.
@@ -407,7 +418,7 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     let mut gaps = gaps.concat();
     let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
     for members in openings {
-        let opening = sheet.opening(&members, false);
+        let opening = sheet.opening(&members, rules, false);
         if opening.candidate.is_none() && opening.width < CRACK_WIDTH {
             cracks.extend(members);
         } else {
@@ -419,8 +430,55 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     }
     for (members, is_seal) in [(cracks, false), (gaps, true)] {
         if !members.is_empty() {
-            out.push(sheet.opening(&members, is_seal));
+            out.push(sheet.opening(&members, rules, is_seal));
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rectangle in the plane `z = 0`, by its low and high corner.
+    fn piece(candidate: u32, [x0, y0, x1, y1]: [f64; 4]) -> Piece {
+        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+        Piece {
+            cells: [0, 1],
+            plane: 0,
+            is_flipped: false,
+            candidate: Some(candidate),
+            is_gap: false,
+            is_rim: false,
+            points: corners
+                .map(|[x, y]| DVec3::new(x, y, 0.0))
+                .into_iter()
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn what_is_missing_in_a_wall_is_no_part_of_the_window_beside_it() {
+        let rules = Rules {
+            planes: &[Plane {
+                normal: DVec3::Z,
+                d: 0.0,
+            }],
+            hole: 0.01,
+            has_seals: true,
+            n_candidates: 2,
+        };
+        // A window on two candidates, and triangles that are missing below.
+        let pieces = vec![
+            piece(0, [0.0, 0.0, 0.9, 2.0]),
+            piece(1, [0.9, 0.0, 1.8, 2.0]),
+            piece(2, [1.8, -1.0, 4.8, 0.5]),
+            piece(3, [4.8, -1.0, 5.8, 0.5]),
+        ];
+        let found: Vec<_> = group(pieces, &rules)
+            .iter()
+            .map(|o| ((o.area * 1e3).round() / 1e3, o.candidate))
+            .collect();
+        assert_eq!(found, [(3.6, Some(0)), (6.0, None)]);
+    }
 }

@@ -206,6 +206,7 @@ fn build(triangles: &[Triangle], candidates: &[Winding]) -> Complex {
     build_complex(&ComplexInput {
         triangles,
         candidates,
+        missing: &[],
         bounds,
         gap: 0.0,
         has_seals: false,
@@ -563,6 +564,7 @@ fn no_input_at_all_is_one_leaf() {
     let c = build_complex(&ComplexInput {
         triangles: &[],
         candidates: &[],
+        missing: &[],
         bounds: Aabb::EMPTY,
         gap: 0.0,
         has_seals: false,
@@ -590,6 +592,7 @@ fn hostile_triangles_are_survived() {
     let d = build_complex(&ComplexInput {
         triangles: &t,
         candidates: &[],
+        missing: &[],
         bounds,
         gap: 0.0,
         has_seals: false,

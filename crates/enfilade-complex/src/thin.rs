@@ -335,6 +335,7 @@ mod tests {
         let complex = build_complex(&ComplexInput {
             triangles: &triangles,
             candidates: &[],
+            missing: &[],
             bounds: Aabb::new(DVec3::splat(-1.0), DVec3::splat(7.0)),
             gap: 0.01,
             has_seals: true,

@@ -40,6 +40,7 @@ fn copies_of_a_triangle_cost_next_to_nothing_and_are_seen_like_it() {
     let input = ComplexInput {
         triangles: &few,
         candidates: &[],
+        missing: &[],
         bounds,
         gap: 0.01,
         has_seals: true,
@@ -70,6 +71,7 @@ fn an_allowance_ends_the_work_soon() {
     let input = ComplexInput {
         triangles: &triangles,
         candidates: &[],
+        missing: &[],
         bounds: space,
         gap: 0.01,
         has_seals: true,

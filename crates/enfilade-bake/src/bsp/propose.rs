@@ -113,11 +113,13 @@ impl Parted {
             };
         }
         let settings = &config.merge;
+        let mut closures = structure.blockers(&Bvh::build(&structure.walls));
+        closures.extend(structure.missing(config));
         arrange::refine(bsp, settings);
         let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
         let evidence = Evidence {
             shapes: &shapes,
-            closures: &Bvh::build(&structure.blockers(&Bvh::build(&structure.walls))),
+            closures: &Bvh::build(&closures),
             slabs: &structure.slabs(),
             allowance,
         };

@@ -55,9 +55,10 @@ impl Session {
         let walls = in_own_order(&structure.walls);
         let bvh = Bvh::build(&walls);
         let closures = in_own_order(&structure.blockers(&bvh));
+        let shut = [closures.clone(), in_own_order(&structure.missing(config))].concat();
         let space = divide_within(
             &walls,
-            &closures,
+            &shut,
             &bvh,
             config.min_opening,
             &Limits {

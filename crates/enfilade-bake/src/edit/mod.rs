@@ -192,6 +192,7 @@ pub(crate) fn cut_cell(
     let complex = build_complex(&ComplexInput {
         triangles: &triangles,
         candidates: &candidates,
+        missing: &[],
         // All of the scene's box, so that tolerances are those of the bake.
         bounds: old.locator.bounds,
         gap: 0.0,

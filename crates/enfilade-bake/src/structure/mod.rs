@@ -6,6 +6,7 @@
 //! | what closes openings: door leaves and panes | `blockers` |
 //! | where storeys end | `slabs` |
 //! | how badly triangles fit together | `misfit` |
+//! | where surfaces end, which triangles are missing | `rims` |
 //! | which side of a surface is matter | `backs` |
 //! | where cells are one room | `pinch`, `lattice` |
 //! | which plane an opening lies in | `candidate`, `picture` |
@@ -19,6 +20,7 @@ mod misfit;
 mod of;
 mod picture;
 mod pinch;
+mod rims;
 mod slabs;
 mod stairs;
 
@@ -30,3 +32,4 @@ pub(crate) use lattice::{connected_count, rim_share};
 pub(crate) use of::{OUTDOORS, Stairs, Structure, bounds_of, in_own_order, structural_triangles};
 pub use pinch::MergeSettings;
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};
+pub(crate) use rims::{RimVertex, Rims};

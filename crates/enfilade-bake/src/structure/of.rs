@@ -6,6 +6,7 @@ use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
 use super::blockers::{plates, without_open_leaves};
 use super::frame::Frame;
 use super::misfit::misfit;
+use super::rims::Rims;
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
 use crate::{BakeConfig, BakeError};
@@ -24,7 +25,7 @@ pub(crate) enum Stairs {
 
 /// The structure of a scene.
 ///
-/// `walls`, `stairs` and `bvh` are in the frame, all else is where the scene has it.
+/// `walls`, `stairs`, `missing` and `bvh` are in the frame, all else is where the scene has it.
 pub(crate) struct Structure<'a> {
     pub(crate) scene: &'a Scene,
     /// Where each triangle comes from.
@@ -40,6 +41,8 @@ pub(crate) struct Structure<'a> {
     pub(crate) stairs: Vec<Triangle>,
     /// Of all structural triangles.
     pub(crate) bvh: Bvh,
+    /// Triangles that are missing in walls.
+    missing: Vec<Triangle>,
     /// How far triangles that should meet miss each other. [Units: wu]
     pub(crate) misfit: f64,
 }
@@ -78,10 +81,12 @@ impl<'a> Structure<'a> {
         };
         let at = |numbers: &[u32]| numbers.iter().map(|&t| framed[t as usize]).collect();
         let wall_numbers = numbers(false);
+        let walls: Vec<Triangle> = at(&wall_numbers);
         let bvh = Bvh::build(&framed);
         Ok(Self {
             misfit: misfit(&framed, &bvh),
-            walls: at(&wall_numbers),
+            missing: Rims::of(&walls).missing_triangles(),
+            walls,
             stairs: at(&numbers(true)),
             bvh,
             frame,
@@ -117,6 +122,13 @@ impl<'a> Structure<'a> {
         without_open_leaves(framed.collect(), surfaces).concat()
     }
 
+    /// Triangles that are missing in walls, each as large as an opening of the least width. What they open is no doorway.
+    pub(crate) fn missing(&self, config: &BakeConfig) -> Vec<Triangle> {
+        let is_large =
+            |t: &Triangle| triangle_area_normal(t).length() >= 2.0 * config.min_opening.powi(2);
+        self.missing.iter().copied().filter(is_large).collect()
+    }
+
     /// Forgets what is in the frame: what a builder found is put where the scene has it.
     pub(crate) fn into_scene(self) -> Self {
         let bvh = if self.frame.is_scene() {
@@ -128,6 +140,7 @@ impl<'a> Structure<'a> {
         Self {
             frame: Frame::SCENE,
             walls: Vec::new(),
+            missing: Vec::new(),
             wall_numbers: Vec::new(),
             stairs: Vec::new(),
             bvh,

@@ -148,7 +148,7 @@ struct Solid {
     /// Those that door leaves and panes fill.
     closures: BitVolume,
     lids: Lids,
-    /// Closures, lids, and caps of open tubes.
+    /// Closures, lids, caps of open tubes, and walls that are missing.
     shut: BitVolume,
 }
 
@@ -158,10 +158,9 @@ impl Solid {
         let closures = voxelize(grid, &structure.blockers(&structure.bvh));
         // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
         let lids = find_lids(grid, &occupied);
-        let mut shut = voxelize(
-            grid,
-            &rim_caps(&structure.walls, config.min_opening.powi(2)),
-        );
+        let mut caps = rim_caps(&structure.walls, config.min_opening.powi(2));
+        caps.extend(structure.missing(config));
+        let mut shut = voxelize(grid, &caps);
         shut.union_with(&closures);
         for voxels in lids.lids.iter().chain(&lids.floors) {
             shut.union_with(voxels);

@@ -11,6 +11,8 @@
 
 use enfilade_geom::{DVec3, Triangle};
 
+use crate::structure::{RimVertex, Rims};
+
 /// A rim strays from its plane by at most this share of the square root of its area.
 const MAX_STRAY: f64 = 0.15;
 /// Perimeter² ÷ area of the longest slit that counts; a circle has 4π, a square 16.
@@ -34,11 +36,8 @@ pub(crate) fn rim_caps(triangles: &[Triangle], min_area: f64) -> Vec<Triangle> {
     caps
 }
 
-/// A corner of a rim, and the far corner of the triangle at the edge that leaves it.
-type Corner = (DVec3, DVec3);
-
 /// The middle of a rim that is the mouth of something.
-fn mouth_of(rim: &[Corner], min_area: f64) -> Option<DVec3> {
+fn mouth_of(rim: &[RimVertex], min_area: f64) -> Option<DVec3> {
     let n = rim.len();
     let center = rim.iter().map(|c| c.0).sum::<DVec3>() / n as f64;
     let edge = |i: usize| (rim[i].0, rim[(i + 1) % n].0);
@@ -68,69 +67,6 @@ fn mouth_of(rim: &[Corner], min_area: f64) -> Option<DVec3> {
         }
     }
     (is_planar && f64::max(up, down) >= MIN_SHARE * perimeter).then_some(center)
-}
-
-/// Edges that only one triangle uses, as that triangle turns.
-struct Rims {
-    points: Vec<DVec3>,
-    /// From, to, far corner; ascending by `from`.
-    edges: Vec<[u32; 3]>,
-}
-
-impl Rims {
-    fn of(triangles: &[Triangle]) -> Self {
-        let key = |p: &DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
-        let mut points: Vec<DVec3> = triangles.iter().flatten().copied().collect();
-        points.sort_by_cached_key(key);
-        points.dedup();
-        let keys: Vec<[u64; 3]> = points.iter().map(key).collect();
-        let index = |p: &DVec3| keys.partition_point(|k| *k < key(p)) as u32;
-        let mut edges: Vec<[u32; 3]> = triangles
-            .iter()
-            .flat_map(|t| {
-                let v = [0, 1, 2].map(|k| index(&t[k]));
-                [[v[0], v[1], v[2]], [v[1], v[2], v[0]], [v[2], v[0], v[1]]]
-            })
-            .collect();
-        let ends = |e: &[u32; 3]| (e[0].min(e[1]), e[0].max(e[1]));
-        edges.sort_unstable_by_key(|e| (ends(e), *e));
-        let mut single: Vec<[u32; 3]> = edges
-            .chunk_by(|a, b| ends(a) == ends(b))
-            .filter(|run| run.len() == 1)
-            .map(|run| run[0])
-            .collect();
-        single.sort_unstable();
-        Self {
-            points,
-            edges: single,
-        }
-    }
-
-    /// Closed loops in which every corner has one edge in and one out.
-    fn loops(&self) -> Vec<Vec<Corner>> {
-        let next = |v: u32| -> Option<usize> {
-            let at = self.edges.partition_point(|e| e[0] < v);
-            let is_only = self.edges.get(at).is_some_and(|e| e[0] == v)
-                && self.edges.get(at + 1).is_none_or(|e| e[0] != v);
-            is_only.then_some(at)
-        };
-        let mut seen = vec![false; self.edges.len()];
-        let mut out = Vec::new();
-        for start in 0..self.edges.len() {
-            let mut rim = Vec::new();
-            let mut at = Some(start);
-            while let Some(i) = at.filter(|&i| !seen[i]) {
-                seen[i] = true;
-                let [from, to, apex] = self.edges[i];
-                rim.push((self.points[from as usize], self.points[apex as usize]));
-                at = next(to);
-            }
-            if at == Some(start) && rim.len() >= 3 && next(self.edges[start][0]) == Some(start) {
-                out.push(rim);
-            }
-        }
-        out
-    }
 }
 
 #[cfg(test)]
