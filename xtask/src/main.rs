@@ -6,6 +6,7 @@
 mod apt;
 mod bench;
 mod check;
+mod dependencies;
 mod features;
 mod floors;
 mod lengths;
@@ -31,7 +32,8 @@ usage: cargo xtask test
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
-  tidy    of these, what needs no build: who may use whom, lengths, links, features that tests name
+  tidy    of these, what needs no build: who may use whom, lengths, links, licenses and versions of
+          dependencies, features that tests name
   score   rooms and doors found, against the rooms that architects modeled
   bench   growth of time and memory with the size of an office tower; with --peers, the voxel
           kernels beside other implementations too (scripts/bench_kernels.py);
@@ -52,7 +54,9 @@ fn main() -> ExitCode {
     };
     let result = match task {
         Task::Test => check::run(),
-        Task::Tidy => tidy::run().and_then(|()| features::run()),
+        Task::Tidy => tidy::run()
+            .and_then(|()| dependencies::run())
+            .and_then(|()| features::run()),
         Task::Score { is_written, dirs } => {
             score::run(RELEASE, &dirs, is_written).and_then(|rows| floors::check(&rows))
         }
