@@ -26,7 +26,7 @@ pub fn bake(data: &[u8]) {
     let kind = numbers.byte();
     let scene = scene(&mut numbers, kind & 4 == 4);
     let config = BakeConfig {
-        max_voxels: 40_000,
+        max_voxels: 8_000,
         smallest_hole: if kind & 8 == 8 {
             SmallestHole::Open(0.01)
         } else {
@@ -49,7 +49,7 @@ pub fn bake(data: &[u8]) {
     let bytes = encode_glb(&baked.world).expect("a valid world can be written");
     let world = decode_glb(&bytes).expect("what was written can be read");
     let options = VerifyOptions {
-        rays: 500,
+        rays: 200,
         ..VerifyOptions::default()
     };
     let report = verify_world(&world, None, &options);
