@@ -109,10 +109,11 @@ pub fn run_time(data: &[u8]) {
         let is_detail = matches!(hit.target, Target::Detail { .. });
         assert!(is_detail || !lines.is_clear(&state, a, b), "{hit:?}");
     }
-    let [whole, by_cells] = [lines.first_hit(a, b), lines.first_hit_by_cells(a, b)];
-    assert_eq!(
-        whole.map(|h| h.t.to_bits()),
-        by_cells.map(|h| h.t.to_bits()),
+    let [whole, by_cells] = [lines.first_hit(a, b), lines.first_hit_by_cells(a, b)]
+        .map(|hit| hit.map(|h| h.t.to_bits()));
+    // Where a world lies about what is in which cell, following the cells finds other walls.
+    assert!(
+        decoded.is_some() || whole == by_cells,
         "{whole:?} {by_cells:?}"
     );
 }
