@@ -349,7 +349,7 @@ fn gltf(boxes: &[(&str, Corners)]) -> (serde_json::Value, Vec<u8>) {
 }
 
 fn glb(mut json: String, bin: &[u8]) -> Vec<u8> {
-    while json.len() % 4 != 0 {
+    while !json.len().is_multiple_of(4) {
         json.push(' ');
     }
     let all = 12 + 8 + json.len() + 8 + bin.len();

@@ -132,7 +132,7 @@ impl Place<'_> {
             if i >= end {
                 return Ok(());
             }
-            if i % 1000 == 0 {
+            if i.is_multiple_of(1000) {
                 eprintln!("mutated: run {i}");
             }
             let (input, line, bytes) = choose(self.clean, i)?;
