@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use enfilade_geom::Allowance;
 
+use crate::budget::WORK_A_VOXEL;
 use crate::{BakeError, Budget, Method, Resolution, Stage};
 
 /// Hears of a bake's progress.
@@ -103,8 +104,13 @@ impl<'a> BakeContext<'a> {
         self.begin(Stage::Structure)
     }
 
-    /// Tells how fine the scene will be looked at.
+    /// Tells how fine the scene will be looked at, and grants the work that its voxels are worth.
     pub(crate) fn tell(&self, resolution: Resolution, memory: f64) {
+        // Memory bounds the voxels; what is open between them grows with their number, not with that of the triangles.
+        if let Resolution::Voxels { dims, .. } = resolution {
+            let n_voxels = dims.iter().map(|&n| n as u64).product::<u64>();
+            self.allowance.grant(WORK_A_VOXEL * n_voxels);
+        }
         self.progress.resolution(resolution, memory);
     }
 
@@ -129,5 +135,22 @@ impl<'a> BakeContext<'a> {
     /// Wall time of each stage so far.
     pub(crate) fn times(&self) -> Vec<(Stage, Duration)> {
         self.times.lock().expect("no panic holds it").clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_of_many_voxels_may_do_more() {
+        let context = BakeContext::default().within(&Budget::default(), 12);
+        let of_triangles = Budget::default().allowance(12);
+        let work = 100_000_000;
+        assert!(!of_triangles.spend(work) && of_triangles.is_over());
+        let dims = [700, 240, 880];
+        context.tell(Resolution::Voxels { edge: 0.1, dims }, 0.0);
+        context.allowance().spend(work);
+        assert!(context.check().is_ok());
     }
 }

@@ -144,6 +144,16 @@ fn clock(seconds: f64) -> String {
     }
 }
 
+/// `65 s` for 65 seconds, `4 min` for 245; an estimate has no more digits than it deserves.
+fn in_words(seconds: f64) -> String {
+    match seconds.round() {
+        0.0 => "less than 1 s".into(),
+        s if s < 100.0 => format!("{s} s"),
+        s if s < 6000.0 => format!("{} min", (s / 60.0).round()),
+        s => format!("{} h", (s / 3600.0).round()),
+    }
+}
+
 /// The progress of a bake: stages by name, the share done and the time left.
 pub(crate) struct BakeBar {
     bar: ProgressBar,
@@ -284,7 +294,7 @@ fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64, wanted: 
     let memory = memory / 1e6;
     let mut text = format!(
         "voxels of {edge:.3} m, {nx} × {ny} × {nz}: {n:.1} million, about {memory:.0} MB and {}\n",
-        clock(seconds)
+        in_words(seconds)
     );
     // The grid grows its voxels by tenths, if at all.
     if edge > wanted * 1.05 {
@@ -387,5 +397,7 @@ mod tests {
         assert_eq!(clock(0.2), "0:00");
         assert_eq!(clock(65.4), "1:05");
         assert_eq!(clock(3725.0), "1:02:05");
+        let words = [0.2, 65.4, 245.0, 9000.0].map(in_words);
+        assert_eq!(words, ["less than 1 s", "65 s", "4 min", "3 h"]);
     }
 }

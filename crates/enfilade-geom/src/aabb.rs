@@ -72,6 +72,33 @@ impl Aabb {
         self.min.cmpgt(self.max).any()
     }
 
+    /// The corners of each face by their indices in [`Self::corners`], counter-clockwise from outside: low and high
+    /// of x, of y, of z.
+    pub const FACES: [[usize; 4]; 6] = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+
+    /// The eight corners: bit `k` of an index says whether axis `k` is at its greatest.
+    #[must_use]
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |k: usize| [self.min[k], self.max[k]][i >> k & 1];
+            DVec3::new(pick(0), pick(1), pick(2))
+        })
+    }
+
+    /// The six faces, see [`Self::FACES`].
+    #[must_use]
+    pub fn faces(&self) -> [[DVec3; 4]; 6] {
+        let corners = self.corners();
+        Self::FACES.map(|face| face.map(|c| corners[c]))
+    }
+
     /// Edge lengths; negative where empty.
     #[must_use]
     pub fn size(&self) -> DVec3 {

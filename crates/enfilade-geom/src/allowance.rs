@@ -14,7 +14,7 @@ const LOOK: u64 = 1 << 16;
 #[derive(Debug)]
 pub struct Allowance {
     spent: AtomicU64,
-    most: u64,
+    most: AtomicU64,
     end: Option<Instant>,
     is_late: AtomicBool,
 }
@@ -31,10 +31,20 @@ impl Allowance {
     pub fn new(most: u64, end: Option<Instant>) -> Self {
         Self {
             spent: AtomicU64::new(0),
-            most,
+            most: AtomicU64::new(most),
             end,
             is_late: AtomicBool::new(false),
         }
+    }
+
+    /// Adds some: the task has turned out larger, by what is bounded elsewhere.
+    pub fn grant(&self, work: u64) {
+        let most = self.most().saturating_add(work);
+        self.most.store(most, Ordering::Relaxed);
+    }
+
+    fn most(&self) -> u64 {
+        self.most.load(Ordering::Relaxed)
     }
 
     /// Spends some; says whether to go on. A few nanoseconds, and a look at the clock now and then.
@@ -45,7 +55,7 @@ impl Allowance {
         if before / LOOK != after / LOOK {
             self.look();
         }
-        after <= self.most && !self.is_late()
+        after <= self.most() && !self.is_late()
     }
 
     #[cold]
@@ -65,7 +75,7 @@ impl Allowance {
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.look();
-        self.is_late() || self.spent() > self.most
+        self.is_late() || self.spent() > self.most()
     }
 
     /// What was spent.
@@ -85,6 +95,8 @@ mod tests {
         let some = Allowance::new(10, None);
         assert!(some.spend(10) && !some.is_over());
         assert!(!some.spend(1) && some.is_over() && !some.is_late());
+        some.grant(2);
+        assert!(!some.is_over() && some.spend(1) && !some.spend(1));
         let late = Allowance::new(u64::MAX, Some(Instant::now()));
         assert!(!late.spend(LOOK) && late.is_late());
         let early = Allowance::new(u64::MAX, Some(Instant::now() + Duration::from_secs(1000)));

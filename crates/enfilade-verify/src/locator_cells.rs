@@ -82,27 +82,7 @@ pub(crate) fn plane_of(locator: &Locator, node: usize) -> Plane {
 }
 
 fn box_body(b: &Aabb) -> Body {
-    let corner = |k: usize| {
-        let pick = |axis: usize| {
-            if k >> axis & 1 == 0 {
-                b.min[axis]
-            } else {
-                b.max[axis]
-            }
-        };
-        DVec3::new(pick(0), pick(1), pick(2))
-    };
-    // Bit 0 is x, bit 1 is y, bit 2 is z.
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let face = |f: [usize; 4]| f.map(corner).into_iter().collect();
-    faces.into_iter().map(face).collect()
+    b.faces().map(|face| face.into_iter().collect()).into()
 }
 
 /// The parts before and behind a plane; a part without faces is empty.

@@ -66,28 +66,15 @@ impl<'a> Soup<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use enfilade_geom::Aabb;
 
     /// A closed box, seen from outside.
     fn boxed(min: DVec3, max: DVec3) -> Vec<Triangle> {
-        let at = |i: usize| {
-            DVec3::new(
-                if i & 1 == 0 { min.x } else { max.x },
-                if i & 2 == 0 { min.y } else { max.y },
-                if i & 4 == 0 { min.z } else { max.z },
-            )
-        };
-        let quads = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .map(|t| t.map(at))
+        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+        Aabb::new(min, max)
+            .faces()
+            .into_iter()
+            .flat_map(halves)
             .collect()
     }
 

@@ -192,28 +192,9 @@ mod tests {
     use super::*;
 
     fn box_triangles(size: DVec3) -> Vec<Triangle> {
-        let corner = |i: usize| {
-            DVec3::new(
-                if i & 1 == 0 { 0.0 } else { size.x },
-                if i & 2 == 0 { 0.0 } else { size.y },
-                if i & 4 == 0 { 0.0 } else { size.z },
-            )
-        };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        quads
-            .iter()
-            .flat_map(|q| {
-                let p = q.map(corner);
-                [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
-            })
-            .collect()
+        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+        let block = Aabb::new(DVec3::ZERO, size);
+        block.faces().into_iter().flat_map(halves).collect()
     }
 
     #[test]

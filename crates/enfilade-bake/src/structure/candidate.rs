@@ -268,24 +268,12 @@ mod tests {
 
     /// The faces of a block, two triangles each.
     fn block(lo: DVec3, hi: DVec3) -> Vec<Triangle> {
-        let corner = |i: usize| {
-            let pick = |k: usize| if i >> k & 1 == 0 { lo[k] } else { hi[k] };
-            DVec3::new(pick(0), pick(1), pick(2))
-        };
-        [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ]
-        .iter()
-        .flat_map(|q| {
-            let p = q.map(corner);
-            [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
-        })
-        .collect()
+        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+        Aabb::new(lo, hi)
+            .faces()
+            .into_iter()
+            .flat_map(halves)
+            .collect()
     }
 
     // Covers V4 and V5.

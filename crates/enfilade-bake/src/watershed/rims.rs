@@ -136,6 +136,7 @@ impl Rims {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use enfilade_geom::Aabb;
 
     /// A tube of `n` sides along z, from 0 to `length`, cone-shaped with these two radii.
     fn tube(n: usize, length: f64, radii: [f64; 2]) -> Vec<Triangle> {
@@ -177,23 +178,9 @@ mod tests {
 
     #[test]
     fn a_closed_box_has_no_rim() {
-        let c =
-            |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * 3.0;
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let mut t: Vec<Triangle> = quads
-            .iter()
-            .flat_map(|q| {
-                let p = q.map(c);
-                [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
-            })
-            .collect();
+        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+        let block = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
+        let mut t: Vec<Triangle> = block.faces().into_iter().flat_map(halves).collect();
         assert!(rim_caps(&t, 0.3).is_empty());
         // Without its lid it has one mouth.
         t.truncate(10);
