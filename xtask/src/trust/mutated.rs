@@ -52,14 +52,14 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     let found = Mutex::new(Vec::new());
     std::thread::scope(|scope| -> anyhow::Result<()> {
         let workers: Vec<_> = (0..AT_ONCE)
-            .map(|worker| {
-                let place = Place {
+            .map(|number| {
+                let worker = Worker {
                     clean: &clean,
                     finds: &finds,
-                    folder: folder.join(worker.to_string()),
+                    folder: folder.join(number.to_string()),
                 };
                 let (next, found, end) = (&next, &found, rows.runs.end);
-                scope.spawn(move || place.work(next, end, found))
+                scope.spawn(move || worker.work(next, end, found))
             })
             .collect();
         for worker in workers {
@@ -108,14 +108,14 @@ fn prepare(clean: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Where one worker works.
-struct Place<'a> {
+/// One that runs commands, in a folder of its own.
+struct Worker<'a> {
     clean: &'a Path,
     finds: &'a Path,
     folder: PathBuf,
 }
 
-impl Place<'_> {
+impl Worker<'_> {
     fn work(
         &self,
         next: &AtomicUsize,
