@@ -1,9 +1,4 @@
 #![no_main]
-//! Hostile bytes for the gltf reader.
+//! Hostile bytes for the glTF reader.
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    enfilade_fuzz::check(enfilade_import::decode_gltf(
-        data,
-        &enfilade_fuzz::options(),
-    ));
-});
+libfuzzer_sys::fuzz_target!(|data: &[u8]| enfilade_fuzz::scene::gltf(data));

@@ -1,6 +1,4 @@
 #![no_main]
-//! Hostile bytes for the obj reader.
+//! Hostile bytes for the OBJ reader.
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    enfilade_fuzz::check(enfilade_import::decode_obj(data, &enfilade_fuzz::options()));
-});
+libfuzzer_sys::fuzz_target!(|data: &[u8]| enfilade_fuzz::scene::obj(data));

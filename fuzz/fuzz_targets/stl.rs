@@ -1,6 +1,4 @@
 #![no_main]
-//! Hostile bytes for the stl reader.
+//! Hostile bytes for the STL reader.
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    enfilade_fuzz::check(enfilade_import::decode_stl(data, &enfilade_fuzz::options()));
-});
+libfuzzer_sys::fuzz_target!(|data: &[u8]| enfilade_fuzz::scene::stl(data));

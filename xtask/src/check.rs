@@ -7,8 +7,8 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 
 use crate::{
-    GATE, add_scene_files, apt, cargo, features, floors, output_of, root, run_to_end, scenes,
-    score, target_dir, tidy,
+    GATE, add_scene_files, apt, cargo, dependencies, features, floors, output_of, root, run_to_end,
+    scenes, score, target_dir, tidy,
 };
 
 /// Segments and rays tested on each scene; the whole 10⁷ are run by hand.
@@ -34,6 +34,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
 fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("tools", tools)?;
     steps.step("tidy", tidy::run)?;
+    steps.step("dependencies", dependencies::run_with_tool)?;
     steps.step("format", || {
         run_to_end(&mut cargo(&["fmt", "--all", "--check"]))
     })?;

@@ -6,6 +6,7 @@
 mod apt;
 mod bench;
 mod check;
+mod dependencies;
 mod features;
 mod floors;
 mod lengths;
@@ -27,18 +28,20 @@ usage: cargo xtask test
        cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
-       cargo xtask bench trust [--json] [--rows ROW,...]
+       cargo xtask bench trust [--json] [--rows ROW,...] [--count N] [--from I]
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
-  tidy    of these, what needs no build: who may use whom, lengths, links, features that tests name
+  tidy    of these, what needs no build: who may use whom, lengths, links, licenses and versions of
+          dependencies, features that tests name
   score   rooms and doors found, against the rooms that architects modeled
   bench   growth of time and memory with the size of an office tower; with --peers, the voxel
           kernels beside other implementations too (scripts/bench_kernels.py);
           messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
           choose by how names begin;
-          trust: hostile and huge input, a row a figure; --rows (case, nasty, large) chooses;
+          trust: hostile and huge input, a row a figure; --rows (case, nasty, large, mutated) chooses;
+          --count and --from choose the damaged files of `mutated`;
           any other NAME (bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 
@@ -52,7 +55,9 @@ fn main() -> ExitCode {
     };
     let result = match task {
         Task::Test => check::run(),
-        Task::Tidy => tidy::run().and_then(|()| features::run()),
+        Task::Tidy => tidy::run()
+            .and_then(|()| dependencies::run())
+            .and_then(|()| features::run()),
         Task::Score { is_written, dirs } => {
             score::run(RELEASE, &dirs, is_written).and_then(|rows| floors::check(&rows))
         }
@@ -139,13 +144,17 @@ impl Task {
 impl Task {
     fn trust(mut args: impl Iterator<Item = String>) -> Option<Self> {
         let mut options = trust::TrustOptions::default();
+        let (mut from, mut n) = (0, None);
         while let Some(arg) = args.next() {
             match arg.as_str() {
                 "--json" => options.is_json = true,
                 "--rows" => options.rows = args.next()?.split(',').map(str::to_owned).collect(),
+                "--count" => n = Some(args.next()?.parse().ok()?),
+                "--from" => from = args.next()?.parse().ok()?,
                 _ => return None,
             }
         }
+        options.runs = trust::runs(from, n);
         Some(Self::Trust(options))
     }
 }

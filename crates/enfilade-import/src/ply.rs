@@ -350,6 +350,10 @@ fn read_vertices(
     cloud: &mut Cloud,
     builder: &mut Builder<'_>,
 ) -> Result<(), ImportError> {
+    // Colors of some of the vertices would be too few for all.
+    if !cloud.positions.is_empty() {
+        return Err(builder.malformed("element vertex", "is there twice"));
+    }
     builder.charge_vertices("element vertex", element.count)?;
     let slots: Vec<Slot> = element.properties.iter().map(slot).collect();
     let has = |want: fn(&Slot) -> bool| slots.iter().any(want);

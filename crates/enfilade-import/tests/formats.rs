@@ -403,3 +403,14 @@ proptest! {
         );
     }
 }
+
+#[test]
+fn a_ply_with_vertices_twice_is_refused() {
+    let bytes = b"ply\nformat ascii 1.0\n\
+        element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+        element vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0 255\n1 0 0 255\n0 1 0 255\n1e99 0 0\n3 0 1 2\n";
+    let error = decode_ply(bytes, &ImportOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("twice"), "{error}");
+}

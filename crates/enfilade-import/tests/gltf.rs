@@ -440,6 +440,21 @@ fn nonfinite_corners_are_dropped_and_reported() {
 }
 
 #[test]
+fn a_texture_is_named_by_a_number_that_is_there_wherever_a_material_names_it() {
+    for index in ["1", "1e-7", "-1", "\"0\"", "null"] {
+        for reference in [
+            format!(r#""normalTexture":{{"index":{index}}}"#),
+            format!(r#""extensions":{{"X":[{{"aTexture":{{"index":{index}}}}}]}}"#),
+        ] {
+            let error = error_of(&format!(
+                r#""nodes":[{{"mesh":0}}],"textures":[{{}}],"materials":[{{{reference}}}]"#
+            ));
+            assert!(error.contains(&format!("no texture {index}")), "{error}");
+        }
+    }
+}
+
+#[test]
 fn textures_of_several_files_keep_their_materials() {
     const PNG: &[u8] = b"\x89PNG\r\n\x1a\nrest";
     let folder = std::env::temp_dir().join(format!("enfilade-import-{}", std::process::id()));

@@ -12,7 +12,9 @@ pub(crate) fn number(x: f64) -> String {
         return (tenths / 10).to_string();
     }
     let sign = if tenths < 0 { "-" } else { "" };
-    format!("{sign}{}.{}", tenths.abs() / 10, tenths.abs() % 10)
+    // The smallest number of all has no absolute value of its own type.
+    let tenths = tenths.unsigned_abs();
+    format!("{sign}{}.{}", tenths / 10, tenths % 10)
 }
 
 /// `x y` of a point in meters, as drawn.
@@ -67,4 +69,17 @@ pub(crate) fn color(id: u32) -> String {
         channel(8.0),
         channel(4.0)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_any_size_are_numbers() {
+        assert_eq!(number(-0.04), "0");
+        assert_eq!(number(-1.25), "-1.3");
+        assert_eq!(number(f64::MAX), "922337203685477580.7");
+        assert_eq!(number(f64::MIN), "-922337203685477580.8");
+    }
 }

@@ -50,6 +50,9 @@ pub(crate) struct Opening {
     is_rim: [bool; 3],
 }
 
+/// Tolerances that a segment may be long: `f64` then tells its parts a thousand times as well.
+const LONGEST: f64 = 1e12;
+
 /// Marks an item that is an opening, not a wall.
 const OPENING: u32 = 1 << 30;
 
@@ -337,11 +340,13 @@ struct Look {
 }
 
 impl Look {
-    /// `None` for a segment that is no longer than a few tolerances, or not finite.
+    /// `None` for a segment that is no longer than a few tolerances, so long that rounding is more than those, or not
+    /// finite.
     fn new(ray: &Ray, near: f64) -> Option<Self> {
         let d = ray.direction;
         let length = d.length();
-        if !length.is_finite() || length <= 16.0 * near {
+        let is_usual = length > 16.0 * near && length < LONGEST * near;
+        if !is_usual {
             return None;
         }
         let a = d.abs();

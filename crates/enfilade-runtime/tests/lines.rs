@@ -56,6 +56,18 @@ fn a_million_segments_equal_brute_force() {
 }
 
 #[test]
+fn from_farther_off_than_numbers_can_tell_both_ways_answer_alike() {
+    let lines = Sightlines::build(&room_grid(&GridParams::offices(6, 3)));
+    let (a, b) = (
+        [4.543_794_5e30, 4.0e-41, 0.0],
+        [537_395_200.0, 2.646_978e-23, 0.0],
+    );
+    let found = lines.first_hit_by_cells(a, b);
+    let plain = |h: SightHit| SightHit { cell: None, ..h };
+    assert_eq!(found.map(plain), lines.first_hit(a, b));
+}
+
+#[test]
 fn closed_doors_and_odd_points_stop_a_line() {
     let world = room_grid(&GridParams {
         size: [2, 1, 1],

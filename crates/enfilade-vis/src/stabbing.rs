@@ -45,6 +45,10 @@ type Row = [f64; 6];
 
 /// Asks whether a line passes all gates inside their edges.
 pub(crate) fn stabbed(gates: &[Gate<'_>]) -> Answer {
+    // An opening without area hides nothing: its edges run there and back, and would show that no line passes it.
+    if gates.iter().any(|gate| gate.normal == DVec3::ZERO) {
+        return Answer::Unknown;
+    }
     let (center, size) = frame(gates);
     let rows = rows(gates, center, size);
     if rows.len() > usize::from(u16::MAX) || rows.iter().flatten().any(|x| !x.is_finite()) {
@@ -344,11 +348,14 @@ mod tests {
 
     #[test]
     fn openings_without_area_say_nothing() {
-        let flat = Made(vec![DVec3::ZERO; 3], DVec3::ZERO, DVec3::ZERO);
-        assert!(!matches!(
-            ask(&[flat, square(0.0, 0.0, 1.0, DVec3::Z)]),
-            Answer::Closed(_)
-        ));
+        for corners in [
+            vec![DVec3::ZERO; 3],
+            vec![DVec3::ZERO, DVec3::X, DVec3::ZERO, DVec3::Y],
+        ] {
+            let flat = Made(corners, DVec3::ZERO, DVec3::ZERO);
+            let answer = ask(&[flat, square(0.0, 0.0, 1.0, DVec3::Z)]);
+            assert!(!matches!(answer, Answer::Closed(_)), "{answer:?}");
+        }
         assert_eq!(ask(&[]), Answer::Unknown);
     }
 }

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
+use super::random::Random;
 use super::{Figures, holds};
 
 /// Files of a few bytes that would take gigabytes, and outputs that would be lost.
@@ -74,7 +75,7 @@ pub(super) fn large(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-type Triangle = [[f64; 3]; 3];
+pub(super) type Triangle = [[f64; 3]; 3];
 
 /// Scenes of at most 2,000 triangles, but for one with copies.
 fn scenes() -> Vec<(&'static str, String)> {
@@ -142,7 +143,7 @@ fn quad([a, b, c, d]: [[f64; 3]; 4]) -> [Triangle; 2] {
     [[a, b, c], [a, c, d]]
 }
 
-fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
+pub(super) fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
     let corner = |c: usize| [0, 1, 2].map(|k| if c >> k & 1 == 1 { high[k] } else { low[k] });
     let faces = [
         [0, 4, 6, 2],
@@ -164,21 +165,4 @@ fn obj(triangles: &[Triangle]) -> String {
         text.push_str("f -3 -2 -1\n");
     }
     text
-}
-
-/// Numbers in `0..1` (SplitMix64), the same every time.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn point(&mut self, size: f64) -> [f64; 3] {
-        [0; 3].map(|_| size * self.next())
-    }
 }

@@ -4,7 +4,12 @@
 //! something that it needs is not there, and `note` then says what.
 
 mod budgets;
+mod inputs;
+mod mutate;
+mod mutated;
+mod random;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -20,17 +25,25 @@ pub(crate) struct TrustOptions {
     pub(crate) is_json: bool,
     /// Beginnings of rows; all where empty.
     pub(crate) rows: Vec<String>,
+    /// Which damaged files are tried, by number.
+    pub(crate) runs: Range<usize>,
 }
 
-/// What the rows of a part begin with, and what measures them. Further parts (tampered worlds, mutated files, adapters)
+/// What the rows of a part begin with, and what measures them. Further parts (tampered worlds, adapters)
 /// are further modules with a line here.
-const PARTS: [(&str, Part); 3] = [
+const PARTS: [(&str, Part); 4] = [
     ("case", budgets::cases),
     ("nasty", budgets::nasty),
     ("large", budgets::large),
+    ("mutated", mutated::run),
 ];
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;
+
+/// The `n` damaged files from number `from` on; as many as there are by default if `n` is not given.
+pub(crate) fn runs(from: usize, n: Option<usize>) -> Range<usize> {
+    from..from.saturating_add(n.unwrap_or(mutated::COUNT))
+}
 
 /// Measures and prints; fails where a bar is not met.
 pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
@@ -40,6 +53,7 @@ pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
     let mut rows = Figures {
         is_json: options.is_json,
         folder,
+        runs: options.runs.clone(),
         n: [0; 3],
     };
     for (name, part) in PARTS {
@@ -59,6 +73,8 @@ struct Figures {
     is_json: bool,
     /// Where inputs and outputs go.
     folder: PathBuf,
+    /// Damaged files that are tried.
+    runs: Range<usize>,
     /// Bars not met, met and unknown.
     n: [usize; 3],
 }

@@ -57,10 +57,10 @@ pub(super) fn read_materials(
     let mut materials = Vec::new();
     for (i, value) in root.materials.iter().enumerate() {
         let mut value = value.clone();
-        let Value::Object(fields) = &mut value else {
+        if !value.is_object() {
             return Err(builder.malformed(format!("material {i}"), "is no object"));
-        };
-        remap_textures(fields, first_texture, root.textures.len() as u64)
+        }
+        remap_textures(&mut value, first_texture, root.textures.len() as u64)
             .map_err(|problem| builder.malformed(format!("material {i}"), problem))?;
         let pbr = &value["pbrMetallicRoughness"];
         let mut base_color = [1.0; 4];
@@ -113,29 +113,27 @@ fn source_of(def: &TextureDef) -> Option<u32> {
 
 /// Adds `first` to the index of every texture reference: an object under a key that ends in
 /// `Texture`, anywhere in the material but its `extras`.
-fn remap_textures(
-    fields: &mut serde_json::Map<String, Value>,
-    first: u32,
-    n: u64,
-) -> Result<(), String> {
-    for (key, value) in fields {
-        if key == "extras" {
-            continue;
-        }
-        // serde_json bounds the nesting of what it reads, and so this recursion.
-        if let Value::Object(inner) = value {
-            if key.ends_with("Texture")
-                && let Some(index) = inner.get("index").and_then(Value::as_u64)
-            {
-                if index >= n {
-                    return Err(format!("{key}: no texture {index}"));
+fn remap_textures(value: &mut Value, first: u32, n: u64) -> Result<(), String> {
+    // serde_json bounds the nesting of what it reads, and so this recursion.
+    match value {
+        Value::Array(items) => items
+            .iter_mut()
+            .try_for_each(|item| remap_textures(item, first, n)),
+        Value::Object(fields) => {
+            for (key, inner) in fields.iter_mut().filter(|(key, _)| *key != "extras") {
+                if key.ends_with("Texture")
+                    && let Some(index) = inner.get_mut("index")
+                {
+                    let number = index.as_u64().filter(|&i| i < n);
+                    let number = number.ok_or_else(|| format!("{key}: no texture {index}"))?;
+                    *index = (number + u64::from(first)).into();
                 }
-                inner.insert("index".into(), (index + u64::from(first)).into());
+                remap_textures(inner, first, n)?;
             }
-            remap_textures(inner, first, n)?;
+            Ok(())
         }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Reads a picture's bytes; `None`, with a note, where a file cannot be had.

@@ -1,14 +1,53 @@
-//! What every decoder must keep, whatever it is given.
+//! Readers of scenes.
 
 use enfilade_geom::scene::Role;
 use enfilade_import::{
     CleaningOptions, ImportError, ImportOptions, Imported, Limits, cleaning_report, decode_gltf,
-    export_glb,
+    decode_map, decode_obj, decode_ply, decode_stl, export_glb, read_prt, read_pvs_text, write_prt,
+    write_pvs_text,
 };
 
+/// glTF, text or binary.
+pub fn gltf(data: &[u8]) {
+    check(decode_gltf(data, &options()));
+}
+
+/// Wavefront OBJ.
+pub fn obj(data: &[u8]) {
+    check(decode_obj(data, &options()));
+}
+
+/// Quake maps.
+pub fn map(data: &[u8]) {
+    check(decode_map(data, &options()));
+}
+
+/// PLY.
+pub fn ply(data: &[u8]) {
+    check(decode_ply(data, &options()));
+}
+
+/// STL.
+pub fn stl(data: &[u8]) {
+    check(decode_stl(data, &options()));
+}
+
+/// Portal files and text PVS: what is read is written and read alike.
+pub fn prt(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    if let Ok(file) = read_prt(text) {
+        assert_eq!(read_prt(&write_prt(&file)).as_ref(), Ok(&file));
+    }
+    if let Ok(pvs) = read_pvs_text(text) {
+        let again = read_pvs_text(&write_pvs_text(&pvs)).map(|p| p.rows);
+        assert_eq!(again, Ok(pvs.rows));
+    }
+}
+
 /// Small limits, but scenes of any size: most inputs would end at the size check otherwise.
-#[must_use]
-pub fn options() -> ImportOptions {
+fn options() -> ImportOptions {
     ImportOptions {
         limits: Limits {
             max_extent: f64::INFINITY,
@@ -21,11 +60,7 @@ pub fn options() -> ImportOptions {
 }
 
 /// What is read keeps the scene's promises, can be looked at, written, and read again.
-///
-/// # Panics
-///
-/// When it does not.
-pub fn check(result: Result<Imported, ImportError>) {
+fn check(result: Result<Imported, ImportError>) {
     let imported = match result {
         Ok(imported) => imported,
         Err(error) => {

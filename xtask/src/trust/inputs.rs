@@ -1,0 +1,446 @@
+//! Two rooms in every format that is read, and the commands that read them.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Context;
+use serde_json::json;
+
+use super::budgets::{Triangle, cuboid};
+
+/// A file that is damaged, the commands that read it (words; `@` is the file, what stands behind `<` is its standard input),
+/// and how often it is chosen.
+pub(super) struct Input {
+    pub(super) file: &'static str,
+    pub(super) commands: &'static [&'static str],
+    pub(super) weight: usize,
+}
+
+const SCENE: &[&str] = &[
+    "bake @ -o out.glb",
+    "bake @ -o out.glb --method watershed",
+    "bake @ -o out.glb --method bsp",
+    "bake @ -o out.glb --method delaunay",
+    "bake @ -o out.glb --repair --repair-holes 2 --leak-path",
+    "bake @ -o out.glb --max-cost 40 --split-outdoors --smallest-hole 0",
+    "bake two.obj -o out.glb --detail @ --unit ft --up z",
+    "decimate @ -o out.glb",
+    "verify world.glb --source @ --rays 200 --sight 5",
+];
+
+/// All but the last: without names the chair is structure, and a map has other units, but the world was baked of `two.obj`.
+const BARE: &[&str] = SCENE.split_at(SCENE.len() - 1).0;
+
+const BAKE: &[&str] = &[
+    "bake two.gltf -o out.glb",
+    "bake two.gltf -o out.glb --method bsp",
+];
+
+pub(super) const INPUTS: [Input; 20] = [
+    Input {
+        file: "two.obj",
+        commands: SCENE,
+        weight: 8,
+    },
+    Input {
+        file: "two.glb",
+        commands: SCENE,
+        weight: 10,
+    },
+    Input {
+        file: "two.gltf",
+        commands: SCENE,
+        weight: 8,
+    },
+    Input {
+        file: "two.ply",
+        commands: BARE,
+        weight: 5,
+    },
+    Input {
+        file: "two.stl",
+        commands: BARE,
+        weight: 5,
+    },
+    Input {
+        file: "two.map",
+        commands: BARE,
+        weight: 8,
+    },
+    Input {
+        file: "two.bin",
+        commands: BAKE,
+        weight: 3,
+    },
+    Input {
+        file: "picture.png",
+        commands: BAKE,
+        weight: 1,
+    },
+    Input {
+        file: "two.mtl",
+        commands: &["bake two.obj -o out.glb"],
+        weight: 1,
+    },
+    Input {
+        file: "world.glb",
+        commands: &[
+            "inspect @",
+            "inspect @ --json",
+            "plan @ -o out.svg",
+            "pvs @ -o out.pvs --mode fast",
+            "pvs @ -o out.pvs --into out.glb --statistics out.json --mutual out.txt --evidence out.ev",
+            "locate @ < points.txt",
+            "see @ --eye 1,1.5,2 --look 7,1.5,2",
+            "simplify @ -o out.glb --max-cells 2",
+            "simplify @ -o out.glb --max-cost 40 --split-outdoors",
+            "edit @ -o out.glb --delete-portal 0",
+            "edit @ -o out.glb --add-portal 2,-1,-1;2,-1,6;2,4,6;2,4,-1",
+            "report @ -o out.html --no-pictures --views 5",
+            "verify @ --rays 500 --sight 20",
+            "verify @ --evidence world.ev",
+            "bake @ -o out.glb",
+            "decimate @",
+        ],
+        weight: 24,
+    },
+    Input {
+        file: "world.glb",
+        commands: &[
+            "render @ -o out.png --size 32x32 --eye 1,1.5,2 --look 7,1.5,2 --lod 1 --adapter software",
+        ],
+        weight: 1,
+    },
+    Input {
+        file: "grid.prt",
+        commands: &[
+            "pvs @ -o out.pvs",
+            "pvs @ -o out.pvs --mode fast --evidence out.ev",
+            "simplify @ -o out.prt --max-cells 3",
+            "verify @ --evidence grid.ev",
+        ],
+        weight: 6,
+    },
+    Input {
+        file: "grid.ev",
+        commands: &["verify grid.prt --evidence @"],
+        weight: 4,
+    },
+    Input {
+        file: "world.ev",
+        commands: &["verify world.glb --evidence @"],
+        weight: 3,
+    },
+    Input {
+        file: "grid.search",
+        commands: &["pvs grid.prt -o out.pvs --checkpoint @"],
+        weight: 5,
+    },
+    Input {
+        file: "settings.toml",
+        commands: &[
+            "bake two.obj -o out.glb --config @ --method watershed",
+            "bake two.obj -o out.glb --config @ --method bsp",
+            "decimate two.obj --config @",
+            "verify world.glb --source two.obj --config @ --rays 200 --sight 0",
+        ],
+        weight: 6,
+    },
+    Input {
+        file: "choices.toml",
+        commands: &[
+            "bake two.obj -o out.glb --method delaunay --choices @",
+            "decimate two.obj --choices @",
+        ],
+        weight: 2,
+    },
+    Input {
+        file: "points.txt",
+        commands: &["locate world.glb < @"],
+        weight: 1,
+    },
+    Input {
+        file: "walk.txt",
+        commands: &["render world.glb -o out.png --size 8x8 --adapter software --path @"],
+        weight: 1,
+    },
+    Input {
+        file: "steps.txt",
+        commands: &["decimate two.obj --steps < @"],
+        weight: 1,
+    },
+];
+
+/// What is made of these by the command itself, in order.
+pub(super) const MADE: [&str; 4] = [
+    "bake two.obj -o world.glb --method watershed",
+    "pvs world.glb -o out.pvs --into world.glb --evidence world.ev",
+    "pvs grid.prt -o out.pvs --evidence grid.ev",
+    "pvs grid.prt -o out.pvs --checkpoint grid.search --budget 0",
+];
+
+/// Writes the files that are not made by the command.
+pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
+    let boxes = boxes();
+    let (json, bin) = gltf(&boxes);
+    let with_buffer = |buffer: serde_json::Value| {
+        let mut json = json.clone();
+        json["buffers"] = json!([buffer]);
+        json.to_string()
+    };
+    let n = bin.len();
+    let inline = with_buffer(json!({"byteLength": n}));
+    let outside = with_buffer(json!({"byteLength": n, "uri": "two.bin"}));
+    let files: [(&str, Vec<u8>); 14] = [
+        ("two.obj", obj(&boxes).into()),
+        (
+            "two.mtl",
+            "newmtl wall\nKd 0.8 0.7 0.6\nmap_Kd picture.png\nnewmtl glass\nKd 0 0 1\nd 0.3\n"
+                .into(),
+        ),
+        ("two.glb", glb(inline, &bin)),
+        ("two.gltf", outside.into()),
+        ("two.bin", bin),
+        ("picture.png", PICTURE.into()),
+        ("two.ply", ply(&boxes).into()),
+        ("two.stl", stl(&boxes)),
+        ("two.map", map(&boxes).into()),
+        ("grid.prt", prt().into()),
+        ("settings.toml", SETTINGS.into()),
+        (
+            "choices.toml",
+            "keep = [[4.1, 1.05, 2.5]]\njoin = [[1.0, 1.5, 2.0]]\n".into(),
+        ),
+        ("points.txt", "1 1.5 2\n7 1.5 2\n".into()),
+        ("walk.txt", "1 1.5 2 7 1.5 2\n".into()),
+    ];
+    let steps = (
+        "steps.txt",
+        b"b 3\nl\nkeep\nn\njoin\nundo\nbake out.glb\nsave out.toml\ng 0\nq\n".to_vec(),
+    );
+    for (name, bytes) in files.into_iter().chain([steps]) {
+        std::fs::write(folder.join(name), bytes).with_context(|| name.to_owned())?;
+    }
+    Ok(())
+}
+
+const SETTINGS: &str = "\
+min_opening = 0.5
+smallest_hole = 0.01
+unit = \"m\"
+up = \"y\"
+origin = [0.0, 0.0, 0.0]
+max_voxels = 100000
+detail_names = [\"chair*\"]
+repair = 0.001
+[merge]
+threshold = 0.7
+[bsp]
+heuristic = \"min-cut\"
+grid = 2.0
+planes = [[2.0, 0.0, 0.0, 1.0, 0.0, 0.0]]
+boxes = [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]
+max_cost = 100
+material_costs = { wall = 2.0 }
+";
+
+/// A gray pixel.
+const PICTURE: &[u8] = b"\x89PNG\x0d\x0a\x1a\x0a\x00\x00\x00\x0dIHDR\x00\x00\x00\x01\x00\x00\x00\x01\x08\x00\x00\x00\x00:~\x9bU\x00\x00\x00\x0aIDATx\x9cch\x00\x00\x00\x82\x00\x81w\xcdr\xb6\x00\x00\x00\x00IEND\xaeB`\x82";
+
+type Corners = [[f64; 3]; 2];
+
+/// Name and corners of each box: two rooms with a doorway between them and a window to the outdoors, and a chair.
+fn boxes() -> Vec<(&'static str, Corners)> {
+    vec![
+        ("floor", [[-0.2, -0.2, -0.2], [8.4, 0.0, 5.2]]),
+        ("roof", [[-0.2, 3.0, -0.2], [8.4, 3.2, 5.2]]),
+        ("west", [[-0.2, 0.0, -0.2], [0.0, 3.0, 5.2]]),
+        ("east-low", [[8.2, 0.0, 0.0], [8.4, 1.0, 5.0]]),
+        ("east-high", [[8.2, 2.0, 0.0], [8.4, 3.0, 5.0]]),
+        ("east-left", [[8.2, 1.0, 0.0], [8.4, 2.0, 2.0]]),
+        ("east-right", [[8.2, 1.0, 3.0], [8.4, 2.0, 5.0]]),
+        ("south", [[0.0, 0.0, -0.2], [8.4, 3.0, 0.0]]),
+        ("north", [[0.0, 0.0, 5.0], [8.4, 3.0, 5.2]]),
+        ("middle-left", [[4.0, 0.0, 0.0], [4.2, 3.0, 2.0]]),
+        ("middle-right", [[4.0, 0.0, 3.0], [4.2, 3.0, 5.0]]),
+        ("middle-high", [[4.0, 2.1, 2.0], [4.2, 3.0, 3.0]]),
+        ("chair", [[1.0, 0.0, 1.0], [1.5, 0.5, 1.5]]),
+    ]
+}
+
+fn triangles(boxes: &[(&str, Corners)]) -> Vec<Triangle> {
+    boxes
+        .iter()
+        .flat_map(|(_, [a, b])| cuboid(*a, *b))
+        .collect()
+}
+
+fn obj(boxes: &[(&str, Corners)]) -> String {
+    let mut text = "mtllib two.mtl\n".to_owned();
+    for (name, [low, high]) in boxes {
+        let _ = writeln!(text, "o {name}\nusemtl wall");
+        for triangle in cuboid(*low, *high) {
+            for [x, y, z] in triangle {
+                let _ = writeln!(text, "v {x} {y} {z}");
+            }
+            text.push_str("f -3 -2 -1\n");
+        }
+    }
+    text
+}
+
+fn ply(boxes: &[(&str, Corners)]) -> String {
+    let all = triangles(boxes);
+    let n = all.len();
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {n}\nproperty list uchar int vertex_indices\nend_header\n",
+        3 * n
+    );
+    for [x, y, z] in all.as_flattened() {
+        let _ = writeln!(text, "{x} {y} {z}");
+    }
+    for i in 0..n {
+        let _ = writeln!(text, "3 {} {} {}", 3 * i, 3 * i + 1, 3 * i + 2);
+    }
+    text
+}
+
+fn stl(boxes: &[(&str, Corners)]) -> Vec<u8> {
+    let all = triangles(boxes);
+    let mut bytes = vec![b' '; 80];
+    bytes.extend((all.len() as u32).to_le_bytes());
+    for triangle in all {
+        bytes.extend([0; 12]);
+        bytes.extend(floats(&triangle));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+fn floats(triangle: &Triangle) -> impl Iterator<Item = u8> + use<'_> {
+    let all = triangle.as_flattened().iter();
+    all.flat_map(|&x| (x as f32).to_le_bytes())
+}
+
+/// A mesh and a node for each box, but for the buffer's place; and the buffer.
+fn gltf(boxes: &[(&str, Corners)]) -> (serde_json::Value, Vec<u8>) {
+    let mut bin = Vec::new();
+    let (mut views, mut accessors, mut meshes, mut nodes) = (vec![], vec![], vec![], vec![]);
+    for (i, (name, [low, high])) in boxes.iter().enumerate() {
+        let begin = bin.len();
+        let all = cuboid(*low, *high);
+        bin.extend(all.iter().flat_map(floats));
+        views.push(json!({"buffer": 0, "byteOffset": begin, "byteLength": bin.len() - begin}));
+        accessors.push(
+            json!({"bufferView": i, "componentType": 5126, "type": "VEC3", "count": 3 * all.len(),
+            "min": low, "max": high}),
+        );
+        meshes.push(json!({"primitives": [{"attributes": {"POSITION": i}, "material": 0}]}));
+        nodes.push(json!({"mesh": i, "name": name, "translation": [0, 0, 0]}));
+    }
+    let roots: Vec<usize> = (0..nodes.len()).collect();
+    let json = json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": roots}], "nodes": nodes, "meshes": meshes,
+        "accessors": accessors, "bufferViews": views, "images": [{"uri": "picture.png"}], "textures": [{"source": 0}],
+        "materials": [{"name": "wall", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+    });
+    (json, bin)
+}
+
+fn glb(mut json: String, bin: &[u8]) -> Vec<u8> {
+    while !json.len().is_multiple_of(4) {
+        json.push(' ');
+    }
+    let all = 12 + 8 + json.len() + 8 + bin.len();
+    let mut bytes = b"glTF".to_vec();
+    for n in [2, all, json.len()] {
+        bytes.extend((n as u32).to_le_bytes());
+    }
+    bytes.extend(b"JSON");
+    bytes.extend(json.as_bytes());
+    bytes.extend((bin.len() as u32).to_le_bytes());
+    bytes.extend(b"BIN\0");
+    bytes.extend(bin);
+    bytes
+}
+
+/// Brushes, z up, 32 units to the meter; the window is filled, as a map must not leak.
+fn map(boxes: &[(&str, Corners)]) -> String {
+    let mut text = "{\n\"classname\" \"worldspawn\"\n".to_owned();
+    let pane = ("pane", [[8.2, 1.0, 2.0], [8.4, 2.0, 3.0]]);
+    for (_, corners) in boxes.iter().chain([&pane]) {
+        // East, north, up. North is -z.
+        let [a, b] = corners.map(|[x, y, z]| [x, -z, y].map(|v| (v * 32.0).round()));
+        let low = [0, 1, 2].map(|k| f64::min(a[k], b[k]));
+        let high = [0, 1, 2].map(|k| f64::max(a[k], b[k]));
+        text.push_str("{\n");
+        for k in 0..3 {
+            let (u, v) = ((k + 1) % 3, (k + 2) % 3);
+            for (corner, first, last) in [(low, v, u), (high, u, v)] {
+                let moved = |axis: usize| {
+                    let mut p = corner;
+                    p[axis] += 64.0;
+                    p
+                };
+                for [x, y, z] in [moved(first), corner, moved(last)] {
+                    let _ = write!(text, "( {x} {y} {z} ) ");
+                }
+                text.push_str("stone 0 0 0 1 1\n");
+            }
+        }
+        text.push_str("}\n");
+    }
+    text.push_str("}\n{\n\"classname\" \"info_player_start\"\n\"origin\" \"64 -64 48\"\n}\n");
+    text
+}
+
+/// Three times three rooms of 64 units, with an opening in each wall between two.
+fn prt() -> String {
+    let mut portals = Vec::new();
+    for a in 0..9 {
+        let (x, y) = (f64::from(a % 3) * 64.0, f64::from(a / 3) * 64.0);
+        if a % 3 < 2 {
+            let x = x + 64.0;
+            let corners = [
+                [x, y + 8.0, 8.0],
+                [x, y + 40.0, 8.0],
+                [x, y + 40.0, 40.0],
+                [x, y + 8.0, 40.0],
+            ];
+            portals.push((a, a + 1, corners));
+        }
+        if a / 3 < 2 {
+            let y = y + 64.0;
+            let corners = [
+                [x + 8.0, y, 8.0],
+                [x + 8.0, y, 40.0],
+                [x + 40.0, y, 40.0],
+                [x + 40.0, y, 8.0],
+            ];
+            portals.push((a, a + 3, corners));
+        }
+    }
+    let mut text = format!("PRT1\n9\n{}\n", portals.len());
+    for (a, b, corners) in portals {
+        let _ = write!(text, "4 {a} {b} ");
+        for [x, y, z] in corners {
+            let _ = write!(text, "({x} {y} {z} ) ");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_glb_says_how_long_it_is() {
+        let (json, bin) = gltf(&boxes());
+        let bytes = glb(json.to_string(), &bin);
+        assert_eq!(bytes[8..12], (bytes.len() as u32).to_le_bytes());
+        assert!(bytes.ends_with(&bin));
+    }
+}
