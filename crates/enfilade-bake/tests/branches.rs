@@ -58,7 +58,7 @@ fn vessel() -> (Vec<Tube>, [DVec3; 3], DVec3) {
     (all, tips, stub.ends[1])
 }
 
-// Covers V10.
+// Covers V10, and T6: once decimation has left rooms, they are divided where branches leave them, and decimated again.
 #[test]
 fn side_tubes_are_cells_and_a_stub_is_none() {
     let (all, tips, stub) = vessel();
