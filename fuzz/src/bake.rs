@@ -5,8 +5,8 @@ use std::time::Duration;
 use enfilade::bake::{BakeConfig, BakeContext, Budget, Method, SmallestHole, bake as bake_scene};
 use enfilade::verify::{VerifyOptions, structural_triangles, verify_world};
 use enfilade_cpg::wire::{decode_glb, encode_glb};
-use enfilade_geom::DMat4;
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
+use enfilade_geom::{Aabb, DMat4};
 
 use crate::Numbers;
 
@@ -107,19 +107,11 @@ pub fn seeds() -> Vec<Vec<u8>> {
         [[32, 0, 24], [33, 24, 40]],
         [[32, 17, 16], [33, 24, 24]],
     ];
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
     let mut corners = Vec::new();
     for [low, high] in boxes {
         let corner =
             |c: usize| [0, 1, 2].map(|k| if c >> k & 1 == 1 { high[k] } else { low[k] } as u8);
-        for [a, b, c, d] in faces {
+        for [a, b, c, d] in Aabb::FACES {
             corners.extend([a, b, c, a, c, d].map(corner));
         }
     }

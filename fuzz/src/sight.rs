@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use enfilade::verify::verify_evidence;
 use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
-use enfilade_cpg::{CellId, Pvs, SightGraph, SightPortal};
+use enfilade_cpg::{CellId, Pvs, SightGraph};
 use enfilade_geom::DVec3;
 use enfilade_import::read_prt;
 use enfilade_testkit::{GridParams, room_grid};
@@ -164,27 +164,18 @@ pub fn checkpoint(data: &[u8]) {
 
 /// Portal files after they are read: both searches agree, and the evidence is accepted.
 pub fn pvs(data: &[u8]) {
-    let Some(graph) = std::str::from_utf8(data)
+    let Some(file) = std::str::from_utf8(data)
         .ok()
         .and_then(|text| read_prt(text).ok())
     else {
         return;
     };
-    let portals = graph.portals.iter().filter(|p| p.points.len() >= 3);
-    let graph = SightGraph {
-        n_cells: graph.n_clusters,
-        portals: portals
-            .map(|portal| SightPortal {
-                cells: portal.clusters,
-                winding: portal
-                    .points
-                    .iter()
-                    .map(|&p| DVec3::from_array(p))
-                    .collect(),
-                pieces: Vec::new(),
-            })
-            .collect(),
-    };
+    let winding = |points: &[[f64; 3]]| points.iter().map(|&p| DVec3::from_array(p)).collect();
+    let portals = file.portals.iter();
+    let graph = SightGraph::of_windings(
+        file.n_clusters,
+        portals.map(|portal| (portal.clusters, winding(&portal.points))),
+    );
     if graph.n_cells > 1000 || graph.portals.len() > 40 {
         return;
     }

@@ -26,7 +26,7 @@ pub(crate) fn realize(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin(Stage::Complex)?;
-    // What a method has found of them, these are exact.
+    // Exact, whatever candidates the method has fitted there.
     let to_scene = |p: DVec3| structure.frame.to_scene(p);
     let missing: Vec<Triangle> = structure
         .missing(config)

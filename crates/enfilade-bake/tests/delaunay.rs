@@ -4,7 +4,7 @@
 use enfilade_bake::delaunay::{JOINED, Session, bake_session};
 use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::{PortalKind, World};
-use enfilade_geom::DVec3;
+use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::mixed::{pitched_roof_attic, room_within_room, stair_hall, two_rooms_crack};
 use enfilade_testkit::{
     Generated, OpeningKind, Site, Variant, gjorup_cavern, gjorup_rooms, scaled, solid,
@@ -151,15 +151,8 @@ fn with_boxes(mut g: Generated, boxes: &[[[f32; 3]; 2]]) -> Generated {
             let pick = |k: usize| if i >> k & 1 == 0 { lo[k] } else { hi[k] };
             primitive.positions.push([pick(0), pick(1), pick(2)]);
         }
-        for [a, b, c, d] in [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ] {
-            let indices = [a, b, c, a, c, d].map(|i| first + i);
+        for [a, b, c, d] in Aabb::FACES {
+            let indices = [a, b, c, a, c, d].map(|i| first + i as u32);
             primitive.indices.extend(indices);
         }
     }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
-use enfilade::cpg::{CellId, SightGraph, SightPortal, World};
+use enfilade::cpg::{CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
 use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
@@ -199,25 +199,14 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
     })
 }
 
-/// The portals of a file that light can pass: those with fewer than three corners have no area.
+/// The graph of a portal file.
 pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
-    SightGraph {
-        n_cells: file.n_clusters,
-        portals: file
-            .portals
-            .iter()
-            .filter(|portal| portal.points.len() >= 3)
-            .map(|portal| SightPortal {
-                cells: portal.clusters,
-                winding: portal
-                    .points
-                    .iter()
-                    .map(|&p| DVec3::from_array(p))
-                    .collect(),
-                pieces: Vec::new(),
-            })
-            .collect(),
-    }
+    let winding = |points: &[[f64; 3]]| points.iter().map(|&p| DVec3::from_array(p)).collect();
+    let portals = file.portals.iter();
+    SightGraph::of_windings(
+        file.n_clusters,
+        portals.map(|portal| (portal.clusters, winding(&portal.points))),
+    )
 }
 
 /// Where the answer goes; all that is written is looked at before the work. Only `--into` may be the input itself: the world

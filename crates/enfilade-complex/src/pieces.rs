@@ -244,6 +244,7 @@ const WIDENING: f64 = 2.0;
 
 /// Pieces of one plane, one pair of cells and one direction, in the plane's own coordinates.
 struct Sheet<'a> {
+    rules: &'a Rules<'a>,
     pieces: &'a [Piece],
     flats: Vec<Flat>,
     plane: Plane,
@@ -252,8 +253,8 @@ struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    fn new(pieces: &'a [Piece], planes: &[Plane]) -> Self {
-        let own = planes[pieces[0].plane as usize];
+    fn new(pieces: &'a [Piece], rules: &'a Rules<'a>) -> Self {
+        let own = rules.planes[pieces[0].plane as usize];
         let plane = if pieces[0].is_flipped {
             own.flipped()
         } else {
@@ -263,6 +264,7 @@ impl<'a> Sheet<'a> {
         let origin = plane.project(pieces[0].points[0]);
         let flat = |p: &DVec3| DVec2::new(u.dot(*p - origin), v.dot(*p - origin));
         Self {
+            rules,
             pieces,
             flats: pieces
                 .iter()
@@ -285,9 +287,15 @@ impl<'a> Sheet<'a> {
         hull(points.copied())
     }
 
+    /// Whether a piece is where a triangle is missing.
+    fn is_missing(&self, i: usize) -> bool {
+        let is_beyond = |candidate| candidate >= self.rules.n_candidates;
+        self.pieces[i].candidate.is_some_and(is_beyond)
+    }
+
     /// Pieces near each other, those on one candidate together wherever they are; what is missing in a wall is no part of an
     /// opening beside it. Ordered by their least members.
-    fn clusters(&self, among: &[usize], n_candidates: u32) -> Vec<Vec<usize>> {
+    fn clusters(&self, among: &[usize]) -> Vec<Vec<usize>> {
         let mut sets = Sets::new(self.flats.len());
         let mut first_on_candidate = BTreeMap::new();
         for &i in among {
@@ -299,14 +307,13 @@ impl<'a> Sheet<'a> {
         let mut order = among.to_vec();
         let left = |i: usize| self.flats[i].min.x;
         order.sort_by(|&a, &b| left(a).total_cmp(&left(b)).then(a.cmp(&b)));
-        let is_missing = |i: usize| self.pieces[i].candidate.is_some_and(|c| c >= n_candidates);
         for (k, &i) in order.iter().enumerate() {
             for &j in &order[k + 1..] {
                 if left(j) > self.flats[i].max.x + TOGETHER {
                     break;
                 }
                 let is_apart = sets.find(i as u32) != sets.find(j as u32);
-                let may_join = is_apart && is_missing(i) == is_missing(j);
+                let may_join = is_apart && self.is_missing(i) == self.is_missing(j);
                 if may_join && self.flats[i].is_near(&self.flats[j]) {
                     sets.join(i as u32, j as u32);
                 }
@@ -326,7 +333,6 @@ impl<'a> Sheet<'a> {
         openings: &mut [Vec<usize>],
         mut parts: Vec<Vec<usize>>,
         widening: f64,
-        hole: f64,
     ) -> Vec<Vec<usize>> {
         let mut hulls: Vec<Flat> = openings.iter().map(|o| self.hull_of(o)).collect();
         let area = |part: &[usize]| part.iter().map(|&i| self.flats[i].area).sum::<f64>();
@@ -347,7 +353,10 @@ impl<'a> Sheet<'a> {
                 growth(a).total_cmp(&growth(b)).then(a.0.cmp(&b.0))
             });
             let Some((o, wider)) = least else { return true };
-            let is_rim = own.points.iter().all(|&p| hulls[o].is_within(p, hole));
+            let is_rim = own
+                .points
+                .iter()
+                .all(|&p| hulls[o].is_within(p, self.rules.hole));
             if is_rim || wider.area - hulls[o].area <= widening * area(part) {
                 openings[o].extend(part);
                 hulls[o] = wider;
@@ -358,11 +367,10 @@ impl<'a> Sheet<'a> {
         parts
     }
 
-    fn opening(&self, members: &[usize], rules: &Rules<'_>, is_seal: bool) -> Opening {
+    fn opening(&self, members: &[usize], is_seal: bool) -> Opening {
         let mut on_candidate = BTreeMap::new();
         for &i in members {
-            let candidate = self.pieces[i].candidate;
-            if let Some(candidate) = candidate.filter(|&c| c < rules.n_candidates) {
+            if let Some(candidate) = self.pieces[i].candidate.filter(|_| !self.is_missing(i)) {
                 *on_candidate.entry(candidate).or_insert(0.0) += self.flats[i].area;
             }
         }
@@ -393,32 +401,27 @@ impl<'a> Sheet<'a> {
 
 /// The openings among pieces of one plane, one pair of cells and one direction.
 fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
-    let sheet = Sheet::new(group, rules.planes);
+    let sheet = Sheet::new(group, rules);
     let all: Vec<usize> = (0..group.len()).collect();
     // Whatever opens to matter is to be closed, but for what nothing could close.
     if group[0].cells[1] == SOLID {
-        return vec![sheet.opening(&all, rules, true)];
+        return vec![sheet.opening(&all, true)];
     }
     let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
-    // What lies on candidates makes the openings; what is open beside them belongs to them or stands for itself.
+    // What lies on candidates or is missing makes the openings; what is open beside them belongs to them or stands for itself.
     let (foreseen, beside): (Vec<usize>, Vec<usize>) = wide
         .into_iter()
         .partition(|&i| group[i].candidate.is_some());
-    let mut openings = sheet.clusters(&foreseen, rules.n_candidates);
-    let beside = sheet.adopt(
-        &mut openings,
-        sheet.clusters(&beside, rules.n_candidates),
-        WIDENING,
-        rules.hole,
-    );
+    let mut openings = sheet.clusters(&foreseen);
+    let beside = sheet.adopt(&mut openings, sheet.clusters(&beside), WIDENING);
     openings.extend(beside);
     let gaps = gaps.into_iter().map(|i| vec![i]).collect();
     // A gap beside a door can be as large as the wall: the sliver between two triangles of it.
-    let gaps = sheet.adopt(&mut openings, gaps, 0.0, rules.hole);
+    let gaps = sheet.adopt(&mut openings, gaps, 0.0);
     let mut gaps = gaps.concat();
     let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
     for members in openings {
-        let opening = sheet.opening(&members, rules, false);
+        let opening = sheet.opening(&members, false);
         if opening.candidate.is_none() && opening.width < CRACK_WIDTH {
             cracks.extend(members);
         } else {
@@ -430,7 +433,7 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     }
     for (members, is_seal) in [(cracks, false), (gaps, true)] {
         if !members.is_empty() {
-            out.push(sheet.opening(&members, rules, is_seal));
+            out.push(sheet.opening(&members, is_seal));
         }
     }
     out

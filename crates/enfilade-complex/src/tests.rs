@@ -20,14 +20,7 @@ fn v(x: f64, y: f64, z: f64) -> DVec3 {
 fn block(out: &mut Vec<Triangle>, a: [f64; 3], b: [f64; 3]) {
     let pick = |i: usize, axis: usize| if i >> axis & 1 == 0 { a[axis] } else { b[axis] };
     let corner = |i: usize| v(pick(i, 0), pick(i, 1), pick(i, 2));
-    for f in [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ] {
+    for f in Aabb::FACES {
         quad(out, f.map(corner));
     }
 }

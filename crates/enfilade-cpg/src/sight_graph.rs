@@ -107,6 +107,25 @@ impl SightGraph {
         }
     }
 
+    /// The graph of cells and outlines, as a portal file has them. Outlines of fewer than three corners have no area and are left
+    /// out.
+    #[must_use]
+    pub fn of_windings(
+        n_cells: u32,
+        portals: impl IntoIterator<Item = ([u32; 2], Vec<DVec3>)>,
+    ) -> Self {
+        let has_area = |(_, winding): &([u32; 2], Vec<DVec3>)| winding.len() >= 3;
+        let portal = |(cells, winding)| SightPortal {
+            cells,
+            winding,
+            pieces: Vec::new(),
+        };
+        Self {
+            n_cells,
+            portals: portals.into_iter().filter(has_area).map(portal).collect(),
+        }
+    }
+
     /// A number that changes with the graph: FNV-1a, 64 bits, over the numbers of cells and portals, then for
     /// each portal its cells, and for its winding and each of its pieces the number of corners and the
     /// corners, all little-endian, counts as 32 bits and coordinates as `f64`.

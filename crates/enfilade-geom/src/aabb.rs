@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-use crate::DVec3;
+use crate::{DVec3, Triangle};
 
 /// An axis-aligned box. [Units: wu] Empty when any `min` exceeds its `max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,6 +97,13 @@ impl Aabb {
     pub fn faces(&self) -> [[DVec3; 4]; 6] {
         let corners = self.corners();
         Self::FACES.map(|face| face.map(|c| corners[c]))
+    }
+
+    /// Two triangles for each face, counter-clockwise from outside.
+    #[must_use]
+    pub fn triangles(&self) -> Vec<Triangle> {
+        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+        self.faces().into_iter().flat_map(halves).collect()
     }
 
     /// Edge lengths; negative where empty.

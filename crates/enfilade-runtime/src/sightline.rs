@@ -50,7 +50,7 @@ pub(crate) struct Opening {
     is_rim: [bool; 3],
 }
 
-/// Tolerances that a segment may be long: `f64` then tells its parts a thousand times as well.
+/// Longest segment that is followed from cell to cell, in tolerances: `f64` rounds places along it to a thousandth of one.
 const LONGEST: f64 = 1e12;
 
 /// Marks an item that is an opening, not a wall.

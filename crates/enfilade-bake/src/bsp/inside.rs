@@ -70,12 +70,7 @@ mod tests {
 
     /// A closed box, seen from outside.
     fn boxed(min: DVec3, max: DVec3) -> Vec<Triangle> {
-        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
-        Aabb::new(min, max)
-            .faces()
-            .into_iter()
-            .flat_map(halves)
-            .collect()
+        Aabb::new(min, max).triangles()
     }
 
     #[test]

@@ -192,9 +192,7 @@ mod tests {
     use super::*;
 
     fn box_triangles(size: DVec3) -> Vec<Triangle> {
-        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
-        let block = Aabb::new(DVec3::ZERO, size);
-        block.faces().into_iter().flat_map(halves).collect()
+        Aabb::new(DVec3::ZERO, size).triangles()
     }
 
     #[test]

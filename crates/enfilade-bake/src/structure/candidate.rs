@@ -268,12 +268,7 @@ mod tests {
 
     /// The faces of a block, two triangles each.
     fn block(lo: DVec3, hi: DVec3) -> Vec<Triangle> {
-        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
-        Aabb::new(lo, hi)
-            .faces()
-            .into_iter()
-            .flat_map(halves)
-            .collect()
+        Aabb::new(lo, hi).triangles()
     }
 
     // Covers V4 and V5.

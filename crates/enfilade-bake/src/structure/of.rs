@@ -25,7 +25,7 @@ pub(crate) enum Stairs {
 
 /// The structure of a scene.
 ///
-/// `walls`, `stairs`, `missing` and `bvh` are in the frame, all else is where the scene has it.
+/// `walls`, `rims`, `stairs` and `bvh` are in the frame, all else is where the scene has it.
 pub(crate) struct Structure<'a> {
     pub(crate) scene: &'a Scene,
     /// Where each triangle comes from.
@@ -41,8 +41,8 @@ pub(crate) struct Structure<'a> {
     pub(crate) stairs: Vec<Triangle>,
     /// Of all structural triangles.
     pub(crate) bvh: Bvh,
-    /// Triangles that are missing in walls.
-    missing: Vec<Triangle>,
+    /// Where walls end.
+    pub(crate) rims: Rims,
     /// How far triangles that should meet miss each other. [Units: wu]
     pub(crate) misfit: f64,
 }
@@ -85,7 +85,7 @@ impl<'a> Structure<'a> {
         let bvh = Bvh::build(&framed);
         Ok(Self {
             misfit: misfit(&framed, &bvh),
-            missing: Rims::of(&walls).missing_triangles(),
+            rims: Rims::of(&walls),
             walls,
             stairs: at(&numbers(true)),
             bvh,
@@ -124,9 +124,7 @@ impl<'a> Structure<'a> {
 
     /// Triangles that are missing in walls, each as large as an opening of the least width. What they open is no doorway.
     pub(crate) fn missing(&self, config: &BakeConfig) -> Vec<Triangle> {
-        let is_large =
-            |t: &Triangle| triangle_area_normal(t).length() >= 2.0 * config.min_opening.powi(2);
-        self.missing.iter().copied().filter(is_large).collect()
+        self.rims.missing_triangles(config.min_opening.powi(2))
     }
 
     /// Forgets what is in the frame: what a builder found is put where the scene has it.
@@ -140,7 +138,7 @@ impl<'a> Structure<'a> {
         Self {
             frame: Frame::SCENE,
             walls: Vec::new(),
-            missing: Vec::new(),
+            rims: Rims::default(),
             wall_numbers: Vec::new(),
             stairs: Vec::new(),
             bvh,

@@ -10,15 +10,16 @@
 //!
 //! Cost: a sort of the edges, `O(n log n)` in triangles.
 
-use enfilade_geom::{DVec3, Triangle};
+use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
 
-/// A corner at which more rims begin tells nothing: so many sheets end there.
+/// Where more rims than these begin at one corner, sheets end there, and no triangle is missing. It bounds the search.
 const MAX_RIMS: usize = 16;
 
 /// A corner of a rim, and the far corner of the triangle at the edge that leaves it.
 pub(crate) type RimVertex = (DVec3, DVec3);
 
 /// Edges that one triangle more uses in one direction than in the other, as that triangle turns.
+#[derive(Default)]
 pub(crate) struct Rims {
     points: Vec<DVec3>,
     /// From, to, far corner; ascending by `from`.
@@ -54,9 +55,9 @@ impl Rims {
         }
     }
 
-    /// The triangles that are missing: three edges that end in one another, each of another triangle. The order of the input has
-    /// no say.
-    pub(crate) fn missing_triangles(&self) -> Vec<Triangle> {
+    /// The triangles of at least `min_area` wu² that are missing: three rims in a ring, each an edge of another triangle. The order
+    /// of the input has no say.
+    pub(crate) fn missing_triangles(&self, min_area: f64) -> Vec<Triangle> {
         let from = |v: u32| {
             let at = self.edges.partition_point(|e| e[0] < v);
             let n = self.edges[at..].partition_point(|e| e[0] == v);
@@ -65,11 +66,14 @@ impl Rims {
         };
         let mut out = Vec::new();
         for &[a, b, apex] in &self.edges {
-            // Each once, from its least corner on. A triangle that stands alone is all rim, and its own far corners.
+            // Each is found once, from its least corner on. The rims of a triangle that stands alone are its own edges: there the
+            // far corner of each is the third corner.
             for &[_, c, next_apex] in from(b).filter(|e| a < b && a < e[1]) {
                 let is_last = |e: &[u32; 3]| e[1] == a && e[2] != b;
-                if apex != c && next_apex != a && from(c).any(is_last) {
-                    out.push([a, b, c].map(|v| self.points[v as usize]));
+                let triangle = [a, b, c].map(|v| self.points[v as usize]);
+                let is_large = triangle_area_normal(&triangle).length() >= 2.0 * min_area;
+                if is_large && apex != c && next_apex != a && from(c).any(is_last) {
+                    out.push(triangle);
                 }
             }
         }
@@ -119,13 +123,11 @@ mod tests {
     use enfilade_geom::Aabb;
 
     fn missing_triangles(triangles: &[Triangle]) -> Vec<Triangle> {
-        Rims::of(triangles).missing_triangles()
+        Rims::of(triangles).missing_triangles(0.3)
     }
 
     fn block(lo: f64, hi: f64) -> Vec<Triangle> {
-        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
-        let block = Aabb::new(DVec3::splat(lo), DVec3::splat(hi));
-        block.faces().into_iter().flat_map(halves).collect()
+        Aabb::new(DVec3::splat(lo), DVec3::splat(hi)).triangles()
     }
 
     fn sorted(t: &Triangle) -> Vec<[u64; 3]> {
@@ -144,6 +146,7 @@ mod tests {
             let found = missing_triangles(&t);
             assert_eq!(found.len(), 1);
             assert_eq!(sorted(&found[0]), sorted(&missing));
+            assert!(Rims::of(&t).missing_triangles(5.0).is_empty());
             t.reverse();
             assert_eq!(missing_triangles(&t), found);
         }

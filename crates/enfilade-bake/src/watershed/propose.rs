@@ -158,7 +158,7 @@ impl Solid {
         let closures = voxelize(grid, &structure.blockers(&structure.bvh));
         // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
         let lids = find_lids(grid, &occupied);
-        let mut caps = rim_caps(&structure.walls, config.min_opening.powi(2));
+        let mut caps = rim_caps(&structure.rims, config.min_opening.powi(2));
         caps.extend(structure.missing(config));
         let mut shut = voxelize(grid, &caps);
         shut.union_with(&closures);

@@ -24,8 +24,7 @@ const MIN_SHARE: f64 = 0.8;
 
 /// Triangles that cap the open rims of at least `min_area` wu². The order of the input has no say.
 #[must_use]
-pub(crate) fn rim_caps(triangles: &[Triangle], min_area: f64) -> Vec<Triangle> {
-    let rims = Rims::of(triangles);
+pub(crate) fn rim_caps(rims: &Rims, min_area: f64) -> Vec<Triangle> {
     let mut caps = Vec::new();
     for rim in rims.loops() {
         if let Some(center) = mouth_of(&rim, min_area) {
@@ -99,27 +98,25 @@ mod tests {
     #[test]
     fn both_mouths_of_a_tube_are_capped_whatever_the_order() {
         let mut t = tube(24, 5.0, [1.0, 1.0]);
-        let caps = rim_caps(&t, 0.3);
+        let caps = rim_caps(&Rims::of(&t), 0.3);
         assert!((area(&caps) - 2.0 * 12.0 * (15.0_f64).to_radians().sin()).abs() < 1e-9);
         t.reverse();
-        assert_eq!(rim_caps(&t, 0.3), caps);
-        assert!(rim_caps(&t, 4.0).is_empty());
+        assert_eq!(rim_caps(&Rims::of(&t), 0.3), caps);
+        assert!(rim_caps(&Rims::of(&t), 4.0).is_empty());
     }
 
     #[test]
     fn flat_sheets_and_shallow_bowls_have_no_mouth() {
-        assert!(rim_caps(&tube(24, 0.0, [1.0, 3.0]), 0.3).is_empty());
-        assert!(rim_caps(&tube(24, 0.5, [1.0, 3.0]), 0.3).is_empty());
+        assert!(rim_caps(&Rims::of(&tube(24, 0.0, [1.0, 3.0])), 0.3).is_empty());
+        assert!(rim_caps(&Rims::of(&tube(24, 0.5, [1.0, 3.0])), 0.3).is_empty());
     }
 
     #[test]
     fn a_closed_box_has_no_rim() {
-        let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
-        let block = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
-        let mut t: Vec<Triangle> = block.faces().into_iter().flat_map(halves).collect();
-        assert!(rim_caps(&t, 0.3).is_empty());
+        let mut t = Aabb::new(DVec3::ZERO, DVec3::splat(3.0)).triangles();
+        assert!(rim_caps(&Rims::of(&t), 0.3).is_empty());
         // Without its lid it has one mouth.
         t.truncate(10);
-        assert!((area(&rim_caps(&t, 0.3)) - 9.0).abs() < 1e-9);
+        assert!((area(&rim_caps(&Rims::of(&t), 0.3)) - 9.0).abs() < 1e-9);
     }
 }
