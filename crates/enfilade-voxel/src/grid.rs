@@ -1,5 +1,7 @@
 //! The voxel box in the world, and a bit a voxel.
 
+use std::ops::Range;
+
 use enfilade_geom::{Aabb, DVec3};
 
 /// Where a box of voxels lies in the world.
@@ -181,6 +183,16 @@ impl BitVolume {
         self.words_mut()[row * n..][..n].copy_from_slice(words);
     }
 
+    /// Sets the voxels `along` x of one row.
+    ///
+    /// # Panics
+    /// When they do not lie in the row.
+    pub fn fill_row(&mut self, row: usize, along: Range<usize>) {
+        assert!(along.end <= self.dims[0], "{along:?} outside the row");
+        let n = self.row_words();
+        set_bits(&mut self.words[row * n..][..n], along.start, along.end);
+    }
+
     /// The bit of voxel `(i, j, k)`.
     ///
     /// # Panics
@@ -261,6 +273,47 @@ impl BitVolume {
                 .step_by(per_row)
                 .for_each(|w| *w &= tail);
         }
+        out
+    }
+
+    /// Those set that share a face with one in the box that is not.
+    #[must_use]
+    pub fn rim(&self) -> Self {
+        use rayon::prelude::*;
+        let [nx, ny, nz] = self.dims;
+        let mut out = Self::new(self.dims);
+        if nx == 0 {
+            return out;
+        }
+        let per_row = self.row_words();
+        let whole = vec![u64::MAX; per_row];
+        out.words
+            .par_chunks_mut(per_row)
+            .enumerate()
+            .with_min_len(64)
+            .for_each(|(row, words)| {
+                let (y, z) = (row % ny, row / ny);
+                let here = self.row(row);
+                let beside = |exists: bool, at: usize| {
+                    if exists { self.row(at) } else { &whole[..] }
+                };
+                let around = [
+                    beside(y > 0, row.wrapping_sub(1)),
+                    beside(y + 1 < ny, row + 1),
+                    beside(z > 0, row.wrapping_sub(ny)),
+                    beside(z + 1 < nz, row + ny),
+                ];
+                for (w, word) in words.iter_mut().enumerate() {
+                    // Beyond both ends of the row nothing is missing.
+                    let before = if w == 0 { 1 } else { here[w - 1] >> 63 };
+                    let after = here.get(w + 1).map_or(1, |next| next & 1) << 63;
+                    let end = nx - 1 - w * 64;
+                    let last = if end < 64 { 1 << end } else { 0 };
+                    let all = around.iter().fold(u64::MAX, |all, r| all & r[w]);
+                    let along = (here[w] << 1 | before) & (here[w] >> 1 | after | last);
+                    *word = here[w] & !(along & all);
+                }
+            });
         out
     }
 
@@ -370,6 +423,18 @@ mod tests {
                 prop_assert_eq!(bits.get(x, y, z), b);
                 prop_assert_eq!(bits.get_index(i), b);
                 prop_assert_eq!(other.get(x, y, z), !b);
+            }
+            let rim = bits.rim();
+            for (v, &is_set) in plain.iter().enumerate() {
+                let at = [v % nx, v / nx % ny, v / nx / ny];
+                let is_rim = (0..3).any(|k| [-1, 1].into_iter().any(|step| {
+                    let mut next = at.map(|c| c as i64);
+                    next[k] += step;
+                    let is_in = (0..3).all(|k| (0..dims[k] as i64).contains(&next[k]));
+                    let [x, y, z] = next.map(|c| c as usize);
+                    is_in && !bits.get(x, y, z)
+                }));
+                prop_assert_eq!(rim.get_index(v), is_set && is_rim);
             }
             for row in 0..ny * nz {
                 let mut again = vec![0u64; bits.row_words()];

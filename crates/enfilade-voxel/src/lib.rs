@@ -12,14 +12,16 @@
 mod components;
 mod edt;
 mod enclosure;
+mod far;
 mod grid;
 mod voxelize;
 mod watershed;
 mod widest;
 
 pub use components::{Components, Connectivity, components, flood};
-pub use edt::{distance, distance_squared};
+pub use edt::{distance, distance_squared, distance_squared_near};
 pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
+pub use far::far_outdoors;
 pub use grid::{BitVolume, Grid};
 pub use voxelize::voxelize;
 pub use watershed::{Basin, Labels, Saddle, Watershed, WatershedOptions, mark_dams, watershed};

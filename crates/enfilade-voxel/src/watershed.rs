@@ -67,7 +67,7 @@ pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions)
     );
     let mut words = squared;
     to_levels(&mut words);
-    let starts = local_maxima(dims, &words);
+    let starts = local_maxima(dims, &words, options.outdoors.as_ref());
     let h = (options.h * f64::from(STEPS))
         .ceil()
         .min(f64::from(u32::MAX)) as u32;
@@ -170,8 +170,8 @@ fn to_levels(words: &mut [u16]) {
 /// Voxels where a basin may start, deepest first, then by index.
 ///
 /// No neighbor is higher, and none of those before it in the scan is as high: every regional
-/// maximum has such a voxel, its first.
-fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<u32> {
+/// maximum has such a voxel, its first. None is in `outdoors`.
+fn local_maxima(dims: [usize; 3], levels: &[u16], outdoors: Option<&BitVolume>) -> Vec<u32> {
     let [nx, ny, nz] = dims;
     let mut found: Vec<u32> = (0..ny * nz)
         .into_par_iter()
@@ -179,6 +179,8 @@ fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<u32> {
         .fold(Vec::new, |mut found, row| {
             let rows = Neighbors::of(levels, dims, row, ny);
             let [y0, z0, y1, z1] = rows.around;
+            let taken = outdoors.map(|o| o.row(row));
+            let is_taken = |x: usize| taken.is_some_and(|t| t[x / 64] >> (x % 64) & 1 != 0);
             for x in 0..nx {
                 let here = rows.here[x];
                 let below = |r: Option<&[u16]>| r.is_none_or(|r| r[x] < here);
@@ -190,6 +192,7 @@ fn local_maxima(dims: [usize; 3], levels: &[u16]) -> Vec<u32> {
                     && below(z0)
                     && not_above(y1)
                     && not_above(z1)
+                    && !is_taken(x)
                 {
                     found.push((row * nx + x) as u32);
                 }

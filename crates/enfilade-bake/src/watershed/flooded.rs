@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::fronts::Faces;
+use crate::structure::OUTDOORS;
 use crate::voxel::{BitVolume, Grid, Labels};
 
 /// A flooded volume, as merging sees it.
@@ -22,7 +23,9 @@ pub(crate) struct Flooded<'a> {
     pub(crate) slabs: &'a [f64],
 }
 
-/// Collects the faces between differently labelled voxels, by pair, in order of the voxels.
+/// Collects the faces between differently labelled voxels, by pair, ascending.
+///
+/// Linear in voxels; within the outdoors, dozens at a time.
 pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
     let [nx, ny, nz] = dims;
     let layer = nx * ny;
@@ -32,27 +35,35 @@ pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32,
             let mut found: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
             for y in 0..ny {
                 let row = z * layer + y * nx;
-                for x in 0..nx {
-                    let i = row + x;
-                    let a = labels.get(i);
-                    if a == 0 {
-                        continue;
+                labels.for_runs(row..row + nx, |voxels, a| {
+                    if a <= OUTDOORS {
+                        return;
                     }
-                    let mut face = |inside: bool, step: usize, axis: u64| {
-                        if inside {
-                            let b = labels.get(i + step);
-                            if b != 0 && b != a {
-                                found
-                                    .entry((a.min(b), a.max(b)))
-                                    .or_default()
-                                    .push(i as u64 * 4 + axis);
+                    for i in voxels {
+                        let x = i - row;
+                        // Of what touches the outdoors the other voxel looks back as well.
+                        for (ahead, behind, step, axis) in [
+                            (x + 1 < nx, x > 0, 1, 0),
+                            (y + 1 < ny, y > 0, nx, 1),
+                            (z + 1 < nz, z > 0, layer, 2),
+                        ] {
+                            let mut face = |b: u32, of: usize| {
+                                let faces = found.entry((a.min(b), a.max(b))).or_default();
+                                faces.push(of as u64 * 4 + axis);
+                            };
+                            if ahead {
+                                match labels.get(i + step) {
+                                    0 => {}
+                                    b if b == a => {}
+                                    b => face(b, i),
+                                }
+                            }
+                            if behind && labels.get(i - step) == OUTDOORS {
+                                face(OUTDOORS, i - step);
                             }
                         }
-                    };
-                    face(x + 1 < nx, 1, 0);
-                    face(y + 1 < ny, nx, 1);
-                    face(z + 1 < nz, layer, 2);
-                }
+                    }
+                });
             }
             found
         })
@@ -63,5 +74,6 @@ pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32,
             all.entry(pair).or_default().extend(faces);
         }
     }
+    all.values_mut().for_each(|faces| faces.sort_unstable());
     all
 }

@@ -150,11 +150,13 @@ pub(crate) fn find_matter(
 /// Voxels of some regions.
 fn n_voxels(labels: &Labels, regions: &Regions, of: &[u32]) -> usize {
     let of: BTreeSet<u32> = of.iter().copied().collect();
-    let is_in = |&i: &usize| {
-        let label = labels.get(i) as usize;
-        label != 0 && of.contains(&regions.region_of_basin[label])
-    };
-    (0..labels.len()).filter(is_in).count()
+    let mut n = 0;
+    labels.for_runs(0..labels.len(), |voxels, label| {
+        if label != 0 && of.contains(&regions.region_of_basin[label as usize]) {
+            n += voxels.len();
+        }
+    });
+    n
 }
 
 /// Which way the surfaces of a scene face.
@@ -373,27 +375,28 @@ fn sample_points(
         is_wanted[r as usize] = true;
     }
     let mut count: BTreeMap<u32, usize> = BTreeMap::new();
-    let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
-    for i in 0..labels.len() {
-        let region = region_at(i);
-        if is_wanted[region as usize] {
-            *count.entry(region).or_default() += 1;
+    let region_of = |label: u32| regions.region_of_basin[label as usize];
+    labels.for_runs(0..labels.len(), |voxels, label| {
+        if is_wanted[region_of(label) as usize] {
+            *count.entry(region_of(label)).or_default() += voxels.len();
         }
-    }
+    });
     let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
     let mut points: BTreeMap<u32, Vec<DVec3>> = BTreeMap::new();
-    for i in 0..labels.len() {
-        let region = region_at(i);
+    labels.for_runs(0..labels.len(), |voxels, label| {
+        let region = region_of(label);
         if !is_wanted[region as usize] {
-            continue;
+            return;
         }
+        // Every so many of the region's voxels, from the middle of the first so many.
         let step = count[&region].div_ceil(POINTS);
         let k = seen.entry(region).or_default();
-        if *k % step == step / 2 {
+        let first = (step / 2 + step - *k % step) % step;
+        for i in voxels.clone().skip(first).step_by(step) {
             let [x, y, z] = grid.coords(i);
             points.entry(region).or_default().push(grid.center(x, y, z));
         }
-        *k += 1;
-    }
+        *k += voxels.len();
+    });
     points
 }

@@ -17,6 +17,7 @@
 //! Cost: a distance transform of the plan for each width that is tried.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use enfilade_geom::Sets;
 
@@ -168,60 +169,74 @@ struct Limb {
     half_width: f64,
 }
 
+/// Where one layer of a region lies.
+#[derive(Clone, Copy)]
+struct Layer {
+    n_voxels: usize,
+    /// Least and greatest column.
+    columns: [[usize; 2]; 2],
+}
+
+impl Layer {
+    const EMPTY: Self = Self {
+        n_voxels: 0,
+        columns: [[usize::MAX; 2], [0; 2]],
+    };
+
+    /// With the voxels `along` x of the row at `z`.
+    fn add(&mut self, along: Range<usize>, z: usize) {
+        let [least, greatest] = &mut self.columns;
+        *least = [least[0].min(along.start), least[1].min(z)];
+        *greatest = [greatest[0].max(along.end - 1), greatest[1].max(z)];
+        self.n_voxels += along.len();
+    }
+}
+
 /// The plan of each region but the outdoors.
 fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
-    let ny = grid.dims[1];
-    let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
-    let mut count: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    let mut last = (0, 0);
-    let mut run = 0_u32;
-    // Counted in runs: neighbors along a row are of one region as a rule.
-    let mut flush = |(region, y): (u32, usize), run: &mut u32| {
-        if region > OUTDOORS && *run > 0 {
-            count.entry(region).or_insert_with(|| vec![0; ny])[y] += *run;
-        }
-        *run = 0;
-    };
-    for i in 0..labels.len() {
-        let here = (region_at(i), i / grid.dims[0] % ny);
-        if here != last {
-            flush(last, &mut run);
-            last = here;
-        }
-        run += 1;
+    let [nx, ny, _] = grid.dims;
+    let mut layers: BTreeMap<u32, Vec<Layer>> = BTreeMap::new();
+    for row in 0..labels.len() / nx {
+        labels.for_runs(row * nx..(row + 1) * nx, |run, label| {
+            let region = regions.region_of_basin[label as usize];
+            if region > OUTDOORS {
+                let of = layers
+                    .entry(region)
+                    .or_insert_with(|| vec![Layer::EMPTY; ny]);
+                of[row % ny].add(run.start - row * nx..run.end - row * nx, row / ny);
+            }
+        });
     }
-    flush(last, &mut run);
-    count
+    let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
+    layers
         .into_iter()
-        .map(|(region, per_row)| {
-            let most = per_row.iter().copied().max().unwrap_or(0);
-            let row = per_row.iter().position(|&n| n == most).unwrap_or(0);
-            (region, Plan::of(grid, row, &|i| region_at(i) == region))
+        .map(|(region, of)| {
+            let most = of.iter().map(|l| l.n_voxels).max().unwrap_or(0);
+            let row = of.iter().position(|l| l.n_voxels == most).unwrap_or(0);
+            let is_free = |x: usize, z: usize| region_at(grid.index(x, row, z)) == region;
+            (region, Plan::of(row, of[row].columns, &is_free))
         })
         .collect()
 }
 
 impl Plan {
-    fn of(grid: &Grid, row: usize, is_free: &dyn Fn(usize) -> bool) -> Self {
-        let [nx, _, nz] = grid.dims;
-        let free: Vec<[usize; 2]> = (0..nz)
-            .flat_map(|z| (0..nx).map(move |x| [x, z]))
-            .filter(|&[x, z]| is_free(grid.index(x, row, z)))
-            .collect();
-        let bound = |k: usize| {
-            let of = || free.iter().map(move |c| c[k]);
-            (of().min().unwrap_or(0), of().max().unwrap_or(0))
-        };
-        let (x, z) = (bound(0), bound(1));
-        let side = [x.1 - x.0 + 3, z.1 - z.0 + 3];
+    /// Of the columns from the least to the greatest, those that are free.
+    fn of(
+        row: usize,
+        [least, greatest]: [[usize; 2]; 2],
+        is_free: &dyn Fn(usize, usize) -> bool,
+    ) -> Self {
+        let side = [0, 1].map(|k| greatest[k] - least[k] + 3);
         let mut plan = Self {
             row,
-            first: [x.0, z.0],
+            first: least,
             side,
             is_free: vec![false; side[0] * side[1]],
         };
-        for [cx, cz] in free {
-            plan.is_free[cx - x.0 + 1 + (cz - z.0 + 1) * side[0]] = true;
+        for z in least[1]..=greatest[1] {
+            for x in least[0]..=greatest[0] {
+                plan.is_free[x - least[0] + 1 + (z - least[1] + 1) * side[0]] = is_free(x, z);
+            }
         }
         plan
     }

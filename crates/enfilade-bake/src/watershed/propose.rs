@@ -19,7 +19,8 @@ use crate::config::BYTES_A_VOXEL;
 use crate::proposal::Proposal;
 use crate::structure::Structure;
 use crate::voxel::{
-    BitVolume, Grid, Labels, WatershedOptions, border, distance_squared, voxelize, watershed,
+    BitVolume, Grid, Labels, WatershedOptions, border, distance_squared_near, far_outdoors,
+    voxelize, watershed,
 };
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
@@ -41,9 +42,10 @@ pub(crate) fn propose(
     let solid = Solid::of(structure, &grid, config);
     let mut notes = solid.lids.notes(&grid);
     context.begin(Stage::Distance)?;
-    let distances = solid.distances();
+    let (distances, far) = solid.distances();
     context.begin(Stage::Flood)?;
-    let mut basins = Basins::flood(&grid, distances, config);
+    let mut basins = Basins::flood(&grid, distances, &far, config);
+    drop(far);
     basins.refill(&grid, &solid.occupied);
     let slabs = structure.slabs();
     basins.cut(&grid, &slabs);
@@ -173,11 +175,13 @@ impl Solid {
         }
     }
 
-    /// How far every voxel of air is from a surface, squared; door leaves count as surfaces here.
-    fn distances(&self) -> Vec<u16> {
+    /// How far voxels of air are from a surface, squared, and those that are outdoors and so far that it does not matter.
+    /// Door leaves count as surfaces here.
+    fn distances(&self) -> (Vec<u16>, BitVolume) {
         let mut blocked = self.occupied.clone();
         blocked.union_with(&self.shut);
-        distance_squared(&blocked)
+        let far = far_outdoors(&blocked);
+        (distance_squared_near(&blocked, &far), far)
     }
 }
 
@@ -191,10 +195,13 @@ struct Basins {
 }
 
 impl Basins {
-    fn flood(grid: &Grid, distances: Vec<u16>, config: &BakeConfig) -> Self {
+    /// Air that is `far` from everything is known to be outdoors.
+    fn flood(grid: &Grid, distances: Vec<u16>, far: &BitVolume, config: &BakeConfig) -> Self {
+        let mut outdoors = border(grid.dims); // which the padding keeps empty
+        outdoors.union_with(far);
         let options = WatershedOptions {
             h: config.noise / grid.voxel,
-            outdoors: Some(border(grid.dims)), // which the padding keeps empty
+            outdoors: Some(outdoors),
         };
         let flood = watershed(grid.dims, distances, options);
         let peaks = flood.basins.iter().map(|b| b.peak as f32);

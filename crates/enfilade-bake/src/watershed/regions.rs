@@ -53,7 +53,8 @@ pub(crate) fn merge_basins(
     let mut merger = BasinMerger {
         flooded,
         settings,
-        parent: (0..n as u32).collect(),
+        cell: (0..n as u32).collect(),
+        basins: (0..n as u32).map(|b| vec![b]).collect(),
         peak: flooded.peaks.to_vec(),
         version: vec![0; n],
         neighbors: vec![BTreeSet::new(); n],
@@ -84,7 +85,10 @@ const WORK: u64 = 2_000;
 struct BasinMerger<'a> {
     flooded: Flooded<'a>,
     settings: &'a MergeSettings,
-    parent: Vec<u32>,
+    /// The cell of each basin: one of its basins.
+    cell: Vec<u32>,
+    /// The basins of each cell, at that one.
+    basins: Vec<Vec<u32>>,
     peak: Vec<f32>,
     /// Grows when a cell does, so that a stale candidate is known by its age.
     version: Vec<u32>,
@@ -97,13 +101,6 @@ struct BasinMerger<'a> {
 }
 
 impl BasinMerger<'_> {
-    fn find(&self, mut a: u32) -> u32 {
-        while self.parent[a as usize] != a {
-            a = self.parent[a as usize];
-        }
-        a
-    }
-
     fn lies_in_slab(&self, opening: &Opening) -> bool {
         opening.plane.normal.y.abs() > 0.9
             && self
@@ -117,8 +114,8 @@ impl BasinMerger<'_> {
     fn absorb_crevices(&mut self) {
         // A voxel center next to a wall is already one voxel away from it.
         let limit = self.settings.min_radius / self.flooded.grid.voxel + 0.5;
-        let mut narrow: Vec<u32> = (OUTDOORS + 1..self.parent.len() as u32)
-            .filter(|&c| self.parent[c as usize] == c && f64::from(self.peak[c as usize]) < limit)
+        let mut narrow: Vec<u32> = (OUTDOORS + 1..self.cell.len() as u32)
+            .filter(|&c| self.cell[c as usize] == c && f64::from(self.peak[c as usize]) < limit)
             .collect();
         narrow.sort_by(|&p, &q| {
             self.peak[p as usize]
@@ -126,7 +123,7 @@ impl BasinMerger<'_> {
                 .then(p.cmp(&q))
         });
         for c in narrow {
-            if self.parent[c as usize] != c {
+            if self.cell[c as usize] != c {
                 continue;
             }
             // What only closures shut off (the space under a table top) is no room either.
@@ -160,7 +157,7 @@ impl BasinMerger<'_> {
             open.insert(pair, n_open(self, pair));
         }
         loop {
-            let bays = (OUTDOORS + 1..self.parent.len() as u32).filter_map(|c| {
+            let bays = (OUTDOORS + 1..self.cell.len() as u32).filter_map(|c| {
                 let neighbors = self.neighbors[c as usize].iter();
                 let open = neighbors.map(|&n| (open[&(c.min(n), c.max(n))], Reverse(n)));
                 let (all, most) =
@@ -180,7 +177,7 @@ impl BasinMerger<'_> {
             // The sides of the outdoors are not counted, nor asked for.
             let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared);
             self.join(pair);
-            let whole = self.find(bay);
+            let whole = self.cell[bay as usize];
             sides[whole as usize] = rest;
             for &n in &self.neighbors[whole as usize] {
                 let pair = (whole.min(n), whole.max(n));
@@ -201,27 +198,29 @@ impl BasinMerger<'_> {
     fn side_faces(&self) -> Vec<usize> {
         let [nx, ny, nz] = self.flooded.grid.dims;
         let labels = self.flooded.labels;
-        let cell_of: Vec<u32> = (0..self.parent.len() as u32)
-            .map(|b| self.find(b))
-            .collect();
+        let cell_of = &self.cell;
+        let layer = nx * ny;
         let count = |z: usize| {
             let mut sides = vec![0usize; cell_of.len()];
-            for i in z * nx * ny..(z + 1) * nx * ny {
-                let cell = cell_of[labels.get(i) as usize];
-                let x = i % nx;
-                let nexts = [
-                    (x > 0, i.wrapping_sub(1)),
-                    (x + 1 < nx, i + 1),
-                    (z > 0, i.wrapping_sub(nx * ny)),
-                    (z + 1 < nz, i + nx * ny),
-                ];
-                if cell > OUTDOORS {
+            labels.for_runs(z * layer..(z + 1) * layer, |voxels, label| {
+                let cell = cell_of[label as usize];
+                if cell <= OUTDOORS {
+                    return;
+                }
+                for i in voxels {
+                    let x = i % nx;
+                    let nexts = [
+                        (x > 0, i.wrapping_sub(1)),
+                        (x + 1 < nx, i + 1),
+                        (z > 0, i.wrapping_sub(layer)),
+                        (z + 1 < nz, i + layer),
+                    ];
                     let is_side = |&(exists, next): &(bool, usize)| {
                         !exists || cell_of[labels.get(next) as usize] != cell
                     };
                     sides[cell as usize] += nexts.iter().filter(|n| is_side(n)).count();
                 }
-            }
+            });
             sides
         };
         let add = |mut sum: Vec<usize>, part: Vec<usize>| {
@@ -235,9 +234,7 @@ impl BasinMerger<'_> {
     }
 
     fn finish(self) -> Regions {
-        let region_of_basin: Vec<u32> = (0..self.parent.len() as u32)
-            .map(|a| if a == 0 { 0 } else { self.find(a) })
-            .collect();
+        let region_of_basin = self.cell;
         let mut contacts = self.contacts;
         for faces in contacts.values_mut() {
             faces.sort_unstable();
@@ -285,7 +282,7 @@ impl Mergeable for BasinMerger<'_> {
             return low;
         }
         self.allowance.spend(WORK + faces.len() as u64);
-        let side = |i: usize| self.find(self.flooded.labels.get(i)) == a;
+        let side = |i: usize| self.cell[self.flooded.labels.get(i) as usize] == a;
         let fronts = group_faces(self.flooded.grid, faces, &side, self.flooded.closures);
         // The two largest are enough: a third opening between the same two is smaller still.
         fronts
@@ -296,7 +293,7 @@ impl Mergeable for BasinMerger<'_> {
                 if apart || front.opening.closed >= self.settings.closed_share {
                     return 0.0;
                 }
-                let cell_of = |label| self.find(label);
+                let cell_of = |label: u32| self.cell[label as usize];
                 let (mut ratio, wall) =
                     section_ratio(self.flooded, self.settings, front, [a, b], &cell_of);
                 if a == OUTDOORS {
@@ -316,7 +313,11 @@ impl Mergeable for BasinMerger<'_> {
         } else {
             (a, b)
         };
-        self.parent[b as usize] = a;
+        let joined = std::mem::take(&mut self.basins[b as usize]);
+        for &basin in &joined {
+            self.cell[basin as usize] = a;
+        }
+        self.basins[a as usize].extend(joined);
         self.peak[a as usize] = self.peak[a as usize].max(self.peak[b as usize]);
         self.version[a as usize] += 1;
         self.contacts.remove(&pair);

@@ -5,76 +5,159 @@ use enfilade_geom::DVec3;
 
 use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
-use crate::structure::{MergeSettings, OUTDOORS, connected_count, rim_share};
+use crate::structure::{MergeSettings, OUTDOORS, Opening, connected_count, rim_share};
+use crate::voxel::{Grid, Labels};
 
 /// Share of a front that leaves must hold for it to stand between them.
 const LEAVES: f64 = 0.2;
 /// An opening lies elsewhere than the front of the flood where it is narrower by this.
 const PINCHED: f64 = 0.9;
 
+/// Steps of the lattice around an opening's rim within which most pinches show: a look at all that is counted costs ten
+/// times as much around a small opening.
+const CLOSE: f64 = 3.0;
+
 /// Area of the opening of `front`, between the cells of `pair`, ÷ the smaller of their largest cross-sections
 /// beside it; and the share of its rim that is wall. `cell_of` tells the cell of a basin.
+///
+/// Below the threshold of `settings` the ratio is that of the first sections found to be large enough for that.
 pub(super) fn section_ratio(
     flooded: Flooded<'_>,
     settings: &MergeSettings,
     front: &Front,
-    [a, b]: [u32; 2],
-    cell_of: &impl Fn(u32) -> u32,
+    pair: [u32; 2],
+    cell_of: &(impl Fn(u32) -> u32 + Sync),
 ) -> (f64, f64) {
-    let opening = &front.opening;
-    let slices = Slices::beside(flooded, settings, front, cell_of);
+    let step = lattice_step(flooded.grid);
+    // Of the same lattice: a section that is large enough there is no smaller in all of it.
+    let rest = ((settings.surround / step).floor() - CLOSE).max(0.0);
+    if rest > 0.0 && front.opening.closed < LEAVES {
+        let close = settings.surround - rest * step;
+        let slices = Slices::beside(flooded, close, front, cell_of);
+        if let Sections::Pinch(ratio) = sections(&slices, settings, &front.opening, pair) {
+            return (ratio, 0.0);
+        }
+    }
+    let slices = Slices::beside(flooded, settings.surround, front, cell_of);
+    match sections(&slices, settings, &front.opening, pair) {
+        Sections::Pinch(ratio) => (ratio, 0.0),
+        Sections::All { ratio, wall } => (ratio, wall),
+    }
+}
+
+/// How large the sections beside an opening are.
+enum Sections {
+    /// So large that the opening is a pinch, whatever more there is: its area ÷ the section.
+    Pinch(f64),
+    /// Its area ÷ the smaller of the largest, and the share of its rim that is wall.
+    All { ratio: f64, wall: f64 },
+}
+
+fn sections(
+    slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>,
+    settings: &MergeSettings,
+    opening: &Opening,
+    [a, b]: [u32; 2],
+) -> Sections {
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
-    let (mut in_a, mut in_b) = (slices.nowhere(), slices.nowhere());
-    let mut stack = Vec::new();
 
     // The front of a flood may stand past the doorway, between the leaves of an open door, say: the
     // opening is where what both have is narrowest.
     let (mut n_open, mut at) = (opening.area / unit, 0);
     if opening.closed >= LEAVES {
+        let (mut inside, mut stack) = (vec![false; slices.seeds.len()], Vec::new());
         for s in (1..=reach).flat_map(|s| [s, -s]) {
-            slices.visit(s, |k, cell| in_a[k] = cell == a || cell == b);
-            let n = connected_count(&mut in_a, slices.side, &slices.seeds, &mut stack, |_| ());
+            slices.visit(s, |k, cell| inside[k] = cell == a || cell == b);
+            let n = connected_count(&mut inside, slices.side, &slices.seeds, &mut stack, |_| ());
             if n > 0 && (n as f64) < PINCHED * n_open {
                 (n_open, at) = (n as f64, s);
             }
         }
     }
 
-    let (mut best_a, mut best_b) = (0, 0);
-    let (mut beside_a, mut beside_b) = (slices.nowhere(), slices.nowhere());
-    let smaller = |best_a: usize, best_b: usize| {
-        if a == OUTDOORS {
-            best_b
-        } else {
-            best_a.min(best_b)
-        }
-    };
     // Once both are this large, the opening is a pinch whatever else there is.
     let enough = n_open / settings.threshold;
+    let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
     // From the opening outward, as far sections are the large ones.
-    let outward = (0..=reach + at.abs()).flat_map(|s| [s, -s]).skip(1);
-    for s in outward.map(|s| at + s) {
-        slices.visit(s, |k, cell| {
-            in_a[k] = cell == a;
-            in_b[k] = cell == b;
-        });
-        let mut section = |inside: &mut [bool], beside: &mut [bool], this_side: bool| {
-            let mark = |k: usize| beside[k] |= this_side;
-            connected_count(inside, slices.side, &slices.seeds, &mut stack, mark)
-        };
-        best_a = best_a.max(section(&mut in_a, &mut beside_a, s <= at));
-        best_b = best_b.max(section(&mut in_b, &mut beside_b, s >= at));
-        let n = smaller(best_a, best_b) as f64;
+    for s in 0..=reach + at.abs() {
+        let [before, after] = &mut sides;
+        let look = |side: &mut Side, own: usize, s: i64| side.look(slices, s, [a, b], own);
+        if slices.seeds.len() < ALONE {
+            look(before, 0, at - s);
+            look(after, 1, at + s);
+        } else {
+            rayon::join(|| look(before, 0, at - s), || look(after, 1, at + s));
+        }
+        let n = smaller(&sides, a) as f64;
         if n > enough {
-            return (n_open / n, 0.0);
+            return Sections::Pinch(n_open / n);
         }
     }
-    let wall = rim_share(&slices.seeds, slices.side, |k| beside_a[k] && beside_b[k]);
-    match smaller(best_a, best_b) {
-        0 => (1.0, wall),
-        n => (n_open / n as f64, wall),
+    let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
+    let wall = rim_share(&slices.seeds, slices.side, is_wall);
+    let ratio = match smaller(&sides, a) {
+        0 => 1.0,
+        n => n_open / n as f64,
+    };
+    Sections::All { ratio, wall }
+}
+
+/// Slices with fewer points than this are visited on one thread.
+const ALONE: usize = 500;
+
+/// The smaller of the largest sections of two cells, the first of them `a`. The outdoors has no end.
+fn smaller([before, after]: &[Side; 2], a: u32) -> usize {
+    let [of_a, of_b] = [0, 1].map(|c| before.largest[c].max(after.largest[c]));
+    if a == OUTDOORS { of_b } else { of_a.min(of_b) }
+}
+
+/// What is found on one side of an opening.
+struct Side {
+    /// Points of the largest section of either cell.
+    largest: [usize; 2],
+    /// Points that the section of the cell on this side has in any slice.
+    beside: Vec<bool>,
+    /// Room for one slice.
+    inside: [Vec<bool>; 2],
+    stack: Vec<usize>,
+}
+
+impl Side {
+    fn of(seeds: &[bool]) -> Self {
+        let nowhere = || vec![false; seeds.len()];
+        Self {
+            largest: [0; 2],
+            beside: nowhere(),
+            inside: [nowhere(), nowhere()],
+            stack: Vec::new(),
+        }
     }
+
+    /// Looks at the slice `s` steps along the normal; the cell `own` of the two is the one on this side.
+    fn look(
+        &mut self,
+        slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>,
+        s: i64,
+        cells: [u32; 2],
+        own: usize,
+    ) {
+        let [in_a, in_b] = &mut self.inside;
+        slices.visit(s, |k, cell| {
+            in_a[k] = cell == cells[0];
+            in_b[k] = cell == cells[1];
+        });
+        for (c, inside) in self.inside.iter_mut().enumerate() {
+            let mark = |k: usize| self.beside[k] |= c == own;
+            let n = connected_count(inside, slices.side, &slices.seeds, &mut self.stack, mark);
+            self.largest[c] = self.largest[c].max(n);
+        }
+    }
+}
+
+/// Between points of a lattice, and between slices. [Units: wu]
+fn lattice_step(grid: &Grid) -> f64 {
+    grid.voxel.max(0.1)
 }
 
 /// Planes parallel to an opening, as lattices of points.
@@ -94,12 +177,7 @@ struct Slices<'a, F> {
 }
 
 impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
-    fn beside(
-        flooded: Flooded<'a>,
-        settings: &MergeSettings,
-        front: &Front,
-        cell_of: &'a F,
-    ) -> Self {
+    fn beside(flooded: Flooded<'a>, surround: f64, front: &Front, cell_of: &'a F) -> Self {
         let (grid, opening) = (flooded.grid, &front.opening);
         let (u, v) = opening.plane.basis();
         let in_plane = |f: u64| {
@@ -113,11 +191,10 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
                 hi[k] = hi[k].max(t);
             }
         }
-        let step = grid.voxel.max(0.1);
-        let start = lo.map(|t| t - settings.surround);
-        let side = [0, 1].map(|k| {
-            (((hi[k] - lo[k] + 2.0 * settings.surround) / step).ceil() as usize).max(1) + 1
-        });
+        let step = lattice_step(grid);
+        let start = lo.map(|t| t - surround);
+        let side =
+            [0, 1].map(|k| (((hi[k] - lo[k] + 2.0 * surround) / step).ceil() as usize).max(1) + 1);
         let mut seeds = vec![false; side[0] * side[1]];
         for &f in &front.faces {
             let [x, y] = in_plane(f);
@@ -135,30 +212,38 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
         }
     }
 
-    fn nowhere(&self) -> Vec<bool> {
-        vec![false; self.seeds.len()]
+    /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
+    fn visit(&self, s: i64, point: impl FnMut(usize, u32)) {
+        match self.flooded.labels {
+            Labels::U16(labels) => self.visit_in(labels, s, point),
+            Labels::U32(labels) => self.visit_in(labels, s, point),
+        }
     }
 
-    /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
-    fn visit(&self, s: i64, mut point: impl FnMut(usize, u32)) {
+    fn visit_in<T>(&self, labels: &[T], s: i64, mut point: impl FnMut(usize, u32))
+    where
+        T: Copy + Into<u32>,
+    {
         let grid = self.flooded.grid;
         let end = DVec3::from(grid.dims.map(|n| n as f64));
+        let is_in = |p: DVec3| p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
+        // Positive, so the cast rounds down; and 32 bits are half the work of 64.
+        let label_at = |p: DVec3| {
+            let [x, y, z] = [p.x as i32, p.y as i32, p.z as i32].map(|c| c as usize);
+            labels[grid.index(x, y, z)].into()
+        };
         let [du, dv, dn] = self.along;
         // In voxels, so that a lattice point costs an addition and a look-up.
         let base = self.base + dn * s as f64;
         let mut last = (0, 0);
         for j in 0..self.side[1] {
             let row = base + dv * j as f64;
+            let at = |i: usize| row + du * i as f64;
+            // What lies between two points of a box lies in it.
+            let all_in = is_in(at(0)) && is_in(at(self.side[0] - 1));
             for i in 0..self.side[0] {
-                let p = row + du * i as f64;
-                let is_in = p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
-                let label = if is_in {
-                    // Positive, so the cast rounds down.
-                    let at = grid.index(p.x as usize, p.y as usize, p.z as usize);
-                    self.flooded.labels.get(at)
-                } else {
-                    0
-                };
+                let p = at(i);
+                let label: u32 = if all_in || is_in(p) { label_at(p) } else { 0 };
                 if label != last.0 {
                     last = (label, if label == 0 { 0 } else { (self.cell_of)(label) });
                 }

@@ -1,5 +1,7 @@
 //! What a flood tells: the basin of each voxel, the basins, and where they touch.
 
+use std::ops::{BitOr, BitXor, Range};
+
 /// Levels to a voxel of distance.
 pub(super) const STEPS: u32 = 64;
 
@@ -54,9 +56,40 @@ impl Labels {
         self.len() == 0
     }
 
+    /// Calls `run(voxels, label)` for each maximal run of voxels with one label within `range`, ascending.
+    ///
+    /// Some dozen voxels at a time where a run is long.
+    pub fn for_runs(&self, range: Range<usize>, run: impl FnMut(Range<usize>, u32)) {
+        match self {
+            Self::U16(v) => for_runs(v, range, run),
+            Self::U32(v) => for_runs(v, range, run),
+        }
+    }
+
     /// All labels in index order.
     pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.len()).map(|i| self.get(i))
+    }
+}
+
+/// Labels compared at a time.
+const CHUNK: usize = 64;
+
+fn for_runs<T>(labels: &[T], range: Range<usize>, mut run: impl FnMut(Range<usize>, u32))
+where
+    T: Copy + PartialEq + Into<u32> + BitXor<Output = T> + BitOr<Output = T> + Default,
+{
+    let mut from = range.start;
+    while from < range.end {
+        let label = labels[from];
+        let rest = &labels[from + 1..range.end];
+        let is_one =
+            |part: &&[T]| part.iter().fold(T::default(), |d, &l| d | (l ^ label)) == T::default();
+        let whole = rest.chunks_exact(CHUNK).take_while(is_one).count() * CHUNK;
+        let more = rest[whole..].iter().take_while(|l| **l == label).count();
+        let to = from + 1 + whole + more;
+        run(from..to, label.into());
+        from = to;
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::Sets;
 use rayon::prelude::*;
 
-use super::super::grid::BitVolume;
+use super::super::grid::{BitVolume, for_runs};
 use super::basins::{Basin, Labels, STEPS, Saddle, Watershed};
 use super::queue::{BATCH, NONE, Queue, Shape};
 
@@ -84,7 +84,7 @@ pub(super) struct Flood<W> {
 
 impl<W: Word> Flood<W> {
     pub(super) fn new(dims: [usize; 3], words: Vec<W>, starts: Vec<u32>, h: u32) -> Self {
-        let level = starts.first().map_or(0, |&s| words[s as usize].get());
+        let level = words.par_iter().map(|w| w.get()).max().unwrap_or(0);
         Self {
             dims,
             shape: Shape::new(dims),
@@ -106,12 +106,11 @@ impl<W: Word> Flood<W> {
     /// Gives the outdoors its voxels; those that touch other free voxels are queued.
     pub(super) fn seed(&mut self, outdoors: &BitVolume) {
         let mut first = None;
-        for v in outdoors.iter_set() {
+        for v in outdoors.rim().iter_set() {
             let level = self.words[v].get();
             if level == 0 {
                 continue;
             }
-            first.get_or_insert(v as u32);
             let rim = self.shape.neighbors(v as u32).iter().any(|&q| {
                 q != NONE && self.words[q as usize].get() != 0 && !outdoors.get_index(q as usize)
             });
@@ -120,11 +119,17 @@ impl<W: Word> Flood<W> {
             }
         }
         // The queue knows the level of what it holds; the rest touches nothing else.
-        for v in outdoors.iter_set() {
-            let word = &mut self.words[v];
-            if word.get() != 0 {
-                *word = W::of(W::REACHED);
-            }
+        let nx = self.dims[0];
+        for row in 0..self.dims[1] * self.dims[2] {
+            for_runs(outdoors.row(row), |from, to| {
+                let range = row * nx + from as usize..row * nx + to as usize;
+                for (at, word) in self.words[range.clone()].iter_mut().enumerate() {
+                    if word.get() != 0 {
+                        first.get_or_insert((range.start + at) as u32);
+                        *word = W::of(W::REACHED);
+                    }
+                }
+            });
         }
         self.pools[0].voxel = first.unwrap_or(0);
     }
@@ -397,10 +402,9 @@ where
 /// Fills in the sizes of the basins.
 fn count(labels: &Labels, basins: &mut [Basin]) {
     let mut counts = vec![0u64; basins.len() + 1];
-    match labels {
-        Labels::U16(v) => v.iter().for_each(|&l| counts[usize::from(l)] += 1),
-        Labels::U32(v) => v.iter().for_each(|&l| counts[l as usize] += 1),
-    }
+    labels.for_runs(0..labels.len(), |voxels, label| {
+        counts[label as usize] += voxels.len() as u64;
+    });
     for (basin, n) in basins.iter_mut().zip(&counts[1..]) {
         basin.n_voxels = *n;
     }

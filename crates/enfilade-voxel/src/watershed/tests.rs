@@ -444,3 +444,27 @@ fn renumbering_changes_nothing() {
     );
     assert_eq!((w.basins.len(), w.saddles.len()), (20_000, 19_999));
 }
+
+proptest! {
+    #[test]
+    fn runs_are_maximal_and_cover_the_range_with_its_labels(
+        lengths in prop::collection::vec((1usize..300, 0u16..3), 1..20),
+        cut in (0.0..0.5f64, 0.5..1.0f64),
+        wide in any::<bool>(),
+    ) {
+        let plain: Vec<u16> = lengths.iter().flat_map(|&(n, l)| vec![l; n]).collect();
+        let labels = if wide {
+            Labels::U32(plain.iter().map(|&l| l.into()).collect())
+        } else {
+            Labels::U16(plain.clone())
+        };
+        let [from, to] = [cut.0, cut.1].map(|share| (share * plain.len() as f64) as usize);
+        let (mut next, mut last) = (from, None);
+        labels.for_runs(from..to, |run, label| {
+            assert!(run.start == next && run.end > next && last != Some(label));
+            assert!(plain[run.clone()].iter().all(|&l| u32::from(l) == label));
+            (next, last) = (run.end, Some(label));
+        });
+        prop_assert_eq!(next, to);
+    }
+}
