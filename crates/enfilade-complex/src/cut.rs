@@ -6,17 +6,17 @@
 //!
 //! > open area that lies on no candidate + [`PER_FACET`] for each piece + [`VOTE`] × volume of votes overruled
 //!
-//! by a minimum cut (Boykov, Veksler & Zabih 2001 move labels in the same way; the flow is Dinic's
-//! 1970) among the leaves around the border. Candidates cost next to nothing, so a border that can be
+//! by a minimum cut (Boykov, Veksler & Zabih 2001 move labels in the same way) among the leaves around the border. Candidates cost next to nothing, so a border that can be
 //! moved into its candidate is.
 //!
 //! Time: `O(V²E)` at worst and near-linear in practice for each pair of cells that leak; at most
-//! [`MAX_LEAVES`] leaves take part. Capacities are whole numbers, so no rounding can loop.
+//! [`MAX_LEAVES`] leaves take part.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap};
 
 use enfilade_geom::Sets;
 
+use super::flow::Flow;
 use super::graph::{LeafGraph, NO_CANDIDATE};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
 
@@ -277,8 +277,7 @@ fn cut(
     }
     let units = |cost: f64| (cost / UNIT).round() as u64;
     let n = leaves.len();
-    let (source, sink) = (n, n + 1);
-    let mut flow = Flow::new(n + 2);
+    let mut flow = Flow::new(n);
     let mut before = 0;
     for (i, &leaf) in leaves.iter().enumerate() {
         let [mut to_a, mut to_b] = pair.map(|c| units(VOTE * votes(leaf, c)));
@@ -315,14 +314,12 @@ fn cut(
             }
         }
         before += if cell(leaf) == pair[0] { to_b } else { to_a };
-        flow.add(source, i, to_a, 0);
-        flow.add(i, sink, to_b, 0);
+        flow.tie(i, to_a, to_b);
     }
-    let after = flow.run(source, sink);
+    let (after, is_a) = flow.cut();
     if after >= before {
         return Vec::new();
     }
-    let is_a = flow.reached();
     let moved: Vec<(u32, u32)> = leaves
         .iter()
         .enumerate()
@@ -332,150 +329,10 @@ fn cut(
     moved
 }
 
-struct Arc {
-    to: u32,
-    capacity: u64,
-}
-
-/// Dinic's maximum flow. Arc `i ^ 1` is the reverse of arc `i`.
-struct Flow {
-    arcs: Vec<Arc>,
-    of_node: Vec<Vec<u32>>,
-    level: Vec<u32>,
-    next: Vec<u32>,
-}
-
-impl Flow {
-    fn new(n: usize) -> Self {
-        Self {
-            arcs: Vec::new(),
-            of_node: vec![Vec::new(); n],
-            level: vec![0; n],
-            next: vec![0; n],
-        }
-    }
-
-    fn add(&mut self, a: usize, b: usize, forward: u64, backward: u64) {
-        if forward == 0 && backward == 0 {
-            return;
-        }
-        let i = self.arcs.len() as u32;
-        self.arcs.push(Arc {
-            to: b as u32,
-            capacity: forward,
-        });
-        self.arcs.push(Arc {
-            to: a as u32,
-            capacity: backward,
-        });
-        self.of_node[a].push(i);
-        self.of_node[b].push(i + 1);
-    }
-
-    fn run(&mut self, source: usize, sink: usize) -> u64 {
-        let mut total = 0_u64;
-        while self.find_levels(source, sink) {
-            self.next.fill(0);
-            loop {
-                let pushed = self.push(source, sink);
-                if pushed == 0 {
-                    break;
-                }
-                total = total.saturating_add(pushed);
-            }
-        }
-        total
-    }
-
-    fn find_levels(&mut self, source: usize, sink: usize) -> bool {
-        self.level.fill(u32::MAX);
-        self.level[source] = 0;
-        let mut queue = VecDeque::from([source as u32]);
-        while let Some(v) = queue.pop_front() {
-            for &i in &self.of_node[v as usize] {
-                let arc = &self.arcs[i as usize];
-                if arc.capacity > 0 && self.level[arc.to as usize] == u32::MAX {
-                    self.level[arc.to as usize] = self.level[v as usize] + 1;
-                    queue.push_back(arc.to);
-                }
-            }
-        }
-        self.level[sink] != u32::MAX
-    }
-
-    /// Pushes along one shortest path; without recursion, as paths may be long.
-    fn push(&mut self, source: usize, sink: usize) -> u64 {
-        let mut path: Vec<u32> = Vec::new();
-        let mut v = source;
-        loop {
-            if v == sink {
-                let least = path.iter().map(|&i| self.arcs[i as usize].capacity).min();
-                let least = least.unwrap_or(0);
-                for &i in &path {
-                    self.arcs[i as usize].capacity -= least;
-                    self.arcs[i as usize ^ 1].capacity += least;
-                }
-                return least;
-            }
-            let step = loop {
-                let Some(&i) = self.of_node[v].get(self.next[v] as usize) else {
-                    break None;
-                };
-                let arc = &self.arcs[i as usize];
-                if arc.capacity > 0 && self.level[arc.to as usize] == self.level[v] + 1 {
-                    break Some(i);
-                }
-                self.next[v] += 1;
-            };
-            match step {
-                Some(i) => {
-                    path.push(i);
-                    v = self.arcs[i as usize].to as usize;
-                }
-                None => {
-                    let Some(i) = path.pop() else {
-                        return 0;
-                    };
-                    v = self.arcs[i as usize ^ 1].to as usize;
-                    self.next[v] += 1;
-                }
-            }
-        }
-    }
-
-    /// What the source still reaches once no more can be pushed.
-    fn reached(&self) -> Vec<bool> {
-        self.level.iter().map(|&l| l != u32::MAX).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::graph::OpenFacet;
     use super::*;
-
-    /// Every cut of a small graph, tried one by one.
-    fn least_cut(n: usize, arcs: &[(usize, usize, u64, u64)]) -> u64 {
-        (0..1_u32 << (n - 2))
-            .map(|inner| {
-                let is_source_side = |v: usize| match v {
-                    0 => true,
-                    1 => false,
-                    v => inner >> (v - 2) & 1 == 1,
-                };
-                arcs.iter()
-                    .map(
-                        |&(a, b, f, r)| match (is_source_side(a), is_source_side(b)) {
-                            (true, false) => f,
-                            (false, true) => r,
-                            _ => 0,
-                        },
-                    )
-                    .sum()
-            })
-            .min()
-            .unwrap()
-    }
 
     #[test]
     fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
@@ -514,29 +371,5 @@ mod tests {
         found.volumes[1] = 1e-3 + 2e-6;
         dissolve_slivers(&graph, &mut found);
         assert_eq!(found.cell_of_leaf, cells().cell_of_leaf);
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn the_flow_equals_the_least_cut(
-            arcs in proptest::collection::vec((0_usize..8, 0_usize..8, 0_u64..50, 0_u64..50), 0..24)
-        ) {
-            let arcs: Vec<_> = arcs.into_iter().filter(|a| a.0 != a.1).collect();
-            let mut flow = Flow::new(8);
-            for &(a, b, f, r) in &arcs {
-                flow.add(a, b, f, r);
-            }
-            proptest::prop_assert_eq!(flow.run(0, 1), least_cut(8, &arcs));
-            let side = flow.reached();
-            let cut: u64 = arcs
-                .iter()
-                .map(|&(a, b, f, r)| match (side[a], side[b]) {
-                    (true, false) => f,
-                    (false, true) => r,
-                    _ => 0,
-                })
-                .sum();
-            proptest::prop_assert_eq!(cut, least_cut(8, &arcs));
-        }
     }
 }

@@ -38,6 +38,7 @@
 mod cut;
 pub mod divide;
 mod facet;
+mod flow;
 mod graph;
 mod label;
 mod leaf_cells;
