@@ -1,6 +1,5 @@
 //! `enfilade verify`: does a world keep its promises?
 
-use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -8,7 +7,6 @@ use anyhow::{Context, bail};
 use enfilade::cpg::World;
 use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
-use enfilade::import::import;
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
@@ -18,17 +16,18 @@ use enfilade_verify::{
 
 use crate::bake::settings::SceneOptions;
 use crate::exact::{Asked, verify_pictures};
-use crate::output::Outputs;
+use crate::output::{Outputs, make_folder};
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
 use enfilade_cli::answers::Answers;
+use enfilade_cli::input::{import_scene, name_of, read};
 use enfilade_cli::values::size;
 use enfilade_cli::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
 #[derive(clap::Args)]
 pub(crate) struct Verify {
-    /// World written by `enfilade bake`; with --evidence, a Quake portal file too.
+    /// World written by `enfilade bake`; with --evidence, a Quake portal file too; `-` for standard input.
     world: PathBuf,
     /// Check this evidence, which `enfilade pvs --evidence` wrote, instead of the
     /// promises.
@@ -78,14 +77,21 @@ pub(crate) struct Verify {
 }
 
 pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
+    let inputs = [&args.world].into_iter().chain(&args.evidence);
+    let inputs = inputs.chain(&args.source).chain(&args.detail);
+    let mut outputs = Outputs::reading(inputs.chain(&args.scene.config))?;
     if let Some(evidence) = &args.evidence {
         return verify_visibility(args, evidence);
+    }
+    let pictures = args.pictures.as_deref().filter(|_| args.views > 0);
+    if let Some(folder) = pictures {
+        make_folder("--pictures", folder)?;
     }
     let world = read_world(&args.world)?;
     let source = if args.source.is_empty() {
         None
     } else {
-        Some(read_source(args)?)
+        Some(read_source(args, &mut outputs)?)
     };
     let options = VerifyOptions {
         rays: args.rays,
@@ -104,18 +110,16 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         .transpose()?;
     let exact = (args.views > 0)
         .then(|| {
-            let inputs = [&args.world].into_iter().chain(&args.source);
-            let inputs = inputs.chain(&args.detail).chain(&args.scene.config);
-            let asked = Asked {
+            let mut asked = Asked {
                 views: args.views,
                 seed: args.seed,
                 size: args.view_size,
                 adapter: &args.adapter,
-                pictures: args.pictures.as_ref(),
-                outputs: Outputs::reading(inputs),
+                pictures,
+                outputs,
                 max_listed: args.list,
             };
-            verify_pictures(&world, &asked).with_context(|| args.world.display().to_string())
+            verify_pictures(&world, &mut asked).with_context(|| name_of(&args.world))
         })
         .transpose()?;
     let mut out = BufWriter::new(io::stdout().lock());
@@ -142,7 +146,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if !report.holds() {
         bail!(
             "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} hidden cells seen, {} problems",
-            args.world.display(),
+            name_of(&args.world),
             report.unsealed,
             report.incomplete,
             report.hidden,
@@ -152,7 +156,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(sight) = sight.filter(|s| !s.holds()) {
         bail!(
             "{} is not seen whole: {} of {} hits are missing from the answers",
-            args.world.display(),
+            name_of(&args.world),
             sight.missed,
             sight.hits
         );
@@ -160,7 +164,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(exact) = exact.filter(|e| e.differing > 0) {
         bail!(
             "{} is not drawn whole: {} pixels differ from pictures without culling",
-            args.world.display(),
+            name_of(&args.world),
             exact.differing
         );
     }
@@ -169,7 +173,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
 
 /// Asks the run-time what random views see, and casts rays in them.
 fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
-    let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
+    let sight = Sight::build(world).with_context(|| name_of(&args.world))?;
     let answers = Answers::new(world, &sight);
     let options = ViewOptions {
         views: args.sight,
@@ -188,10 +192,9 @@ fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
 /// Checks every claim of the evidence about what can be seen.
 fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     let (graph, walls) = read_graph(&args.world)?;
-    let bytes =
-        fs::read(evidence).with_context(|| format!("cannot read {}", evidence.display()))?;
+    let bytes = read(evidence)?;
     let report = verify_evidence(&graph, &bytes, walls.as_deref())
-        .with_context(|| format!("{} is not accepted", evidence.display()))?;
+        .with_context(|| format!("{} is not accepted", name_of(evidence)))?;
     let mut out = io::stdout().lock();
     if args.json {
         let value = serde_json::json!({
@@ -221,8 +224,10 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
 }
 
 /// The structural triangles of a scene, as the builder saw them.
-fn read_source(args: &Verify) -> anyhow::Result<Vec<Triangle>> {
-    let scene = import(&args.source, &args.detail, &args.scene.resolve()?)?.scene;
+fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Vec<Triangle>> {
+    let imported = import_scene(&args.source, &args.detail, &args.scene.resolve()?)?;
+    outputs.read(&imported.report.references)?;
+    let scene = imported.scene;
     Ok(scene
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))
