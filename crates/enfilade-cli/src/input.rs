@@ -5,7 +5,7 @@ use std::io::{self, Read, StdinLock};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use enfilade::import::{ImportError, ImportOptions, Imported, Limits, Source, import_sources};
+use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
 
 /// Whether a path stands for standard input or output. A file of that name is `./-`.
 #[must_use]
@@ -72,7 +72,7 @@ pub fn import_scene(
     if all().any(|p| is_stream(p)) {
         stdin = Some(io::stdin().lock());
     }
-    let mut sources: Vec<Source<'_>> = all().map(|p| Source::file(p)).collect();
+    let mut sources: Vec<SceneSource<'_>> = all().map(|p| SceneSource::file(p)).collect();
     for (i, (source, path)) in sources.iter_mut().zip(all()).enumerate() {
         source.is_detail = i >= paths.len();
         if is_stream(path)

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use enfilade::cpg::World;
 use enfilade::geom::Triangle;
-use enfilade::geom::scene::Role;
+use enfilade::geom::scene::{Role, Scene, TriangleSource};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
-    VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
-    verify_world_with_progress,
+    SourceDetail, VerifyOptions, ViewOptions, ViewReport, compare_details, verify_evidence,
+    verify_views, verify_world_with_progress,
 };
 
 use crate::bake::settings::SceneOptions;
@@ -34,7 +34,8 @@ pub(crate) struct Verify {
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
     /// The scene that it was baked from: its structural triangles decide what blocks, instead of
-    /// those that the world holds. It is read by the settings below; give those of the bake.
+    /// those that the world holds, and its details must be where the world has them. It is read by the settings below; give those
+    /// of the bake.
     #[arg(long, num_args = 1.., value_name = "IN")]
     source: Vec<PathBuf>,
     /// The files of the source whose objects are all detail, as in the bake.
@@ -93,6 +94,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     } else {
         Some(read_source(args, &mut outputs)?)
     };
+    let structure = source.as_ref().map(structure_of);
     let options = VerifyOptions {
         rays: args.rays,
         seed: args.seed,
@@ -101,10 +103,14 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     };
     let bar = StageBar::new();
     bar.start("shooting rays", args.rays.saturating_mul(2));
-    let report = verify_world_with_progress(&world, source.as_deref(), &options, &|done, _| {
-        bar.set(done);
-    });
+    let mut report =
+        verify_world_with_progress(&world, structure.as_deref(), &options, &|done, _| {
+            bar.set(done);
+        });
     bar.finish();
+    if let Some(scene) = &source {
+        report.problems.extend(detail_problems(&world, scene));
+    }
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
         .transpose()?;
@@ -223,15 +229,44 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The structural triangles of a scene, as the builder saw them.
-fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Vec<Triangle>> {
+fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Scene> {
     let imported = import_scene(&args.source, &args.detail, &args.scene.resolve()?)?;
     outputs.read(&imported.report.references)?;
-    let scene = imported.scene;
-    Ok(scene
+    Ok(imported.scene)
+}
+
+/// The structural triangles of a scene, as the builder saw them.
+fn structure_of(scene: &Scene) -> Vec<Triangle> {
+    scene
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))
-        .collect())
+        .collect()
+}
+
+/// Whether the world's details are those of the scene.
+fn detail_problems(world: &World, scene: &Scene) -> Vec<String> {
+    let numbers = 0..scene.objects.len() as u32;
+    let role = |&i: &u32| scene.objects[i as usize].role;
+    let ids: Vec<u32> = numbers.filter(|i| role(i) == Role::Detail).collect();
+    compare_details(world, ids.len(), |i| SourceDetail {
+        name: scene.objects[ids[i] as usize].name.clone(),
+        triangles: triangles_of_object(scene, ids[i]).collect(),
+    })
+}
+
+fn triangles_of_object(scene: &Scene, object: u32) -> impl Iterator<Item = Triangle> {
+    let mesh = &scene.meshes[scene.objects[object as usize].mesh as usize];
+    let primitives = mesh.primitives.iter().zip(0..);
+    primitives.flat_map(move |(primitive, number)| {
+        let triangles = 0..primitive.indices.len() as u32 / 3;
+        triangles.map(move |triangle| {
+            scene.world_triangle(TriangleSource {
+                object,
+                primitive: number,
+                triangle,
+            })
+        })
+    })
 }
 
 fn positive(text: &str) -> Result<f64, String> {

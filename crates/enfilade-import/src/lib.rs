@@ -85,9 +85,9 @@ pub fn import(
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
     let file = |is_detail| {
-        move |path: &'_ PathBuf| Source {
+        move |path: &PathBuf| SceneSource {
             is_detail,
-            ..Source::file(path)
+            ..SceneSource::file(path)
         }
     };
     let all = paths.iter().map(file(false));
@@ -95,7 +95,7 @@ pub fn import(
 }
 
 /// A scene on its way in: a file, or a stream such as standard input.
-pub struct Source<'a> {
+pub struct SceneSource<'a> {
     /// The file, or what the stream is called in messages; a name's ending tells the format where content leaves a doubt.
     pub path: PathBuf,
     /// Read instead of the file, up to [`Limits::max_file_bytes`]. What comes so has no folder, and refers to no files.
@@ -104,7 +104,7 @@ pub struct Source<'a> {
     pub is_detail: bool,
 }
 
-impl Source<'_> {
+impl SceneSource<'_> {
     /// A file whose objects have the roles that they seem to have.
     #[must_use]
     pub fn file(path: &Path) -> Self {
@@ -122,7 +122,7 @@ impl Source<'_> {
 ///
 /// As [`import`].
 pub fn import_sources<'a>(
-    sources: impl IntoIterator<Item = Source<'a>>,
+    sources: impl IntoIterator<Item = SceneSource<'a>>,
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
     let mut builder = Builder::new(options)?;
