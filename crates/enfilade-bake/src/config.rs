@@ -24,7 +24,8 @@ pub struct BakeConfig {
     pub merge: MergeSettings,
     /// Bounds on the cells, and what a cell costs; nothing is bounded if not given.
     pub costs: SimplifySettings,
-    /// Watershed: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size.
+    /// Watershed: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. One that does not fit
+    /// the budget is refused.
     /// [Units: wu] [Limit: above 0]
     pub voxel: Option<f64>,
     /// Watershed: most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
@@ -185,7 +186,7 @@ impl BakeConfig {
     /// The grid for a scene of so many triangles within these bounds. All checks of settings live here.
     ///
     /// # Errors
-    /// When a setting is out of its limits, or the budget leaves voxels that no opening fits.
+    /// When a setting is out of its limits, or the budget leaves voxels that no opening fits, or wider ones than were asked for.
     pub(crate) fn grid(&self, bounds: &Aabb, n_triangles: usize) -> Result<Grid, BakeError> {
         positive("min_opening", self.min_opening)?;
         self.smallest_hole.check()?;
@@ -205,6 +206,18 @@ impl BakeConfig {
         let widest = wanted.max(bounds.size().max_element());
         while n_voxels(bounds, voxel) > most && voxel <= widest.max(self.min_opening) {
             voxel *= 1.1;
+        }
+        if self.voxel.is_some() {
+            // Finer than what corners are stored to, voxels tell nothing.
+            let corners = bounds.min.abs().max(bounds.max.abs());
+            let finest = voxel.max(corners.max_element() * f64::from(f32::EPSILON));
+            if wanted < finest {
+                return Err(BakeError::TooFine {
+                    wanted,
+                    finest,
+                    bytes: BYTES_A_VOXEL * n_voxels(bounds, wanted),
+                });
+            }
         }
         if voxel > wanted && voxel > self.min_opening {
             return Err(BakeError::TooLarge {
@@ -273,6 +286,38 @@ mod tests {
         }
         config.min_opening = 10.0;
         config.grid(&bounds, 100_000).unwrap();
+    }
+
+    #[test]
+    fn voxels_that_were_asked_for_are_kept_or_refused() {
+        let grid = |voxel, budget: Budget| {
+            let config = BakeConfig {
+                voxel: Some(voxel),
+                budget,
+                ..BakeConfig::default()
+            };
+            let bounds = Aabb::new(DVec3::ZERO, DVec3::new(10.0, 3.0, 10.0));
+            config.grid(&bounds, 1000)
+        };
+        assert!((grid(0.05, Budget::default()).unwrap().voxel - 0.05).abs() < 1e-12);
+        let rich = Budget {
+            memory: Some(u64::MAX / 2),
+            ..Budget::default()
+        };
+        // The last are beyond what any memory holds, and what `f32` tells apart.
+        for (voxel, budget) in [
+            (1e-5, Budget::default()),
+            (1e-7, rich),
+            (1e-300, rich),
+            (f64::MIN_POSITIVE, rich),
+        ] {
+            let error = grid(voxel, budget).unwrap_err();
+            assert!(matches!(error, BakeError::TooFine { .. }), "{error}");
+            let said = error.to_string();
+            for word in ["--voxel", "--max-memory"] {
+                assert!(said.contains(word), "{word}: {said}");
+            }
+        }
     }
 
     #[test]

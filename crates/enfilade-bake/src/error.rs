@@ -49,6 +49,20 @@ pub enum BakeError {
         /// Width of the narrowest opening that must be found. [Units: wu]
         min_opening: f64,
     },
+    /// Voxels that were asked for do not fit the budget, or are finer than the scene's corners.
+    #[error(
+        "voxels of {wanted:?} m would take {}; give --voxel {:.4} or wider, or leave it out, or allow more with --max-memory and \
+         max_voxels",
+        gigabytes(*.bytes), (.finest * 1e4).ceil() / 1e4
+    )]
+    TooFine {
+        /// What was asked for. [Units: wu]
+        wanted: f64,
+        /// The finest that fit. [Units: wu]
+        finest: f64,
+        /// Memory for what was asked for.
+        bytes: f64,
+    },
     /// More work than the scene's triangles are worth, see [`crate::Budget`].
     #[error(
         "the stage '{}' has more to do than {n_triangles} triangles are worth: they cross each other, or lie so close, all \
@@ -83,4 +97,12 @@ pub enum BakeError {
     /// The caller asked to stop.
     #[error("cancelled")]
     Cancelled,
+}
+
+/// Memory in words; of absurd numbers, nobody reads the digits.
+fn gigabytes(bytes: f64) -> String {
+    match bytes / 1e9 {
+        n if n < 1e6 => format!("about {n:.0} GB of memory"),
+        _ => "more memory than there is".to_owned(),
+    }
 }

@@ -17,19 +17,21 @@ use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::{Role, Scene};
-use enfilade::import::{CleaningOptions, ImportReport, cleaning_report, import};
+use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
 
+use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{Outputs, Told, write_atomically};
+use crate::output::{Outputs, Told, write_whole, wrote};
 use crate::progress::{BakeBar, StageBar};
+use enfilade_cli::input::import_scene;
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
 pub(crate) struct Bake {
-    /// Scene files: GLB, glTF, OBJ, PLY, STL or Quake MAP. Several become one scene.
+    /// Scene files: GLB, glTF, OBJ, PLY, STL or Quake MAP. Several become one scene; `-` is standard input.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
-    /// World to write, one GLB.
+    /// World to write, one GLB; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
     #[command(flatten)]
@@ -38,15 +40,15 @@ pub(crate) struct Bake {
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let options = &args.options;
-    let mut outputs = Outputs::reading(options.inputs(&args.inputs));
-    outputs.write("-o", &args.output)?;
+    let mut outputs = Outputs::reading(options.inputs(&args.inputs))?;
+    outputs.write("-o", Format::World, &args.output)?;
     if let Some(path) = &options.leak {
-        outputs.write("--leak", path)?;
+        outputs.write("--leak", Format::Leak, path)?;
     }
     let settings = settings::resolve(options)?;
     let bar = StageBar::new();
     bar.start("reading", 0);
-    let imported = import(&args.inputs, &options.detail, &settings.import)?;
+    let imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
     outputs.read(&imported.report.references)?;
     report_import(&imported.scene, &imported.report, options.verbose)?;
@@ -75,7 +77,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         told.insert("repair.hole".into(), repair.hole.to_string());
     }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
-    write_atomically(&args.output, &bytes)?;
+    write_whole(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
     if let Some(path) = &leak_path {
         path.write(&mut Told)?;
@@ -89,14 +91,9 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
              --method watershed or delaunay needs no planes"
         )?;
     }
-    let mut out = io::stdout().lock();
+    let mut out = outputs.printed();
     print_summary(&mut out, &baked.world)?;
-    writeln!(
-        out,
-        "wrote {} ({:.1} MB)",
-        args.output.display(),
-        bytes.len() as f64 / 1e6
-    )?;
+    writeln!(out, "{}", wrote(&args.output, &bytes))?;
     Ok(())
 }
 
@@ -112,7 +109,7 @@ fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result
         .collect();
     let mut way = String::new();
     if let Some(path) = &options.leak {
-        write_atomically(path, lines.as_bytes())?;
+        write_whole(path, lines.as_bytes())?;
         way = format!("; the way is in {}", path.display());
     }
     let shown: Vec<String> = leak

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use enfilade::cpg::{Cell, CellId, PortalId, World};
 use enfilade::runtime::{Sight, Sightlines};
 use enfilade_render::{Camera, Culling, RenderError, Shown, Studio};
 use enfilade_testkit::Rng;
+
+use crate::input::read_text;
 
 /// Height of an eye above the floor. [Units: wu]
 pub const EYE_HEIGHT: f32 = 1.6;
@@ -167,8 +169,7 @@ pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> V
 ///
 /// A file that cannot be read, a line that is not six numbers, or no line at all.
 pub fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
-    let text =
-        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = read_text("cameras", path)?;
     let mut out = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();

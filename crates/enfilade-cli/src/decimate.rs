@@ -12,16 +12,17 @@ use enfilade::bake::delaunay::{JOINED, Session, Step, bake_session};
 use enfilade::bake::{BakeConfig, BakeContext, Method, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
-use enfilade::import::import;
 
 use crate::bake::delaunay::choices_text;
 use crate::bake::{print_summary, settings};
-use crate::output::{Outputs, Told, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, Told, refuse_stream, write_whole, wrote};
+use enfilade_cli::input::{import_scene, is_stream};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
 #[derive(clap::Args)]
 pub(crate) struct Decimate {
-    /// Scene files, or a baked world.
+    /// Scene files, or a baked world; `-` for standard input.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
     /// Reads commands from standard input: `n [K]` forwards, `b [K]` back, `g N` to a step, `l` lists
@@ -32,7 +33,7 @@ pub(crate) struct Decimate {
     /// Begin after this many steps; where it stops by itself if not given.
     #[arg(long, value_name = "N")]
     at: Option<usize>,
-    /// Bake the rooms that are left then.
+    /// Bake the rooms that are left then; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -40,18 +41,21 @@ pub(crate) struct Decimate {
 }
 
 pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
-    let mut outputs = Outputs::reading(args.options.inputs(&args.inputs));
-    if let Some(path) = &args.output {
-        outputs.write("-o", path)?;
+    if args.steps && args.options.inputs(&args.inputs).any(|p| is_stream(p)) {
+        bail!("--steps reads commands from standard input; give files to read, not '-'");
     }
+    let mut outputs = Outputs::reading(args.options.inputs(&args.inputs))?;
     // Choices that were read are gone on with, and may be saved where they were.
-    let mut choices = Outputs::reading(args.inputs.iter().chain(&args.options.detail));
+    let mut choices = Outputs::reading(args.inputs.iter().chain(&args.options.detail))?;
     if let Some(path) = &args.output {
-        choices.write("-o", path)?;
+        outputs.write("-o", Format::World, path)?;
+        choices.write("-o", Format::World, path)?;
     }
     let mut settings = settings::resolve(&args.options)?;
     settings.config.method = Method::Delaunay;
-    let imported = import(&args.inputs, &args.options.detail, &settings.import)?;
+    let imported = import_scene(&args.inputs, &args.options.detail, &settings.import)?;
+    outputs.read(&imported.report.references)?;
+    choices.read(&imported.report.references)?;
     let scene = &imported.scene;
     let config = settings.config_for(scene);
     config.costs.cost.check(&scene.materials)?;
@@ -60,6 +64,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     if let Some(at) = args.at.filter(|&at| at > n) {
         bail!("--at {at} is past the last step; there are {n}");
     }
+    let mut out = outputs.printed();
     let mut walk = Walk {
         scene,
         at: args.at.unwrap_or(session.decimation.stop),
@@ -70,7 +75,6 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         outputs,
         choices,
     };
-    let mut out = io::stdout().lock();
     if args.steps {
         walk.show(&mut out)?;
         for line in io::stdin().lock().lines() {
@@ -91,7 +95,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         walk.bake(path, &mut out)?;
     }
-    Ok(())
+    out.flush().context("cannot write to standard output")
 }
 
 /// What a step's portal weighed, in words where no ratio was asked.
@@ -131,6 +135,11 @@ save FILE.toml  writes all decisions; `bake --method delaunay --choices FILE.tom
 bake FILE.glb   writes a world of the cells that are left now
 q               ends";
 
+/// What is said in a walk goes to standard output, and no file.
+fn in_walk(option: &str, path: &Path) -> anyhow::Result<()> {
+    refuse_stream(option, path, "a file beside what is said here")
+}
+
 /// Steps that `l` shows.
 const AHEAD: usize = 10;
 
@@ -164,7 +173,8 @@ impl Walk<'_> {
             },
             Some("bake") if words.len() == 2 => {
                 let path = Path::new(words[1]);
-                let allowed = self.outputs.clone().write("bake", path);
+                let allowed = in_walk("bake", path)
+                    .and_then(|()| self.outputs.clone().write("bake", Format::World, path));
                 if let Err(error) = allowed.and_then(|()| self.bake(path, out)) {
                     writeln!(out, "{error:#}")?;
                 }
@@ -227,8 +237,9 @@ impl Walk<'_> {
     }
 
     fn save(&mut self, path: &Path) -> anyhow::Result<()> {
-        self.choices.clone().write("save", path)?;
-        write_atomically(path, choices_text(&self.config.delaunay.choices).as_bytes())?;
+        in_walk("save", path)?;
+        self.choices.clone().write("save", Format::Choices, path)?;
+        write_whole(path, choices_text(&self.config.delaunay.choices).as_bytes())?;
         self.is_saved = true;
         Ok(())
     }
@@ -288,9 +299,9 @@ impl Walk<'_> {
         }
         let bytes =
             encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
-        write_atomically(path, &bytes)?;
+        write_whole(path, &bytes)?;
         print_summary(out, &baked.world)?;
-        writeln!(out, "wrote {}", path.display())?;
+        writeln!(out, "{}", wrote(path, &bytes))?;
         Ok(())
     }
 }

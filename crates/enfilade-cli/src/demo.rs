@@ -11,7 +11,8 @@ use enfilade_report::{PlanOptions, plan_svg};
 use enfilade_testkit::furnished_house;
 
 use crate::bake::{bake_scene, print_summary};
-use crate::output::{Outputs, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, make_folder, write_whole};
 
 /// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
 #[derive(clap::Args)]
@@ -23,19 +24,22 @@ pub(crate) struct Demo {
 
 pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
     let scene = furnished_house().scene;
-    std::fs::create_dir_all(&args.output)
-        .with_context(|| format!("cannot make folder {}", args.output.display()))?;
+    make_folder("-o", &args.output)?;
     let path = |name: &str| args.output.join(name);
     let mut outputs = Outputs::default();
-    for name in ["house.glb", "world.glb", "plan.svg"] {
-        outputs.write("-o", &path(name))?;
+    for (name, format) in [
+        ("house.glb", Format::World),
+        ("world.glb", Format::World),
+        ("plan.svg", Format::Plan),
+    ] {
+        outputs.write("-o", format, &path(name))?;
     }
-    write_atomically(&path("house.glb"), &export_glb(&scene))?;
+    write_whole(&path("house.glb"), &export_glb(&scene))?;
     let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
-    write_atomically(&path("world.glb"), &bytes)?;
+    write_whole(&path("world.glb"), &bytes)?;
     let plan = plan_svg(&baked.world, &PlanOptions::default());
-    write_atomically(&path("plan.svg"), plan.as_bytes())?;
+    write_whole(&path("plan.svg"), plan.as_bytes())?;
     let mut out = io::stdout().lock();
     print_summary(&mut out, &baked.world)?;
     let (house, world, plan) = (path("house.glb"), path("world.glb"), path("plan.svg"));

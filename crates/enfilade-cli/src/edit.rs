@@ -9,18 +9,20 @@ use enfilade::bake::simplify::{Simplified, delete_portal};
 use enfilade::cpg::{Portal, PortalId, World};
 use enfilade::geom::DVec3;
 
+use crate::formats::Format;
 use crate::output::Outputs;
 use crate::simplify::{cost_line, write};
+use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 
 /// Takes portals out of a world and puts new ones in.
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("edits").required(true).multiple(true)))]
 pub(crate) struct Edit {
-    /// World, whatever built it.
+    /// World, whatever built it; `-` for standard input.
     #[arg(value_name = "IN.glb")]
     input: PathBuf,
-    /// World to write.
+    /// World to write; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
     /// Portal to take away, by its number in the input; all others between its two cells go, too.
@@ -76,7 +78,8 @@ fn parse_polygon(text: &str) -> Result<Polygon, String> {
 }
 
 pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
-    Outputs::reading([&args.input]).write("-o", &args.output)?;
+    let mut outputs = Outputs::reading([&args.input])?;
+    outputs.write("-o", Format::World, &args.output)?;
     let before = read_world(&args.input)?;
     let mut note = String::new();
     let mut world: Option<World> = None;
@@ -107,7 +110,7 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
         world = Some(added.world);
     }
     let world = world.context("no portal was taken away")?;
-    write(&args.output, &before, &world, &note)
+    write(&outputs, &args.output, &before, &world, &note)
 }
 
 /// The world without the portals that are to be taken away.
@@ -116,7 +119,7 @@ fn without_portals(args: &Edit, before: &World) -> anyhow::Result<Simplified> {
     if let Some(id) = args.delete_portal.iter().find(|&&id| id as usize >= n) {
         bail!(
             "there is no portal {id}: {} has {n}, counted from 0",
-            args.input.display()
+            name_of(&args.input)
         );
     }
     let mut result: Option<Simplified> = None;

@@ -1,9 +1,8 @@
 //! `verify --views`: pictures with and without culling, compared pixel by pixel.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::Path;
 
-use anyhow::Context;
 use enfilade::cpg::{CellId, World};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio, Style,
@@ -11,7 +10,8 @@ use enfilade_render::{
 use enfilade_testkit::Rng;
 use serde::Serialize;
 
-use crate::output::{Outputs, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, write_whole};
 use crate::progress::StageBar;
 use enfilade_cli::cameras::random_camera;
 
@@ -24,7 +24,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) seed: u64,
     pub(crate) size: [u32; 2],
     pub(crate) adapter: &'a AdapterChoice,
-    pub(crate) pictures: Option<&'a PathBuf>,
+    /// A folder that is there.
+    pub(crate) pictures: Option<&'a Path>,
     /// What the command reads.
     pub(crate) outputs: Outputs,
     pub(crate) max_listed: usize,
@@ -133,7 +134,7 @@ fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) 
     }
 }
 
-pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Result<Exactness> {
+pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::Result<Exactness> {
     let mut studio = Studio::new(enfilade_cli::adapter::open(asked.adapter)?, world)?;
     let bounds = studio.world.bounds();
     let margin = 0.05;
@@ -144,10 +145,6 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
         adapter: studio.gpu.name(),
         ..Exactness::default()
     };
-    if let Some(dir) = asked.pictures {
-        std::fs::create_dir_all(dir)
-            .with_context(|| format!("cannot make folder {}", dir.display()))?;
-    }
     let oracle = Oracle::new(world, &studio.sight);
     let bar = StageBar::new();
     bar.start("comparing pictures", asked.views);
@@ -207,8 +204,8 @@ pub(crate) fn verify_pictures(world: &World, asked: &Asked<'_>) -> anyhow::Resul
                 if let Some(dir) = asked.pictures {
                     let picture = picture_of_loss(&mut studio, &camera, &lost, asked.size)?;
                     let to = dir.join(format!("view-{view}.png"));
-                    asked.outputs.clone().write("--pictures", &to)?;
-                    write_atomically(&to, &picture.to_png()?)?;
+                    asked.outputs.write("--pictures", Format::Picture, &to)?;
+                    write_whole(&to, &picture.to_png()?)?;
                 }
             }
         }

@@ -14,7 +14,7 @@ use enfilade_cli::world::read_world;
 /// Shows the cells, portals and statistics of a world.
 #[derive(clap::Args)]
 pub(crate) struct Inspect {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
     /// Print JSON for machines.
     #[arg(long)]

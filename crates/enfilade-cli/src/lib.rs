@@ -5,5 +5,6 @@
 pub mod adapter;
 pub mod answers;
 pub mod cameras;
+pub mod input;
 pub mod values;
 pub mod world;

@@ -7,6 +7,7 @@ use anyhow::{Context, bail};
 use enfilade::cpg::Locator;
 use enfilade::geom::DVec3;
 
+use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
 
 /// Reads `x y z` lines (meters, +Y up) and prints the id of each point's cell, `-` where there is
@@ -22,6 +23,9 @@ pub(crate) struct Locate {
 const MAX_LINE: u64 = 4096;
 
 pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
+    if is_stream(&args.world) {
+        bail!("standard input has the points; give the world as a file, not '-'");
+    }
     let world = read_world(&args.world)?;
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
     let output = BufWriter::with_capacity(1 << 16, io::stdout().lock());

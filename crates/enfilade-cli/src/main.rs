@@ -1,6 +1,7 @@
 //! The `enfilade` command: arguments → library calls → report.
 //!
-//! Results go to standard output, progress and messages to standard error. Exit code 0: done;
+//! Results go to standard output, progress and messages to standard error; `-` is standard input among inputs and standard
+//! output among outputs, and then the results go to standard error, too. Exit code 0: done;
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
 mod bake;
@@ -8,6 +9,7 @@ mod decimate;
 mod demo;
 mod edit;
 mod exact;
+mod formats;
 mod inspect;
 mod locate;
 mod output;

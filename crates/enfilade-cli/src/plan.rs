@@ -5,15 +5,17 @@ use std::path::PathBuf;
 use anyhow::bail;
 use enfilade_report::{PlanOptions, plan_svg};
 
-use crate::output::{Outputs, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, write_whole};
+use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 
 /// Draws the floor plan of every storey as one SVG: rooms colored, doorways at their width.
 #[derive(clap::Args)]
 pub(crate) struct Plan {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write the drawing.
+    /// Where to write the drawing; `-` for standard output.
     #[arg(short, long, value_name = "SVG")]
     output: PathBuf,
     /// Height of the cut above each storey's floor, in meters.
@@ -22,13 +24,13 @@ pub(crate) struct Plan {
 }
 
 pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
-    Outputs::reading([&args.world]).write("-o", &args.output)?;
+    Outputs::reading([&args.world])?.write("-o", Format::Plan, &args.output)?;
     let world = read_world(&args.world)?;
     if let Err(errors) = world.validate() {
         let first = errors.first().map(ToString::to_string).unwrap_or_default();
         bail!(
             "{}: the world is broken, so no plan is drawn: {first}",
-            args.world.display()
+            name_of(&args.world)
         );
     }
     let svg = plan_svg(
@@ -37,7 +39,7 @@ pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
             cut_height: args.height,
         },
     );
-    write_atomically(&args.output, svg.as_bytes())
+    write_whole(&args.output, svg.as_bytes())
 }
 
 fn height(text: &str) -> Result<f64, String> {

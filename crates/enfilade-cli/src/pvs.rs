@@ -15,8 +15,10 @@ use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, se
 use enfilade_verify::structural_triangles;
 
 use self::statistics::Statistics;
-use crate::output::{Outputs, is_same_file, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, is_same_file, write_whole};
 use crate::progress::StageBar;
+use enfilade_cli::input::{is_stream, name_of, read};
 use enfilade_cli::values::{bytes, seconds};
 
 mod statistics;
@@ -25,9 +27,9 @@ mod statistics;
 /// from it. Writes it as text.
 #[derive(clap::Args)]
 pub(crate) struct Pvs {
-    /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3).
+    /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3); `-` for standard input.
     input: PathBuf,
-    /// Where to write the answer, as text.
+    /// Where to write the answer, as text; `-` for standard output. Beside the input, as X.pvs, if not given.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// Write the world with the answer in it, for programs to ask; may be the input itself.
@@ -105,13 +107,13 @@ struct PvsReport {
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
-    let output = output_path(args)?;
+    let (outputs, output) = outputs_of(args)?;
     let input = read_input(&args.input)?;
     let graph = &input.graph;
     if args.into.is_some() && input.world.is_none() {
         bail!(
             "{} is a portal file: only a world holds an answer (--into)",
-            args.input.display()
+            name_of(&args.input)
         );
     }
     let start = Instant::now();
@@ -123,25 +125,25 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         notes: notes(&report, args.mode),
         rows,
     });
-    write_atomically(&output, text.as_bytes())?;
+    write_whole(&output, text.as_bytes())?;
     if let (Some(path), Some(evidence)) = (&args.evidence, &vis.evidence) {
-        write_atomically(path, evidence)?;
+        write_whole(path, evidence)?;
     }
     if let Some(path) = &args.statistics {
         let statistics = Statistics::new(&vis.cells, input.world.as_ref(), graph);
         let text = serde_json::to_vec_pretty(&statistics)?;
-        write_atomically(path, &text)?;
+        write_whole(path, &text)?;
     }
     if let Some(path) = &args.mutual {
         let text = statistics::mutual(&vis.cells, input.world.as_ref());
-        write_atomically(path, text.as_bytes())?;
+        write_whole(path, text.as_bytes())?;
     }
     if let (Some(path), Some(world)) = (&args.into, input.world) {
         let pvs = Some(vis.cells);
         let bytes = encode_glb(&World { pvs, ..world })?;
-        write_atomically(path, &bytes)?;
+        write_whole(path, &bytes)?;
     }
-    print(&report, args.json)
+    print(outputs.printed(), &report, args.json)
 }
 
 /// What to look through.
@@ -169,13 +171,13 @@ pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Vec<
 }
 
 fn read_input(path: &Path) -> anyhow::Result<Input> {
-    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = read(path)?;
     // FNV-1a: tells files apart, not forgers.
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     });
     if bytes.starts_with(b"glTF") {
-        let world = decode_glb(&bytes).with_context(|| path.display().to_string())?;
+        let world = decode_glb(&bytes).with_context(|| name_of(path))?;
         let walls: Vec<Triangle> = structural_triangles(&world)
             .into_iter()
             .map(|(triangle, _)| triangle)
@@ -189,8 +191,8 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
     }
     let text = std::str::from_utf8(&bytes)
         .ok()
-        .with_context(|| format!("{}: no text, so no portal file", path.display()))?;
-    let file = read_prt(text).with_context(|| path.display().to_string())?;
+        .with_context(|| format!("{}: no text, so no portal file", name_of(path)))?;
+    let file = read_prt(text).with_context(|| name_of(path))?;
     Ok(Input {
         graph: sight_graph(&file),
         walls: None,
@@ -209,32 +211,33 @@ pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
     )
 }
 
-/// Where the answer goes; all that is written is looked at before the work. Only `--into` may be the input itself: the world
+/// What is written, looked at before the work, and where the answer goes. Only `--into` may be the input itself: the world
 /// stays what it was, with an answer in it.
-fn output_path(args: &Pvs) -> anyhow::Result<PathBuf> {
-    let path = args
-        .output
-        .clone()
-        .unwrap_or_else(|| args.input.with_extension("pvs"));
-    let mut outputs = Outputs::reading([&args.input]);
-    outputs.write("-o", &path)?;
+fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
+    let path = match &args.output {
+        Some(path) => path.clone(),
+        None if is_stream(&args.input) => args.input.clone(),
+        None => args.input.with_extension("pvs"),
+    };
+    let mut outputs = Outputs::reading([&args.input])?;
+    outputs.write("-o", Format::Visible, &path)?;
     let others = [
-        ("--evidence", &args.evidence),
-        ("--statistics", &args.statistics),
-        ("--mutual", &args.mutual),
-        ("--checkpoint", &args.checkpoint),
+        ("--evidence", Format::Evidence, &args.evidence),
+        ("--statistics", Format::Statistics, &args.statistics),
+        ("--mutual", Format::Pairs, &args.mutual),
+        ("--checkpoint", Format::Search, &args.checkpoint),
     ];
-    for (option, other) in others {
+    for (option, format, other) in others {
         if let Some(other) = other {
-            outputs.write(option, other)?;
+            outputs.write(option, format, other)?;
         }
     }
     if let Some(into) = &args.into
-        && !is_same_file(into, &args.input)
+        && (is_stream(into) || !is_same_file(into, &args.input))
     {
-        outputs.write("--into", into)?;
+        outputs.write("--into", Format::World, into)?;
     }
-    Ok(path)
+    Ok((outputs, path))
 }
 
 fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
@@ -263,7 +266,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
     let mut unsaved = None;
     let mut save = |bytes: Vec<u8>| {
         if let Some(path) = &args.checkpoint {
-            unsaved = write_atomically(path, &bytes).err();
+            unsaved = write_whole(path, &bytes).err();
         }
     };
     let checkpoint = match &args.checkpoint {
@@ -287,8 +290,8 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
     let answer = pool.install(|| see_all(&input.graph, &config, &mut context));
     bar.finish();
     let vis = answer.with_context(|| match &args.checkpoint {
-        Some(path) => format!("{}, {}", args.input.display(), path.display()),
-        None => args.input.display().to_string(),
+        Some(path) => format!("{}, {}", name_of(&args.input), path.display()),
+        None => name_of(&args.input),
     })?;
     if let Some(error) = unsaved {
         return Err(error.context("cannot save the search"));
@@ -358,8 +361,8 @@ fn notes(report: &PvsReport, mode: PvsMode) -> Vec<String> {
     ]
 }
 
-fn print(report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
-    let mut out = BufWriter::new(io::stdout().lock());
+fn print(to: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
+    let mut out = BufWriter::new(to);
     if is_json {
         serde_json::to_writer(&mut out, report).map_err(io::Error::from)?;
         writeln!(out)?;

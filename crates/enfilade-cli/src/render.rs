@@ -1,6 +1,6 @@
 //! `enfilade render`: pictures, without a display.
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -12,17 +12,19 @@ use enfilade_render::{
 };
 use serde_json::json;
 
-use crate::output::{Outputs, Told, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, Told, refuse_stream, write_whole};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
+use enfilade_cli::input::name_of;
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
 
 /// Draws a picture of a world, or one for each camera of a path, to PNG files; needs no display.
 #[derive(clap::Args)]
 pub(crate) struct Render {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write the picture; of a path, `walk.png` becomes `walk-0001.png` and so on.
+    /// Where to write the picture, `-` for standard output; of a path, `walk.png` becomes `walk-0001.png` and so on.
     #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
     /// Where the eye is, in meters; without it, a place with much to see is looked for.
@@ -125,7 +127,7 @@ fn angle(text: &str) -> Result<f32, String> {
 pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
     let world = read_world(path)?;
     let studio = Studio::new(enfilade_cli::adapter::open(adapter)?, &world)
-        .with_context(|| path.display().to_string())?;
+        .with_context(|| name_of(path))?;
     let n = studio.world.n_missing_pictures();
     if n > 0 {
         writeln!(
@@ -151,12 +153,16 @@ pub(crate) fn smooth(
 pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let fov = args.fov.to_radians();
     let is_path = args.path.is_some() || args.walk.is_some();
-    let mut outputs = Outputs::reading([&args.world].into_iter().chain(&args.path));
+    let mut outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
     if let Some(record) = &args.record {
-        outputs.write("--record", record)?;
+        outputs.write("--record", Format::Cameras, record)?;
     }
-    if !is_path {
-        outputs.write("-o", &args.output)?;
+    if is_path {
+        // Names of the pictures follow when their number is known.
+        refuse_stream("-o", &args.output, "several pictures")?;
+        Format::Picture.check("-o", &args.output)?;
+    } else {
+        outputs.write("-o", Format::Picture, &args.output)?;
     }
     let given = args
         .path
@@ -183,13 +189,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }],
     };
     if cameras.is_empty() {
-        bail!("{}: no room to walk in", args.world.display());
+        bail!("{}: no room to walk in", name_of(&args.world));
     }
     if is_path {
         let pictures: Vec<_> = (1..=cameras.len())
             .map(|n| numbered(&args.output, n))
             .collect();
-        outputs.write_all("-o", &pictures)?;
+        outputs.write_all("-o", Format::Picture, &pictures)?;
     }
     if args.lod > 0.0 {
         studio.add_levels(&world)?;
@@ -204,7 +210,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         shadows: !args.plain,
         cut_above: args.cut.unwrap_or(f32::INFINITY),
     };
-    let mut out = io::stdout().lock();
+    let mut out = outputs.printed();
     for (i, camera) in cameras.iter().enumerate() {
         let picture = smooth(args.size, |size| {
             // As many pixels for one as pictures are drawn larger.
@@ -232,11 +238,11 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         } else {
             args.output.clone()
         };
-        write_atomically(&to, &picture.to_png()?)?;
+        write_whole(&to, &picture.to_png()?)?;
         report(&mut out, args, &mut studio, &world, camera, &to)?;
     }
     if let Some(record) = &args.record {
-        write_atomically(record, path_text(&cameras).as_bytes())?;
+        write_whole(record, path_text(&cameras).as_bytes())?;
     }
     Ok(())
 }

@@ -13,17 +13,19 @@ use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, 
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
-use crate::output::{Outputs, Told, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, Told, write_whole};
 use crate::render::{above, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
+use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
 /// Writes one self-contained page: plans, the graph, what can be seen from where, tables, pictures.
 #[derive(clap::Args)]
 pub(crate) struct Report {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write the page.
+    /// Where to write the page; `-` for standard output.
     #[arg(short, long, value_name = "HTML")]
     output: PathBuf,
     /// Views on the walk that is measured.
@@ -42,15 +44,19 @@ const SIZE: [u32; 2] = [960, 540];
 const BUDGET: Duration = Duration::from_secs(20);
 
 pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
-    Outputs::reading([&args.world]).write("-o", &args.output)?;
+    Outputs::reading([&args.world])?.write("-o", Format::Page, &args.output)?;
     let world = read_world(&args.world)?;
-    let name = args.world.file_stem().unwrap_or_default().to_string_lossy();
+    let name = if is_stream(&args.world) {
+        "world".into()
+    } else {
+        args.world.file_stem().unwrap_or_default().to_string_lossy()
+    };
     let mut parts = ReportParts {
         title: name.into_owned(),
         ..ReportParts::default()
     };
     parts.visible = visible(&world, &mut parts.notes)?;
-    let sight = Sight::build(&world).with_context(|| args.world.display().to_string())?;
+    let sight = Sight::build(&world).with_context(|| name_of(&args.world))?;
     let steps = measured(&world, &sight, args.views);
     parts
         .tables
@@ -68,7 +74,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
             Err(why) => bail!(why),
         }
     }
-    write_atomically(&args.output, report_html(&world, &parts).as_bytes())
+    write_whole(&args.output, report_html(&world, &parts).as_bytes())
 }
 
 fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {

@@ -17,7 +17,7 @@ use enfilade_cli::world::read_world;
 /// find out.
 #[derive(clap::Args)]
 pub(crate) struct See {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
     /// Where the eye is, in meters.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]

@@ -1,7 +1,6 @@
 //! `enfilade simplify`: a graph becomes a simpler one, of cells within bounds.
 
-use std::fs;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -11,16 +10,19 @@ use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};
 
-use crate::output::{Outputs, Told, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, Told, write_whole, wrote};
 use crate::pvs::sight_graph;
+use enfilade_cli::input::{name_of, read};
 
 /// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
 #[derive(clap::Args)]
 pub(crate) struct Simplify {
-    /// World, whatever built it, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3).
+    /// World, whatever built it, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3); `-` for standard input.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// World or portal file to write, as the input is; PRT1 becomes PRT2, whose leaves are the clusters that were.
+    /// World or portal file to write, as the input is; PRT1 becomes PRT2, whose leaves are the clusters that
+    /// were. `-` for standard output.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Merge until there are no more cells than this, as far as the cost bound allows.
@@ -92,9 +94,15 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     {
         bail!("--min-cost {min} is above --max-cost {max}; no cell can be within both");
     }
-    Outputs::reading([&args.input]).write("-o", &args.output)?;
-    let bytes =
-        fs::read(&args.input).with_context(|| format!("cannot read {}", args.input.display()))?;
+    let mut outputs = Outputs::reading([&args.input])?;
+    let bytes = read(&args.input)?;
+    let is_world = bytes.starts_with(b"glTF") || std::str::from_utf8(&bytes).is_err();
+    let format = if is_world {
+        Format::World
+    } else {
+        Format::PortalFile
+    };
+    outputs.write("-o", format, &args.output)?;
     let settings = SimplifySettings {
         min_cost: args.min_cost.unwrap_or(0.0),
         max_cost: args.max_cost,
@@ -112,15 +120,15 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
             materials: args.material_cost.iter().cloned().collect(),
         },
     };
-    if !bytes.starts_with(b"glTF")
-        && let Ok(text) = std::str::from_utf8(&bytes)
-    {
-        return simplify_portal_file(args, text, &settings);
+    if !is_world {
+        let text = String::from_utf8_lossy(&bytes);
+        return simplify_portal_file(args, &outputs, &text, &settings);
     }
-    let world = decode_glb(&bytes).with_context(|| args.input.display().to_string())?;
+    let world = decode_glb(&bytes).with_context(|| name_of(&args.input))?;
     settings.cost.check(&world.materials)?;
     let bounded = keep_bounds(&world, &settings);
     write(
+        &outputs,
         &args.output,
         &world,
         &bounded.world,
@@ -145,6 +153,7 @@ fn warn_of_costs(args: &Simplify, max_cost: f64) -> anyhow::Result<()> {
 /// Merges the clusters of a portal file.
 fn simplify_portal_file(
     args: &Simplify,
+    outputs: &Outputs,
     text: &str,
     settings: &SimplifySettings,
 ) -> anyhow::Result<()> {
@@ -157,15 +166,14 @@ fn simplify_portal_file(
             "--metric, --split-outdoors, --area-cost and --material-cost ask for surfaces, which a portal file does not have"
         );
     }
-    let file = read_prt(text).with_context(|| args.input.display().to_string())?;
+    let file = read_prt(text).with_context(|| name_of(&args.input))?;
     let graph = sight_graph(&file);
-    graph
-        .validate()
-        .with_context(|| args.input.display().to_string())?;
+    graph.validate().with_context(|| name_of(&args.input))?;
     let simple = simplify_graph(&graph, &cluster_costs(&file, &settings.cost), settings);
     let merged = file.merged(&simple.cell_of, simple.n_cells);
-    write_atomically(&args.output, write_prt(&merged).as_bytes())?;
-    let mut out = io::stdout().lock();
+    let merged_text = write_prt(&merged);
+    write_whole(&args.output, merged_text.as_bytes())?;
+    let mut out = outputs.printed();
     writeln!(
         out,
         "clusters {:>7} → {}",
@@ -175,7 +183,7 @@ fn simplify_portal_file(
     writeln!(out, "portals  {before:>7} → {after}")?;
     let (least, most) = (simple.min_cost, simple.max_cost);
     writeln!(out, "cost of a cluster {least:.0} to {most:.0}")?;
-    writeln!(out, "wrote {}", args.output.display())?;
+    writeln!(out, "{}", wrote(&args.output, merged_text.as_bytes()))?;
     warn_of_costs(args, simple.max_cost)
 }
 
@@ -203,20 +211,21 @@ fn costs_text([min, max]: [f64; 2]) -> String {
 }
 
 /// Writes a world made from another one, and says how they compare.
-pub(crate) fn write(path: &Path, before: &World, after: &World, note: &str) -> anyhow::Result<()> {
+pub(crate) fn write(
+    outputs: &Outputs,
+    path: &Path,
+    before: &World,
+    after: &World,
+    note: &str,
+) -> anyhow::Result<()> {
     let bytes = encode_glb(after).context("the new world breaks an invariant (a bug)")?;
-    write_atomically(path, &bytes)?;
+    write_whole(path, &bytes)?;
     let count = |w: &World| (w.graph.cells.len(), w.graph.portals.len());
     let ((cells, portals), (c, p)) = (count(before), count(after));
-    let mut out = io::stdout().lock();
+    let mut out = outputs.printed();
     writeln!(out, "cells   {cells:>7} → {c}")?;
     writeln!(out, "portals {portals:>7} → {p}")?;
     write!(out, "{note}")?;
-    writeln!(
-        out,
-        "wrote {} ({:.1} MB)",
-        path.display(),
-        bytes.len() as f64 / 1e6
-    )?;
+    writeln!(out, "{}", wrote(path, &bytes))?;
     Ok(())
 }

@@ -1,41 +1,41 @@
 //! `enfilade verify`: does a world keep its promises?
 
-use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::World;
 use enfilade::geom::Triangle;
-use enfilade::geom::scene::Role;
-use enfilade::import::import;
+use enfilade::geom::scene::{Role, Scene, TriangleSource};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
-    VerifyOptions, ViewOptions, ViewReport, verify_evidence, verify_views,
-    verify_world_with_progress,
+    SourceDetail, VerifyOptions, ViewOptions, ViewReport, compare_details, verify_evidence,
+    verify_views, verify_world_with_progress,
 };
 
 use crate::bake::settings::SceneOptions;
 use crate::exact::{Asked, verify_pictures};
-use crate::output::Outputs;
+use crate::output::{Outputs, make_folder};
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
 use enfilade_cli::answers::Answers;
+use enfilade_cli::input::{import_scene, name_of, read};
 use enfilade_cli::values::size;
 use enfilade_cli::world::read_world;
 
 /// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
 #[derive(clap::Args)]
 pub(crate) struct Verify {
-    /// World written by `enfilade bake`; with --evidence, a Quake portal file too.
+    /// World written by `enfilade bake`; with --evidence, a Quake portal file too; `-` for standard input.
     world: PathBuf,
     /// Check this evidence, which `enfilade pvs --evidence` wrote, instead of the
     /// promises.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
     /// The scene that it was baked from: its structural triangles decide what blocks, instead of
-    /// those that the world holds. It is read by the settings below; give those of the bake.
+    /// those that the world holds, and its details must be where the world has them. It is read by the settings below; give those
+    /// of the bake.
     #[arg(long, num_args = 1.., value_name = "IN")]
     source: Vec<PathBuf>,
     /// The files of the source whose objects are all detail, as in the bake.
@@ -78,15 +78,23 @@ pub(crate) struct Verify {
 }
 
 pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
+    let inputs = [&args.world].into_iter().chain(&args.evidence);
+    let inputs = inputs.chain(&args.source).chain(&args.detail);
+    let mut outputs = Outputs::reading(inputs.chain(&args.scene.config))?;
     if let Some(evidence) = &args.evidence {
         return verify_visibility(args, evidence);
+    }
+    let pictures = args.pictures.as_deref().filter(|_| args.views > 0);
+    if let Some(folder) = pictures {
+        make_folder("--pictures", folder)?;
     }
     let world = read_world(&args.world)?;
     let source = if args.source.is_empty() {
         None
     } else {
-        Some(read_source(args)?)
+        Some(read_source(args, &mut outputs)?)
     };
+    let structure = source.as_ref().map(structure_of);
     let options = VerifyOptions {
         rays: args.rays,
         seed: args.seed,
@@ -95,27 +103,29 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     };
     let bar = StageBar::new();
     bar.start("shooting rays", args.rays.saturating_mul(2));
-    let report = verify_world_with_progress(&world, source.as_deref(), &options, &|done, _| {
-        bar.set(done);
-    });
+    let mut report =
+        verify_world_with_progress(&world, structure.as_deref(), &options, &|done, _| {
+            bar.set(done);
+        });
     bar.finish();
+    if let Some(scene) = &source {
+        report.problems.extend(detail_problems(&world, scene));
+    }
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
         .transpose()?;
     let exact = (args.views > 0)
         .then(|| {
-            let inputs = [&args.world].into_iter().chain(&args.source);
-            let inputs = inputs.chain(&args.detail).chain(&args.scene.config);
-            let asked = Asked {
+            let mut asked = Asked {
                 views: args.views,
                 seed: args.seed,
                 size: args.view_size,
                 adapter: &args.adapter,
-                pictures: args.pictures.as_ref(),
-                outputs: Outputs::reading(inputs),
+                pictures,
+                outputs,
                 max_listed: args.list,
             };
-            verify_pictures(&world, &asked).with_context(|| args.world.display().to_string())
+            verify_pictures(&world, &mut asked).with_context(|| name_of(&args.world))
         })
         .transpose()?;
     let mut out = BufWriter::new(io::stdout().lock());
@@ -142,7 +152,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if !report.holds() {
         bail!(
             "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} hidden cells seen, {} problems",
-            args.world.display(),
+            name_of(&args.world),
             report.unsealed,
             report.incomplete,
             report.hidden,
@@ -152,7 +162,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(sight) = sight.filter(|s| !s.holds()) {
         bail!(
             "{} is not seen whole: {} of {} hits are missing from the answers",
-            args.world.display(),
+            name_of(&args.world),
             sight.missed,
             sight.hits
         );
@@ -160,7 +170,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(exact) = exact.filter(|e| e.differing > 0) {
         bail!(
             "{} is not drawn whole: {} pixels differ from pictures without culling",
-            args.world.display(),
+            name_of(&args.world),
             exact.differing
         );
     }
@@ -169,7 +179,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
 
 /// Asks the run-time what random views see, and casts rays in them.
 fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
-    let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
+    let sight = Sight::build(world).with_context(|| name_of(&args.world))?;
     let answers = Answers::new(world, &sight);
     let options = ViewOptions {
         views: args.sight,
@@ -188,10 +198,9 @@ fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
 /// Checks every claim of the evidence about what can be seen.
 fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     let (graph, walls) = read_graph(&args.world)?;
-    let bytes =
-        fs::read(evidence).with_context(|| format!("cannot read {}", evidence.display()))?;
+    let bytes = read(evidence)?;
     let report = verify_evidence(&graph, &bytes, walls.as_deref())
-        .with_context(|| format!("{} is not accepted", evidence.display()))?;
+        .with_context(|| format!("{} is not accepted", name_of(evidence)))?;
     let mut out = io::stdout().lock();
     if args.json {
         let value = serde_json::json!({
@@ -220,13 +229,44 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Scene> {
+    let imported = import_scene(&args.source, &args.detail, &args.scene.resolve()?)?;
+    outputs.read(&imported.report.references)?;
+    Ok(imported.scene)
+}
+
 /// The structural triangles of a scene, as the builder saw them.
-fn read_source(args: &Verify) -> anyhow::Result<Vec<Triangle>> {
-    let scene = import(&args.source, &args.detail, &args.scene.resolve()?)?.scene;
-    Ok(scene
+fn structure_of(scene: &Scene) -> Vec<Triangle> {
+    scene
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))
-        .collect())
+        .collect()
+}
+
+/// Whether the world's details are those of the scene.
+fn detail_problems(world: &World, scene: &Scene) -> Vec<String> {
+    let numbers = 0..scene.objects.len() as u32;
+    let role = |&i: &u32| scene.objects[i as usize].role;
+    let ids: Vec<u32> = numbers.filter(|i| role(i) == Role::Detail).collect();
+    compare_details(world, ids.len(), |i| SourceDetail {
+        name: scene.objects[ids[i] as usize].name.clone(),
+        triangles: triangles_of_object(scene, ids[i]).collect(),
+    })
+}
+
+fn triangles_of_object(scene: &Scene, object: u32) -> impl Iterator<Item = Triangle> {
+    let mesh = &scene.meshes[scene.objects[object as usize].mesh as usize];
+    let primitives = mesh.primitives.iter().zip(0..);
+    primitives.flat_map(move |(primitive, number)| {
+        let triangles = 0..primitive.indices.len() as u32 / 3;
+        triangles.map(move |triangle| {
+            scene.world_triangle(TriangleSource {
+                object,
+                primitive: number,
+                triangle,
+            })
+        })
+    })
 }
 
 fn positive(text: &str) -> Result<f64, String> {

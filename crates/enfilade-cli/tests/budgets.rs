@@ -1,4 +1,5 @@
-//! What a bake may take: said before the work, and held.
+//! What a bake may take: said before the work, and held. On Linux each bake here has an address space of 4 GiB: one that asks for
+//! more than its budget is aborted, and fails.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,17 @@ fn folder(name: &str) -> PathBuf {
 }
 
 fn bake(dir: &Path, more: &[&str]) -> (Output, String) {
-    let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+    let binary = env!("CARGO_BIN_EXE_enfilade");
+    let mut command = if cfg!(target_os = "linux") {
+        let mut limited = Command::new("sh");
+        limited
+            .args(["-c", "ulimit -v 4194304 && exec \"$0\" \"$@\""])
+            .arg(binary);
+        limited
+    } else {
+        Command::new(binary)
+    };
+    let done = command
         .args(["bake", "house.glb", "-o", "w.glb"])
         .args(more)
         .current_dir(dir)
@@ -52,6 +63,35 @@ fn what_cannot_be_done_within_a_budget_is_refused_with_a_way_out() {
         let (done, said) = bake(&dir, &wrong);
         assert_eq!(done.status.code(), Some(2), "{said}");
     }
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn voxels_that_cannot_be_are_refused_with_those_that_can() {
+    let dir = folder("voxels");
+    for args in [
+        &["--voxel", "0.00001"][..],
+        &["--voxel", "1e-9", "--max-memory", "900T"],
+        &["--voxel", "1e-300"],
+        &["--voxel", "0.05", "--max-memory", "1M"],
+        &["--voxel", "0.00001", "--leak-path"],
+    ] {
+        let (done, said) = bake(&dir, args);
+        assert_eq!(done.status.code(), Some(1), "{args:?}: {said}");
+        // No number of hundreds of digits.
+        assert!(said.lines().all(|l| l.len() < 400), "{args:?}: {said}");
+        let (_, way) = said.split_once("give --voxel ").expect(&said);
+        let finest: f64 = way.split(' ').next().unwrap().parse().unwrap();
+        assert!(finest > 0.0, "{said}");
+        assert!(way.contains("--max-memory"), "{said}");
+        assert_eq!(fs::read(dir.join("w.glb")).unwrap(), b"old");
+    }
+    // The way out is one.
+    let (_, said) = bake(&dir, &["--voxel", "0.05", "--max-memory", "15M"]);
+    let (_, way) = said.split_once("give --voxel ").expect(&said);
+    let finest = way.split(' ').next().unwrap();
+    let (done, said) = bake(&dir, &["--voxel", finest, "--max-memory", "15M"]);
+    assert!(done.status.success(), "{said}");
     fs::remove_dir_all(&dir).unwrap();
 }
 

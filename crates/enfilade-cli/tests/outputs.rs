@@ -42,7 +42,7 @@ fn no_command_writes_over_an_input_or_twice() {
         ("report w.glb --no-pictures -o w.glb", is_input),
         ("render w.glb -o w.glb", is_input),
         ("render w.glb -o a.png --record w.glb", is_input),
-        ("render w.glb -o a.png --record a.png", twice),
+        ("render w.glb -o a --record a", twice),
         (
             "render w.glb -o a.png --path p.txt --record p.txt",
             is_input,
@@ -90,7 +90,7 @@ fn no_command_writes_over_an_input_or_twice() {
 #[test]
 fn the_next_run_removes_what_a_killed_one_left() {
     let (dir, _) = folder("left");
-    fs::write(dir.join(".plan.svg.4000000.tmp"), "<svg").unwrap();
+    fs::write(dir.join(".plan.svg.4000000-1.tmp"), "<svg").unwrap();
     let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
         .args(["plan", "w.glb", "-o", "plan.svg"])
         .current_dir(&dir)
@@ -98,7 +98,7 @@ fn the_next_run_removes_what_a_killed_one_left() {
         .unwrap();
     assert!(done.status.success(), "{done:?}");
     assert!(dir.join("plan.svg").exists());
-    assert!(!dir.join(".plan.svg.4000000.tmp").exists());
+    assert!(!dir.join(".plan.svg.4000000-1.tmp").exists());
     fs::remove_dir_all(&dir).unwrap();
 }
 
@@ -122,8 +122,13 @@ fn what_a_scene_refers_to_is_an_input() {
             .output()
             .unwrap()
     };
-    for output in ["a.bin", "sub/../a.bin"] {
-        let done = bake(output);
+    let decimate = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(["decimate", "a.gltf", "-o", "a.bin"])
+        .current_dir(&dir)
+        .output()
+        .unwrap();
+    let baked = ["a.bin", "sub/../a.bin"].map(bake);
+    for done in baked.into_iter().chain([decimate]) {
         let said = String::from_utf8_lossy(&done.stderr);
         assert_eq!(done.status.code(), Some(1), "{said}");
         assert!(said.contains("the scene refers to"), "{said}");
@@ -147,5 +152,78 @@ fn a_bake_that_nobody_listens_to_writes_its_world() {
     drop((child.stdout.take(), child.stderr.take()));
     assert!(child.wait().unwrap().success());
     enfilade::open(dir.join("out.glb")).unwrap();
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn an_extension_that_contradicts_is_refused_before_the_work() {
+    let (dir, before) = folder("extensions");
+    fs::write(dir.join("g.prt"), "PRT1\n2\n0\n").unwrap();
+    let files = || fs::read_dir(&dir).unwrap().count();
+    let n_files = files();
+    for (line, fits) in [
+        (
+            "bake s.obj -o x.obj",
+            "-o writes a world, one GLB, which .obj contradicts; .glb fits",
+        ),
+        (
+            "bake s.obj -o x.glb --leak x.toml",
+            ".pts or .lin or .txt fits",
+        ),
+        ("decimate s.obj -o x.gltf", ".glb fits"),
+        ("edit w.glb --delete-portal 0 -o x.svg", ".glb fits"),
+        ("simplify w.glb --max-cells 2 -o x.prt", ".glb fits"),
+        ("simplify g.prt --max-cells 1 -o x.glb", ".prt fits"),
+        ("plan w.glb -o x.png", ".svg fits"),
+        ("report w.glb --no-pictures -o x.pdf", ".html or .htm fits"),
+        ("render w.glb -o x.jpg", ".png fits"),
+        ("render w.glb --walk 3 -o x.jpg", ".png fits"),
+        (
+            "render w.glb -o x.png --record x.json",
+            ".txt or .path fits",
+        ),
+        ("pvs w.glb -o x.glb", ".pvs or .txt fits"),
+        ("pvs w.glb -o x --into x.pvs", ".glb fits"),
+        ("pvs w.glb -o x --evidence x.json", ".ev or .evidence fits"),
+        ("pvs w.glb -o x --statistics x.csv", ".json fits"),
+        ("pvs w.glb -o x --mutual x.json", ".txt fits"),
+        (
+            "pvs w.glb -o x --checkpoint x.txt",
+            ".search or .checkpoint fits",
+        ),
+    ] {
+        let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(line.split(' '))
+            .current_dir(&dir)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(1), "{line}: {said}");
+        assert!(said.trim_end().ends_with(fits), "{line}: {said}");
+        assert_eq!(files(), n_files, "{line}");
+    }
+    assert!(INPUTS.map(|f| fs::read(dir.join(f)).unwrap()).to_vec() == before);
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[cfg(feature = "view")]
+#[test]
+fn a_walk_in_a_window_writes_pictures_and_paths_alone() {
+    let (dir, _) = folder("view");
+    for (line, says) in [
+        ("view w.glb --record x.png", ".txt or .path fits"),
+        ("view w.glb --screenshot x.gif", ".png fits"),
+        ("view w.glb --record -", "another name than '-'"),
+        ("view - --path -", "once only"),
+    ] {
+        let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(line.split(' '))
+            .current_dir(&dir)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains(says), "{line}: {said}");
+    }
     fs::remove_dir_all(&dir).unwrap();
 }

@@ -90,3 +90,32 @@ fn a_plan_is_written() {
         Some(2)
     );
 }
+
+#[test]
+fn a_detail_moved_within_its_room_is_found_by_the_source() {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let [scene, baked, moved] = ["house.glb", "baked.glb", "moved.glb"]
+        .map(|name| dir.join(format!("verify-moved-{name}")));
+    let house = enfilade_testkit::furnished_house().scene;
+    fs::write(&scene, enfilade::import::export_glb(&house)).unwrap();
+    let [scene, baked] = [&scene, &baked].map(|p| p.to_str().unwrap());
+    let done = enfilade(&["bake", scene, "-o", baked, "--voxel", "0.2"]);
+    assert!(done.status.success(), "{done:?}");
+    let verify = |world: &str| {
+        let quick = ["--rays", "0", "--sight", "0"];
+        enfilade(&[&["verify", world, "--source", scene][..], &quick].concat())
+    };
+    let done = verify(baked);
+    assert!(done.status.success(), "{done:?}");
+    let mut world = enfilade::open(baked).unwrap();
+    let n = world.details.len();
+    world.details[n / 2].transform[13] += 0.01;
+    enfilade::save(&moved, &world).unwrap();
+    let done = verify(moved.to_str().unwrap());
+    assert_eq!(done.status.code(), Some(1), "{done:?}");
+    let out = String::from_utf8_lossy(&done.stdout);
+    assert!(
+        out.contains("the world lacks a detail of the source"),
+        "{out}"
+    );
+}

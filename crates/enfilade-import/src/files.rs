@@ -11,30 +11,40 @@ pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, ImportError>
         path: path.to_path_buf(),
         reason,
     };
-    let too_large = |n| ImportError::TooMuch {
-        path: path.to_path_buf(),
-        place: "file".into(),
-        what: "bytes",
-        n,
-        limit,
-    };
     // Asked before opening: opening a pipe would wait for a writer, and a device never ends.
     let meta = std::fs::metadata(path).map_err(read_error)?;
     if !meta.is_file() {
         return Err(read_error(std::io::Error::other("not a regular file")));
     }
     if meta.len() > limit {
-        return Err(too_large(meta.len()));
+        return Err(too_large(path, meta.len(), limit));
     }
-    let file = File::open(path).map_err(read_error)?;
+    read_up_to(File::open(path).map_err(read_error)?, path, limit)
+}
+
+/// Reads all of what has at most `limit` bytes; `path` is its name in messages.
+pub(crate) fn read_up_to(from: impl Read, path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
     let mut bytes = Vec::new();
-    file.take(limit.saturating_add(1))
+    from.take(limit.saturating_add(1))
         .read_to_end(&mut bytes)
-        .map_err(read_error)?;
+        .map_err(|reason| ImportError::Read {
+            path: path.to_path_buf(),
+            reason,
+        })?;
     if bytes.len() as u64 > limit {
-        return Err(too_large(bytes.len() as u64));
+        return Err(too_large(path, bytes.len() as u64, limit));
     }
     Ok(bytes)
+}
+
+fn too_large(path: &Path, n: u64, limit: u64) -> ImportError {
+    ImportError::TooMuch {
+        path: path.to_path_buf(),
+        place: "file".into(),
+        what: "bytes",
+        n,
+        limit,
+    }
 }
 
 /// Decodes a `data:` URI; `None` if it is none, an error text if it is a bad one.
@@ -89,7 +99,7 @@ pub(crate) fn read_reference(
 fn resolve(folder: Option<&Path>, reference: &str, may_leave: bool) -> Result<PathBuf, String> {
     let Some(folder) = folder else {
         return Err(format!(
-            "refers to the file '{reference}', but was read from memory"
+            "refers to the file '{reference}', but was read from memory or a stream; give the scene's file"
         ));
     };
     let here = if folder.as_os_str().is_empty() {

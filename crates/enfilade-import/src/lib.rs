@@ -58,6 +58,7 @@ pub use roles::RoleRules;
 use builder::Builder;
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, DVec3};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A scene and what was noticed while reading it.
@@ -83,15 +84,55 @@ pub fn import(
     detail_paths: &[PathBuf],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
+    let file = |is_detail| {
+        move |path: &PathBuf| SceneSource {
+            is_detail,
+            ..SceneSource::file(path)
+        }
+    };
+    let all = paths.iter().map(file(false));
+    import_sources(all.chain(detail_paths.iter().map(file(true))), options)
+}
+
+/// A scene on its way in: a file, or a stream such as standard input.
+pub struct SceneSource<'a> {
+    /// The file, or what the stream is called in messages; a name's ending tells the format where content leaves a doubt.
+    pub path: PathBuf,
+    /// Read instead of the file, up to [`Limits::max_file_bytes`]. What comes so has no folder, and refers to no files.
+    pub stream: Option<Box<dyn Read + 'a>>,
+    /// Whether all its objects are detail.
+    pub is_detail: bool,
+}
+
+impl SceneSource<'_> {
+    /// A file whose objects have the roles that they seem to have.
+    #[must_use]
+    pub fn file(path: &Path) -> Self {
+        Self {
+            path: path.to_path_buf(),
+            stream: None,
+            is_detail: false,
+        }
+    }
+}
+
+/// [`import`], from files and streams; the stream of each is read to its end before the next source is begun.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn import_sources<'a>(
+    sources: impl IntoIterator<Item = SceneSource<'a>>,
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
     let mut builder = Builder::new(options)?;
-    let all = paths
-        .iter()
-        .map(|p| (p, false))
-        .chain(detail_paths.iter().map(|p| (p, true)));
-    for (path, is_detail) in all {
-        let bytes = files::read_file(path, options.limits.max_file_bytes)?;
-        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        builder.begin_file(path, Some(&folder), is_detail);
+    for source in sources {
+        let (path, limit) = (&source.path, options.limits.max_file_bytes);
+        let (bytes, folder) = match source.stream {
+            None => (files::read_file(path, limit)?, path.parent()),
+            Some(stream) => (files::read_up_to(stream, path, limit)?, None),
+        };
+        builder.begin_file(path, folder, source.is_detail);
         builder.add_read_bytes(bytes.len() as u64);
         read_any(&bytes, path, &mut builder)?;
     }

@@ -1,6 +1,6 @@
 //! What a world says about its cells in numbers: boxes, volumes, counts and names.
 
-use enfilade_cpg::{CellId, Seals, World};
+use enfilade_cpg::{CellId, DetailObject, Seals, World};
 
 use crate::locator_cells::measure;
 use crate::subject::to_dvec;
@@ -40,9 +40,7 @@ fn check_counts(world: &World, out: &mut Vec<String>) {
         add(&mut structural, &batch.cells, batch.primitive.indices.len());
     }
     for object in &world.details {
-        let mesh = &world.detail_meshes[object.mesh as usize];
-        let n = mesh.primitives.iter().map(|p| p.indices.len()).sum();
-        add(&mut detail, &object.cells, n);
+        add(&mut detail, &object.cells, n_indices(world, object));
     }
     for (i, cell) in world.graph.cells.iter().enumerate() {
         let pairs = [
@@ -59,12 +57,35 @@ fn check_counts(world: &World, out: &mut Vec<String>) {
             }
         }
     }
+    let total = |sums: &mut dyn Iterator<Item = usize>| sums.sum::<usize>() / 3;
+    let of_batches = world.batches.iter().filter(|b| !b.is_seal);
+    let structure = total(&mut of_batches.map(|b| b.primitive.indices.len()));
+    let details = total(&mut world.details.iter().map(|d| n_indices(world, d)));
+    let count = |name: &str| world.graph.statistics.counts.get(name);
+    // Only who counted both says how many are of details.
+    if let (Some(&all), Some(&structural)) =
+        (count("input_triangles"), count("structural_triangles"))
+    {
+        for (what, said, found) in [
+            ("structural triangles", structural, structure),
+            ("triangles of details", all - structural, details),
+        ] {
+            if said != found as f64 {
+                out.push(format!("{said} {what} were baked, {found} are there"));
+            }
+        }
+    }
     // Later work may cut a seal in two, but never takes one away.
     let said = world.graph.statistics.counts.get("seals");
     let found = Seals::of(world).count;
     if let Some(said) = said.filter(|&&said| said > found as f64) {
         out.push(format!("{said} seals were made, {found} are there"));
     }
+}
+
+fn n_indices(world: &World, object: &DetailObject) -> usize {
+    let mesh = &world.detail_meshes[object.mesh as usize];
+    mesh.primitives.iter().map(|p| p.indices.len()).sum()
 }
 
 fn add(sums: &mut [usize], cells: &[CellId], n: usize) {

@@ -68,7 +68,7 @@ fn problem(world: &World, detail: &DetailObject, rounding: f64) -> Option<String
     }
 }
 
-fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
+pub(crate) fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
     let by = DMat4::from_cols_array(&detail.transform.map(f64::from));
     let mut out = Vec::new();
     for p in &world.detail_meshes[detail.mesh as usize].primitives {

@@ -2,7 +2,10 @@
 
 use std::collections::HashSet;
 
-use enfilade_geom::{Bvh, Triangle};
+use enfilade_cpg::World;
+use enfilade_geom::{Aabb, Bvh, Triangle};
+
+use crate::details;
 
 /// Triangles of each that are looked for on the other's surface, at most.
 const ASKED: usize = 2000;
@@ -51,4 +54,148 @@ fn percent_on(of: &[Triangle], within: &[Triangle], reach: f64) -> usize {
         n += 1;
     }
     100 * there / n.max(1)
+}
+
+/// A detail object of the scene that a world was baked from, in world space.
+pub struct SourceDetail {
+    /// What it is called.
+    pub name: String,
+    /// Its triangles.
+    pub triangles: Vec<Triangle>,
+}
+
+/// One object of either side.
+struct Shape {
+    /// Its number on its side.
+    id: usize,
+    name: String,
+    n: usize,
+    bounds: Aabb,
+    is_met: bool,
+}
+
+impl Shape {
+    /// `None` without triangles.
+    fn of(id: usize, name: &str, triangles: &[Triangle]) -> Option<Self> {
+        (!triangles.is_empty()).then(|| Self {
+            id,
+            name: name.to_owned(),
+            n: triangles.len(),
+            bounds: Aabb::of_points(triangles.iter().flatten()),
+            is_met: false,
+        })
+    }
+
+    /// What rounding may have moved of it. [Units: wu]
+    fn slack(&self) -> f64 {
+        let largest = self.bounds.min.abs().max(self.bounds.max.abs());
+        SLACK + ROUNDING * largest.max_element()
+    }
+
+    fn is_before(&self, other: &Self) -> bool {
+        let is_left = || self.bounds.min.x < other.bounds.min.x - other.slack();
+        self.n < other.n || (self.n == other.n && is_left())
+    }
+}
+
+/// What writing positions and transforms in `f32` may move, at the origin and by the distance from it. [Units: wu]
+const SLACK: f64 = 1e-4;
+const ROUNDING: f64 = 2e-6;
+
+/// Objects named at most, of those that lack a partner.
+const NAMED: usize = 10;
+
+/// Whether a world has the details of its source, each where it was: problems, a line each. `source` gives the one of a number
+/// below `n`, and may be asked for it several times.
+///
+/// A detail that was moved, changed, added or taken away is found, whatever the world's counts say. Triangles are compared in
+/// their order, which no writer of ours changes; objects in any. Linear in triangles and `O(n log n)` in objects, as long as few
+/// that differ lie in one place.
+#[must_use]
+pub fn compare_details(
+    world: &World,
+    n: usize,
+    source: impl Fn(usize) -> SourceDetail,
+) -> Vec<String> {
+    let of_world = |i: usize| details::triangles_of(world, &world.details[i]);
+    let numbered = world.details.iter().enumerate();
+    let mut own: Vec<Shape> = numbered
+        .filter_map(|(i, d)| Shape::of(i, &d.name, &of_world(i)))
+        .collect();
+    let mut theirs: Vec<Shape> = (0..n)
+        .filter_map(|i| {
+            let detail = source(i);
+            Shape::of(i, &detail.name, &detail.triangles)
+        })
+        .collect();
+    // By where they begin, so that only what is near is compared.
+    for shapes in [&mut own, &mut theirs] {
+        shapes.sort_by(|a, b| {
+            let by_place = a.bounds.min.x.total_cmp(&b.bounds.min.x);
+            a.n.cmp(&b.n).then(by_place).then(a.id.cmp(&b.id))
+        });
+    }
+    let mut first = 0;
+    for shape in &mut theirs {
+        while own
+            .get(first)
+            .is_some_and(|o| o.is_met || o.is_before(shape))
+        {
+            first += 1;
+        }
+        let triangles = source(shape.id).triangles;
+        let near = own[first..].iter_mut();
+        let mut near = near.take_while(|o| !shape.is_before(o));
+        let met = near.find(|o| {
+            let bounds = [
+                o.bounds.min - shape.bounds.min,
+                o.bounds.max - shape.bounds.max,
+            ];
+            let is_near = bounds
+                .iter()
+                .all(|d| d.abs().max_element() <= shape.slack());
+            !o.is_met && is_near && is_same(&of_world(o.id), &triangles, shape.slack())
+        });
+        if let Some(met) = met {
+            met.is_met = true;
+            shape.is_met = true;
+        }
+    }
+    unmet(&theirs, &own)
+}
+
+fn is_same(a: &[Triangle], b: &[Triangle], slack: f64) -> bool {
+    let corners = a.iter().flatten().zip(b.iter().flatten());
+    corners
+        .into_iter()
+        .all(|(p, q)| (*p - *q).abs().max_element() <= slack)
+}
+
+/// Those that lack a partner, a line each.
+fn unmet(theirs: &[Shape], own: &[Shape]) -> Vec<String> {
+    let n_met = own.iter().filter(|s| s.is_met).count();
+    if 2 * n_met < own.len().max(theirs.len()) {
+        return vec![format!(
+            "the source's details are those of another scene, or were read by other settings than in the bake: {n_met} of its {} \
+             are among the world's {}",
+            theirs.len(),
+            own.len()
+        )];
+    }
+    let mut out = Vec::new();
+    for (shapes, lack) in [
+        (theirs, "the world lacks a detail of the source"),
+        (own, "the source has no such detail there"),
+    ] {
+        let alone = || shapes.iter().filter(|s| !s.is_met);
+        out.extend(alone().take(NAMED).map(|s| {
+            let c = s.bounds.center();
+            format!("{lack}: {:?}, {} triangles around {c:.3}", s.name, s.n)
+        }));
+        let more = alone().count().saturating_sub(NAMED);
+        if more > 0 {
+            out.push(format!("{lack}: {more} more"));
+        }
+    }
+    out
 }

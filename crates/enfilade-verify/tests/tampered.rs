@@ -7,10 +7,10 @@ use std::sync::LazyLock;
 
 use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::wire::{decode_glb, encode_glb};
-use enfilade_cpg::{CellId, CellSet, Locator, Portal, PortalId, Pvs, World};
-use enfilade_geom::DVec3;
+use enfilade_cpg::{CellId, CellSet, Locator, Portal, PortalId, PortalKind, Pvs, World};
+use enfilade_geom::{DMat4, DVec3};
 use enfilade_testkit::{Fault, furnished_house};
-use enfilade_verify::{VerifyOptions, VerifyReport, verify_world};
+use enfilade_verify::{SourceDetail, VerifyOptions, VerifyReport, compare_details, verify_world};
 use serde_json::Value;
 
 /// A house with furniture: rooms on two storeys, doors, windows, a stair.
@@ -189,6 +189,30 @@ const CHANGES: &[(&str, Change)] = &[
         for (cell, n) in w.graph.cells.iter_mut().zip(counts) {
             cell.n_detail_triangles = n;
         }
+    }),
+    ("a detail taken away", |w, at| {
+        w.details.remove(detail(w, at));
+    }),
+    ("a window that is called a door", |w, at| {
+        let i = pick(w.graph.portals.len(), at, |i| {
+            w.graph.portals[i].kind == PortalKind::Window
+        });
+        w.graph.portals[i].kind = PortalKind::Door;
+    }),
+    ("a window that is called open", |w, at| {
+        let i = pick(w.graph.portals.len(), at, |i| {
+            w.graph.portals[i].kind == PortalKind::Window
+        });
+        w.graph.portals[i].kind = PortalKind::Open;
+    }),
+    ("a door that is called a window", |w, at| {
+        let i = pick(w.graph.portals.len(), at, |i| {
+            w.graph.portals[i].kind == PortalKind::Door
+        });
+        w.graph.portals[i].kind = PortalKind::Window;
+    }),
+    ("a wide crack", |w, at| {
+        portal(w, at).kind = PortalKind::Crack;
     }),
     ("a halved box", |w, at| {
         let i = room(w, at);
@@ -475,4 +499,103 @@ fn an_unrelated_source_is_named_as_such() {
         let said = report.problems.iter().any(|p| p.contains("another scene"));
         assert!(said, "{report}");
     }
+}
+
+/// A detail of a world, as of the scene that it was baked from.
+fn detail_of(w: &World, i: usize) -> SourceDetail {
+    let d = &w.details[i];
+    let by = DMat4::from_cols_array(&d.transform.map(f64::from));
+    let mut triangles = Vec::new();
+    for p in &w.detail_meshes[d.mesh as usize].primitives {
+        let at = |i: u32| {
+            let local = DVec3::from(p.positions[i as usize].map(f64::from));
+            by.transform_point3(local)
+        };
+        let corners = p.indices.chunks_exact(3);
+        triangles.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
+    }
+    SourceDetail {
+        name: d.name.clone(),
+        triangles,
+    }
+}
+
+#[test]
+fn details_are_where_the_source_has_them() {
+    let n = HOUSE.details.len();
+    let problems = |w: &World| compare_details(w, n, |i| detail_of(&HOUSE, i));
+    assert_eq!(problems(&HOUSE), [""; 0]);
+    // Order says nothing.
+    let mut turned = HOUSE.clone();
+    turned.details.reverse();
+    assert_eq!(problems(&turned), [""; 0]);
+    let changes: [(&str, Change); 5] = [
+        ("moved within its room", |w, at| {
+            let i = detail(w, at);
+            w.details[i].transform[12] += 0.01;
+        }),
+        ("turned about where it is", |w, at| {
+            let i = detail(w, at);
+            let t = &mut w.details[i].transform;
+            let by = DMat4::from_cols_array(&t.map(f64::from));
+            let spun = by * DMat4::from_rotation_y(0.1);
+            *t = spun.to_cols_array().map(|v| v as f32);
+        }),
+        ("taken away, and never counted", |w, at| {
+            let i = detail(w, at);
+            w.details.remove(i);
+        }),
+        ("twice", |w, at| {
+            let twice = w.details[detail(w, at)].clone();
+            w.details.push(twice);
+        }),
+        ("of another shape", |w, at| {
+            let mesh = w.details[detail(w, at)].mesh as usize;
+            w.detail_meshes[mesh].primitives[0].positions[0][1] += 0.01;
+        }),
+    ];
+    for (name, change) in changes {
+        for place in 0..3 {
+            let mut world = HOUSE.clone();
+            change(&mut world, place);
+            let said = problems(&world);
+            assert!(!said.is_empty() && said.len() <= 22, "{name}: {said:?}");
+            assert!(!said[0].contains("another scene"), "{name}: {said:?}");
+        }
+    }
+    let said = compare_details(&HOUSE, 0, |i| detail_of(&HOUSE, i));
+    assert!(said.len() == 1 && said[0].contains("other settings"));
+}
+
+#[test]
+fn kinds_of_portals_are_those_of_the_rule_as_far_as_a_file_tells() {
+    let is_found = |change: &dyn Fn(&mut World)| {
+        let mut world = HOUSE.clone();
+        change(&mut world);
+        !verify(&world, 0).holds()
+    };
+    let first = |kind| {
+        HOUSE
+            .graph
+            .portals
+            .iter()
+            .position(|p| p.kind == kind)
+            .unwrap()
+    };
+    let window = first(PortalKind::Window);
+    let as_door = |w: &mut World| w.graph.portals[window].kind = PortalKind::Door;
+    assert!(is_found(&as_door));
+    // Who cuts portals or has another rule says so, and is not judged by this one.
+    let by_another = |w: &mut World| {
+        as_door(w);
+        w.graph.provenance.generator = "another".into();
+    };
+    let edited = |w: &mut World| {
+        as_door(w);
+        w.graph.statistics.counts.insert("edits".into(), 1.0);
+    };
+    assert!(!is_found(&by_another) && !is_found(&edited));
+    // What a leaf decides is not judged.
+    let door = first(PortalKind::Door);
+    assert!(!is_found(&|w| w.graph.portals[door].kind = PortalKind::Open));
 }

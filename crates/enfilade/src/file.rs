@@ -1,11 +1,12 @@
 //! World files by path.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use enfilade_cpg::World;
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+
+use crate::whole;
 
 /// Why a world could not be read or written. Messages say which file and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -56,7 +57,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<World, FileError> {
     })
 }
 
-/// Writes a world as one GLB, aside first and then renamed: nobody finds half a file. Linear in the world.
+/// Writes a world as one GLB, [whole or not at all](crate::whole), and removes what killed runs left beside it. Linear in the world.
 ///
 /// # Errors
 ///
@@ -67,15 +68,9 @@ pub fn save(path: impl AsRef<Path>, world: &World) -> Result<(), FileError> {
         path: path.into(),
         source,
     })?;
-    let mut aside = OsString::from(path);
-    aside.push(format!(".{}.part", std::process::id()));
-    let written = fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, path));
-    written.map_err(|source| {
-        // What is left of it is of no use; that the first failure is told matters more than this one.
-        let _ = fs::remove_file(&aside);
-        FileError::Write {
-            path: path.into(),
-            source,
-        }
+    whole::remove_left(&[path]);
+    whole::write(path, &bytes).map_err(|source| FileError::Write {
+        path: path.into(),
+        source,
     })
 }

@@ -106,6 +106,7 @@
 //! | --- | --- | --- |
 //! | always | [`cpg`] | the graph, its invariants, the locator, and the file ([`cpg::wire`]) |
 //! | always | [`runtime`] | questions per frame |
+//! | always | [`whole`] | files that are written whole or not at all |
 //! | always | [`geom`] | boxes, planes, windings, the scene, the bounding volume hierarchy |
 //! | `import` | `import` | reads glTF, OBJ, PLY and STL into one [`Scene`](geom::scene::Scene) |
 //! | `bake` | `bake` | scene → [`World`]: finds cells and portals |
@@ -127,6 +128,7 @@
 //! moves (door leaves, furniture) is detail: it bounds no cell.
 
 mod file;
+pub mod whole;
 
 pub use enfilade_cpg as cpg;
 pub use enfilade_geom as geom;

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use enfilade::FileError;
+use enfilade::{FileError, whole};
 use enfilade_testkit::{GridParams, room_grid};
 
 fn folder(name: &str) -> PathBuf {
@@ -17,6 +17,8 @@ fn what_is_saved_is_opened_again_and_nothing_else_is_left() {
     let folder = folder("saved");
     let path = folder.join("world.glb");
     let mut world = room_grid(&GridParams::offices(12, 1));
+    // What a run left that was killed while it saved.
+    std::fs::write(folder.join(".world.glb.4000000-1.tmp"), "half").unwrap();
     enfilade::save(&path, &world).unwrap();
     assert_eq!(enfilade::open(&path).unwrap().graph, world.graph);
     // A broken world is refused, and the file stays as it was.
@@ -46,5 +48,26 @@ fn errors_name_the_file() {
     let world = room_grid(&GridParams::offices(2, 1));
     let nowhere = enfilade::save(path.join("world.glb"), &world).unwrap_err();
     assert!(matches!(nowhere, FileError::Write { .. }), "{nowhere}");
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn threads_that_write_to_one_path_leave_one_whole_file() {
+    let folder = folder("threads");
+    let path = folder.join("w.glb");
+    std::thread::scope(|scope| {
+        for byte in 0..8_u8 {
+            let path = &path;
+            scope.spawn(move || {
+                for _ in 0..20 {
+                    whole::remove_left(&[path]);
+                    whole::write(path, &[byte; 50_000]).unwrap();
+                }
+            });
+        }
+    });
+    let bytes = std::fs::read(&path).unwrap();
+    assert!(bytes.len() == 50_000 && bytes.iter().all(|b| *b == bytes[0]));
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
     std::fs::remove_dir_all(&folder).unwrap();
 }

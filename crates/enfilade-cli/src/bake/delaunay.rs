@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use enfilade::bake::delaunay::{Choices, DelaunayConfig, Weight};
 use enfilade::geom::DVec3;
+use enfilade_cli::input::{name_of, read_text};
 
 #[derive(clap::Args)]
 pub(crate) struct DelaunayOptions {
@@ -64,12 +65,11 @@ struct ChoicesFile {
 }
 
 fn read_choices(path: &Path) -> anyhow::Result<Choices> {
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("cannot read choices {}", path.display()))?;
+    let text = read_text("choices", path)?;
     let file: ChoicesFile = toml::from_str(&text).with_context(|| {
         format!(
             "choices {} are not understood; correct or remove the line",
-            path.display()
+            name_of(path)
         )
     })?;
     let points = |list: Vec<[f64; 3]>| list.into_iter().map(DVec3::from_array).collect();

@@ -13,6 +13,8 @@ use enfilade::geom::scene::Scene;
 use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{ImportOptions, RepairOptions, RoleRules, Up};
 
+use enfilade_cli::input::{name_of, read_text};
+
 use super::values::{
     Amount, Budget, Hole, Length, Unit, Weld, parse_hole, parse_length, parse_point, parse_unit,
     parse_weld,
@@ -215,12 +217,11 @@ struct MergeTable {
 
 impl ConfigFile {
     fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .with_context(|| format!("cannot read settings {}", path.display()))?;
+        let text = read_text("settings", path)?;
         toml::from_str(&text).with_context(|| {
             format!(
                 "settings {} are not understood; correct or remove the line",
-                path.display()
+                name_of(path)
             )
         })
     }

@@ -23,7 +23,8 @@ use winit::window::{Window, WindowId};
 
 use self::panel::{Panel, Shown};
 use self::walker::Walker;
-use crate::output::{Outputs, write_atomically};
+use crate::formats::Format;
+use crate::output::{Outputs, refuse_stream, write_whole};
 use crate::render::portal_marks;
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
@@ -58,13 +59,16 @@ pub(crate) struct View {
     adapter: AdapterChoice,
 }
 
-impl View {
-    fn outputs(&self) -> Outputs {
-        Outputs::reading([&self.world].into_iter().chain(&self.path))
-    }
-}
-
 pub(crate) fn run(args: &View) -> anyhow::Result<()> {
+    let outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
+    // Where they may be written is asked when a key asks for them: most walks write nothing.
+    for (option, format, path) in [
+        ("--record", Format::Cameras, &args.record),
+        ("--screenshot", Format::Picture, &args.screenshot),
+    ] {
+        refuse_stream(option, path, "files of a walk")?;
+        format.check(option, path)?;
+    }
     let path = args
         .path
         .as_deref()
@@ -79,6 +83,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         lines: Sightlines::build(&world),
         world,
         path: path.map(Into::into),
+        outputs,
         open: None,
         failed: None,
     };
@@ -95,6 +100,8 @@ struct App<'a> {
     lines: Sightlines,
     /// Cameras still to come.
     path: Option<VecDeque<Camera>>,
+    /// What was read, and what was written in this walk.
+    outputs: Outputs,
     open: Option<Open>,
     failed: Option<anyhow::Error>,
 }
@@ -287,11 +294,10 @@ impl App<'_> {
             KeyCode::F5 => {
                 if let Some(path) = open.recorded.take() {
                     let record = &self.args.record;
-                    match self.args.outputs().write("--record", record) {
-                        Ok(()) => {
-                            write_atomically(record, path_text(&path).as_bytes())?;
-                            open.say(format!("wrote {}", record.display()));
-                        }
+                    let text = path_text(&path);
+                    let written = self.outputs.write("--record", Format::Cameras, record);
+                    match written.and_then(|()| write_whole(record, text.as_bytes())) {
+                        Ok(()) => open.say(format!("wrote {}", record.display())),
                         // What was walked stays, and so does the window.
                         Err(why) => {
                             open.recorded = Some(path);
@@ -300,7 +306,7 @@ impl App<'_> {
                     }
                 }
             }
-            KeyCode::F12 => open.shot(self.args, &self.world)?,
+            KeyCode::F12 => open.shot(self.args, &self.world, &mut self.outputs)?,
             _ => {}
         }
         Ok(())
@@ -482,7 +488,7 @@ impl Open {
     }
 
     /// A picture of the world as it is shown now, without the panel.
-    fn shot(&mut self, args: &View, world: &World) -> anyhow::Result<()> {
+    fn shot(&mut self, args: &View, world: &World, outputs: &mut Outputs) -> anyhow::Result<()> {
         self.n_shots += 1;
         let stem = args
             .screenshot
@@ -501,11 +507,13 @@ impl Open {
         let size = [self.config.width, self.config.height];
         let leaves = self.leaves(world);
         let picture = studio.picture(&camera, self.culling, self.style(), &leaves, size)?;
-        if let Err(why) = args.outputs().write("--screenshot", &to) {
+        let png = picture.to_png()?;
+        let written = outputs.write("--screenshot", Format::Picture, &to);
+        if let Err(why) = written.and_then(|()| write_whole(&to, &png)) {
+            // The walk goes on.
             self.say(format!("{why:#}"));
             return Ok(());
         }
-        write_atomically(&to, &picture.to_png()?)?;
         let [drawn, ..] = self.shown.counts;
         self.say(format!("wrote {}, {drawn} triangles", to.display()));
         Ok(())

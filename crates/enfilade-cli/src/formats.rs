@@ -1,0 +1,151 @@
+//! What the outputs hold, and the extensions that say so.
+
+use std::path::Path;
+
+use anyhow::bail;
+
+/// What a command writes to a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    World,
+    PortalFile,
+    Plan,
+    Page,
+    Picture,
+    Cameras,
+    Choices,
+    Leak,
+    Visible,
+    Pairs,
+    Statistics,
+    Evidence,
+    Search,
+}
+
+struct Row {
+    format: Format,
+    /// In words, with an article.
+    name: &'static str,
+    /// That say what it is, in lower case; the first is the usual one.
+    extensions: &'static [&'static str],
+    /// Whether it may go to standard output.
+    is_streamed: bool,
+}
+
+const fn row(format: Format, name: &'static str, extensions: &'static [&'static str]) -> Row {
+    Row {
+        format,
+        name,
+        extensions,
+        // A search that was saved is read again.
+        is_streamed: !matches!(format, Format::Search),
+    }
+}
+
+/// The outputs of all commands.
+const TABLE: [Row; 13] = [
+    row(Format::World, "a world, one GLB", &["glb"]),
+    row(Format::PortalFile, "a Quake portal file", &["prt"]),
+    row(Format::Plan, "a floor plan as SVG", &["svg"]),
+    row(Format::Page, "a page of HTML", &["html", "htm"]),
+    row(Format::Picture, "a picture as PNG", &["png"]),
+    row(Format::Cameras, "cameras as text", &["txt", "path"]),
+    row(Format::Choices, "decisions as TOML", &["toml"]),
+    row(
+        Format::Leak,
+        "a way as lines of text",
+        &["pts", "lin", "txt"],
+    ),
+    row(Format::Visible, "visible sets as text", &["pvs", "txt"]),
+    row(Format::Pairs, "pairs as text", &["txt"]),
+    row(Format::Statistics, "statistics as JSON", &["json"]),
+    row(Format::Evidence, "evidence", &["ev", "evidence"]),
+    row(
+        Format::Search,
+        "a search to go on with",
+        &["search", "checkpoint"],
+    ),
+];
+
+/// Extensions of what no command writes.
+const FOREIGN: [&str; 38] = [
+    "3ds", "avif", "blend", "bmp", "bsp", "csv", "dae", "dxf", "exr", "fbx", "gif", "gltf", "gz",
+    "ifc", "jpeg", "jpg", "ktx2", "map", "md", "mtl", "obj", "pdf", "ply", "ppm", "stl", "svgz",
+    "tga", "tif", "tiff", "usd", "usda", "usdc", "usdz", "webp", "xml", "yaml", "yml", "zip",
+];
+
+impl Format {
+    fn row(self) -> &'static Row {
+        let row = TABLE.iter().find(|row| row.format == self);
+        row.expect("each format has a row")
+    }
+
+    /// Refuses a name whose extension says that the file holds something else. Extensions that nobody knows say nothing:
+    /// a temporary name is as good as any.
+    pub(crate) fn check(self, option: &str, path: &Path) -> anyhow::Result<()> {
+        let row = self.row();
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let extension = extension.to_ascii_lowercase();
+        let is_known = |e: &str| {
+            let mut ours = TABLE.iter().flat_map(|row| row.extensions);
+            FOREIGN.contains(&e) || ours.any(|other| *other == e)
+        };
+        if row.extensions.contains(&&*extension) || !is_known(&extension) {
+            return Ok(());
+        }
+        let fit: Vec<String> = row.extensions.iter().map(|e| format!(".{e}")).collect();
+        bail!(
+            "{}: {option} writes {}, which .{extension} contradicts; {} fits",
+            path.display(),
+            row.name,
+            fit.join(" or ")
+        );
+    }
+
+    /// Refuses standard output for what is of no use there.
+    pub(crate) fn check_stream(self, option: &str) -> anyhow::Result<()> {
+        let row = self.row();
+        if !row.is_streamed {
+            bail!(
+                "{option} writes {}, which is read again; give it a file, not '-'",
+                row.name
+            );
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_extension_that_contradicts_is_refused_with_those_that_fit() {
+        let refused = |format: Format, path: &str| {
+            let error = format.check("-o", Path::new(path)).err();
+            error.map(|e| e.to_string())
+        };
+        for (format, path) in [
+            (Format::Plan, "x.SVG"),
+            (Format::Plan, "x"),
+            (Format::Plan, "/dev/stdout"),
+            (Format::Plan, "tmp.Xq3kf"),
+            (Format::Page, "x.htm"),
+            (Format::Visible, "v1.2"),
+            (Format::Cameras, "walk.txt"),
+        ] {
+            assert_eq!(refused(format, path), None);
+        }
+        for (format, path, fits) in [
+            (Format::Plan, "x.png", ".svg fits"),
+            (Format::World, "x.glb.OBJ", ".glb fits"),
+            (Format::World, "x.txt", ".glb fits"),
+            (Format::Page, "x.svg", ".html or .htm fits"),
+            (Format::Picture, "x.jpg", ".png fits"),
+            (Format::Statistics, "x.txt", ".json fits"),
+        ] {
+            let error = refused(format, path).unwrap();
+            assert!(error.ends_with(fits), "{error}");
+        }
+    }
+}

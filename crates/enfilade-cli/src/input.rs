@@ -1,0 +1,118 @@
+//! What commands read: files, and standard input for `-`.
+
+use std::fs::File;
+use std::io::{self, Read, StdinLock};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
+
+/// Whether a path stands for standard input or output. A file of that name is `./-`.
+#[must_use]
+pub fn is_stream(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// What an input is called in messages.
+#[must_use]
+pub fn name_of(path: &Path) -> String {
+    if is_stream(path) {
+        "standard input".into()
+    } else {
+        path.display().to_string()
+    }
+}
+
+/// Reads a file, or standard input, of at most as many bytes as a scene may have ([`Limits::max_file_bytes`]).
+///
+/// A GLB says in its head how long it is: of what does not end there, no more than a byte is read.
+///
+/// # Errors
+///
+/// What cannot be read, or is longer; the error names it.
+pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    read_headed(path, |head| glb_length(head).unwrap_or(u64::MAX))
+        .with_context(|| cannot_read(path))
+}
+
+/// [`read`], of what is nothing but a GLB: of anything else, only the head is read.
+///
+/// # Errors
+///
+/// As [`read`]; not for what is no GLB, of which a decoder has more to say.
+pub fn read_glb(path: &Path) -> anyhow::Result<Vec<u8>> {
+    read_headed(path, |head| glb_length(head).unwrap_or(0)).with_context(|| cannot_read(path))
+}
+
+/// [`read`], as text. `what` it is stands in the errors, as in "cannot read settings a.toml".
+///
+/// # Errors
+///
+/// As [`read`], and what is no UTF-8.
+pub fn read_text(what: &str, path: &Path) -> anyhow::Result<String> {
+    let read = || {
+        let bytes = read_headed(path, |_| u64::MAX)?;
+        String::from_utf8(bytes).map_err(io::Error::other)
+    };
+    read().with_context(|| format!("cannot read {what} {}", name_of(path)))
+}
+
+/// Reads scenes as [`import`](enfilade::import::import) does; one of them may be standard input.
+///
+/// # Errors
+///
+/// As [`import`](enfilade::import::import).
+pub fn import_scene(
+    paths: &[PathBuf],
+    detail_paths: &[PathBuf],
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
+    let mut stdin: Option<StdinLock<'_>> = None;
+    let all = || paths.iter().chain(detail_paths);
+    if all().any(|p| is_stream(p)) {
+        stdin = Some(io::stdin().lock());
+    }
+    let mut sources: Vec<SceneSource<'_>> = all().map(|p| SceneSource::file(p)).collect();
+    for (i, (source, path)) in sources.iter_mut().zip(all()).enumerate() {
+        source.is_detail = i >= paths.len();
+        if is_stream(path)
+            && let Some(stdin) = stdin.take()
+        {
+            source.stream = Some(Box::new(stdin));
+            source.path = name_of(path).into();
+        }
+    }
+    import_sources(sources, options)
+}
+
+const HEAD: u64 = 12;
+
+/// The length that a GLB says it has.
+fn glb_length(head: &[u8]) -> Option<u64> {
+    let length = head.strip_prefix(b"glTF")?.get(4..8)?;
+    Some(u32::from_le_bytes(length.try_into().ok()?).into())
+}
+
+fn cannot_read(path: &Path) -> String {
+    format!("cannot read {}", name_of(path))
+}
+
+fn read_headed(path: &Path, length: impl Fn(&[u8]) -> u64) -> io::Result<Vec<u8>> {
+    let limit = Limits::default().max_file_bytes;
+    let mut from: Box<dyn Read> = if is_stream(path) {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(File::open(path)?)
+    };
+    let mut bytes = Vec::new();
+    from.by_ref().take(HEAD).read_to_end(&mut bytes)?;
+    // One more, which tells whoever decodes it that there is too much.
+    let most = length(&bytes).min(limit).saturating_add(1);
+    from.take(most.saturating_sub(HEAD))
+        .read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        let text = format!("more than {limit} bytes, which is the most that is read");
+        return Err(io::Error::other(text));
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,148 @@
+//! Kinds of portals, as far as a file tells what they must be.
+//!
+//! A crack is narrow and a door stands upright, whoever made the world. What a bake of this version calls a window, a door or
+//! an opening follows from a sill and a height, too, unless the portals were cut since. Whether a leaf or a pane fills an
+//! opening is not judged: that depends on the scene's materials and on the bake's settings, so a door that is called an
+//! opening, or an opening a door, is not found.
+//!
+//! Sills are found anew, by the triangles of the file; what is within a rounding of the other kind is left alone.
+
+use enfilade_cpg::{Portal, PortalKind, World};
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle, Winding};
+
+use crate::subject::to_dvec;
+
+/// Every piece of a crack is narrower than this. [Units: wu]
+const CRACK_WIDTH: f64 = 0.05;
+/// An opening is upright if its normal rises less than this.
+const UPRIGHT: f64 = 0.5;
+/// What stands higher over the ground has a sill. [Units: wu]
+const SILL: f64 = 0.4;
+/// A lower opening is no door. [Units: wu]
+const LEAST_DOOR: f64 = 1.5;
+/// What outlines were grown by, and more: nearer to a bound than this, nothing is judged. [Units: wu]
+const ROOM: f64 = 0.02;
+/// Distance from an opening where the ground is looked for. [Units: wu]
+const BESIDE: f64 = 0.5;
+
+/// Problems, a line each.
+pub(crate) fn check(world: &World, own: &[Triangle]) -> Vec<String> {
+    let is_by_rule = is_by_rule(world);
+    let ground = is_by_rule.then(|| Bvh::build(own));
+    let portals = world.graph.portals.iter().enumerate();
+    portals
+        .filter_map(|(i, p)| {
+            let of_shape = shape_problem(p);
+            let what = of_shape.or_else(|| stance_problem(p, ground.as_ref()?))?;
+            Some(format!("portal {i} is called {}, but {what}", word(p.kind)))
+        })
+        .collect()
+}
+
+/// Whether all portals are as a bake of this version made them.
+fn is_by_rule(world: &World) -> bool {
+    let counts = &world.graph.statistics.counts;
+    let is_cut = ["edits", "cost_cuts"]
+        .iter()
+        .any(|name| counts.get(*name).is_some_and(|&n| n > 0.0));
+    let ours = concat!("enfilade ", env!("CARGO_PKG_VERSION"));
+    world.graph.provenance.generator == ours && !is_cut
+}
+
+fn word(kind: PortalKind) -> &'static str {
+    match kind {
+        PortalKind::Open => "open",
+        PortalKind::Door => "a door",
+        PortalKind::Window => "a window",
+        PortalKind::Crack => "a crack",
+    }
+}
+
+fn shape_problem(p: &Portal) -> Option<String> {
+    match p.kind {
+        PortalKind::Crack => {
+            let width = p
+                .pieces
+                .iter()
+                .map(|piece| width(piece))
+                .fold(0.0, f64::max);
+            (width > CRACK_WIDTH + ROOM).then(|| format!("is {width:.3} m wide"))
+        }
+        PortalKind::Door => (!is_upright(p)).then(|| "does not stand upright".to_owned()),
+        PortalKind::Open | PortalKind::Window => None,
+    }
+}
+
+/// What is wrong with the kind of an upright portal, by its height and its sill.
+fn stance_problem(p: &Portal, ground: &Bvh) -> Option<String> {
+    if p.kind == PortalKind::Crack || !is_upright(p) {
+        return None;
+    }
+    let heights = p.outline.iter().map(|c| f64::from(c[1]));
+    let [low, high] = heights.fold([f64::MAX, f64::MIN], |[a, b], y| [a.min(y), b.max(y)]);
+    let height = high - low;
+    let [least, most] = sills(p, low, ground);
+    match p.kind {
+        PortalKind::Door if height < LEAST_DOOR - ROOM => Some(format!("is {height:.2} m high")),
+        PortalKind::Door | PortalKind::Open if least > SILL + ROOM => {
+            Some(format!("stands {least:.2} m over the ground"))
+        }
+        // One of several pieces may be a bay, joined of panes that are lower.
+        PortalKind::Window
+            if p.pieces.len() == 1 && height > LEAST_DOOR + ROOM && most < SILL - ROOM =>
+        {
+            Some(format!("is {height:.2} m high and stands on the ground"))
+        }
+        _ => None,
+    }
+}
+
+fn is_upright(p: &Portal) -> bool {
+    f64::from(p.normal[1]).abs() < UPRIGHT
+}
+
+/// Least and greatest height over the ground on the higher side, of some points around the one that the rule asks at: a ray
+/// that falls beside an edge is not to decide. [Units: wu]
+fn sills(p: &Portal, low: f64, ground: &Bvh) -> [f64; 2] {
+    let corners: Vec<DVec3> = p.outline.iter().map(|&c| to_dvec(c)).collect();
+    let middle = Winding::new(corners).centroid();
+    let n = to_dvec(p.normal);
+    let out = DVec3::new(n.x, 0.0, n.z).normalize_or_zero();
+    let along = out.cross(DVec3::Y);
+    let mut bounds = [f64::INFINITY, 0.0_f64];
+    for (u, v) in [
+        (0.0, 0.0),
+        (ROOM, 0.0),
+        (-ROOM, 0.0),
+        (0.0, ROOM),
+        (0.0, -ROOM),
+    ] {
+        let drop = |side: f64| {
+            let foot =
+                DVec3::new(middle.x, low + 0.05, middle.z) + out * (BESIDE * side + u) + along * v;
+            let ray = Ray {
+                origin: foot,
+                direction: -DVec3::Y,
+                t_max: 100.0,
+            };
+            let hit = ground.closest_hit(&ray, |_| false);
+            hit.map_or(f64::INFINITY, |h| h.t - 0.05)
+        };
+        let sill = drop(1.0).min(drop(-1.0));
+        bounds = [bounds[0].min(sill), bounds[1].max(sill)];
+    }
+    bounds
+}
+
+/// Least distance between two parallel lines along an edge that hold the polygon. [Units: wu]
+fn width(piece: &[[f32; 3]]) -> f64 {
+    let points: Vec<DVec3> = piece.iter().map(|&c| to_dvec(c)).collect();
+    let n = points.len();
+    let across = |i: usize| {
+        let (a, b) = (points[i], points[(i + 1) % n]);
+        let along = (b - a).try_normalize()?;
+        let off = |p: &DVec3| (*p - a).reject_from_normalized(along).length();
+        Some(points.iter().map(off).fold(0.0, f64::max))
+    };
+    (0..n).filter_map(across).fold(f64::INFINITY, f64::min)
+}
