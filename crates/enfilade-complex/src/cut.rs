@@ -12,7 +12,7 @@
 //! Time: `O(V²E)` at worst and near-linear in practice for each pair of cells that leak; at most
 //! [`MAX_LEAVES`] leaves take part.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use enfilade_geom::Sets;
 
@@ -52,6 +52,7 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
         return;
     }
     let adjacency = Adjacency::of(graph, &cells.cell_of_leaf, &leaks);
+    let mut node_of = vec![NO_NODE; graph.volumes.len()];
     let mut moves: Vec<(u32, u32)> = Vec::new();
     for (pair, (_, facets)) in &leaks {
         // Earlier moves may have changed whose leaf it is.
@@ -59,8 +60,8 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
             graph,
             &cells.cell_of_leaf,
             &adjacency,
-            *pair,
-            facets,
+            &mut node_of,
+            (*pair, facets),
             &votes,
         ) {
             moves.push((leaf, to));
@@ -241,23 +242,26 @@ impl Adjacency {
     }
 }
 
-/// The leaves that change sides, with the cell they go to.
+/// Number of a leaf that takes no part in a cut.
+const NO_NODE: u32 = u32::MAX;
+
+/// The leaves that change sides, with the cell they go to. `node_of` has no node for any leaf, before and after.
 fn cut(
     graph: &LeafGraph,
     cell_of_leaf: &[u32],
     adjacency: &Adjacency,
-    pair: [u32; 2],
-    border: &[u32],
+    node_of: &mut [u32],
+    (pair, border): ([u32; 2], &[u32]),
     votes: &impl Fn(u32, u32) -> f64,
 ) -> Vec<(u32, u32)> {
     let cell = |leaf: u32| cell_of_leaf[leaf as usize];
     let is_ours = |leaf: u32| pair.contains(&cell(leaf));
     // The leaves around the border, nearest first.
-    let mut node_of: HashMap<u32, u32> = HashMap::new();
     let mut leaves: Vec<u32> = Vec::new();
     let mut take = |leaf: u32, leaves: &mut Vec<u32>| {
-        if is_ours(leaf) && leaves.len() < MAX_LEAVES && !node_of.contains_key(&leaf) {
-            node_of.insert(leaf, leaves.len() as u32);
+        let node = &mut node_of[leaf as usize];
+        if is_ours(leaf) && leaves.len() < MAX_LEAVES && *node == NO_NODE {
+            *node = leaves.len() as u32;
             leaves.push(leaf);
         }
     };
@@ -299,22 +303,25 @@ fn cut(
             let shows = f.candidate == NO_CANDIDATE && !f.is_gap;
             let each = if shows { PER_FACET } else { 0.0 };
             let cost = units(f.cost() + each);
-            match node_of.get(&other) {
-                Some(&j) if (j as usize) > i => {
+            match node_of[other as usize] {
+                // What lies beyond keeps its side.
+                NO_NODE if is_ours(other) => add(cell(other), cost),
+                // To a third cell the border stays a border on either side.
+                NO_NODE => {}
+                j if (j as usize) > i => {
                     flow.add(i, j as usize, cost, cost);
                     if cell(leaf) != cell(other) {
                         before += cost;
                     }
                 }
-                Some(_) => {}
-                // What lies beyond keeps its side.
-                None if is_ours(other) => add(cell(other), cost),
-                // To a third cell the border stays a border on either side.
-                None => {}
+                _ => {}
             }
         }
         before += if cell(leaf) == pair[0] { to_b } else { to_a };
         flow.tie(i, to_a, to_b);
+    }
+    for &leaf in &leaves {
+        node_of[leaf as usize] = NO_NODE;
     }
     let (after, is_a) = flow.cut();
     if after >= before {
