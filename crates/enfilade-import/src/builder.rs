@@ -191,6 +191,14 @@ impl<'a> Builder<'a> {
         self.n_read_bytes = self.n_read_bytes.saturating_add(n);
     }
 
+    /// Says that bytes read were unpacked, so that a compressed file may hold what it could in plain.
+    ///
+    /// Up to [`MAX_UNPACKING`] times what it is: what unpacks further has no more numbers in it, only more zeros.
+    pub(crate) fn add_unpacked_bytes(&mut self, packed: u64, plain: u64) {
+        let most = packed.saturating_mul(MAX_UNPACKING);
+        self.add_read_bytes(plain.min(most).saturating_sub(packed));
+    }
+
     /// Counts `n` pieces of `size` bytes before they are allocated.
     pub(crate) fn charge_memory(
         &mut self,
@@ -526,6 +534,9 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// How many times its size a compressed part counts as read. Triangles of buildings take 18 bytes or more in plain, and one or
+/// two compressed.
+const MAX_UNPACKING: u64 = 16;
 /// Room for an object, its texts aside.
 const OBJECT_BYTES: u64 = 2 * size_of::<Object>() as u64;
 /// A triangle in world space, as the decomposition holds it.

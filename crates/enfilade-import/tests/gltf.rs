@@ -184,7 +184,6 @@ fn a_deep_tree_is_refused_without_deep_recursion() {
 fn what_is_not_supported_says_what_to_do() {
     for (name, advice) in [
         ("KHR_draco_mesh_compression", "gltf-transform"),
-        ("EXT_meshopt_compression", "gltf-transform"),
         ("VENDOR_odd", "export without it"),
     ] {
         let error = error_of(&format!(

@@ -7,6 +7,8 @@ use std::borrow::Cow;
 pub(super) struct Document<'a> {
     pub(super) root: Root,
     pub(super) buffers: Vec<Option<Cow<'a, [u8]>>>,
+    /// By buffer view its bytes, where the buffer holds them compressed.
+    pub(super) plain_views: Vec<Option<Vec<u8>>>,
 }
 
 /// How a component is stored.
@@ -92,10 +94,10 @@ impl<'a> Document<'a> {
             .buffer_views
             .get(index as usize)
             .ok_or_else(|| format!("no buffer view {index}"))?;
-        let missing = || match &view.extensions {
-            Some(e) if e.meshopt.is_some() => MESHOPT.to_owned(),
-            _ => format!("buffer {} of buffer view {index} has no data", view.buffer),
-        };
+        if let Some(Some(plain)) = self.plain_views.get(index as usize) {
+            return Ok((plain, view));
+        }
+        let missing = || format!("buffer {} of buffer view {index} has no data", view.buffer);
         let buffer = self
             .buffers
             .get(view.buffer as usize)
@@ -215,9 +217,6 @@ impl<'a> Document<'a> {
         Ok(())
     }
 }
-
-/// What to say about meshopt; compared by the reader to give the right kind of error.
-pub(super) const MESHOPT: &str = "meshopt";
 
 /// `count` elements from `offset`, `stride` apart, the last one `size` long.
 fn span(bytes: &[u8], offset: u64, count: u64, stride: u64, size: u64) -> Result<&[u8], String> {

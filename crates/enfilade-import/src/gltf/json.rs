@@ -202,13 +202,36 @@ pub(super) struct BufferView {
     pub(super) byte_offset: u64,
     pub(super) byte_length: u64,
     pub(super) byte_stride: Option<u64>,
-    pub(super) extensions: Option<Box<ViewExtensions>>,
+    extensions: Option<Box<ViewExtensions>>,
+}
+
+impl BufferView {
+    /// How it is compressed, if it is.
+    pub(super) fn meshopt(&self) -> Option<&MeshoptDef> {
+        let extensions = self.extensions.as_ref()?;
+        extensions.khr.as_ref().or(extensions.ext.as_ref())
+    }
 }
 
 #[derive(serde::Deserialize)]
-pub(super) struct ViewExtensions {
-    #[serde(rename = "EXT_meshopt_compression", alias = "KHR_meshopt_compression")]
-    pub(super) meshopt: Option<serde::de::IgnoredAny>,
+struct ViewExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    ext: Option<MeshoptDef>,
+    #[serde(rename = "KHR_meshopt_compression")]
+    khr: Option<MeshoptDef>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MeshoptDef {
+    pub(super) buffer: u32,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    pub(super) byte_stride: u64,
+    pub(super) count: u64,
+    pub(super) mode: String,
+    pub(super) filter: Option<String>,
 }
 
 #[derive(serde::Deserialize)]
@@ -216,6 +239,30 @@ pub(super) struct ViewExtensions {
 pub(super) struct BufferDef {
     pub(super) uri: Option<String>,
     pub(super) byte_length: u64,
+    extensions: Option<Box<BufferExtensions>>,
+}
+
+impl BufferDef {
+    /// Whether it only stands for what compressed buffer views hold, so that readers without the codec find something.
+    pub(super) fn is_fallback(&self) -> bool {
+        let extensions = self.extensions.as_ref();
+        let either = extensions.map(|e| [&e.ext, &e.khr]);
+        either.is_some_and(|e| e.into_iter().flatten().any(|m| m.fallback))
+    }
+}
+
+#[derive(serde::Deserialize)]
+struct BufferExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    ext: Option<MeshoptBuffer>,
+    #[serde(rename = "KHR_meshopt_compression")]
+    khr: Option<MeshoptBuffer>,
+}
+
+#[derive(serde::Deserialize)]
+struct MeshoptBuffer {
+    #[serde(default)]
+    fallback: bool,
 }
 
 #[derive(serde::Deserialize)]

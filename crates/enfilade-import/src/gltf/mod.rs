@@ -7,11 +7,12 @@
 mod accessor;
 mod json;
 mod look;
+mod meshopt;
 mod primitive;
 
 use crate::builder::{Builder, Placement};
 use crate::{ImportError, files};
-use accessor::{Document, MESHOPT};
+use accessor::Document;
 use enfilade_geom::scene::Mesh;
 use enfilade_geom::{DMat4, DVec3};
 use json::{Node, Root};
@@ -19,14 +20,16 @@ pub(crate) use look::read_picture_file;
 use std::borrow::Cow;
 
 /// Required extensions that are read, or that change nothing that is read.
-const KNOWN_EXTENSIONS: [&str; 12] = [
+const KNOWN_EXTENSIONS: [&str; 14] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_avif",
     "EXT_texture_webp",
     "ENFILADE_cell_portal_graph",
     "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_basisu",
     "KHR_texture_transform",
@@ -74,7 +77,12 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         _ => 0,
     };
     builder.add_read_bytes(buffers.iter().map(n_own).sum());
-    let document = Document { root, buffers };
+    let plain_views = meshopt::decode_views(&root, &buffers, builder)?;
+    let document = Document {
+        root,
+        buffers,
+        plain_views,
+    };
     let materials = look::read_materials(&document, builder)?;
     GltfReader {
         meshes: vec![None; document.root.meshes.len()],
@@ -147,7 +155,7 @@ fn unsupported_version(builder: &Builder<'_>, version: &str) -> ImportError {
 }
 
 fn unsupported_extension(builder: &Builder<'_>, name: &str) -> ImportError {
-    let advice = if name.contains("draco") || name.contains("meshopt") {
+    let advice = if name.contains("draco") {
         "decompress it first: `npx @gltf-transform/cli copy IN.glb OUT.glb`, \
          or export without compression"
     } else {
@@ -184,6 +192,7 @@ fn read_buffers<'b>(
     for (i, def) in root.buffers.iter().enumerate() {
         let place = format!("buffer {i}");
         let bytes = match &def.uri {
+            _ if def.is_fallback() => None,
             None if i == 0 => bin.map(Cow::Borrowed),
             None => None,
             Some(uri) => Some(Cow::Owned(match files::decode_data_uri(uri) {
@@ -454,15 +463,6 @@ fn why_dropped(node: &Node) -> Option<String> {
         return Some("hidden by KHR_node_visibility".to_owned());
     }
     crate::roles::drops_subtree(node.name.as_deref().unwrap_or(""))
-}
-
-/// Turns a text of [`Document`] into the fitting error.
-fn data_error(builder: &Builder<'_>, place: &str, problem: &str) -> ImportError {
-    if problem.ends_with(MESHOPT) {
-        unsupported_extension(builder, "EXT_meshopt_compression")
-    } else {
-        builder.malformed(place, problem)
-    }
 }
 
 fn local_transform(node: &Node) -> Result<DMat4, String> {

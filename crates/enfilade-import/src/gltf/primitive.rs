@@ -2,7 +2,7 @@
 
 use super::accessor::{Document, Elements};
 use super::json::{Instancing, PrimitiveDef};
-use super::{compose, data_error, unsupported_extension};
+use super::{compose, unsupported_extension};
 use crate::ImportError;
 use crate::builder::Builder;
 use enfilade_geom::scene::Primitive;
@@ -266,7 +266,8 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
     }
 
     fn data_error(&self, what: &str, problem: &str) -> ImportError {
-        data_error(self.builder, self.place, &format!("{what}: {problem}"))
+        self.builder
+            .malformed(self.place, format!("{what}: {problem}"))
     }
 }
 
