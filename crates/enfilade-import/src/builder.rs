@@ -207,9 +207,7 @@ impl<'a> Builder<'a> {
         size: u64,
     ) -> Result<(), ImportError> {
         self.n_held_bytes = self.n_held_bytes.saturating_add(n.saturating_mul(size));
-        let limits = self.limits();
-        let explained = self.n_read_bytes.saturating_mul(limits.max_expansion);
-        let limit = limits.max_bytes_of_small.max(explained);
+        let limit = self.max_held_bytes();
         if self.n_held_bytes > limit {
             return Err(ImportError::Bomb {
                 path: self.path.clone(),
@@ -219,6 +217,17 @@ impl<'a> Builder<'a> {
             });
         }
         Ok(())
+    }
+
+    /// Bytes that may be asked for before [`ImportError::Bomb`].
+    pub(crate) fn memory_left(&self) -> u64 {
+        self.max_held_bytes().saturating_sub(self.n_held_bytes)
+    }
+
+    fn max_held_bytes(&self) -> u64 {
+        let limits = self.limits();
+        let explained = self.n_read_bytes.saturating_mul(limits.max_expansion);
+        limits.max_bytes_of_small.max(explained)
     }
 
     /// Checks a number of placements before they are made; placing them counts them.

@@ -18,7 +18,7 @@
 //! # Ok::<(), enfilade_import::ImportError>(())
 //! ```
 //!
-//! Not promised: animation, skins, morph targets, cameras, lights, curves, points and lines; they
+//! Not promised: animation, skins, cameras, lights, curves, points and lines; they
 //! are left out with a note.
 
 mod auto_roles;

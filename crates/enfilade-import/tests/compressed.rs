@@ -2,10 +2,15 @@
 
 mod common;
 
-use common::{box_primitive, glb, world};
+use common::{box_primitive, f32_bytes, glb, triangle_bin, triangle_json, v, world};
+use draco_core::{
+    DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder,
+    PointAttribute, PointIndex,
+};
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DVec3, Triangle};
-use enfilade_import::{ImportError, ImportOptions, Imported, decode_gltf};
+use enfilade_import::{ImportError, ImportOptions, Imported, Limits, decode_gltf};
+use proptest::prelude::*;
 
 fn read(json: &str, bin: &[u8]) -> Result<Imported, ImportError> {
     decode_gltf(&glb(json, bin), &ImportOptions::default())
@@ -187,4 +192,190 @@ fn compressed_views_that_do_not_fit_are_errors_with_their_place() {
             "{to}: {error}"
         );
     }
+}
+
+/// A Draco bitstream of a primitive; its positions have the number 0, a color a vertex 1.
+fn draco(primitive: &Primitive, speed: i32, bits: i32) -> Vec<u8> {
+    let mut mesh = Mesh::new();
+    let n = primitive.positions.len();
+    let mut add = |kind, n_components: u8, data_type, bytes: &[u8]| {
+        let mut attribute = PointAttribute::new();
+        attribute.init(
+            kind,
+            n_components,
+            data_type,
+            kind == GeometryAttributeType::Color,
+            n,
+        );
+        attribute.buffer_mut().write(0, bytes);
+        mesh.add_attribute(attribute);
+    };
+    let positions = f32_bytes(primitive.positions.as_flattened());
+    add(
+        GeometryAttributeType::Position,
+        3,
+        DataType::Float32,
+        &positions,
+    );
+    let colors: Vec<u8> = (0..n).flat_map(|i| [i as u8 * 30, 255, 0, 255]).collect();
+    add(GeometryAttributeType::Color, 4, DataType::Uint8, &colors);
+    let faces = primitive.indices.as_chunks::<3>().0;
+    mesh.set_num_points(n);
+    mesh.set_num_faces(faces.len());
+    for (i, face) in faces.iter().enumerate() {
+        mesh.set_face(FaceIndex(i as u32), face.map(PointIndex));
+    }
+    let mut options = EncoderOptions::new();
+    options.set_global_int("encoding_speed", speed);
+    options.set_global_int("decoding_speed", speed);
+    if bits > 0 {
+        options.set_attribute_int(0, "quantization_bits", bits);
+    }
+    let mut encoder = MeshEncoder::new();
+    encoder.set_mesh(mesh);
+    let mut out = EncoderBuffer::new();
+    encoder.encode(&options, &mut out).unwrap();
+    out.data().to_vec()
+}
+
+/// A document whose one primitive is a Draco bitstream.
+fn draco_json(n_bytes: usize) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":["KHR_draco_mesh_compression"],
+        "nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"COLOR_0":1}},"indices":2,
+        "extensions":{{"KHR_draco_mesh_compression":
+          {{"bufferView":0,"attributes":{{"POSITION":0,"COLOR_0":1}}}}}}}}]}}],
+        "accessors":[{{"componentType":5126,"count":8,"type":"VEC3"}},
+          {{"componentType":5121,"count":8,"type":"VEC4","normalized":true}},
+          {{"componentType":5123,"count":36,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{n_bytes}}}],
+        "buffers":[{{"byteLength":{n_bytes}}}]}}"#
+    )
+}
+
+#[test]
+fn draco_reads_as_what_was_packed() {
+    let plain = box_primitive([2.0, 3.0, 4.0]);
+    // Speeds choose the codec: edgebreaker with valences, plain edgebreaker, sequential.
+    for speed in [0, 5, 10] {
+        let bytes = draco(&plain, speed, 0);
+        let scene = read(&draco_json(bytes.len()), &bytes).unwrap().scene;
+        assert_eq!(sorted(world(&scene)), corners_of(&plain, 1.0), "{speed}");
+        let read = &scene.meshes[0].primitives[0];
+        for (p, color) in read.positions.iter().zip(&read.colors) {
+            let i = plain.positions.iter().position(|q| q == p).unwrap();
+            assert_eq!(*color, [i as f32 * 30.0 / 255.0, 1.0, 0.0, 1.0]);
+        }
+    }
+}
+
+#[test]
+fn draco_that_does_not_fit_ends_in_an_error() {
+    let bytes = draco(&box_primitive([2.0, 3.0, 4.0]), 5, 0);
+    let json = draco_json(bytes.len());
+    for (from, to, text) in [
+        (r#""bufferView":0"#, r#""bufferView":7"#, "no buffer view 7"),
+        (
+            r#"{"POSITION":0,"COLOR_0":1}}}"#,
+            r#"{"POSITION":9,"COLOR_0":1}}}"#,
+            "no attribute 9",
+        ),
+        (
+            r#"{"POSITION":0,"COLOR_0":1}}}"#,
+            r#"{"POSITION":1,"COLOR_0":1}}}"#,
+            "4 components",
+        ),
+        (r#""byteLength":"#, r#""byteLength":10,"was":"#, "Draco"),
+    ] {
+        let changed = json.replacen(from, to, 1);
+        assert_ne!(json, changed, "{from}");
+        let error = read(&changed, &bytes).unwrap_err().to_string();
+        assert!(
+            error.contains("primitive 0") && error.contains(text),
+            "{to}: {error}"
+        );
+    }
+}
+
+proptest! {
+    #[test]
+    fn damaged_draco_never_panics(
+        speed in prop::sample::select(vec![0, 5, 10]),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in any::<prop::sample::Index>(),
+    ) {
+        let mut bytes = draco(&box_primitive([2.0, 3.0, 4.0]), speed, 11);
+        for (at, with) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = with;
+        }
+        let options = ImportOptions { limits: Limits::tiny(), ..ImportOptions::default() };
+        let _ = decode_gltf(&glb(&draco_json(bytes.len()), &bytes), &options);
+        let cut = &bytes[..cut.index(bytes.len())];
+        let _ = decode_gltf(&glb(&draco_json(cut.len()), cut), &options);
+    }
+}
+
+/// The triangle of `triangle_json` with two morph targets, the second one sparse: `+1 z` on all, `+5 y` on the last.
+fn morph_json(mesh: &str, nodes: &str) -> (String, Vec<u8>) {
+    let mut bin = triangle_bin();
+    bin.extend(f32_bytes(&[
+        0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 5.0, 0.0,
+    ]));
+    bin.push(2);
+    let json = triangle_json(nodes)
+        .replace(
+            r#""indices":1}]"#,
+            &format!(r#""indices":1,"targets":[{{"POSITION":2}},{{"POSITION":3}}]}}]{mesh}"#),
+        )
+        .replace(
+            r#""type":"SCALAR"}]"#,
+            r#""type":"SCALAR"},
+            {"bufferView":2,"componentType":5126,"count":3,"type":"VEC3"},
+            {"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,
+            "indices":{"bufferView":3,"componentType":5121},"values":{"bufferView":2,"byteOffset":36}}}]"#,
+        )
+        .replace(
+            r#""byteLength":6}"#,
+            r#""byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":48},
+            {"buffer":0,"byteOffset":92,"byteLength":1}"#,
+        )
+        .replace(r#"{"byteLength":44}"#, r#"{"byteLength":93}"#);
+    (json, bin)
+}
+
+#[test]
+fn morph_targets_rest_at_the_weights_of_the_node_or_else_of_the_mesh() {
+    let nodes = r#""nodes":[{"mesh":0},{"mesh":0,"weights":[2,0]},{"mesh":0,"weights":[2,0]}]"#;
+    let (json, bin) = morph_json(r#","weights":[1,0.5]"#, nodes);
+    let imported = read(&json, &bin).unwrap();
+    let world = world(&imported.scene);
+    assert_eq!(
+        world[0],
+        [v(0.0, 0.0, 1.0), v(4.0, 0.0, 1.0), v(0.0, 5.5, 1.0)]
+    );
+    assert_eq!(
+        world[1],
+        [v(0.0, 0.0, 2.0), v(4.0, 0.0, 2.0), v(0.0, 3.0, 2.0)]
+    );
+    // Two shapes for three placements.
+    assert_eq!(imported.scene.meshes.len(), 2);
+    assert!(imported.report.to_string().contains("morph targets; taken"));
+    // Without weights they rest where they are.
+    let (json, bin) = morph_json("", r#""nodes":[{"mesh":0}]"#);
+    assert_eq!(
+        common::world(&read(&json, &bin).unwrap().scene)[0][2],
+        v(0.0, 3.0, 0.0)
+    );
+    let (json, bin) = morph_json(r#","weights":[0,1]"#, r#""nodes":[{"mesh":0}]"#);
+    let short = json.replace(
+        r#"{"componentType":5126,"count":3"#,
+        r#"{"componentType":5126,"count":4"#,
+    );
+    let error = read(&short, &bin).unwrap_err().to_string();
+    assert!(
+        error.contains("target 1") && error.contains("4 elements"),
+        "{error}"
+    );
 }

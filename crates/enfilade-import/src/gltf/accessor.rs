@@ -35,7 +35,7 @@ impl Component {
         })
     }
 
-    fn size(self) -> u64 {
+    pub(super) fn size(self) -> u64 {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -237,7 +237,26 @@ fn span(bytes: &[u8], offset: u64, count: u64, stride: u64, size: u64) -> Result
         })
 }
 
-impl Elements<'_> {
+impl<'d> Elements<'d> {
+    /// Elements without gaps.
+    pub(super) fn of_bytes(
+        bytes: &'d [u8],
+        component: Component,
+        n_components: usize,
+        normalized: bool,
+    ) -> Self {
+        let size = component.size() as usize * n_components;
+        Self {
+            count: (bytes.len() / size.max(1)) as u64,
+            component,
+            n_components,
+            normalized,
+            bytes: Some((bytes, size)),
+            sparse_indices: Vec::new(),
+            sparse_values: &[],
+        }
+    }
+
     /// Bytes of element `i`, or none where it is zero by definition.
     fn element(&self, i: u32) -> Option<&[u8]> {
         let size = self.component.size() as usize * self.n_components;

@@ -103,6 +103,8 @@ pub(super) struct Node {
     pub(super) name: Option<Box<str>>,
     pub(super) mesh: Option<u32>,
     pub(super) skin: Option<u32>,
+    /// In place of the mesh's, where given.
+    pub(super) weights: Option<Box<List<f64>>>,
     #[serde(default)]
     pub(super) children: List<u32>,
     pub(super) matrix: Option<Box<[f64; 16]>>,
@@ -136,23 +138,39 @@ pub(super) struct MeshDef {
     pub(super) name: Option<String>,
     #[serde(default)]
     pub(super) primitives: List<PrimitiveDef>,
+    /// Of the primitives' morph targets.
+    #[serde(default)]
+    pub(super) weights: List<f64>,
 }
+
+/// Accessors by what they hold.
+pub(super) type AccessorOf = BTreeMap<String, u32>;
 
 #[derive(serde::Deserialize)]
 pub(super) struct PrimitiveDef {
     #[serde(default)]
-    pub(super) attributes: BTreeMap<String, u32>,
+    pub(super) attributes: AccessorOf,
     pub(super) indices: Option<u32>,
     pub(super) material: Option<u32>,
     pub(super) mode: Option<u32>,
-    pub(super) targets: Option<serde::de::IgnoredAny>,
+    #[serde(default)]
+    pub(super) targets: List<AccessorOf>,
     pub(super) extensions: Option<PrimitiveExtensions>,
 }
 
 #[derive(serde::Deserialize)]
 pub(super) struct PrimitiveExtensions {
     #[serde(rename = "KHR_draco_mesh_compression")]
-    pub(super) draco: Option<serde::de::IgnoredAny>,
+    pub(super) draco: Option<DracoDef>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct DracoDef {
+    pub(super) buffer_view: u32,
+    /// Unique ids in the bitstream, by what they hold.
+    #[serde(default)]
+    pub(super) attributes: BTreeMap<String, u32>,
 }
 
 #[derive(serde::Deserialize)]

@@ -5,9 +5,11 @@
 //! are flattened; a mesh placed several times stays one mesh. Everything else is noted.
 
 mod accessor;
+mod draco;
 mod json;
 mod look;
 mod meshopt;
+mod morph;
 mod primitive;
 
 use crate::builder::{Builder, Placement};
@@ -18,15 +20,17 @@ use enfilade_geom::{DMat4, DVec3};
 use json::{Node, Root};
 pub(crate) use look::read_picture_file;
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Required extensions that are read, or that change nothing that is read.
-const KNOWN_EXTENSIONS: [&str; 14] = [
+const KNOWN_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_avif",
     "EXT_texture_webp",
     "ENFILADE_cell_portal_graph",
     "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
@@ -85,7 +89,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     };
     let materials = look::read_materials(&document, builder)?;
     GltfReader {
-        meshes: vec![None; document.root.meshes.len()],
+        meshes: HashMap::new(),
         document: &document,
         materials,
         builder,
@@ -155,16 +159,10 @@ fn unsupported_version(builder: &Builder<'_>, version: &str) -> ImportError {
 }
 
 fn unsupported_extension(builder: &Builder<'_>, name: &str) -> ImportError {
-    let advice = if name.contains("draco") {
-        "decompress it first: `npx @gltf-transform/cli copy IN.glb OUT.glb`, \
-         or export without compression"
-    } else {
-        "export without it"
-    };
     ImportError::Unsupported {
         path: builder.path.clone(),
         feature: format!("the required extension {name}"),
-        advice: advice.into(),
+        advice: "export without it".into(),
     }
 }
 
@@ -224,8 +222,8 @@ struct GltfReader<'r, 'a, 'b> {
     document: &'r Document<'b>,
     /// Scene materials by document material.
     materials: Vec<u32>,
-    /// Scene meshes by document mesh, as far as used.
-    meshes: Vec<Option<u32>>,
+    /// Scene meshes by document mesh and the bits of its weights, as far as used.
+    meshes: HashMap<(u32, Vec<u64>), u32>,
     builder: &'r mut Builder<'a>,
 }
 
@@ -366,7 +364,10 @@ impl GltfReader<'_, '_, '_> {
             .flat_map(|a| a.channels.iter())
         {
             let target = &channel.target;
-            let is_move = matches!(target.path.as_str(), "translation" | "rotation" | "scale");
+            let is_move = matches!(
+                target.path.as_str(),
+                "translation" | "rotation" | "scale" | "weights"
+            );
             if let Some(slot) = target.node.and_then(|n| animated.get_mut(n as usize))
                 && is_move
             {
@@ -389,14 +390,21 @@ impl GltfReader<'_, '_, '_> {
         let node = &root.nodes[i];
         let name = node.name.as_deref().unwrap_or("");
         let place = format!("node {i} '{name}'");
-        let Some(slot) = self.meshes.get(mesh as usize) else {
+        let Some(def) = root.meshes.get(mesh as usize) else {
             return Err(self.builder.malformed(place, format!("no mesh {mesh}")));
         };
-        let scene_mesh = match *slot {
-            Some(made) => made,
+        let has_targets = def.primitives.iter().any(|p| !p.targets.is_empty());
+        let weights: &[f64] = match &node.weights {
+            _ if !has_targets => &[],
+            Some(weights) => weights,
+            None => &def.weights,
+        };
+        let key = (mesh, weights.iter().map(|w| w.to_bits()).collect());
+        let scene_mesh = match self.meshes.get(&key) {
+            Some(&made) => made,
             None => {
-                let made = self.read_mesh(mesh)?;
-                self.meshes[mesh as usize] = Some(made);
+                let made = self.read_mesh(mesh, weights)?;
+                self.meshes.insert(key, made);
                 made
             }
         };
@@ -434,7 +442,7 @@ impl GltfReader<'_, '_, '_> {
         })
     }
 
-    fn read_mesh(&mut self, index: u32) -> Result<u32, ImportError> {
+    fn read_mesh(&mut self, index: u32, weights: &[f64]) -> Result<u32, ImportError> {
         let def = &self.document.root.meshes[index as usize];
         let mut mesh = Mesh {
             name: def.name.clone().unwrap_or_default(),
@@ -445,6 +453,7 @@ impl GltfReader<'_, '_, '_> {
             let read = primitive::read_primitive(
                 self.document,
                 primitive,
+                weights,
                 &self.materials,
                 &place,
                 self.builder,
