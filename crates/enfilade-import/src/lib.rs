@@ -30,6 +30,7 @@ mod export;
 mod files;
 mod gltf;
 mod map;
+mod mesh;
 mod mtl;
 mod obj;
 mod options;

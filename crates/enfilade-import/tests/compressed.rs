@@ -379,3 +379,125 @@ fn morph_targets_rest_at_the_weights_of_the_node_or_else_of_the_mesh() {
         "{error}"
     );
 }
+
+/// Two boxes side by side, each in whole numbers of a grid of its own: 1 mm from `[0, 0, 0]`, 1.3 mm from `[2.0002, 0, 0]`.
+fn quantized_boxes(scale: f64) -> (String, Vec<u8>) {
+    let positions = |size: [f32; 3]| -> Vec<u8> {
+        let positions = box_primitive(size).positions;
+        positions
+            .iter()
+            .flatten()
+            .flat_map(|&c| (c as u16).to_le_bytes())
+            .collect()
+    };
+    let mut bin = positions([2000.0, 3000.0, 4000.0]);
+    bin.extend(positions([1538.0, 2308.0, 3077.0]));
+    bin.extend(box_primitive([1.0; 3]).indices.iter().map(|&i| i as u8));
+    let node = |mesh: u32, x: f64, step: f64| {
+        let (x, step) = (x * scale, step * scale);
+        format!(r#"{{"mesh":{mesh},"translation":[{x},0,0],"scale":[{step},{step},{step}]}}"#)
+    };
+    let mesh = |k| format!(r#"{{"primitives":[{{"attributes":{{"POSITION":{k}}},"indices":2}}]}}"#);
+    let positions = |offset| {
+        format!(
+            r#"{{"bufferView":0,"byteOffset":{offset},"componentType":5123,"count":8,"type":"VEC3"}}"#
+        )
+    };
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{},{}],"meshes":[{},{}],
+        "accessors":[{},{},
+          {{"bufferView":1,"componentType":5121,"count":36,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":96}},
+          {{"buffer":0,"byteOffset":96,"byteLength":36}}],"buffers":[{{"byteLength":132}}]}}"#,
+        node(0, 0.0, 0.001),
+        node(1, 2.0002, 0.0013),
+        mesh(0),
+        mesh(1),
+        positions(0),
+        positions(48),
+    );
+    (json, bin)
+}
+
+/// Corners of both objects that lie in the plane between two boxes.
+fn shared_corners(scene: &enfilade_geom::scene::Scene, x: f64) -> usize {
+    let mut corners: Vec<[u64; 3]> = world(scene)
+        .concat()
+        .iter()
+        .filter(|p| (p.x - x).abs() < 0.1)
+        .map(|p| p.to_array().map(f64::to_bits))
+        .collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners.len()
+}
+
+#[test]
+fn corners_that_quantization_parted_are_one_again() {
+    let (json, bin) = quantized_boxes(1.0);
+    let imported = read(&json, &bin).unwrap();
+    // Eight where they are 0.2 mm, and along the edges up to half a millimeter, apart.
+    assert_eq!(shared_corners(&imported.scene, 2.0), 4);
+    assert!(
+        imported.report.to_string().contains("4 corners"),
+        "{}",
+        imported.report
+    );
+    // The finer grid says where.
+    let farthest = world(&imported.scene)
+        .concat()
+        .iter()
+        .filter(|p| p.x < 2.1)
+        .fold(0.0, |m: f64, p| m.max(p.z));
+    assert_eq!(farthest, f64::from(4.0_f32));
+    // A grid of 6 cm is no rounding, and its corners are meant.
+    let (json, bin) = quantized_boxes(60.0);
+    assert_eq!(shared_corners(&read(&json, &bin).unwrap().scene, 120.0), 8);
+    // Numbers that were not rounded stay apart, as near as they are.
+    let (json, bin) = quantized_boxes(1.0);
+    let floats: Vec<f32> = bin[..96]
+        .as_chunks::<2>()
+        .0
+        .iter()
+        .map(|b| u16::from_le_bytes(*b).into())
+        .collect();
+    let floats = [f32_bytes(&floats), bin[96..].to_vec()].concat();
+    let json = json
+        .replace("5123", "5126")
+        .replace(r#""byteOffset":48"#, r#""byteOffset":96"#);
+    let json = json.replace(
+        r#"{"buffer":0,"byteLength":96}"#,
+        r#"{"buffer":0,"byteLength":192}"#,
+    );
+    let json = json.replace(
+        r#""byteOffset":96,"byteLength":36"#,
+        r#""byteOffset":192,"byteLength":36"#,
+    );
+    let json = json.replace(r#"[{"byteLength":132}]"#, r#"[{"byteLength":228}]"#);
+    assert_eq!(shared_corners(&read(&json, &floats).unwrap().scene, 2.0), 8);
+}
+
+#[test]
+fn corners_of_one_mesh_never_become_one() {
+    // A sheet as thin as a step of its grid, in the middle of it the corners of a finer mesh.
+    let (json, _) = quantized_boxes(1.0);
+    let mut bin = Vec::new();
+    for size in [[2000.0, 3000.0, 4000.0], [1.0, 2308.0, 3077.0]] {
+        let positions = box_primitive(size).positions;
+        bin.extend(
+            positions
+                .iter()
+                .flatten()
+                .flat_map(|&c| (c as u16).to_le_bytes()),
+        );
+    }
+    bin.extend(box_primitive([1.0; 3]).indices.iter().map(|&i| i as u8));
+    let scene = read(&json.replace("2.0002", "1.99935"), &bin)
+        .unwrap()
+        .scene;
+    let thin = &world(&scene)[12..];
+    assert!(
+        thin.iter()
+            .all(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
+    );
+}

@@ -182,12 +182,11 @@ fn a_deep_tree_is_refused_without_deep_recursion() {
 
 #[test]
 fn what_is_not_supported_says_what_to_do() {
-    for (name, advice) in [("VENDOR_odd", "export without it")] {
-        let error = error_of(&format!(
-            r#""extensionsRequired":["{name}"],"nodes":[{{"mesh":0}}]"#
-        ));
-        assert!(error.contains(name) && error.contains(advice), "{error}");
-    }
+    let error = error_of(r#""extensionsRequired":["VENDOR_odd"],"nodes":[{"mesh":0}]"#);
+    assert!(
+        error.contains("VENDOR_odd") && error.contains("export without it"),
+        "{error}"
+    );
     let old = r#"{"asset":{"version":"1.0"}}"#;
     assert!(read(old, &[]).unwrap_err().to_string().contains("2.0"));
 }

@@ -60,6 +60,19 @@ impl Component {
         }
     }
 
+    /// Distance of two neighboring values; 0 for floats, which are rounded by their value alone, so that what was one stays one.
+    fn step(self, normalized: bool) -> f32 {
+        match self {
+            Self::F32 => 0.0,
+            _ if !normalized => 1.0,
+            Self::I8 => 1.0 / 127.0,
+            Self::U8 => 1.0 / 255.0,
+            Self::I16 => 1.0 / 32767.0,
+            Self::U16 => 1.0 / 65535.0,
+            Self::U32 => 0.0,
+        }
+    }
+
     fn read_index(self, bytes: &[u8]) -> u32 {
         match self {
             Self::U8 | Self::I8 => bytes[0].into(),
@@ -84,6 +97,8 @@ pub(super) struct Elements<'d> {
     /// Strictly increasing, each below `count`.
     sparse_indices: Vec<u32>,
     sparse_values: &'d [u8],
+    /// Width of the grid that the values were rounded to; 0 if they were not.
+    pub(super) step: f32,
 }
 
 impl<'a> Document<'a> {
@@ -169,6 +184,7 @@ impl<'a> Document<'a> {
             bytes,
             sparse_indices: Vec::new(),
             sparse_values: &[],
+            step: component.step(accessor.normalized),
         };
         self.read_sparse(accessor, size, &mut elements)
             .map_err(|problem| at(format!("sparse: {problem}")))?;
@@ -244,6 +260,7 @@ impl<'d> Elements<'d> {
         component: Component,
         n_components: usize,
         normalized: bool,
+        step: f32,
     ) -> Self {
         let size = component.size() as usize * n_components;
         Self {
@@ -254,6 +271,7 @@ impl<'d> Elements<'d> {
             bytes: Some((bytes, size)),
             sparse_indices: Vec::new(),
             sparse_values: &[],
+            step,
         }
     }
 

@@ -22,6 +22,8 @@ pub(super) struct DracoAttribute {
     pub(super) component: Component,
     pub(super) n_components: usize,
     pub(super) bytes: Vec<u8>,
+    /// Width of the grid that its floats were rounded to; 0 if none is found.
+    pub(super) step: f32,
 }
 
 /// Bytes that a face takes while it is decoded, at least.
@@ -94,9 +96,101 @@ fn unpacked(attribute: &PointAttribute, n_vertices: usize) -> Result<DracoAttrib
             .ok_or_else(|| format!("no value for vertex {vertex}"))?;
         bytes.extend(value);
     }
+    let step = match component {
+        Component::F32 => step_of(&bytes, n_components),
+        _ => 0.0,
+    };
     Ok(DracoAttribute {
         component,
         n_components,
         bytes,
+        step,
     })
+}
+
+/// Bits that encoders round positions to: 11 and 14 are usual.
+const BITS: std::ops::RangeInclusive<u32> = 8..=20;
+
+/// Width of the coarsest grid that all values lie on; 0 if there is none.
+///
+/// Draco divides the longest edge of the box by `2^bits - 1` and counts from the least corner, and the decoder does not tell
+/// how many bits it found. Values on a grid of fewer bits than anyone uses were not rounded to it: they are just so.
+fn step_of(bytes: &[u8], n_components: usize) -> f32 {
+    let value = |b: &[u8; 4]| f64::from(f32::from_le_bytes(*b));
+    let values: Vec<f64> = bytes.as_chunks::<4>().0.iter().map(value).collect();
+    if values.iter().any(|v| !v.is_finite()) {
+        return 0.0;
+    }
+    let mut low = vec![f64::INFINITY; n_components];
+    let mut high = vec![f64::NEG_INFINITY; n_components];
+    for (i, &v) in values.iter().enumerate() {
+        let k = i % n_components;
+        (low[k], high[k]) = (low[k].min(v), high[k].max(v));
+    }
+    let range = low
+        .iter()
+        .zip(&high)
+        .map(|(l, h)| h - l)
+        .fold(0.0, f64::max);
+    let most = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let is_grid = |step: f64| {
+        // Four roundings to f32 on the way.
+        let noise = 4.0 * most * f64::from(f32::EPSILON) / step;
+        let place = |(i, v): (usize, &f64)| (v - low[i % n_components]) / step;
+        noise < 0.1
+            && values
+                .iter()
+                .enumerate()
+                .map(place)
+                .all(|x| (x - x.round()).abs() <= noise)
+    };
+    let steps = (1..=*BITS.end()).map(|bits| (bits, range / f64::from((1_u32 << bits) - 1)));
+    let found = steps.filter(|s| s.1 > 0.0).find(|s| is_grid(s.1));
+    found
+        .filter(|(bits, _)| BITS.contains(bits))
+        .map_or(0.0, |(_, step)| step as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn bytes(values: &[f32]) -> Vec<u8> {
+        values.iter().flat_map(|v| v.to_le_bytes()).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn the_grid_that_values_were_rounded_to_is_found(
+            bits in BITS.start() + 1..=15,
+            range in 1.0f32..60.0,
+            low in -1.0f32..1.0,
+            places in prop::collection::vec(prop::array::uniform3(0.0f32..1.0), 6..40),
+        ) {
+            let most = ((1_u32 << bits) - 1) as f32;
+            let step = range / most;
+            // The ends of the longest edge are on the grid, and so is the least corner.
+            let mut values = vec![low; 3];
+            values.extend([low + range, low, low]);
+            values.extend(places.iter().flatten().map(|x| low + (x * most).round() * step));
+            let found = step_of(&bytes(&values), 3);
+            prop_assert!((found / step - 1.0).abs() < 1e-3, "{} for {}", found, step);
+        }
+
+        #[test]
+        fn values_that_were_not_rounded_have_none(
+            places in prop::collection::vec(prop::array::uniform3(-9.0f32..9.0), 8..40),
+        ) {
+            prop_assert_eq!(step_of(&bytes(places.as_flattened()), 3), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_box_and_nonsense_have_none() {
+        assert_eq!(step_of(&bytes(&[0.0, 0.0, 0.0, 4.0, 4.0, 0.0]), 3), 0.0);
+        assert_eq!(step_of(&bytes(&[1.0; 6]), 3), 0.0);
+        assert_eq!(step_of(&bytes(&[f32::NAN, 0.0, 0.0]), 3), 0.0);
+        assert_eq!(step_of(&[], 3), 0.0);
+    }
 }

@@ -448,6 +448,7 @@ impl GltfReader<'_, '_, '_> {
             name: def.name.clone().unwrap_or_default(),
             primitives: Vec::new(),
         };
+        let mut steps = Vec::new();
         for (k, primitive) in def.primitives.iter().enumerate() {
             let place = format!("mesh {index} '{}' primitive {k}", mesh.name);
             let read = primitive::read_primitive(
@@ -458,9 +459,12 @@ impl GltfReader<'_, '_, '_> {
                 &place,
                 self.builder,
             )?;
-            mesh.primitives.extend(read);
+            if let Some((primitive, step)) = read {
+                mesh.primitives.push(primitive);
+                steps.push(step);
+            }
         }
-        Ok(self.builder.push_mesh(mesh))
+        Ok(self.builder.push_quantized_mesh(mesh, steps))
     }
 }
 

@@ -14,7 +14,8 @@ use std::collections::BTreeMap;
 /// Most texture coordinate sets kept.
 const MAX_UV_SETS: usize = 8;
 
-/// Reads one primitive with its morph targets as `weights` have them; `None` where it holds no triangles.
+/// Reads one primitive with its morph targets as `weights` have them, and the width of the grid that its positions were
+/// rounded to, 0 if they were not; `None` where it holds no triangles.
 pub(super) fn read_primitive(
     document: &Document<'_>,
     def: &PrimitiveDef,
@@ -22,7 +23,7 @@ pub(super) fn read_primitive(
     materials: &[u32],
     place: &str,
     builder: &mut Builder<'_>,
-) -> Result<Option<Primitive>, ImportError> {
+) -> Result<Option<(Primitive, f32)>, ImportError> {
     let draco = match def.extensions.as_ref().and_then(|e| e.draco.as_ref()) {
         Some(packed) => Some(draco::decode(document, packed, place, builder)?),
         None => None,
@@ -68,7 +69,7 @@ pub(super) fn read_primitive(
         morph::apply(document, &def.targets, rest, place, &mut primitive, builder)?;
     }
     reader.builder.drop_nonfinite(place, &mut primitive);
-    Ok(Some(primitive))
+    Ok(Some((primitive, positions.step)))
 }
 
 /// How a list of indices makes triangles.
@@ -157,6 +158,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
             attribute.component,
             attribute.n_components,
             accessor.is_some_and(|a| a.normalized),
+            attribute.step,
         ))
     }
 
