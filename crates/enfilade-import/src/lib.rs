@@ -244,7 +244,9 @@ fn check_extent(
         })
     };
     let longest = size.max_element();
-    if longest.is_nan() || longest > limits.max_extent {
+    // The unit of a map is known, and skies stand where they like.
+    let is_known = !scene.solids.is_empty() && options.unit.is_none();
+    if longest.is_nan() || longest > limits.max_extent && !is_known {
         let limit = limits.max_extent;
         let offender = offender(&boxes, &counted, limit).map(|i| scene.objects[i].name.clone());
         let advice = if offender.is_some() {
