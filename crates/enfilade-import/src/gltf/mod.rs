@@ -60,6 +60,15 @@ pub(crate) fn is_gltf(bytes: &[u8]) -> bool {
 
 /// Reads one file into the builder.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    read_renamed(bytes, builder, &|_| None)
+}
+
+/// As [`read`], with other names for nodes and meshes where `rename` gives one.
+pub(crate) fn read_renamed(
+    bytes: &[u8],
+    builder: &mut Builder<'_>,
+    rename: &dyn Fn(&str) -> Option<String>,
+) -> Result<(), ImportError> {
     builder.set_format("glTF");
     let (json, bin) = split_container(bytes, builder)?;
     let limit = builder.limits().max_json_bytes;
@@ -72,9 +81,13 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
             limit,
         });
     }
-    let root: Root = serde_json::from_slice(json)
+    let mut root: Root = serde_json::from_slice(json)
         .map_err(|e| builder.malformed("JSON", format!("{e}; is the file whole?")))?;
     check_version(&root, builder)?;
+    for node in &mut root.nodes.0 {
+        let name = node.name.as_deref().and_then(rename);
+        node.name = name.map(String::into_boxed_str).or(node.name.take());
+    }
     let buffers = read_buffers(&root, bin, builder)?;
     let n_own = |b: &Option<Cow<'_, [u8]>>| match b {
         Some(Cow::Owned(bytes)) => bytes.len() as u64,
