@@ -608,3 +608,28 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn ktx2_pictures_pass_through_as_they_are() {
+    let picture = b"\xABKTX 20\xBB\r\n\x1A\nBasis and whatever else it holds";
+    let data: String = picture.iter().map(|b| format!("%{b:02x}")).collect();
+    let json = triangle_json(&format!(
+        r#""nodes":[{{"mesh":0}}],"extensionsRequired":["KHR_texture_basisu"],
+        "images":[{{"uri":"data:image/ktx2,{data}"}}],
+        "textures":[{{"extensions":{{"KHR_texture_basisu":{{"source":0}}}}}}],
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}]"#
+    ))
+    .replace(r#""indices":1"#, r#""indices":1,"material":0"#);
+    let first = read(&json, &triangle_bin()).unwrap().scene;
+    let written = export_glb(&first);
+    let text = String::from_utf8_lossy(&written);
+    assert!(text.contains(r#""KHR_texture_basisu":{"source":0}"#));
+    let again = decode_gltf(&written, &ImportOptions::default())
+        .unwrap()
+        .scene;
+    for scene in [first, again] {
+        assert_eq!(scene.images[0].mime, "image/ktx2");
+        assert_eq!(scene.images[0].bytes, picture);
+        assert_eq!(scene.textures[0].image, Some(0));
+    }
+}

@@ -196,17 +196,17 @@ mod tests {
     #[test]
     fn grids_and_far_jumps_come_back() {
         check(&grid(40));
-        // Strips of vertices that were never next: each is one off the last.
-        check(
-            &(0..50)
-                .flat_map(|i| [900 - i, 899 - i, 898 - i])
-                .collect::<Vec<_>>(),
-        );
-        check(
-            &(0..50)
-                .flat_map(|i| [900 + i, 901 + i, 902 + i])
-                .collect::<Vec<_>>(),
-        );
+        // Strips of vertices that were never next: each third one is one off the last that was stored.
+        let strip = |step: i32| -> Vec<u32> {
+            let at = |i: i32| (900 + step * i) as u32;
+            let triangle = |i: i32| {
+                let [a, b] = if i % 2 == 0 { [i, i + 1] } else { [i + 1, i] };
+                [at(a), at(b), at(i + 2)]
+            };
+            (0..50).flat_map(triangle).collect()
+        };
+        check(&strip(-1));
+        check(&strip(1));
         check(&[0, 1, 2]);
         check(&[
             4_000_000, 5, 4_000_001, 9, 8, 7, 0, 1, 2, 4_000_002, 3, 70_000,
