@@ -168,6 +168,9 @@ fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow:
             writeln!(err, "{role:<10} {}: {}", o.name, o.reason)?;
         }
     }
+    if let Some(doubt) = &report.unit_doubt {
+        writeln!(err, "{doubt}")?;
+    }
     let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
     let title = if let Some(repair) = &report.repair {
         writeln!(

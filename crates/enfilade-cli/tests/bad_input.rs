@@ -170,7 +170,7 @@ fn a_cut_off_glb_is_told_apart_from_a_whole_one() {
     folder.refused_file(
         "empty.glb",
         [],
-        &["not a glTF, GLB, OBJ, PLY, STL or Quake map file"],
+        &["not a glTF, GLB, OBJ, PLY, STL, IFC or Quake map file"],
     );
     for share in [
         1,

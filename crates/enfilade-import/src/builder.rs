@@ -1,5 +1,7 @@
 //! Fills one [`Scene`] from several files: merging, limits, mirrored placements, roles.
 
+use crate::mesh::{bytes_of, mirror};
+use crate::repair::{GridSteps, weld_quantized};
 use crate::roles::{Facts, Verdict};
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
@@ -30,6 +32,8 @@ pub(crate) struct Builder<'a> {
     n_held_bytes: u64,
     /// Meshes made from other meshes: which, mirrored or not, which primitives.
     variants: HashMap<(u32, bool, MeshPart), u32>,
+    /// Of the meshes so far.
+    steps: GridSteps,
 }
 
 /// Which primitives of a mesh.
@@ -71,6 +75,7 @@ impl<'a> Builder<'a> {
             n_read_bytes: 0,
             n_held_bytes: 0,
             variants: HashMap::new(),
+            steps: GridSteps::new(),
         })
     }
 
@@ -191,6 +196,14 @@ impl<'a> Builder<'a> {
         self.n_read_bytes = self.n_read_bytes.saturating_add(n);
     }
 
+    /// Says that bytes read were unpacked, so that a compressed file may hold what it could in plain.
+    ///
+    /// Up to [`MAX_UNPACKING`] times what it is: what unpacks further has no more numbers in it, only more zeros.
+    pub(crate) fn add_unpacked_bytes(&mut self, packed: u64, plain: u64) {
+        let most = packed.saturating_mul(MAX_UNPACKING);
+        self.add_read_bytes(plain.min(most).saturating_sub(packed));
+    }
+
     /// Counts `n` pieces of `size` bytes before they are allocated.
     pub(crate) fn charge_memory(
         &mut self,
@@ -199,9 +212,7 @@ impl<'a> Builder<'a> {
         size: u64,
     ) -> Result<(), ImportError> {
         self.n_held_bytes = self.n_held_bytes.saturating_add(n.saturating_mul(size));
-        let limits = self.limits();
-        let explained = self.n_read_bytes.saturating_mul(limits.max_expansion);
-        let limit = limits.max_bytes_of_small.max(explained);
+        let limit = self.max_held_bytes();
         if self.n_held_bytes > limit {
             return Err(ImportError::Bomb {
                 path: self.path.clone(),
@@ -211,6 +222,17 @@ impl<'a> Builder<'a> {
             });
         }
         Ok(())
+    }
+
+    /// Bytes that may be asked for before [`ImportError::Bomb`].
+    pub(crate) fn memory_left(&self) -> u64 {
+        self.max_held_bytes().saturating_sub(self.n_held_bytes)
+    }
+
+    fn max_held_bytes(&self) -> u64 {
+        let limits = self.limits();
+        let explained = self.n_read_bytes.saturating_mul(limits.max_expansion);
+        limits.max_bytes_of_small.max(explained)
     }
 
     /// Checks a number of placements before they are made; placing them counts them.
@@ -277,6 +299,15 @@ impl<'a> Builder<'a> {
     pub(crate) fn push_mesh(&mut self, mesh: Mesh) -> u32 {
         self.scene.meshes.push(mesh);
         self.scene.meshes.len() as u32 - 1
+    }
+
+    /// As [`Builder::push_mesh`], a mesh of which some positions were rounded to a grid; `steps` as in [`GridSteps`].
+    pub(crate) fn push_quantized_mesh(&mut self, mesh: Mesh, steps: Vec<f32>) -> u32 {
+        let made = self.push_mesh(mesh);
+        if steps.iter().any(|&s| s > 0.0) {
+            self.steps.insert(made, steps);
+        }
+        made
     }
 
     /// Drops triangles at vertices that are no finite numbers, and those vertices.
@@ -469,6 +500,7 @@ impl<'a> Builder<'a> {
             return Ok(mesh);
         }
         let original = &self.scene.meshes[source as usize];
+        let steps = self.steps.get(&source).map_or(&[][..], Vec::as_slice);
         let is_kept = |p: &&Primitive| match part {
             MeshPart::All => true,
             MeshPart::Opaque => !self.is_see_through(p),
@@ -489,6 +521,9 @@ impl<'a> Builder<'a> {
                 .cloned()
                 .collect(),
         };
+        let kept_steps = original.primitives.iter().zip(steps);
+        let kept_steps = kept_steps.filter(|(p, _)| is_kept(p)).map(|(_, s)| *s);
+        let kept_steps = kept_steps.collect();
         self.charge_vertices(placement.place, n_vertices)?;
         self.charge_memory(placement.place, bytes_of(&mesh), 1)?;
         if is_mirrored {
@@ -504,12 +539,12 @@ impl<'a> Builder<'a> {
                 "an object of opaque and see-through parts; split in two",
             );
         }
-        let made = self.push_mesh(mesh);
+        let made = self.push_quantized_mesh(mesh, kept_steps);
         self.variants.insert((source, is_mirrored, part), made);
         Ok(made)
     }
 
-    /// Ends the import: drops meshes that nothing places.
+    /// Ends the import: drops meshes that nothing places, and makes one what quantization parted.
     pub(crate) fn finish(mut self) -> (Scene, ImportReport) {
         let mut remap = vec![u32::MAX; self.scene.meshes.len()];
         let mut kept = Vec::new();
@@ -522,42 +557,23 @@ impl<'a> Builder<'a> {
             object.mesh = *slot;
         }
         self.scene.meshes = kept;
+        let steps = std::mem::take(&mut self.steps).into_iter();
+        let steps = steps.map(|(mesh, steps)| (remap[mesh as usize], steps));
+        let n_welded = weld_quantized(&mut self.scene, &steps.collect());
+        if n_welded > 0 {
+            let text = format!(
+                "quantized positions: {n_welded} corners that were less than half a step of their grids apart made one"
+            );
+            self.note("meshes", text);
+        }
         (self.scene, self.report)
     }
 }
 
+/// How many times its size a compressed part counts as read. Triangles of buildings take 18 bytes or more in plain, and one or
+/// two compressed.
+const MAX_UNPACKING: u64 = 16;
 /// Room for an object, its texts aside.
 const OBJECT_BYTES: u64 = 2 * size_of::<Object>() as u64;
 /// A triangle in world space, as the decomposition holds it.
 const TRIANGLE_BYTES: u64 = size_of::<Triangle>() as u64;
-
-/// Bytes that a mesh's lists hold.
-fn bytes_of(mesh: &Mesh) -> u64 {
-    let bytes = |p: &Primitive| {
-        size_of_val(&*p.positions)
-            + size_of_val(&*p.normals)
-            + size_of_val(&*p.tangents)
-            + size_of_val(&*p.colors)
-            + size_of_val(&*p.indices)
-            + p.uvs.iter().map(|u| size_of_val(&**u)).sum::<usize>()
-    };
-    mesh.primitives.iter().map(bytes).sum::<usize>() as u64
-}
-
-/// Mirrors at the plane `x = 0` and turns the winding round. Exact.
-fn mirror(primitive: &mut Primitive) {
-    for p in &mut primitive.positions {
-        p[0] = -p[0];
-    }
-    for n in &mut primitive.normals {
-        n[0] = -n[0];
-    }
-    for t in &mut primitive.tangents {
-        // The bitangent is `cross(normal, tangent) * w`; a mirror turns the cross product round.
-        t[0] = -t[0];
-        t[3] = -t[3];
-    }
-    for t in primitive.indices.chunks_exact_mut(3) {
-        t.swap(1, 2);
-    }
-}

@@ -16,7 +16,7 @@ pub enum ImportError {
     },
     /// The file is of no format that is read here.
     #[error(
-        "{path}: not a glTF, GLB, OBJ, PLY, STL or Quake map file; convert it to GLB (Blender and most modelers export it)",
+        "{path}: not a glTF, GLB, OBJ, PLY, STL, IFC or Quake map file; convert it to GLB (Blender and most modelers export it)",
         path = path.display()
     )]
     UnknownFormat {

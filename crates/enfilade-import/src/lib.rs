@@ -18,7 +18,7 @@
 //! # Ok::<(), enfilade_import::ImportError>(())
 //! ```
 //!
-//! Not promised: animation, skins, morph targets, cameras, lights, curves, points and lines; they
+//! Not promised: animation, skins, cameras, lights, curves, points and lines; they
 //! are left out with a note.
 
 mod auto_roles;
@@ -27,9 +27,13 @@ mod clean;
 mod crossing;
 mod error;
 mod export;
+mod extent;
 mod files;
+mod foreign;
 mod gltf;
+mod ifc;
 mod map;
+mod mesh;
 mod mtl;
 mod obj;
 mod options;
@@ -48,7 +52,7 @@ mod tjunction;
 pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
 pub use error::ImportError;
 pub use export::export_glb;
-pub use options::{ImportOptions, Limits, Up};
+pub use options::{IfcConverter, ImportOptions, Limits, Up};
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
 pub use repair::{RepairOptions, RepairReport, repair};
@@ -56,8 +60,7 @@ pub use report::{Example, FileReport, Finding, ImportReport, Note};
 pub use roles::RoleRules;
 
 use builder::Builder;
-use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::scene::Scene;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -156,6 +159,10 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         map::read(bytes, builder)
     } else if ending == "stl" {
         stl::read(bytes, builder)
+    } else if ifc::is_ifc(bytes) {
+        ifc::read(bytes, builder)
+    } else if let Some(error) = foreign::unsupported(bytes, path) {
+        Err(error)
     } else if gltf::is_gltf(bytes) {
         gltf::read(bytes, builder)
     } else if stl::is_stl(bytes) {
@@ -237,11 +244,12 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
             None => "export the meshes, too".into(),
         };
         return Err(ImportError::NoTriangles {
-            paths: paths_of(&report),
+            paths: extent::paths_of(&report),
             advice,
         });
     }
-    check_extent(&scene, &report, options)?;
+    extent::check(&scene, &report, options)?;
+    report.unit_doubt = extent::unit_doubt(&scene, &report, options);
     if options.roles.is_automatic && !options.roles.is_manual {
         auto_roles::judge(&mut scene);
     }
@@ -249,131 +257,4 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
         report.repair = Some(repair(&mut scene, wanted)?);
     }
     Ok(Imported { scene, report })
-}
-
-fn paths_of(report: &ImportReport) -> String {
-    let path = |f: &FileReport| f.path.display().to_string();
-    report.files.iter().map(path).collect::<Vec<_>>().join(", ")
-}
-
-/// Refuses scenes that are far larger or smaller than any building, or far off.
-fn check_extent(
-    scene: &Scene,
-    report: &ImportReport,
-    options: &ImportOptions,
-) -> Result<(), ImportError> {
-    let limits = &options.limits;
-    let boxes: Vec<Aabb> = (0..scene.objects.len())
-        .map(|i| scene.object_aabb(i))
-        .collect();
-    let has_structure = scene.objects.iter().any(|o| o.role == Role::Structural);
-    // A sky dome or a landscape may be as large as it likes, if it is detail.
-    let counted: Vec<usize> = (0..boxes.len())
-        .filter(|&i| !has_structure || scene.objects[i].role == Role::Structural)
-        .collect();
-    let bounds = counted.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i]));
-    let size = bounds.size();
-    let unit = options.unit.unwrap_or(1.0);
-    let error = |bound: String, offender, advice| {
-        Err(ImportError::Extent {
-            paths: paths_of(report),
-            size: size.to_array(),
-            bound,
-            offender,
-            advice,
-        })
-    };
-    let longest = size.max_element();
-    if longest.is_nan() || longest > limits.max_extent {
-        let limit = limits.max_extent;
-        let offender = offender(&boxes, &counted, limit).map(|i| scene.objects[i].name.clone());
-        let advice = if offender.is_some() {
-            "remove that object or name it detail; or, if the unit is wrong, ".to_owned()
-        } else {
-            String::new()
-        };
-        let factor = if longest * 0.01 > limit { 0.001 } else { 0.01 };
-        let factor = if longest * 0.001 > 1.0 { 0.001 } else { factor };
-        let advice = format!(
-            "{advice}give the unit of its numbers, e.g. --unit {}",
-            significant(unit * factor)
-        );
-        return error(format!("larger than {limit} m"), offender, advice);
-    }
-    if longest < limits.min_extent {
-        if longest == 0.0 {
-            return error(
-                format!("smaller than {} m", limits.min_extent),
-                None,
-                "all its corners lie in one point; export it again".into(),
-            );
-        }
-        let factor = if longest * 100.0 >= 2.0 {
-            100.0
-        } else {
-            1000.0
-        };
-        let advice = format!(
-            "give the unit of its numbers, e.g. --unit {}",
-            significant(unit * factor)
-        );
-        return error(
-            format!("smaller than {} m", limits.min_extent),
-            None,
-            advice,
-        );
-    }
-    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
-    if reach > limits.max_coordinate {
-        let center = bounds.center().round();
-        let advice = format!(
-            "move the scene to its origin, e.g. --origin {},{},{}",
-            center.x, center.y, center.z
-        );
-        return error(
-            format!(
-                "and {reach:.0} m off its origin, where 32-bit numbers are too coarse \
-                 (the limit is {} m)",
-                limits.max_coordinate
-            ),
-            None,
-            advice,
-        );
-    }
-    let all = boxes.iter().fold(Aabb::EMPTY, |b, &o| b.union(o));
-    let most = DVec3::splat(f32::MAX.into());
-    if !(all.max.cmple(most).all() && all.min.cmpge(-most).all()) {
-        return error(
-            "and a detail object lies beyond what 32-bit numbers hold".into(),
-            None,
-            "remove it".into(),
-        );
-    }
-    Ok(())
-}
-
-/// Six digits are enough to type, and hide the dust of binary fractions.
-fn significant(x: f64) -> f64 {
-    format!("{x:.6e}").parse().unwrap_or(x)
-}
-
-/// The one object without which the rest would fit, if there is one.
-fn offender(boxes: &[Aabb], counted: &[usize], limit: f64) -> Option<usize> {
-    let n = counted.len();
-    if n < 2 {
-        return None;
-    }
-    let mut after = vec![Aabb::EMPTY; n + 1];
-    for k in (0..n).rev() {
-        after[k] = after[k + 1].union(boxes[counted[k]]);
-    }
-    let mut before = Aabb::EMPTY;
-    for k in 0..n {
-        let rest = before.union(after[k + 1]);
-        if rest.size().max_element() <= limit {
-            return Some(counted[k]);
-        }
-        before = before.union(boxes[counted[k]]);
-    }
-    None
 }

@@ -3,6 +3,7 @@
 use crate::roles::RoleRules;
 use crate::{ImportError, RepairOptions};
 use enfilade_geom::{DMat4, DVec3};
+use std::path::PathBuf;
 
 /// The input's up axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +34,19 @@ pub struct ImportOptions {
     ///
     /// Off, a scene from elsewhere cannot bring a file of the reader's disk into the output.
     pub allow_outside: bool,
+    /// What makes IFC readable; without it such files are refused.
+    pub ifc: Option<IfcConverter>,
     /// What to put right in structural triangles; nothing if not given.
     pub repair: Option<RepairOptions>,
+}
+
+/// The command `IfcConvert` of IfcOpenShell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct IfcConverter {
+    /// The program, by path or by a name that the system finds.
+    pub program: PathBuf,
+    /// Where a folder for what it makes may be; it is removed at the end.
+    pub folder: PathBuf,
 }
 
 /// What to refuse, so that hostile input ends in an error in bounded memory and time.

@@ -33,6 +33,8 @@ pub struct ImportReport {
     pub n_polygons: u64,
     /// Files that the scene refers to and that were read: buffers, pictures, materials. Each once.
     pub references: Vec<PathBuf>,
+    /// Why the numbers are probably no meters, and what to give; `None` if nothing speaks for it.
+    pub unit_doubt: Option<String>,
     /// What was put right, if that was asked for.
     pub repair: Option<crate::RepairReport>,
 }
@@ -42,7 +44,7 @@ pub struct ImportReport {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY` or `STL`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC` or `Quake map`.
     pub format: &'static str,
     /// Objects it gave.
     pub n_objects: u64,

@@ -107,6 +107,12 @@ const IFC_VOID: [&str; 4] = [
     "IfcVirtualElement",
 ];
 
+/// The classes that decide a role; for the tests of who writes them.
+#[cfg(test)]
+pub(crate) fn ifc_classes() -> impl Iterator<Item = &'static str> {
+    IFC_DETAIL.into_iter().chain(IFC_VOID)
+}
+
 /// Words for what bounds rooms.
 #[rustfmt::skip]
 const STRUCTURAL_WORDS: [&str; 19] = [

@@ -414,3 +414,36 @@ fn a_ply_with_vertices_twice_is_refused() {
     let error = decode_ply(bytes, &ImportOptions::default()).unwrap_err();
     assert!(error.to_string().contains("twice"), "{error}");
 }
+
+#[test]
+fn numbers_that_are_no_meters_are_doubted_before_the_work() {
+    // A room of 10 x 3 x 8 m with the given number of units a meter.
+    let room = |a_meter: f64| {
+        let (x, y, z) = (10.0 * a_meter, 3.0 * a_meter, 8.0 * a_meter);
+        format!("v 0 0 0\nv {x} 0 0\nv 0 {y} {z}\nf 1 2 3\n")
+    };
+    let doubt = |a_meter: f64, unit: Option<f64>| {
+        let options = ImportOptions {
+            unit,
+            ..ImportOptions::default()
+        };
+        let read = decode_obj(room(a_meter).as_bytes(), &options).unwrap();
+        read.report.unit_doubt
+    };
+    assert_eq!(doubt(1.0, None), None);
+    assert_eq!(doubt(15.0, None), None, "a hall");
+    let text = doubt(100.0, None).unwrap();
+    assert!(
+        text.contains("1000 x 300 x 800 m") && text.contains("--unit cm or --unit in"),
+        "{text}"
+    );
+    assert!(doubt(39.37, None).unwrap().ends_with("--unit in"));
+    assert_eq!(
+        doubt(100.0, Some(1.0)),
+        None,
+        "whoever says meters means them"
+    );
+    // Millimeters are beyond the limit, and refused.
+    let error = decode_obj(room(1000.0).as_bytes(), &ImportOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("--unit 0.001"), "{error}");
+}

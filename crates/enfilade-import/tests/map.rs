@@ -77,7 +77,7 @@ fn both_formats_give_the_same_solid() {
         read(&map(&valve, "")).scene.solids
     );
     // Quake 2's three numbers more.
-    let quake2 = standard.replace("0 0 0 1 1", "0 0 0 1 1 134217728 0 0");
+    let quake2 = standard.replace("0 0 0 1 1", "0 0 0 1 1 1 2 0");
     assert_eq!(
         read(&map(&standard, "")).scene.solids,
         read(&map(&quake2, "")).scene.solids
@@ -175,7 +175,24 @@ fn what_is_wrong_is_said_with_line_and_column() {
     says("{\n\"classname\" \"worldspawn\n}", "line 2:13", "quote");
     says("{\n\"classname\" \"worldspawn\"\n", "line 1:1", "no '}'");
     says("{\n\"classname\" \"light\"\n}", "line 1:1", "worldspawn");
-    says(&map("{\nbrushDef\n{\n}\n}\n", ""), "line 5:1", "Valve 220");
+    says(&map("{\nbrushDef\n{\n}\n}\n", ""), "line 4:1", "0 sides");
+    says(
+        &map("{\nbrushDef3\n{\n( 0 0 0 5 )", ""),
+        "line 7:1",
+        "direction",
+    );
+    says(
+        &map("{\npatchDefWS\n{\n}\n}\n", ""),
+        "line 5:1",
+        "another game",
+    );
+    says(
+        &map(&patch("( 4 3 0 0 0 )"), ""),
+        "line 4:1",
+        "4 x 3 points",
+    );
+    says(&map(&patch("( 5 3 0 0 0 )"), ""), "line 13:1", "row");
+    says(&map(&patch("( 3 3 0 0 )"), ""), "line 8:11", "flag");
     // Inside out: two points of each side swapped.
     let swap = |line: &str| {
         let parts: Vec<&str> = line.split(" ) ").collect();
@@ -196,11 +213,133 @@ fn what_is_wrong_is_said_with_line_and_column() {
     says(&map(&line, ""), "line 5:1", "line");
 }
 
+/// A quarter of a pipe of 64 units, 96 long, with the line of its numbers given.
+fn patch(numbers: &str) -> String {
+    let row =
+        |x: i32, y: i32| format!("( ( {x} {y} 0 0 0 ) ( {x} {y} 48 0 0.5 ) ( {x} {y} 96 0 1 ) )\n");
+    let rows = row(64, 0) + &row(64, 64) + &row(0, 64);
+    let name = if numbers.split(' ').count() > 7 {
+        "patchDef3"
+    } else {
+        "patchDef2"
+    };
+    format!("{{\n{name}\n{{\nbase/pipe\n{numbers}\n(\n{rows})\n}}\n}}\n")
+}
+
+#[test]
+fn patches_are_curved_details() {
+    let wall = boxed([200, 0, 0], [232, 32, 32], "wall");
+    let scene = read(&map(&(wall.clone() + &patch("( 3 3 0 0 0 )")), "")).scene;
+    let object = &scene.objects[1];
+    assert_eq!(
+        (object.name.as_str(), object.role),
+        ("worldspawn 0 patches", Role::Detail)
+    );
+    let primitive = &scene.meshes[object.mesh as usize].primitives[0];
+    assert!(scene.materials[primitive.material.unwrap() as usize].double_sided);
+    // 64 - 128 + 0 is 90 off a line at most: five segments around, one along.
+    assert_eq!(
+        (primitive.positions.len(), primitive.indices.len()),
+        (12, 30)
+    );
+    assert_eq!(primitive.positions[0], [64.0, 0.0, 0.0]);
+    assert_eq!(primitive.positions[11], [0.0, 64.0, 96.0]);
+    for (p, n) in primitive.positions.iter().zip(&primitive.normals) {
+        // The curve is x = 64 (1 - t²), y = 64 (2t - t²); its square roots make a straight line.
+        let t = (1.0 - p[0] / 64.0).max(0.0).sqrt();
+        assert!((p[1] - 64.0 * (2.0 * t - t * t)).abs() < 1e-3, "{p:?}");
+        assert!(
+            n[2].abs() < 1e-6 && n[0] * p[0] + n[1] * p[1] != 0.0,
+            "{n:?}"
+        );
+    }
+    // Doom 3 says how many.
+    let scene = read(&map(&(wall + &patch("( 3 3 7 2 0 0 0 )")), "")).scene;
+    let primitive = &scene.meshes[scene.objects[1].mesh as usize].primitives[0];
+    assert_eq!(primitive.positions.len(), 8 * 3);
+}
+
+#[test]
+fn brush_primitives_and_planes_give_the_same_solid() {
+    let standard = boxed([0, 0, 0], [64, 32, 96], "stone");
+    let quake3 = standard.replacen("{\n", "{\nbrushDef\n{\n", 1).replace(
+        "stone 0 0 0 1 1",
+        "( ( 0.03125 0 -0 ) ( 0 0.03125 0 ) ) stone 0 0 0",
+    ) + "}\n";
+    let plain = read(&map(&standard, "")).scene;
+    assert_eq!(plain.solids, read(&map(&quake3, "")).scene.solids);
+    let mut planes = String::new();
+    for plane in [
+        "-1 0 0 0",
+        "1 0 0 -64",
+        "0 -1 0 0",
+        "0 1 0 -32",
+        "0 0 -2 0",
+        "0 0 1 -96",
+    ] {
+        writeln!(
+            planes,
+            "( {plane} ) ( ( 1 0 0 ) ( 0 1 0 ) ) \"textures/base\" 0 0 0"
+        )
+        .unwrap();
+    }
+    let doom3 = format!("{{\nbrushDef3\n{{\n{planes}}}\n}}\n");
+    let scene = read(&format!("Version 2\n{}", map(&doom3, ""))).scene;
+    assert_eq!(scene.object_aabb(0), plain.object_aabb(0));
+    assert!((scene.solids[0].volume() - plain.solids[0].volume()).abs() < 1e-9);
+    assert_eq!(scene.materials[0].name, "textures/base");
+}
+
+#[test]
+fn the_detail_flag_and_tools_of_quake_3_close_nothing() {
+    let detail = boxed([64, 0, 0], [96, 32, 32], "base/trim")
+        .replace(" 0 0 0 1 1", " 0 0 0 1 1 134217728 0 0");
+    let others = boxed([0, 0, 0], [32, 32, 32], "base/wall")
+        + &boxed([128, 0, 0], [160, 32, 32], "common/weapclip")
+        + &boxed([192, 0, 0], [224, 32, 32], "base/#lava1");
+    let scene = read(&map(&(detail + &others), "")).scene;
+    let told: Vec<_> = scene
+        .objects
+        .iter()
+        .map(|o| (o.name.as_str(), o.role))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("worldspawn 0", Role::Structural),
+            ("worldspawn 0 liquid", Role::Detail),
+            ("worldspawn 0 detail", Role::Detail),
+        ]
+    );
+    assert_eq!(scene.solids.len(), 1);
+}
+
+#[test]
+fn a_box_of_sky_kilometers_away_is_no_reason_to_refuse_a_map() {
+    let far = 100_000;
+    let sky = boxed([-far, -far, -far], [far, far, 64 - far], "skies/blue");
+    let wall = boxed([0, 0, 0], [64, 32, 96], "stone");
+    let text = map(&(wall + &sky), "");
+    assert!(read(&text).scene.object_aabb(0).size().x > 6000.0);
+    // With a unit of the caller's it may be wrong, and the error says so.
+    let options = ImportOptions {
+        unit: Some(1.0),
+        ..ImportOptions::default()
+    };
+    let error = decode_map(text.as_bytes(), &options)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("--unit"), "{error}");
+}
+
 #[test]
 fn every_prefix_of_a_map_is_an_error_or_a_scene() {
     let text = map(
-        &boxed([0, 0, 0], [32, 32, 32], "a")
-            .replace("a 0 0 0 1 1", "a [ 1 0 0 0 ] [ 0 1 0 0 ] 0 1 1"),
+        (boxed([0, 0, 0], [32, 32, 32], "a")
+            .replace("a 0 0 0 1 1", "a [ 1 0 0 0 ] [ 0 1 0 0 ] 0 1 1")
+            + &patch("( 3 3 0 0 0 )")
+            + &patch("( 3 3 7 2 0 0 0 )"))
+            .as_str(),
         "{\n\"classname\" \"light\"\n}\n",
     );
     for n in 0..text.len() {

@@ -11,7 +11,7 @@ use enfilade::bake::simplify::{CostModel, SimplifySettings};
 use enfilade::bake::{BakeConfig, Method, SmallestHole};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::{Aabb, DVec3, Plane};
-use enfilade::import::{ImportOptions, RepairOptions, RoleRules, Up};
+use enfilade::import::{IfcConverter, ImportOptions, RepairOptions, RoleRules, Up};
 
 use enfilade_cli::input::{name_of, read_text};
 
@@ -46,6 +46,9 @@ pub(crate) struct SceneOptions {
     /// of strangers.
     #[arg(long)]
     allow_outside: bool,
+    /// The program IfcConvert of IfcOpenShell, by which IFC is read [default: the one on the PATH].
+    #[arg(long, value_name = "PATH")]
+    ifc_convert: Option<PathBuf>,
     /// Repair structural triangles: weld corners along open edges within METERS (0.001 if not given), split
     /// T-junctions, turn shells alike, drop what is there twice, fill small holes; each change is counted.
     #[arg(long, value_name = "METERS", num_args = 0..=1, require_equals = true,
@@ -421,6 +424,20 @@ impl SceneOptions {
         })
     }
 
+    /// The one given, or the one on the PATH.
+    fn ifc_converter(&self) -> Option<IfcConverter> {
+        let name = format!("IfcConvert{}", std::env::consts::EXE_SUFFIX);
+        let on_path = || {
+            let folders = std::env::var_os("PATH")?;
+            let mut programs = std::env::split_paths(&folders).map(|f| f.join(&name));
+            programs.find(|p| p.is_file())
+        };
+        Some(IfcConverter {
+            program: self.ifc_convert.clone().or_else(on_path)?,
+            folder: std::env::temp_dir(),
+        })
+    }
+
     fn resolve_with(&self, file: &ConfigFile) -> ImportOptions {
         ImportOptions {
             unit: self.unit.or(file.unit.as_ref().map(|u| u.0)),
@@ -443,6 +460,7 @@ impl SceneOptions {
                 ..RoleRules::default()
             },
             allow_outside: self.allow_outside,
+            ifc: self.ifc_converter(),
             repair: self.repair_with(file),
             ..ImportOptions::default()
         }

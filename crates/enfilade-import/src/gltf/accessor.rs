@@ -7,6 +7,8 @@ use std::borrow::Cow;
 pub(super) struct Document<'a> {
     pub(super) root: Root,
     pub(super) buffers: Vec<Option<Cow<'a, [u8]>>>,
+    /// By buffer view its bytes, where the buffer holds them compressed.
+    pub(super) plain_views: Vec<Option<Vec<u8>>>,
 }
 
 /// How a component is stored.
@@ -33,7 +35,7 @@ impl Component {
         })
     }
 
-    fn size(self) -> u64 {
+    pub(super) fn size(self) -> u64 {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -55,6 +57,19 @@ impl Component {
             (value / most).max(-1.0)
         } else {
             value
+        }
+    }
+
+    /// Distance of two neighboring values; 0 for floats, which are rounded by their value alone, so that what was one stays one.
+    fn step(self, normalized: bool) -> f32 {
+        match self {
+            Self::F32 => 0.0,
+            _ if !normalized => 1.0,
+            Self::I8 => 1.0 / 127.0,
+            Self::U8 => 1.0 / 255.0,
+            Self::I16 => 1.0 / 32767.0,
+            Self::U16 => 1.0 / 65535.0,
+            Self::U32 => 0.0,
         }
     }
 
@@ -82,6 +97,8 @@ pub(super) struct Elements<'d> {
     /// Strictly increasing, each below `count`.
     sparse_indices: Vec<u32>,
     sparse_values: &'d [u8],
+    /// Width of the grid that the values were rounded to; 0 if they were not.
+    pub(super) step: f32,
 }
 
 impl<'a> Document<'a> {
@@ -92,10 +109,10 @@ impl<'a> Document<'a> {
             .buffer_views
             .get(index as usize)
             .ok_or_else(|| format!("no buffer view {index}"))?;
-        let missing = || match &view.extensions {
-            Some(e) if e.meshopt.is_some() => MESHOPT.to_owned(),
-            _ => format!("buffer {} of buffer view {index} has no data", view.buffer),
-        };
+        if let Some(Some(plain)) = self.plain_views.get(index as usize) {
+            return Ok((plain, view));
+        }
+        let missing = || format!("buffer {} of buffer view {index} has no data", view.buffer);
         let buffer = self
             .buffers
             .get(view.buffer as usize)
@@ -167,6 +184,7 @@ impl<'a> Document<'a> {
             bytes,
             sparse_indices: Vec::new(),
             sparse_values: &[],
+            step: component.step(accessor.normalized),
         };
         self.read_sparse(accessor, size, &mut elements)
             .map_err(|problem| at(format!("sparse: {problem}")))?;
@@ -216,9 +234,6 @@ impl<'a> Document<'a> {
     }
 }
 
-/// What to say about meshopt; compared by the reader to give the right kind of error.
-pub(super) const MESHOPT: &str = "meshopt";
-
 /// `count` elements from `offset`, `stride` apart, the last one `size` long.
 fn span(bytes: &[u8], offset: u64, count: u64, stride: u64, size: u64) -> Result<&[u8], String> {
     if count == 0 {
@@ -238,7 +253,28 @@ fn span(bytes: &[u8], offset: u64, count: u64, stride: u64, size: u64) -> Result
         })
 }
 
-impl Elements<'_> {
+impl<'d> Elements<'d> {
+    /// Elements without gaps.
+    pub(super) fn of_bytes(
+        bytes: &'d [u8],
+        component: Component,
+        n_components: usize,
+        normalized: bool,
+        step: f32,
+    ) -> Self {
+        let size = component.size() as usize * n_components;
+        Self {
+            count: (bytes.len() / size.max(1)) as u64,
+            component,
+            n_components,
+            normalized,
+            bytes: Some((bytes, size)),
+            sparse_indices: Vec::new(),
+            sparse_values: &[],
+            step,
+        }
+    }
+
     /// Bytes of element `i`, or none where it is zero by definition.
     fn element(&self, i: u32) -> Option<&[u8]> {
         let size = self.component.size() as usize * self.n_components;

@@ -103,6 +103,8 @@ pub(super) struct Node {
     pub(super) name: Option<Box<str>>,
     pub(super) mesh: Option<u32>,
     pub(super) skin: Option<u32>,
+    /// In place of the mesh's, where given.
+    pub(super) weights: Option<Box<List<f64>>>,
     #[serde(default)]
     pub(super) children: List<u32>,
     pub(super) matrix: Option<Box<[f64; 16]>>,
@@ -136,23 +138,39 @@ pub(super) struct MeshDef {
     pub(super) name: Option<String>,
     #[serde(default)]
     pub(super) primitives: List<PrimitiveDef>,
+    /// Of the primitives' morph targets.
+    #[serde(default)]
+    pub(super) weights: List<f64>,
 }
+
+/// Accessors by what they hold.
+pub(super) type AccessorOf = BTreeMap<String, u32>;
 
 #[derive(serde::Deserialize)]
 pub(super) struct PrimitiveDef {
     #[serde(default)]
-    pub(super) attributes: BTreeMap<String, u32>,
+    pub(super) attributes: AccessorOf,
     pub(super) indices: Option<u32>,
     pub(super) material: Option<u32>,
     pub(super) mode: Option<u32>,
-    pub(super) targets: Option<serde::de::IgnoredAny>,
+    #[serde(default)]
+    pub(super) targets: List<AccessorOf>,
     pub(super) extensions: Option<PrimitiveExtensions>,
 }
 
 #[derive(serde::Deserialize)]
 pub(super) struct PrimitiveExtensions {
     #[serde(rename = "KHR_draco_mesh_compression")]
-    pub(super) draco: Option<serde::de::IgnoredAny>,
+    pub(super) draco: Option<DracoDef>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct DracoDef {
+    pub(super) buffer_view: u32,
+    /// Unique ids in the bitstream, by what they hold.
+    #[serde(default)]
+    pub(super) attributes: BTreeMap<String, u32>,
 }
 
 #[derive(serde::Deserialize)]
@@ -202,13 +220,36 @@ pub(super) struct BufferView {
     pub(super) byte_offset: u64,
     pub(super) byte_length: u64,
     pub(super) byte_stride: Option<u64>,
-    pub(super) extensions: Option<Box<ViewExtensions>>,
+    extensions: Option<Box<ViewExtensions>>,
+}
+
+impl BufferView {
+    /// How it is compressed, if it is.
+    pub(super) fn meshopt(&self) -> Option<&MeshoptDef> {
+        let extensions = self.extensions.as_ref()?;
+        extensions.khr.as_ref().or(extensions.ext.as_ref())
+    }
 }
 
 #[derive(serde::Deserialize)]
-pub(super) struct ViewExtensions {
-    #[serde(rename = "EXT_meshopt_compression", alias = "KHR_meshopt_compression")]
-    pub(super) meshopt: Option<serde::de::IgnoredAny>,
+struct ViewExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    ext: Option<MeshoptDef>,
+    #[serde(rename = "KHR_meshopt_compression")]
+    khr: Option<MeshoptDef>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MeshoptDef {
+    pub(super) buffer: u32,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    pub(super) byte_stride: u64,
+    pub(super) count: u64,
+    pub(super) mode: String,
+    pub(super) filter: Option<String>,
 }
 
 #[derive(serde::Deserialize)]
@@ -216,6 +257,30 @@ pub(super) struct ViewExtensions {
 pub(super) struct BufferDef {
     pub(super) uri: Option<String>,
     pub(super) byte_length: u64,
+    extensions: Option<Box<BufferExtensions>>,
+}
+
+impl BufferDef {
+    /// Whether it only stands for what compressed buffer views hold, so that readers without the codec find something.
+    pub(super) fn is_fallback(&self) -> bool {
+        let extensions = self.extensions.as_ref();
+        let either = extensions.map(|e| [&e.ext, &e.khr]);
+        either.is_some_and(|e| e.into_iter().flatten().any(|m| m.fallback))
+    }
+}
+
+#[derive(serde::Deserialize)]
+struct BufferExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    ext: Option<MeshoptBuffer>,
+    #[serde(rename = "KHR_meshopt_compression")]
+    khr: Option<MeshoptBuffer>,
+}
+
+#[derive(serde::Deserialize)]
+struct MeshoptBuffer {
+    #[serde(default)]
+    fallback: bool,
 }
 
 #[derive(serde::Deserialize)]

@@ -1,7 +1,6 @@
 //! Materials, textures, samplers and pictures, carried over as they are.
 
 use super::accessor::Document;
-use super::data_error;
 use super::json::TextureDef;
 use crate::builder::Builder;
 use crate::{ImportError, files};
@@ -149,7 +148,7 @@ fn read_image(
     let bytes = if let Some(view) = def.buffer_view {
         let (bytes, _) = document
             .view(view)
-            .map_err(|problem| data_error(builder, &place, &problem))?;
+            .map_err(|problem| builder.malformed(&place, problem))?;
         bytes.to_vec()
     } else if let Some(uri) = &def.uri {
         match files::decode_data_uri(uri) {

@@ -5,28 +5,35 @@
 //! are flattened; a mesh placed several times stays one mesh. Everything else is noted.
 
 mod accessor;
+mod draco;
 mod json;
 mod look;
+mod meshopt;
+mod morph;
 mod primitive;
 
 use crate::builder::{Builder, Placement};
 use crate::{ImportError, files};
-use accessor::{Document, MESHOPT};
+use accessor::Document;
 use enfilade_geom::scene::Mesh;
 use enfilade_geom::{DMat4, DVec3};
 use json::{Node, Root};
 pub(crate) use look::read_picture_file;
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Required extensions that are read, or that change nothing that is read.
-const KNOWN_EXTENSIONS: [&str; 12] = [
+const KNOWN_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_avif",
     "EXT_texture_webp",
     "ENFILADE_cell_portal_graph",
     "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_basisu",
     "KHR_texture_transform",
@@ -53,6 +60,15 @@ pub(crate) fn is_gltf(bytes: &[u8]) -> bool {
 
 /// Reads one file into the builder.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    read_renamed(bytes, builder, &|_| None)
+}
+
+/// As [`read`], with other names for nodes and meshes where `rename` gives one.
+pub(crate) fn read_renamed(
+    bytes: &[u8],
+    builder: &mut Builder<'_>,
+    rename: &dyn Fn(&str) -> Option<String>,
+) -> Result<(), ImportError> {
     builder.set_format("glTF");
     let (json, bin) = split_container(bytes, builder)?;
     let limit = builder.limits().max_json_bytes;
@@ -65,19 +81,28 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
             limit,
         });
     }
-    let root: Root = serde_json::from_slice(json)
+    let mut root: Root = serde_json::from_slice(json)
         .map_err(|e| builder.malformed("JSON", format!("{e}; is the file whole?")))?;
     check_version(&root, builder)?;
+    for node in &mut root.nodes.0 {
+        let name = node.name.as_deref().and_then(rename);
+        node.name = name.map(String::into_boxed_str).or(node.name.take());
+    }
     let buffers = read_buffers(&root, bin, builder)?;
     let n_own = |b: &Option<Cow<'_, [u8]>>| match b {
         Some(Cow::Owned(bytes)) => bytes.len() as u64,
         _ => 0,
     };
     builder.add_read_bytes(buffers.iter().map(n_own).sum());
-    let document = Document { root, buffers };
+    let plain_views = meshopt::decode_views(&root, &buffers, builder)?;
+    let document = Document {
+        root,
+        buffers,
+        plain_views,
+    };
     let materials = look::read_materials(&document, builder)?;
     GltfReader {
-        meshes: vec![None; document.root.meshes.len()],
+        meshes: HashMap::new(),
         document: &document,
         materials,
         builder,
@@ -147,16 +172,10 @@ fn unsupported_version(builder: &Builder<'_>, version: &str) -> ImportError {
 }
 
 fn unsupported_extension(builder: &Builder<'_>, name: &str) -> ImportError {
-    let advice = if name.contains("draco") || name.contains("meshopt") {
-        "decompress it first: `npx @gltf-transform/cli copy IN.glb OUT.glb`, \
-         or export without compression"
-    } else {
-        "export without it"
-    };
     ImportError::Unsupported {
         path: builder.path.clone(),
         feature: format!("the required extension {name}"),
-        advice: advice.into(),
+        advice: "export without it".into(),
     }
 }
 
@@ -184,6 +203,7 @@ fn read_buffers<'b>(
     for (i, def) in root.buffers.iter().enumerate() {
         let place = format!("buffer {i}");
         let bytes = match &def.uri {
+            _ if def.is_fallback() => None,
             None if i == 0 => bin.map(Cow::Borrowed),
             None => None,
             Some(uri) => Some(Cow::Owned(match files::decode_data_uri(uri) {
@@ -215,8 +235,8 @@ struct GltfReader<'r, 'a, 'b> {
     document: &'r Document<'b>,
     /// Scene materials by document material.
     materials: Vec<u32>,
-    /// Scene meshes by document mesh, as far as used.
-    meshes: Vec<Option<u32>>,
+    /// Scene meshes by document mesh and the bits of its weights, as far as used.
+    meshes: HashMap<(u32, Vec<u64>), u32>,
     builder: &'r mut Builder<'a>,
 }
 
@@ -357,7 +377,10 @@ impl GltfReader<'_, '_, '_> {
             .flat_map(|a| a.channels.iter())
         {
             let target = &channel.target;
-            let is_move = matches!(target.path.as_str(), "translation" | "rotation" | "scale");
+            let is_move = matches!(
+                target.path.as_str(),
+                "translation" | "rotation" | "scale" | "weights"
+            );
             if let Some(slot) = target.node.and_then(|n| animated.get_mut(n as usize))
                 && is_move
             {
@@ -380,14 +403,21 @@ impl GltfReader<'_, '_, '_> {
         let node = &root.nodes[i];
         let name = node.name.as_deref().unwrap_or("");
         let place = format!("node {i} '{name}'");
-        let Some(slot) = self.meshes.get(mesh as usize) else {
+        let Some(def) = root.meshes.get(mesh as usize) else {
             return Err(self.builder.malformed(place, format!("no mesh {mesh}")));
         };
-        let scene_mesh = match *slot {
-            Some(made) => made,
+        let has_targets = def.primitives.iter().any(|p| !p.targets.is_empty());
+        let weights: &[f64] = match &node.weights {
+            _ if !has_targets => &[],
+            Some(weights) => weights,
+            None => &def.weights,
+        };
+        let key = (mesh, weights.iter().map(|w| w.to_bits()).collect());
+        let scene_mesh = match self.meshes.get(&key) {
+            Some(&made) => made,
             None => {
-                let made = self.read_mesh(mesh)?;
-                self.meshes[mesh as usize] = Some(made);
+                let made = self.read_mesh(mesh, weights)?;
+                self.meshes.insert(key, made);
                 made
             }
         };
@@ -425,24 +455,29 @@ impl GltfReader<'_, '_, '_> {
         })
     }
 
-    fn read_mesh(&mut self, index: u32) -> Result<u32, ImportError> {
+    fn read_mesh(&mut self, index: u32, weights: &[f64]) -> Result<u32, ImportError> {
         let def = &self.document.root.meshes[index as usize];
         let mut mesh = Mesh {
             name: def.name.clone().unwrap_or_default(),
             primitives: Vec::new(),
         };
+        let mut steps = Vec::new();
         for (k, primitive) in def.primitives.iter().enumerate() {
             let place = format!("mesh {index} '{}' primitive {k}", mesh.name);
             let read = primitive::read_primitive(
                 self.document,
                 primitive,
+                weights,
                 &self.materials,
                 &place,
                 self.builder,
             )?;
-            mesh.primitives.extend(read);
+            if let Some((primitive, step)) = read {
+                mesh.primitives.push(primitive);
+                steps.push(step);
+            }
         }
-        Ok(self.builder.push_mesh(mesh))
+        Ok(self.builder.push_quantized_mesh(mesh, steps))
     }
 }
 
@@ -454,15 +489,6 @@ fn why_dropped(node: &Node) -> Option<String> {
         return Some("hidden by KHR_node_visibility".to_owned());
     }
     crate::roles::drops_subtree(node.name.as_deref().unwrap_or(""))
-}
-
-/// Turns a text of [`Document`] into the fitting error.
-fn data_error(builder: &Builder<'_>, place: &str, problem: &str) -> ImportError {
-    if problem.ends_with(MESHOPT) {
-        unsupported_extension(builder, "EXT_meshopt_compression")
-    } else {
-        builder.malformed(place, problem)
-    }
 }
 
 fn local_transform(node: &Node) -> Result<DMat4, String> {

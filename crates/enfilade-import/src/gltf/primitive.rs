@@ -1,8 +1,10 @@
 //! Primitives and instances.
 
 use super::accessor::{Document, Elements};
+use super::compose;
+use super::draco::{self, DracoMesh};
 use super::json::{Instancing, PrimitiveDef};
-use super::{compose, data_error, unsupported_extension};
+use super::morph::{self, Rest};
 use crate::ImportError;
 use crate::builder::Builder;
 use enfilade_geom::scene::Primitive;
@@ -12,17 +14,24 @@ use std::collections::BTreeMap;
 /// Most texture coordinate sets kept.
 const MAX_UV_SETS: usize = 8;
 
-/// Reads one primitive; `None` where it holds no triangles.
+/// Reads one primitive with its morph targets as `weights` have them, and the width of the grid that its positions were
+/// rounded to, 0 if they were not; `None` where it holds no triangles.
 pub(super) fn read_primitive(
     document: &Document<'_>,
     def: &PrimitiveDef,
+    weights: &[f64],
     materials: &[u32],
     place: &str,
     builder: &mut Builder<'_>,
-) -> Result<Option<Primitive>, ImportError> {
+) -> Result<Option<(Primitive, f32)>, ImportError> {
+    let draco = match def.extensions.as_ref().and_then(|e| e.draco.as_ref()) {
+        Some(packed) => Some(draco::decode(document, packed, place, builder)?),
+        None => None,
+    };
     let mut reader = PrimitiveReader {
         document,
         def,
+        draco: draco.as_ref(),
         place,
         builder,
     };
@@ -50,8 +59,17 @@ pub(super) fn read_primitive(
         ..Primitive::default()
     };
     reader.read_attributes(&mut primitive, used, n_vertices)?;
+    if !def.targets.is_empty() {
+        let rest = Rest {
+            weights,
+            used,
+            n_vertices,
+        };
+        let builder = &mut *reader.builder;
+        morph::apply(document, &def.targets, rest, place, &mut primitive, builder)?;
+    }
     reader.builder.drop_nonfinite(place, &mut primitive);
-    Ok(Some(primitive))
+    Ok(Some((primitive, positions.step)))
 }
 
 /// How a list of indices makes triangles.
@@ -66,6 +84,8 @@ enum Mode {
 struct PrimitiveReader<'r, 'a, 'b> {
     document: &'r Document<'b>,
     def: &'r PrimitiveDef,
+    /// Where its geometry is compressed as a whole.
+    draco: Option<&'r DracoMesh>,
     place: &'r str,
     builder: &'r mut Builder<'a>,
 }
@@ -92,20 +112,8 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
             self.builder.note(self.place, "no POSITION; left out");
             return Ok(None);
         };
-        let accessors = &self.document.root.accessors;
-        let is_hollow = accessors
-            .get(position as usize)
-            .is_some_and(|a| a.buffer_view.is_none());
-        let extensions = self.def.extensions.as_ref();
-        if is_hollow && extensions.is_some_and(|e| e.draco.is_some()) {
-            return Err(unsupported_extension(
-                self.builder,
-                "KHR_draco_mesh_compression",
-            ));
-        }
         let positions = self
-            .document
-            .elements(position, &["VEC3"])
+            .elements("POSITION", position, &["VEC3"])
             .map_err(|problem| self.data_error("POSITION", &problem))?;
         Ok(Some(positions))
     }
@@ -135,7 +143,31 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
         Ok(indices)
     }
 
+    /// An attribute of the compressed mesh, or of an accessor.
+    fn elements(&self, name: &str, index: u32, shapes: &[&str]) -> Result<Elements<'r>, String> {
+        let Some(attribute) = self.draco.and_then(|d| d.attributes.get(name)) else {
+            return self.document.elements(index, shapes);
+        };
+        let shape = ["", "SCALAR", "VEC2", "VEC3", "VEC4"].get(attribute.n_components);
+        if !shape.is_some_and(|shape| shapes.contains(shape)) {
+            return Err(format!("has {} components", attribute.n_components));
+        }
+        let accessor = self.document.root.accessors.get(index as usize);
+        Ok(Elements::of_bytes(
+            &attribute.bytes,
+            attribute.component,
+            attribute.n_components,
+            accessor.is_some_and(|a| a.normalized),
+            attribute.step,
+        ))
+    }
+
     fn indices(&mut self, mode: Mode, n_vertices: u64) -> Result<Vec<u32>, ImportError> {
+        if let Some(draco) = self.draco {
+            self.builder
+                .check_triangles(self.place, draco.indices.len() as u64 / 3)?;
+            return Ok(draco.indices.clone());
+        }
         let Some(index) = self.def.indices else {
             self.builder.charge_vertices(self.place, n_vertices)?;
             self.builder.charge_memory(self.place, n_vertices, 4)?;
@@ -165,7 +197,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
         indices: &mut [u32],
         n_vertices: u64,
     ) -> Result<Option<Vec<u32>>, ImportError> {
-        if self.def.indices.is_none() {
+        if self.def.indices.is_none() && self.draco.is_none() {
             return Ok(None);
         }
         let distinct = distinct(indices, n_vertices);
@@ -203,8 +235,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
             return Ok(None);
         };
         let elements = self
-            .document
-            .elements(index, shapes)
+            .elements(name, index, shapes)
             .map_err(|problem| self.data_error(name, &problem))?;
         if elements.count != n_vertices {
             return Err(self.builder.malformed(
@@ -244,9 +275,6 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
                  the first color; left out",
             );
         }
-        if self.def.targets.is_some() {
-            self.builder.note(self.place, "morph targets; left out");
-        }
         let mut n_repaired = 0;
         primitive.normals = cleaned(normals.map(|e| e.read(used, 0.0)), &mut n_repaired);
         primitive.tangents = cleaned(tangents.map(|e| e.read(used, 1.0)), &mut n_repaired);
@@ -266,7 +294,8 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
     }
 
     fn data_error(&self, what: &str, problem: &str) -> ImportError {
-        data_error(self.builder, self.place, &format!("{what}: {problem}"))
+        self.builder
+            .malformed(self.place, format!("{what}: {problem}"))
     }
 }
 

@@ -1,8 +1,10 @@
-//! Quake `.map` files, Standard and Valve 220: brushes become solids and their faces, entities are kept.
+//! Quake `.map` files, Standard and Valve 220, of Quake 3 (brush primitives, patches) and Doom 3: brushes become solids and their
+//! faces, entities are kept.
 //!
 //! A brush is the space behind all of its planes, so no brush is ever not convex; what cannot be right
 //! (planes that face inwards or leave a way to infinity) ends in an error with line and column. World
 //! and `func_group` brushes are structural; `func_detail*` and all other brush entities are detail;
+//! so are brushes with the detail flag of Quake 2 and 3, and patches, which close nothing for their compilers either;
 //! sky is structural also where it is detail; liquids are detail that one sees through; triggers, clips and hints are no matter. A structural face
 //! that other structural brushes hide altogether is left out.
 //!
@@ -11,6 +13,7 @@
 //! come out of a map.
 
 mod parse;
+mod patch;
 
 use std::collections::BTreeMap;
 
@@ -23,6 +26,7 @@ use crate::builder::Builder;
 use crate::{ImportError, Up};
 use parse::Place;
 use parse::{Brush, MAX_COORDINATE, RawEntity};
+use patch::Tessellation;
 
 /// Meters in a unit of a map, if nothing else is said.
 const UNIT: f64 = 1.0 / 32.0;
@@ -73,24 +77,28 @@ enum BrushMatter {
 }
 
 fn matter_of(brush: &Brush<'_>) -> BrushMatter {
-    const TOOLS: [&str; 6] = [
-        "clip",
+    // What ends in "clip" is one, too: Quake 3 has them for players, monsters, weapons.
+    const TOOLS: [&str; 8] = [
         "hint",
         "hintskip",
         "trigger",
         "origin",
         "areaportal",
+        "clusterportal",
+        "donotenter",
+        "lightgrid",
     ];
     let is = |s: &str| TOOLS.iter().any(|t| s.eq_ignore_ascii_case(t));
     fn name(texture: &str) -> &str {
         texture.rsplit('/').next().unwrap_or(texture)
     }
-    if brush.sides.iter().any(|s| is(name(s.texture))) {
+    let is_tool = |t: &str| is(t) || t.to_ascii_lowercase().ends_with("clip");
+    if brush.sides.iter().any(|s| is_tool(name(s.texture))) {
         BrushMatter::Tool
     } else if brush
         .sides
         .iter()
-        .any(|s| name(s.texture).starts_with(['*', '!']))
+        .any(|s| name(s.texture).starts_with(['*', '!', '#']) || s.texture.starts_with("liquids/"))
     {
         BrushMatter::Liquid
     } else if brush.sides.iter().any(|s| {
@@ -109,6 +117,9 @@ enum EntityPart {
     Own,
     Sky,
     Liquid,
+    /// Brushes with the detail flag.
+    Detail,
+    Patch,
 }
 
 /// A brush that has a shape.
@@ -117,6 +128,8 @@ struct Shaped<'t> {
     textures: Vec<&'t str>,
     entity: usize,
     matter: BrushMatter,
+    /// It has the detail flag.
+    is_detail: bool,
 }
 
 /// Reads one file into the builder.
@@ -144,7 +157,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     builder.charge_memory("brushes", n_brushes as u64, 1024)?;
     let mut shaped: Vec<Shaped<'_>> = Vec::new();
     for (i, entity) in entities.iter().enumerate() {
-        if entity.brushes.is_empty()
+        if entity.brushes.is_empty() && entity.patches.is_empty()
             || kind_of_class(entity.get("classname").unwrap_or("")) == Kind::Nothing
         {
             continue;
@@ -171,6 +184,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
                 textures,
                 entity: i,
                 matter,
+                is_detail: brush.sides.iter().any(|s| s.is_detail),
             });
         }
     }
@@ -324,11 +338,11 @@ impl<'s, 't> Brushwork<'s, 't> {
     /// Whether a brush is sky that closes the world, though it is detail.
     fn seals(&self, s: &Shaped<'_>) -> bool {
         let class = class_of(&self.entities[s.entity]);
-        s.matter == BrushMatter::Sky && class.starts_with("func_detail")
+        s.matter == BrushMatter::Sky && (class.starts_with("func_detail") || s.is_detail)
     }
 
     fn is_structural(&self, s: &Shaped<'_>) -> bool {
-        let is_of_structure = self.roles[s.entity].0 == Role::Structural;
+        let is_of_structure = self.roles[s.entity].0 == Role::Structural && !s.is_detail;
         s.matter != BrushMatter::Liquid && (is_of_structure || self.seals(s))
     }
 
@@ -351,6 +365,7 @@ impl<'s, 't> Brushwork<'s, 't> {
             let part = match s.matter {
                 BrushMatter::Liquid => EntityPart::Liquid,
                 BrushMatter::Sky if self.seals(s) => EntityPart::Sky,
+                _ if s.is_detail => EntityPart::Detail,
                 _ => EntityPart::Own,
             };
             let parts = faces.entry((s.entity, part)).or_default();
@@ -370,6 +385,21 @@ impl<'s, 't> Brushwork<'s, 't> {
                     .extend((1..n - 1).flat_map(|k| [first, first + k, first + k + 1]));
             }
         }
+        for (e, entity) in self.entities.iter().enumerate() {
+            if kind_of_class(class_of(entity)) == Kind::Nothing {
+                continue;
+            }
+            for patch in &entity.patches {
+                let shape = Tessellation::new(patch);
+                let place = patch.place.to_string();
+                let n = shape.n_vertices() as u64;
+                builder.charge_vertices(&place, n)?;
+                // A vertex with its normal, and the two triangles that it begins.
+                builder.charge_memory(&place, n, 48)?;
+                let parts = faces.entry((e, EntityPart::Patch)).or_default();
+                shape.append(parts.entry(patch.texture).or_default());
+            }
+        }
         Ok(faces)
     }
 
@@ -380,7 +410,7 @@ impl<'s, 't> Brushwork<'s, 't> {
         base: DMat4,
         builder: &mut Builder<'_>,
     ) -> Result<BTreeMap<usize, u32>, ImportError> {
-        let mut material_of: BTreeMap<(&str, bool), u32> = BTreeMap::new();
+        let mut material_of: BTreeMap<(&str, Look), u32> = BTreeMap::new();
         let mut object_of: BTreeMap<usize, u32> = BTreeMap::new();
         for ((e, part), parts) in faces {
             if parts.is_empty() {
@@ -388,23 +418,28 @@ impl<'s, 't> Brushwork<'s, 't> {
             }
             let class = class_of(&self.entities[e]);
             let (role, reason) = &self.roles[e];
-            let (name, role, reason) = match part {
-                EntityPart::Own => (format!("{class} {e}"), *role, reason.as_str()),
+            let (suffix, told) = match part {
+                EntityPart::Own => ("", None),
                 EntityPart::Sky => (
-                    format!("{class} {e} sky"),
-                    Role::Structural,
-                    "map: sky closes the world",
+                    " sky",
+                    Some((Role::Structural, "map: sky closes the world")),
                 ),
-                EntityPart::Liquid => {
-                    (format!("{class} {e} liquid"), Role::Detail, "map: a liquid")
-                }
+                EntityPart::Liquid => (" liquid", Some((Role::Detail, "map: a liquid"))),
+                EntityPart::Detail => (" detail", Some((Role::Detail, "map: detail brushes"))),
+                EntityPart::Patch => (" patches", Some((Role::Detail, "map: patches"))),
             };
+            let name = format!("{class} {e}{suffix}");
+            let (role, reason) = told.unwrap_or((*role, reason));
             let is_liquid = part == EntityPart::Liquid;
+            let look = Look {
+                is_liquid,
+                is_double_sided: is_liquid || part == EntityPart::Patch,
+            };
             let mut primitives = Vec::new();
             for (texture, mut primitive) in parts {
                 let material = *material_of
-                    .entry((texture, is_liquid))
-                    .or_insert_with(|| builder.push_material(material(texture, is_liquid)));
+                    .entry((texture, look))
+                    .or_insert_with(|| builder.push_material(material(texture, look)));
                 primitive.material = Some(material);
                 primitives.push(primitive);
             }
@@ -419,8 +454,19 @@ impl<'s, 't> Brushwork<'s, 't> {
     }
 }
 
+/// What a material shows besides its texture's name.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Look {
+    is_liquid: bool,
+    is_double_sided: bool,
+}
+
 /// A plain material of a texture's name, in a color of its own.
-fn material(texture: &str, is_liquid: bool) -> Material {
+fn material(texture: &str, look: Look) -> Material {
+    let Look {
+        is_liquid,
+        is_double_sided,
+    } = look;
     // FNV-1a, for a color that is the same every time.
     let hash = texture.bytes().fold(0x811c_9dc5_u32, |h, b| {
         (h ^ u32::from(b.to_ascii_lowercase())).wrapping_mul(0x0100_0193)
@@ -440,12 +486,14 @@ fn material(texture: &str, is_liquid: bool) -> Material {
     });
     if is_liquid {
         fields["alphaMode"] = json!("BLEND");
+    }
+    if is_double_sided {
         fields["doubleSided"] = json!(true);
     }
     Material {
         name: texture.to_owned(),
         gltf: fields.to_string(),
-        double_sided: is_liquid,
+        double_sided: is_double_sided,
         transparent: is_liquid,
         base_color,
     }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use enfilade_geom::DVec3;
+
 /// Numbers beyond this are taken for damage.
 pub(super) const MAX_COORDINATE: f64 = 1e6;
 
@@ -29,6 +31,8 @@ pub(super) struct Problem {
 pub(super) struct Side<'t> {
     pub(super) points: [[f64; 3]; 3],
     pub(super) texture: &'t str,
+    /// Whether Quake 2 or 3 was told that it divides no space.
+    pub(super) is_detail: bool,
     pub(super) place: Place,
 }
 
@@ -38,10 +42,23 @@ pub(super) struct Brush<'t> {
     pub(super) place: Place,
 }
 
+/// A curved surface: a grid of quadratic Bezier patches.
+pub(super) struct Patch<'t> {
+    pub(super) texture: &'t str,
+    /// Rows and columns, both odd and at least 3.
+    pub(super) size: [usize; 2],
+    /// Row by row.
+    pub(super) controls: Vec<[f64; 3]>,
+    /// Segments a Bezier curve along columns and rows, where the file says how many.
+    pub(super) n_segments: Option<[usize; 2]>,
+    pub(super) place: Place,
+}
+
 /// A thing of the map.
 pub(super) struct RawEntity<'t> {
     pub(super) properties: Vec<(&'t str, &'t str)>,
     pub(super) brushes: Vec<Brush<'t>>,
+    pub(super) patches: Vec<Patch<'t>>,
     pub(super) place: Place,
 }
 
@@ -63,6 +80,10 @@ pub(super) fn parse(text: &str) -> Result<Vec<RawEntity<'_>>, Problem> {
     };
     let mut entities = Vec::new();
     while let Some((place, word)) = words.next()? {
+        if word == "Version" && entities.is_empty() {
+            words.number("a version")?;
+            continue;
+        }
         if word != "{" {
             return Err(problem(
                 place,
@@ -78,6 +99,7 @@ fn entity<'t>(words: &mut Words<'t>, place: Place) -> Result<RawEntity<'t>, Prob
     let mut out = RawEntity {
         properties: Vec::new(),
         brushes: Vec::new(),
+        patches: Vec::new(),
         place,
     };
     loop {
@@ -101,7 +123,16 @@ fn entity<'t>(words: &mut Words<'t>, place: Place) -> Result<RawEntity<'t>, Prob
             continue;
         }
         match word {
-            "{" => out.brushes.push(brush(words, at)?),
+            "{" => match words.peek()? {
+                Some("brushDef" | "brushDef3") => {
+                    words.next()?;
+                    words.expect("{", "a brush's")?;
+                    out.brushes.push(brush(words, at)?);
+                    words.expect("}", "a brush's")?;
+                }
+                Some("patchDef2" | "patchDef3") => out.patches.push(patch(words, at)?),
+                _ => out.brushes.push(brush(words, at)?),
+            },
             "}" => return Ok(out),
             _ => {
                 return Err(problem(
@@ -125,11 +156,11 @@ fn brush<'t>(words: &mut Words<'t>, place: Place) -> Result<Brush<'t>, Problem> 
         match word {
             "(" => sides.push(side(words, at)?),
             "}" => return Ok(Brush { sides, place }),
-            "brushDef" | "brushDef3" | "patchDef2" | "patchDef3" | "patchDefWS" => {
+            "patchDefWS" | "patchTerrainDef3" | "curve" | "mesh" => {
                 return Err(problem(
                     at,
                     format!(
-                        "'{word}' is of Quake 3 or Doom 3; save the map in the Standard or Valve 220 format"
+                        "'{word}' is of another game; save the map in the format of Quake (Standard, Valve 220) or Quake 3"
                     ),
                 ));
             }
@@ -152,12 +183,39 @@ fn side<'t>(words: &mut Words<'t>, place: Place) -> Result<Side<'t>, Problem> {
         for c in point.iter_mut() {
             *c = words.number("a coordinate")?;
         }
+        if i == 0 && words.peek()? != Some(")") {
+            // Doom 3: the normal of the plane, outwards, and what is added to its product with a point.
+            let offset = words.number("a plane's offset")?;
+            let normal = *point;
+            points = points_of_plane(normal, offset).ok_or_else(|| {
+                problem(
+                    place,
+                    "a plane without a direction; delete its brush".into(),
+                )
+            })?;
+            words.expect(")", "a plane's")?;
+            break;
+        }
         words.expect(")", "a point's")?;
+    }
+    // Brush primitives: a matrix, before the texture.
+    let has_matrix = words.peek()? == Some("(");
+    if has_matrix {
+        words.expect("(", "a texture matrix'")?;
+        for _ in 0..2 {
+            words.expect("(", "a texture matrix'")?;
+            for _ in 0..3 {
+                words.number("a texture matrix")?;
+            }
+            words.expect(")", "a texture matrix'")?;
+        }
+        words.expect(")", "a texture matrix'")?;
     }
     let texture = words.raw("a texture's name")?;
     // Standard: two shifts, an angle, two scales. Valve 220: two axes in brackets, then the last three.
     // Numbers that Quake 2 adds to either follow on the same line and say nothing of the shape.
-    if words.peek()? == Some("[") {
+    if has_matrix {
+    } else if words.peek()? == Some("[") {
         for _ in 0..2 {
             words.expect("[", "a texture axis'")?;
             for _ in 0..4 {
@@ -173,15 +231,104 @@ fn side<'t>(words: &mut Words<'t>, place: Place) -> Result<Side<'t>, Problem> {
             words.number("a texture's shift, angle or scale")?;
         }
     }
-    while words.peek()?.is_some_and(|w| w.parse::<f64>().is_ok()) {
+    let mut contents = None;
+    while let Some(number) = words.peek()?.and_then(|w| w.parse::<f64>().ok()) {
+        contents = contents.or(Some(number));
         words.next()?;
     }
     Ok(Side {
         points,
         texture,
+        is_detail: contents.is_some_and(|c| c as i64 & CONTENTS_DETAIL != 0),
         place,
     })
 }
+
+/// The flag of Quake 2 and 3 for what is seen but divides no space.
+const CONTENTS_DETAIL: i64 = 0x0800_0000;
+
+/// Three points of a plane, in the order in which they make its normal.
+fn points_of_plane(normal: [f64; 3], offset: f64) -> Option<[[f64; 3]; 3]> {
+    let normal = DVec3::from_array(normal);
+    let length = normal.length();
+    if length < 1e-6 {
+        return None;
+    }
+    let (normal, offset) = (normal / length, offset / length);
+    let (u, v) = normal.any_orthonormal_pair();
+    let (u, v) = if u.cross(v).dot(normal) > 0.0 {
+        (u, v)
+    } else {
+        (v, u)
+    };
+    let origin = normal * -offset;
+    // Far apart, as the points of an editor are.
+    Some([origin + u * 64.0, origin, origin + v * 64.0].map(|p| p.to_array()))
+}
+
+/// A patch, from the word behind its first brace to its last one.
+fn patch<'t>(words: &mut Words<'t>, place: Place) -> Result<Patch<'t>, Problem> {
+    let is_def3 = words.next()?.is_some_and(|(_, word)| word == "patchDef3");
+    words.expect("{", "a patch's")?;
+    let texture = words.raw("a texture's name")?;
+    words.expect("(", "a patch's")?;
+    let count = |words: &mut Words<'t>, what| words.number(what).map(|n| n as usize);
+    let size = [
+        count(words, "a patch's width")?,
+        count(words, "a patch's height")?,
+    ];
+    let is_grid = |n: usize| n % 2 == 1 && (3..=MAX_PATCH).contains(&n);
+    if !size.into_iter().all(is_grid) {
+        let [w, h] = size;
+        return Err(problem(
+            place,
+            format!("a patch of {w} x {h} points; both must be odd, and from 3 to {MAX_PATCH}"),
+        ));
+    }
+    let mut n_segments = None;
+    if is_def3 {
+        n_segments = Some([
+            count(words, "a patch's subdivision")?,
+            count(words, "a patch's subdivision")?,
+        ]);
+    }
+    for _ in 0..3 {
+        words.number("a patch's flag")?;
+    }
+    words.expect(")", "a patch's")?;
+    words.expect("(", "a patch's")?;
+    let mut controls = Vec::new();
+    for _ in 0..size[0] {
+        words.expect("(", "a patch's row's")?;
+        for _ in 0..size[1] {
+            words.expect("(", "a patch's point's")?;
+            let mut point = [0.0; 3];
+            for c in &mut point {
+                *c = words.number("a coordinate")?;
+            }
+            controls.push(point);
+            // Where its texture is.
+            for _ in 0..2 {
+                words.number("a texture coordinate")?;
+            }
+            words.expect(")", "a patch's point's")?;
+        }
+        words.expect(")", "a patch's row's")?;
+    }
+    for bracket in [")", "}", "}"] {
+        words.expect(bracket, "a patch's")?;
+    }
+    Ok(Patch {
+        texture,
+        size,
+        controls,
+        n_segments,
+        place,
+    })
+}
+
+/// Most rows or columns of a patch; Quake 3 takes 31.
+const MAX_PATCH: usize = 1023;
 
 fn problem(place: Place, text: String) -> Problem {
     Problem { place, text }

@@ -11,6 +11,7 @@
 mod drop;
 mod fill;
 mod orient;
+mod quantized;
 mod split;
 mod surface;
 mod weld;
@@ -20,6 +21,7 @@ use std::fmt;
 use enfilade_geom::scene::Scene;
 
 use crate::ImportError;
+pub(crate) use quantized::{GridSteps, weld_quantized};
 use surface::Surface;
 
 /// What is put right, and how far.

@@ -1,0 +1,245 @@
+//! IFC, through the converter of IfcOpenShell.
+//!
+//! IfcConvert makes a GLB whose nodes have the products' global ids as names; the classes are read from the IFC file itself, so
+//! that objects are called `IfcWall/0iEHWY1$XA8eQeeULq4jE6` and roles go by class.
+
+use std::collections::HashMap;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::builder::Builder;
+use crate::options::IfcConverter;
+use crate::{ImportError, files, gltf};
+
+/// Characters of a global id.
+const GUID_LENGTH: usize = 22;
+/// Most of what the converter says that goes into an error.
+const SAID_BYTES: u64 = 2000;
+
+/// Whether it is a STEP file of some IFC schema.
+pub(crate) fn is_ifc(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(1 << 16)];
+    let head = String::from_utf8_lossy(head).to_ascii_uppercase();
+    head.trim_start().starts_with("ISO-10303-21") && head.contains("IFC")
+}
+
+/// Converts the file and reads what came out.
+pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    let Some(converter) = &builder.options.ifc else {
+        return Err(ImportError::Unsupported {
+            path: builder.path.clone(),
+            feature: "IFC without its converter".into(),
+            advice: "install IfcConvert of IfcOpenShell (https://ifcopenshell.org) on the PATH, or give it by --ifc-convert PATH"
+                .into(),
+        });
+    };
+    let folder = Folder::new(&converter.folder).map_err(|reason| ImportError::Read {
+        path: converter.folder.clone(),
+        reason,
+    })?;
+    let glb = convert(converter, &builder.path, &folder.0)
+        .map_err(|problem| builder.malformed(converter.program.display().to_string(), problem))?;
+    let glb = files::read_file(&glb, builder.limits().max_file_bytes)?;
+    drop(folder);
+    builder.add_read_bytes(glb.len() as u64);
+    let classes = classes(bytes);
+    gltf::read_renamed(&glb, builder, &|name| {
+        // Some versions put a word before and behind it: `product-GUID-body`.
+        let guid = name.strip_prefix("product-").unwrap_or(name);
+        let guid = guid.get(..GUID_LENGTH)?;
+        Some(format!("{}/{guid}", classes.get(guid)?))
+    })?;
+    builder.set_format("IFC");
+    Ok(())
+}
+
+/// The GLB that the converter made, or what it said.
+fn convert(converter: &IfcConverter, input: &Path, folder: &Path) -> Result<PathBuf, String> {
+    let (output, said) = (folder.join("out.glb"), folder.join("said.txt"));
+    let text = |e: std::io::Error| e.to_string();
+    let stderr = File::create(&said).map_err(text)?;
+    // Where it lies, so that a name that begins with a dash is no option.
+    let input = fs::canonicalize(input).map_err(text)?;
+    let status = Command::new(&converter.program)
+        .args(["--use-element-guids", "--yes"])
+        .args([&input, &output])
+        .stdin(Stdio::null())
+        .stdout(stderr.try_clone().map_err(text)?)
+        .stderr(stderr)
+        .status()
+        .map_err(|e| format!("cannot be run: {e}; give IfcConvert by --ifc-convert PATH"))?;
+    if status.success() && output.is_file() {
+        return Ok(output);
+    }
+    let said = tail(&said).unwrap_or_default();
+    Err(format!("made no GLB ({status}): {}", said.trim()))
+}
+
+/// The last bytes of a file, as text.
+fn tail(path: &Path) -> std::io::Result<String> {
+    use std::io::{Read, Seek, SeekFrom};
+    let mut file = File::open(path)?;
+    let n = file.metadata()?.len();
+    file.seek(SeekFrom::Start(n.saturating_sub(SAID_BYTES)))?;
+    let mut bytes = Vec::new();
+    file.take(SAID_BYTES).read_to_end(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// By global id the class of each instance that has one, as `IFCWALL`: `#12=IFCWALL('...',`. Linear.
+fn classes(bytes: &[u8]) -> HashMap<String, String> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut classes = HashMap::new();
+    for instance in text.split(';') {
+        let Some((_, rest)) = instance.split_once('=') else {
+            continue;
+        };
+        let Some((class, rest)) = rest.split_once('(') else {
+            continue;
+        };
+        let class = class.trim();
+        let guid = rest.trim_start().strip_prefix('\'');
+        let guid = guid.and_then(|g| g.split_once('\'')).map(|g| g.0);
+        if let Some(guid) = guid.filter(|g| g.len() == GUID_LENGTH)
+            && let Some(kind) = class.to_ascii_uppercase().strip_prefix("IFC")
+        {
+            classes.insert(guid.to_owned(), format!("Ifc{}", capitalized(kind)));
+        }
+    }
+    classes
+}
+
+/// Words of the classes that have a shape.
+const WORDS: [&str; 59] = [
+    "Air",
+    "Annotation",
+    "Assembly",
+    "Beam",
+    "Building",
+    "Built",
+    "Case",
+    "Chimney",
+    "Civil",
+    "Column",
+    "Controller",
+    "Conversion",
+    "Covering",
+    "Curtain",
+    "Device",
+    "Discrete",
+    "Distribution",
+    "Door",
+    "Electric",
+    "Element",
+    "Elemented",
+    "Energy",
+    "Equipment",
+    "Feature",
+    "Fitting",
+    "Fixture",
+    "Flight",
+    "Flow",
+    "Footing",
+    "Furnishing",
+    "Furniture",
+    "Geographic",
+    "Grid",
+    "Lamp",
+    "Light",
+    "Member",
+    "Opening",
+    "Outlet",
+    "Pile",
+    "Plate",
+    "Proxy",
+    "Railing",
+    "Ramp",
+    "Roof",
+    "Sanitary",
+    "Segment",
+    "Shading",
+    "Site",
+    "Slab",
+    "Space",
+    "Stair",
+    "Standard",
+    "Switching",
+    "System",
+    "Terminal",
+    "Transport",
+    "Virtual",
+    "Wall",
+    "Window",
+];
+
+/// `WALLSTANDARDCASE` as the schema writes it: STEP files have capitals only. What is no known word stays one.
+fn capitalized(kind: &str) -> String {
+    let mut out = String::new();
+    let mut rest = kind;
+    while !rest.is_empty() {
+        let is_next = |w: &&&str| {
+            rest.get(..w.len())
+                .is_some_and(|r| r.eq_ignore_ascii_case(w))
+        };
+        let found = WORDS.iter().filter(is_next).max_by_key(|w| w.len());
+        let n = found.map_or(rest.len(), |w| w.len());
+        let (first, tail) = rest[..n].split_at_checked(1).unwrap_or((rest, ""));
+        out += first;
+        out += &tail.to_ascii_lowercase();
+        rest = &rest[n..];
+    }
+    out
+}
+
+/// A folder of our own that goes with all that is in it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(parent: &Path) -> std::io::Result<Self> {
+        let mut n = 0_u32;
+        loop {
+            let path = parent.join(format!("enfilade-ifc-{}-{n}", std::process::id()));
+            match fs::create_dir(&path) {
+                Ok(()) => return Ok(Self(path)),
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && n < 1000 => n += 1,
+                Err(e) => return Err(e),
+            }
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What cannot be removed is the system's to remove.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn classes_are_read_by_global_id() {
+        let text = b"ISO-10303-21;HEADER;FILE_SCHEMA(('IFC4'));ENDSEC;DATA;\n\
+            #1= IFCWALLSTANDARDCASE('0iEHWY1$XA8eQeeULq4jE6',#2,'a;b');\n\
+            #2=IFCCARTESIANPOINT((0.,0.));#3=IFCDOOR ( '1iEHWY1$XA8eQeeULq4jE6' ,$);#4=IFC('2iEHWY1$XA8eQeeULq4jE6');";
+        assert!(is_ifc(text) && !is_ifc(b"ISO-10303-21; AP214"));
+        let classes = classes(text);
+        assert_eq!(classes["0iEHWY1$XA8eQeeULq4jE6"], "IfcWallStandardCase");
+        assert_eq!(classes["1iEHWY1$XA8eQeeULq4jE6"], "IfcDoor");
+        assert_eq!(classes["2iEHWY1$XA8eQeeULq4jE6"], "Ifc");
+        assert_eq!(classes.len(), 3);
+    }
+
+    #[test]
+    fn classes_that_roles_know_are_written_as_they_know_them() {
+        for class in crate::roles::ifc_classes() {
+            let upper = class["Ifc".len()..].to_ascii_uppercase();
+            assert_eq!(format!("Ifc{}", capitalized(&upper)), class);
+        }
+        assert_eq!(capitalized("CURTAINWALL"), "CurtainWall");
+        assert_eq!(capitalized("ODDTHING"), "Oddthing");
+    }
+}

@@ -1,0 +1,107 @@
+//! IFC through a converter: one of our own makes, that hands out a GLB made here. Covers S1.
+#![cfg(unix)]
+
+mod common;
+
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use common::{glb, triangle_bin, triangle_json};
+use enfilade_geom::scene::Role;
+use enfilade_import::{IfcConverter, ImportError, ImportOptions, Imported, import};
+
+const IFC: &str = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n\
+    #7=IFCWALLSTANDARDCASE('0iEHWY1$XA8eQeeULq4jE6',#2,'north',$);\n\
+    #8=IFCDOOR('1iEHWY1$XA8eQeeULq4jE6',#2,'leaf',$);\nENDSEC;\nEND-ISO-10303-21;\n";
+
+/// A folder of one test, with an IFC file and a converter that is this script.
+fn house(name: &str, script: &str) -> (PathBuf, IfcConverter) {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(folder.join("temporary")).unwrap();
+    std::fs::write(folder.join("-house.ifc"), IFC).unwrap();
+    let nodes = r#""nodes":[{"mesh":0,"name":"0iEHWY1$XA8eQeeULq4jE6"},
+        {"mesh":0,"name":"product-1iEHWY1$XA8eQeeULq4jE6-body"},{"mesh":0,"name":"else"}]"#;
+    std::fs::write(
+        folder.join("made.glb"),
+        glb(&triangle_json(nodes), &triangle_bin()),
+    )
+    .unwrap();
+    let program = folder.join("convert.sh");
+    std::fs::write(
+        &program,
+        format!("#!/bin/sh\nset -e\ncd \"$(dirname \"$0\")\"\n{script}\n"),
+    )
+    .unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let converter = IfcConverter {
+        program,
+        folder: folder.join("temporary"),
+    };
+    (folder, converter)
+}
+
+fn read(folder: &Path, ifc: Option<IfcConverter>) -> Result<Imported, ImportError> {
+    let options = ImportOptions {
+        ifc,
+        ..ImportOptions::default()
+    };
+    let read = import(&[folder.join("-house.ifc")], &[], &options);
+    let left = std::fs::read_dir(folder.join("temporary")).unwrap().count();
+    assert_eq!(left, 0, "temporary files are removed");
+    read
+}
+
+#[test]
+fn products_have_their_class_and_global_id_as_name() {
+    let script = "[ \"$1 $2\" = '--use-element-guids --yes' ] && grep -q IFCDOOR \"$3\" && cp made.glb \"$4\"";
+    let (folder, converter) = house("ifc-names", script);
+    let imported = read(&folder, Some(converter)).unwrap();
+    let objects = imported.scene.objects.iter();
+    let told: Vec<_> = objects
+        .map(|o| (o.name.as_str(), o.role, o.reason.as_str()))
+        .collect();
+    assert_eq!(
+        told[..2],
+        [
+            (
+                "IfcWallStandardCase/0iEHWY1$XA8eQeeULq4jE6",
+                Role::Structural,
+                "IFC class IfcWallStandardCase"
+            ),
+            (
+                "IfcDoor/1iEHWY1$XA8eQeeULq4jE6",
+                Role::Detail,
+                "IFC class IfcDoor"
+            ),
+        ]
+    );
+    assert_eq!(told[2].0, "else");
+    assert_eq!(imported.report.files[0].format, "IFC");
+}
+
+#[test]
+fn a_converter_that_fails_is_quoted_and_leaves_nothing_behind() {
+    for (name, script, text) in [
+        (
+            "ifc-fails",
+            "echo half > \"$4\"; echo 'no such schema' >&2; exit 3",
+            "no such schema",
+        ),
+        ("ifc-silent", "exit 0", "made no GLB"),
+        ("ifc-nonsense", "echo half > \"$4\"", "JSON"),
+    ] {
+        let (folder, converter) = house(name, script);
+        let error = read(&folder, Some(converter)).unwrap_err().to_string();
+        assert!(
+            error.contains(text) && error.contains("-house.ifc"),
+            "{error}"
+        );
+    }
+    let (folder, mut converter) = house("ifc-missing", "");
+    converter.program = folder.join("nowhere");
+    let error = read(&folder, Some(converter)).unwrap_err().to_string();
+    assert!(error.contains("cannot be run"), "{error}");
+    let error = read(&folder, None).unwrap_err().to_string();
+    assert!(error.contains("--ifc-convert"), "{error}");
+}
