@@ -9,7 +9,7 @@ use enfilade_geom::scene::{Role, Scene};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
     /// Memory. Voxels and points are as many as fit; a bake that cannot do with that is refused before it begins. If not
-    /// given, 8 GiB, and less for few triangles: those of 2,000 get no more voxels than fit 1 GiB. [Units: bytes]
+    /// given, 8 GiB, and less for few triangles: those of 2,000 get no more voxels or points than fit 1 GiB. [Units: bytes]
     pub memory: Option<u64>,
     /// Time, after which a bake is refused. Without it, a bake ends where its work is out of all proportion to its
     /// triangles and voxels, which depends on no clock: what a minute does for 2,000 triangles, and seven times or more what
@@ -32,6 +32,11 @@ pub(crate) const WORK_A_VOXEL: u64 = 5;
 const VOXELS: f64 = 120e6;
 const VOXELS_A_TRIANGLE: f64 = 50e3;
 
+/// Memory that points of any scene are worth, and those of each triangle more. Real buildings take three quarters of it at
+/// most. [Units: bytes]
+const POINT_BYTES: u64 = 800_000_000;
+const POINT_BYTES_A_TRIANGLE: u64 = 100_000;
+
 impl Budget {
     /// What a bake of so many triangles that begins now may spend.
     pub(crate) fn allowance(&self, n_triangles: usize) -> Allowance {
@@ -51,9 +56,10 @@ impl Budget {
         }
     }
 
-    /// Most points of `bytes_each` on surfaces, but for corners.
-    pub(crate) fn points(&self, bytes_each: u64) -> usize {
-        (self.memory.unwrap_or(MEMORY) / bytes_each) as usize
+    /// Most points of `bytes_each` on surfaces of so many triangles, but for corners.
+    pub(crate) fn points(&self, n_triangles: usize, bytes_each: u64) -> usize {
+        let worth = POINT_BYTES + POINT_BYTES_A_TRIANGLE * n_triangles as u64;
+        (self.memory.unwrap_or(worth.min(MEMORY)) / bytes_each) as usize
     }
 }
 
@@ -132,7 +138,8 @@ mod tests {
         // Those of 2,000 triangles fit a gibibyte.
         assert!(budget.voxels(2000, 3.0) * 3.0 < f64::from(1 << 30));
         assert!(budget.voxels(50_000, 3.0) > 1.6e9);
-        assert!(budget.points(4000) >= 300_000);
+        assert!(budget.points(50_000, 5000) >= 1_000_000);
+        assert!(budget.points(2_000, 5000) * 5000 <= 1 << 30);
         let small = budget.allowance(2000);
         assert!(!small.spend(u64::MAX / 2) && small.is_over());
     }

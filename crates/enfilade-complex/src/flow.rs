@@ -18,9 +18,9 @@ const ROOT: u32 = u32::MAX - 1;
 /// Parent of a node that has lost it and waits for another.
 const LOST: u32 = u32::MAX - 2;
 
-/// Which tree a node is in, if it has a parent.
+/// Where a tree grows from: which one a node is in, if it has a parent.
 #[derive(Clone, Copy, PartialEq)]
-enum Tree {
+enum Terminal {
     Source,
     Sink,
 }
@@ -71,7 +71,7 @@ impl Flow {
         let mut search = Search::of(self);
         let pushed = search.run();
         let sides = search.parent.iter().zip(&search.tree);
-        let is_source = sides.map(|(&p, &tree)| p != NONE && tree == Tree::Source);
+        let is_source = sides.map(|(&p, &tree)| p != NONE && tree == Terminal::Source);
         (total.saturating_add(pushed), is_source.collect())
     }
 }
@@ -81,7 +81,7 @@ struct Search {
     /// First arc of each node, and the number of arcs.
     start: Vec<u32>,
     terminal: Vec<i64>,
-    tree: Vec<Tree>,
+    tree: Vec<Terminal>,
     /// The arc to the parent; [`ROOT`], [`LOST`], or [`NONE`] outside the trees.
     parent: Vec<u32>,
     /// When the distance was last known to be right, and the distance to the terminal.
@@ -129,7 +129,7 @@ impl Search {
         let mut search = Self {
             arcs,
             start,
-            tree: vec![Tree::Source; n],
+            tree: vec![Terminal::Source; n],
             parent: vec![NONE; n],
             stamp: vec![0; n],
             distance: vec![0; n],
@@ -142,7 +142,11 @@ impl Search {
         for node in 0..n {
             let left = search.terminal[node];
             if left != 0 {
-                search.tree[node] = if left > 0 { Tree::Source } else { Tree::Sink };
+                search.tree[node] = if left > 0 {
+                    Terminal::Source
+                } else {
+                    Terminal::Sink
+                };
                 search.parent[node] = ROOT;
                 search.distance[node] = 1;
                 search.activate(node as u32);
@@ -163,11 +167,11 @@ impl Search {
 
     /// Whether flow can pass from the parent's end of an arc to the child's in a tree: from `from` along the arc, or, in the
     /// sink's tree, against it.
-    fn is_open(&self, arc: u32, tree: Tree) -> bool {
+    fn is_open(&self, arc: u32, tree: Terminal) -> bool {
         let arc = self.arcs[arc as usize];
         match tree {
-            Tree::Source => arc.capacity > 0,
-            Tree::Sink => self.arcs[arc.twin as usize].capacity > 0,
+            Terminal::Source => arc.capacity > 0,
+            Terminal::Sink => self.arcs[arc.twin as usize].capacity > 0,
         }
     }
 
@@ -208,7 +212,7 @@ impl Search {
                 self.hang(to, twin, node);
                 self.activate(to);
             } else if self.tree[t] != tree {
-                return Some(if tree == Tree::Source { arc } else { twin });
+                return Some(if tree == Terminal::Source { arc } else { twin });
             } else if self.stamp[t] <= self.stamp[n] && self.distance[t] > self.distance[n] {
                 // Shorter that way.
                 self.hang(to, twin, node);
@@ -228,8 +232,8 @@ impl Search {
     fn augment(&mut self, middle: u32) -> u64 {
         let twin = self.arcs[middle as usize].twin;
         let ends = [
-            (self.arcs[twin as usize].to, Tree::Source),
-            (self.arcs[middle as usize].to, Tree::Sink),
+            (self.arcs[twin as usize].to, Terminal::Source),
+            (self.arcs[middle as usize].to, Terminal::Sink),
         ];
         let mut least = self.arcs[middle as usize].capacity;
         for (end, tree) in ends {
@@ -237,8 +241,8 @@ impl Search {
             while self.parent[node] != ROOT {
                 let arc = self.arcs[self.parent[node] as usize];
                 least = least.min(match tree {
-                    Tree::Source => self.arcs[arc.twin as usize].capacity,
-                    Tree::Sink => arc.capacity,
+                    Terminal::Source => self.arcs[arc.twin as usize].capacity,
+                    Terminal::Sink => arc.capacity,
                 });
                 node = arc.to as usize;
             }
@@ -253,8 +257,8 @@ impl Search {
                 let down = self.arcs[up].twin as usize;
                 // Toward the node from the source, and away from it to the sink.
                 let (with, against) = match tree {
-                    Tree::Source => (down, up),
-                    Tree::Sink => (up, down),
+                    Terminal::Source => (down, up),
+                    Terminal::Sink => (up, down),
                 };
                 self.arcs[with].capacity -= least;
                 self.arcs[against].capacity += least;
@@ -264,8 +268,8 @@ impl Search {
                 node = self.arcs[up].to as usize;
             }
             match tree {
-                Tree::Source => self.terminal[node] -= least as i64,
-                Tree::Sink => self.terminal[node] += least as i64,
+                Terminal::Source => self.terminal[node] -= least as i64,
+                Terminal::Sink => self.terminal[node] += least as i64,
             }
             if self.terminal[node] == 0 {
                 self.orphan(node as u32);

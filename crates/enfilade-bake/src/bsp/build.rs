@@ -70,7 +70,7 @@ impl Bsp {
             } else if !input.triangles.is_empty() {
                 let soup = inside::Soup::of(input.triangles, input.objects);
                 settle(&mut tree, &tolerance, true, allowance, &|p| {
-                    has_matter && soup.is_inside(p)
+                    has_matter && soup.is_inside(p, allowance)
                 });
             }
             let mut bsp = Self {

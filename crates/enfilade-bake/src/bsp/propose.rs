@@ -38,7 +38,7 @@ pub(crate) fn propose(
     let mut votes = parted.votes(&bsp);
     if !structure.stairs.is_empty() {
         let matter = Soup::of(&structure.stairs, &[]);
-        votes.retain(|v| !matter.is_inside(v.point));
+        votes.retain(|v| !matter.is_inside(v.point, context.allowance()));
     }
     let cells = &parted.cells;
     let counts = vec![

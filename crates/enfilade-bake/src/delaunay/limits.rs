@@ -3,7 +3,7 @@
 use enfilade_geom::Allowance;
 
 /// Memory that a point takes, at most, while tetrahedra become cells. [Units: bytes]
-pub(super) const BYTES_A_POINT: u64 = 4_000;
+pub(super) const BYTES_A_POINT: u64 = 5_000;
 
 /// What dividing may take.
 pub(super) struct Limits<'a> {

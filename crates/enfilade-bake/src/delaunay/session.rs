@@ -62,7 +62,9 @@ impl Session {
             &bvh,
             config.min_opening,
             &Limits {
-                n_points: config.budget.points(BYTES_A_POINT),
+                n_points: config
+                    .budget
+                    .points(structure.triangles.len(), BYTES_A_POINT),
                 allowance: context.allowance(),
             },
         )?;
