@@ -38,7 +38,7 @@ pub fn write(path: impl AsRef<Path>, bytes: &[u8]) -> io::Result<()> {
     written
 }
 
-/// Whether [`write`] to `path` would find a place: makes the file aside and removes it again. Leaves `path` alone.
+/// Whether [`write()`] to `path` would find a place: makes the file aside and removes it again. Leaves `path` alone.
 ///
 /// # Errors
 ///
