@@ -172,13 +172,14 @@ fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     })
 }
 
-/// The lines `NAME  1.23 s` that `bake -v` prints among others.
+/// The lines `NAME  1.23 s` that `bake -v` prints among others; names are words, and the estimate at the beginning is a sentence.
 fn stage_times(said: &str) -> Vec<(String, String)> {
     said.lines()
         .filter_map(|line| {
             let (name, seconds) = line.strip_suffix(" s")?.trim().rsplit_once(' ')?;
             seconds.parse::<f64>().ok()?;
-            Some((name.trim().to_owned(), seconds.to_owned()))
+            let is_name = name.chars().all(|c| c.is_alphabetic() || c == ' ');
+            is_name.then_some((name.trim().to_owned(), seconds.to_owned()))
         })
         .collect()
 }
