@@ -32,8 +32,8 @@ pub(crate) const WORK_A_VOXEL: u64 = 5;
 const VOXELS: f64 = 120e6;
 const VOXELS_A_TRIANGLE: f64 = 50e3;
 
-/// Memory that points of any scene are worth, and those of each triangle more. Real buildings take three quarters of it at
-/// most. [Units: bytes]
+/// Memory that points of any scene are worth, and those of each triangle more. Of six real buildings none takes more than four
+/// fifths of it. [Units: bytes]
 const POINT_BYTES: u64 = 800_000_000;
 const POINT_BYTES_A_TRIANGLE: u64 = 100_000;
 

@@ -8,7 +8,7 @@
 //! Sills are found anew, by the triangles of the file; what is within a rounding of the other kind is left alone.
 
 use enfilade_cpg::{Portal, PortalKind, World};
-use enfilade_geom::{Bvh, DVec3, Ray, Triangle, Winding};
+use enfilade_geom::{Bvh, DVec3, Plane, Ray, Triangle, Winding};
 
 use crate::subject::to_dvec;
 
@@ -78,10 +78,15 @@ fn stance_problem(p: &Portal, ground: &Bvh) -> Option<String> {
     if p.kind == PortalKind::Crack || !is_upright(p) {
         return None;
     }
-    let heights = p.outline.iter().map(|c| f64::from(c[1]));
+    // Around what is open: outlines of sharp openings are rectangles, and reach below the ground.
+    let corners: Vec<DVec3> = p.pieces.iter().flatten().map(|&c| to_dvec(c)).collect();
+    let normal = to_dvec(p.normal).try_normalize()?;
+    let plane = Plane::through(*corners.first()?, normal);
+    let opening = Winding::hull_in_plane(&plane, &corners);
+    let heights = corners.iter().map(|c| c.y);
     let [low, high] = heights.fold([f64::MAX, f64::MIN], |[a, b], y| [a.min(y), b.max(y)]);
     let height = high - low;
-    let [least, most] = sills(p, low, ground);
+    let [least, most] = sills(normal, opening.centroid().with_y(low), ground);
     match p.kind {
         PortalKind::Door if height < LEAST_DOOR - ROOM => Some(format!("is {height:.2} m high")),
         PortalKind::Door | PortalKind::Open if least > SILL + ROOM => {
@@ -101,12 +106,9 @@ fn is_upright(p: &Portal) -> bool {
     f64::from(p.normal[1]).abs() < UPRIGHT
 }
 
-/// Least and greatest height over the ground on the higher side, of some points around the one that the rule asks at: a ray
-/// that falls beside an edge is not to decide. [Units: wu]
-fn sills(p: &Portal, low: f64, ground: &Bvh) -> [f64; 2] {
-    let corners: Vec<DVec3> = p.outline.iter().map(|&c| to_dvec(c)).collect();
-    let middle = Winding::new(corners).centroid();
-    let n = to_dvec(p.normal);
+/// Least and greatest height of an opening's `foot` over the ground on the higher side, of some points around the one that the
+/// rule asks at: a ray that falls beside an edge is not to decide. [Units: wu]
+fn sills(n: DVec3, foot: DVec3, ground: &Bvh) -> [f64; 2] {
     let out = DVec3::new(n.x, 0.0, n.z).normalize_or_zero();
     let along = out.cross(DVec3::Y);
     let mut bounds = [f64::INFINITY, 0.0_f64];
@@ -118,10 +120,8 @@ fn sills(p: &Portal, low: f64, ground: &Bvh) -> [f64; 2] {
         (0.0, -ROOM),
     ] {
         let drop = |side: f64| {
-            let foot =
-                DVec3::new(middle.x, low + 0.05, middle.z) + out * (BESIDE * side + u) + along * v;
             let ray = Ray {
-                origin: foot,
+                origin: foot + DVec3::Y * 0.05 + out * (BESIDE * side + u) + along * v,
                 direction: -DVec3::Y,
                 t_max: 100.0,
             };
@@ -145,4 +145,48 @@ fn width(piece: &[[f32; 3]]) -> f64 {
         Some(points.iter().map(off).fold(0.0, f64::max))
     };
     (0..n).filter_map(across).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_cpg::{CellId, CellPortalGraph};
+    use enfilade_geom::Aabb;
+
+    #[test]
+    fn a_sill_is_that_of_what_is_open_and_not_of_the_outline() {
+        // A triangle that stands on the ground, in an outline that reaches half a meter below it.
+        let ground = Aabb::new(DVec3::new(-5.0, -0.2, -5.0), DVec3::new(5.0, 0.0, 5.0)).triangles();
+        let open = Portal {
+            cells: [CellId(0), CellId(1)],
+            kind: PortalKind::Open,
+            normal: [1.0, 0.0, 0.0],
+            outline: vec![
+                [0.0, -0.5, 0.0],
+                [0.0, -0.5, 2.0],
+                [0.0, 2.0, 2.0],
+                [0.0, 2.0, 0.0],
+            ],
+            pieces: vec![vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 2.0, 1.0]]],
+            area: 2.0,
+        };
+        let mut world = World {
+            graph: CellPortalGraph {
+                portals: vec![open],
+                ..CellPortalGraph::default()
+            },
+            ..World::default()
+        };
+        world.graph.provenance.generator = concat!("enfilade ", env!("CARGO_PKG_VERSION")).into();
+        assert_eq!(check(&world, &ground), Vec::<String>::new());
+        // A meter higher it has a sill.
+        for corner in world.graph.portals[0].pieces[0].iter_mut() {
+            corner[1] += 1.0;
+        }
+        let said = check(&world, &ground);
+        assert!(
+            said.len() == 1 && said[0].contains("1.00 m over the ground"),
+            "{said:?}"
+        );
+    }
 }

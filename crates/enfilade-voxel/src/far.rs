@@ -30,7 +30,7 @@ const NOISE: f64 = 0.5;
 
 /// Free voxels that are outdoors and at least eight voxels away from all that is set in `blocked`; not all that are.
 ///
-/// Linear in voxels, with 1/8 byte for each of them for the answer, and a 12th more while it is looked for.
+/// Linear in voxels, with an eighth of a byte for each of them for the answer, and a tenth more while it is looked for.
 #[must_use]
 pub fn far_outdoors(blocked: &BitVolume) -> BitVolume {
     let blocks = blocks_of(blocked);

@@ -27,44 +27,18 @@ pub(crate) struct Flooded<'a> {
 ///
 /// Linear in voxels; within the outdoors, dozens at a time.
 pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
-    let [nx, ny, nz] = dims;
-    let layer = nx * ny;
-    let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..nz)
+    let layer = dims[0] * dims[1];
+    let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..dims[2])
         .into_par_iter()
         .map(|z| {
             let mut found: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
-            for y in 0..ny {
-                let row = z * layer + y * nx;
-                labels.for_runs(row..row + nx, |voxels, a| {
-                    if a <= OUTDOORS {
-                        return;
-                    }
+            labels.for_runs(z * layer..(z + 1) * layer, |voxels, label| {
+                if label > OUTDOORS {
                     for i in voxels {
-                        let x = i - row;
-                        // Of what touches the outdoors the other voxel looks back as well.
-                        for (ahead, behind, step, axis) in [
-                            (x + 1 < nx, x > 0, 1, 0),
-                            (y + 1 < ny, y > 0, nx, 1),
-                            (z + 1 < nz, z > 0, layer, 2),
-                        ] {
-                            let mut face = |b: u32, of: usize| {
-                                let faces = found.entry((a.min(b), a.max(b))).or_default();
-                                faces.push(of as u64 * 4 + axis);
-                            };
-                            if ahead {
-                                match labels.get(i + step) {
-                                    0 => {}
-                                    b if b == a => {}
-                                    b => face(b, i),
-                                }
-                            }
-                            if behind && labels.get(i - step) == OUTDOORS {
-                                face(OUTDOORS, i - step);
-                            }
-                        }
+                        add_faces(dims, labels, i, &mut found);
                     }
-                });
-            }
+                }
+            });
             found
         })
         .collect();
@@ -76,4 +50,25 @@ pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32,
     }
     all.values_mut().for_each(|faces| faces.sort_unstable());
     all
+}
+
+/// Adds the faces of a voxel that is not outdoors: those to the next voxels, and, as outdoor voxels are not asked, those from
+/// outdoor voxels before it.
+fn add_faces(dims: [usize; 3], labels: &Labels, i: usize, found: &mut BTreeMap<(u32, u32), Faces>) {
+    let [nx, ny, nz] = dims;
+    let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
+    let label = labels.get(i);
+    let mut add = |other: u32, of: usize, axis: u64| {
+        let pair = (label.min(other), label.max(other));
+        found.entry(pair).or_default().push(of as u64 * 4 + axis);
+    };
+    for (at, n, step, axis) in [(x, nx, 1, 0), (y, ny, nx, 1), (z, nz, nx * ny, 2)] {
+        let next = if at + 1 < n { labels.get(i + step) } else { 0 };
+        if next != 0 && next != label {
+            add(next, i, axis);
+        }
+        if at > 0 && labels.get(i - step) == OUTDOORS {
+            add(OUTDOORS, i - step, axis);
+        }
+    }
 }
