@@ -180,7 +180,7 @@ mod tests {
         world.graph.provenance.generator = concat!("enfilade ", env!("CARGO_PKG_VERSION")).into();
         assert_eq!(check(&world, &ground), Vec::<String>::new());
         // A meter higher it has a sill.
-        for corner in world.graph.portals[0].pieces[0].iter_mut() {
+        for corner in &mut world.graph.portals[0].pieces[0] {
             corner[1] += 1.0;
         }
         let said = check(&world, &ground);
