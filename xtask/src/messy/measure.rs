@@ -8,8 +8,8 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::RELEASE;
 use crate::score::{V3, center_and_area, dot, inspect, locate, score_world, sub, unit, vec3};
+use crate::{RELEASE, add_scene_files};
 
 /// What came out of a bake.
 #[derive(Clone)]
@@ -86,7 +86,7 @@ pub(super) fn measure(
         in_matter: n_indoors(&graph, world, &matter)?,
         seconds,
         broken: if rays > 0 {
-            broken(&dir.join("scene.glb"), world, rays)
+            broken(dir, world, rays)
         } else {
             Ok(0)
         },
@@ -113,9 +113,10 @@ pub(super) fn n_indoors(graph: &Value, world: &Path, points: &[V3]) -> anyhow::R
 }
 
 /// Promises that `verify` finds broken; lines that the source's triangles block are not tried.
-fn broken(scene: &Path, world: &Path, rays: u64) -> Result<u64, String> {
+fn broken(dir: &Path, world: &Path, rays: u64) -> Result<u64, String> {
     let mut command = Command::new(RELEASE.binary("enfilade"));
-    command.arg("verify").arg(world).arg("--source").arg(scene);
+    command.arg("verify").arg(world);
+    add_scene_files(&mut command, dir, Some("--source"));
     command.args(["--rays", &rays.to_string(), "--json"]);
     let done = command.output().map_err(|e| e.to_string())?;
     // It exits with 1 where promises are broken, after its report.
@@ -161,6 +162,9 @@ const NO_CELLS: [&str; 3] = ["no cell", "no room", "without a cell"];
 const NO_DOORWAY: [&str; 2] = ["no doorway", "without doorway"];
 const CRACKS: [&str; 2] = ["crack", "gap"];
 
+/// Lower or narrower cells are ducts and hollow walls: nobody misses a doorway there. [Units: wu]
+const PERSON: [f64; 3] = [0.6, 1.8, 0.6];
+
 /// How many of these hold and are not said; `None` where none holds.
 fn unsaid(graph: &Value, said: &str) -> Option<usize> {
     let (cells, portals) = (list(&graph["cells"]), list(&graph["portals"]));
@@ -170,10 +174,16 @@ fn unsaid(graph: &Value, said: &str) -> Option<usize> {
         doorways.any(|p| list(&p["cells"]).contains(&c["id"]))
     };
     let indoors: Vec<&Value> = cells.iter().filter(|c| c["outdoor"] != true).collect();
+    let is_room = |c: &&Value| {
+        let corner = |i: usize| vec3(&c["aabb"][i]).unwrap_or_default();
+        let (low, high) = (corner(0), corner(1));
+        (0..3).all(|k| high[k] - low[k] >= PERSON[k])
+    };
+    let rooms: Vec<&Value> = indoors.iter().copied().filter(is_room).collect();
     let n_cracks = portals.iter().filter(|p| p["kind"] == "crack").count();
     let to_say = [
         (indoors.is_empty(), &NO_CELLS[..]),
-        (indoors.iter().any(|c| !has_doorway(c)), &NO_DOORWAY),
+        (rooms.iter().any(|c| !has_doorway(c)), &NO_DOORWAY),
         (
             n_cracks > portals.iter().filter(is_doorway).count(),
             &CRACKS,
@@ -215,13 +225,16 @@ mod tests {
 
     #[test]
     fn silence_about_nothing_is_no_silence() {
-        let cell = |id: u32, outdoor: bool| json!({"id": id, "outdoor": outdoor});
+        let sized = |id: u32, outdoor: bool, height: f64| json!({"id": id, "outdoor": outdoor, "aabb": [[0.0, 0.0, 0.0], [4.0, height, 4.0]]});
+        let cell = |id: u32, outdoor: bool| sized(id, outdoor, 2.6);
         let rooms = [cell(0, true), cell(1, false), cell(2, false)];
         let sound = json!({"cells": rooms, "portals": [portal([1, 2], "open", 0.0, 0.0)]});
         assert_eq!(unsaid(&sound, ""), None);
         let closed = json!({"cells": rooms, "portals": [portal([0, 1], "open", 0.0, 0.0)]});
         assert_eq!(unsaid(&closed, ""), Some(1));
         assert_eq!(unsaid(&closed, "1 room has No Doorway"), Some(0));
+        let plenum = json!({"cells": [cell(0, true), sized(1, false, 0.8)], "portals": []});
+        assert_eq!(unsaid(&plenum, ""), None);
         let empty = json!({"cells": [cell(0, true)], "portals": []});
         assert_eq!(unsaid(&empty, "cells"), Some(1));
         let crack = |x| portal([1, 2], "crack", x, 0.0);
