@@ -92,8 +92,7 @@ fn scene(numbers: &mut Numbers<'_>, is_any: bool) -> Scene {
             mesh: 0,
             transform: DMat4::IDENTITY,
             role: Role::Structural,
-            reason: String::new(),
-        }],
+            reason: String::new(), node: None, }],
         ..Scene::default()
     }
 }

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, Portal, PortalId, PortalKind,
-    Provenance, Statistics, World,
+    Provenance, SourceRuns, Statistics, World,
 };
 use enfilade_geom::scene::{Mesh, Primitive, Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
@@ -100,6 +100,9 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         textures: scene.textures.clone(),
         images: scene.images.clone(),
         leak_path: Vec::new(),
+        sources: scene.nodes.clone(),
+        fixtures: scene.fixtures.clone(),
+        about: scene.about.clone(),
         pvs: None,
     }
 }
@@ -294,10 +297,21 @@ fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
     drop(1.0).min(drop(-1.0))
 }
 
-#[derive(Default)]
 struct BatchBuilder {
     primitive: Primitive,
     vertices: HashMap<(u32, u32, u32), u32>,
+    /// Of its triangles, where all of them have one.
+    sources: Option<SourceRuns>,
+}
+
+impl BatchBuilder {
+    fn new() -> Self {
+        Self {
+            primitive: Primitive::default(),
+            vertices: HashMap::new(),
+            sources: Some(SourceRuns::default()),
+        }
+    }
 }
 
 fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
@@ -319,7 +333,11 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         let layout = layout_of(from);
         let builder = builders
             .entry((seen_from, from.material, layout))
-            .or_default();
+            .or_insert_with(BatchBuilder::new);
+        match (&mut builder.sources, object.node) {
+            (Some(sources), Some(node)) => sources.push(node, 1),
+            _ => builder.sources = None,
+        }
         let to = &mut builder.primitive;
         to.material = from.material;
         to.uvs.resize(from.uvs.len(), Vec::new());
@@ -353,6 +371,7 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         .map(|((cells, _, _), b)| Batch {
             cells: cells.into_iter().map(CellId).collect(),
             primitive: b.primitive,
+            sources: b.sources.unwrap_or_default(),
             is_seal: false,
         })
         .collect()
@@ -391,6 +410,7 @@ fn details(scene: &Scene, locator: &Locator, cells: &mut [Cell]) -> (Vec<DetailO
             mesh,
             transform: object.transform.to_cols_array().map(|v| v as f32),
             cells: touched,
+            source: object.node,
         });
     }
     (out, meshes)

@@ -16,6 +16,7 @@ fn graph_of(mesh: Mesh) -> CellPortalGraph {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: String::new(),
+            node: None,
         }],
         ..Scene::default()
     };

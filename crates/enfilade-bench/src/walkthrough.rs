@@ -425,6 +425,7 @@ impl Rings {
                 mesh,
                 transform,
                 cells,
+                source: None,
             });
         }
     }

@@ -1,5 +1,7 @@
 //! `enfilade inspect`: what a world holds.
 
+mod objects;
+
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
@@ -19,12 +21,17 @@ pub(crate) struct Inspect {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    /// Instead of all that: the objects that this cell sees, by its name or id, with their triangles.
+    #[arg(long, value_name = "CELL")]
+    objects: Option<String>,
 }
 
 pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
     let world = read_world(&args.world)?;
     let mut out = BufWriter::new(io::stdout().lock());
-    if args.json {
+    if let Some(cell) = &args.objects {
+        objects::write(&mut out, &world, cell, args.json)?;
+    } else if args.json {
         serde_json::to_writer(&mut out, &report(&world)).map_err(io::Error::from)?;
         writeln!(out)?;
     } else {

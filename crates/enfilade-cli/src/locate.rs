@@ -1,11 +1,13 @@
 //! `enfilade locate`: points in, cells out.
 
+use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use enfilade::cpg::Locator;
+use enfilade::cpg::{Locator, World};
 use enfilade::geom::DVec3;
+use enfilade::import::is_match;
 
 use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
@@ -16,6 +18,10 @@ use enfilade_cli::world::read_world;
 pub(crate) struct Locate {
     /// World written by `enfilade bake`.
     world: PathBuf,
+    /// Instead of points: print the cells that see the object of this name, an id a line; `*` and `?` in PATTERN stand
+    /// for other letters, and it may name the nodes above, as in 'storey 2/*/IfcDoor*'.
+    #[arg(long, value_name = "PATTERN")]
+    object: Option<String>,
 }
 
 /// Longest line that is read; three numbers never take as much, and a file without line ends must
@@ -23,6 +29,9 @@ pub(crate) struct Locate {
 const MAX_LINE: u64 = 4096;
 
 pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
+    if let Some(pattern) = &args.object {
+        return locate_object(&read_world(&args.world)?, pattern);
+    }
     if is_stream(&args.world) {
         bail!("standard input has the points; give the world as a file, not '-'");
     }
@@ -30,6 +39,37 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
     let output = BufWriter::with_capacity(1 << 16, io::stdout().lock());
     locate_lines(&world.graph.locator, input, output)
+}
+
+/// Prints the cells of all sources whose name or path fits.
+fn locate_object(world: &World, pattern: &str) -> anyhow::Result<()> {
+    let found = sources_named(world, pattern);
+    if found.is_empty() {
+        bail!(
+            "no object is called '{pattern}'; `enfilade inspect --objects CELL` lists those that a cell sees"
+        );
+    }
+    let cells: BTreeSet<_> = found
+        .into_iter()
+        .flat_map(|source| world.cells_of_source(source))
+        .collect();
+    let mut output = BufWriter::new(io::stdout().lock());
+    for cell in cells {
+        writeln!(output, "{}", cell.0)?;
+    }
+    output.flush().context("cannot write to standard output")
+}
+
+/// Sources whose name or path fits the pattern, and all below them: the cells of a storey are those of what it holds.
+fn sources_named(world: &World, pattern: &str) -> Vec<u32> {
+    let fits = |text: &str| is_match(pattern, text);
+    let mut is_found: Vec<bool> = Vec::with_capacity(world.sources.len());
+    for (i, node) in world.sources.iter().enumerate() {
+        let is_below = node.parent.is_some_and(|p| is_found[p as usize]);
+        is_found.push(is_below || fits(&node.name) || fits(&world.source_path(i as u32)));
+    }
+    let found = is_found.iter().enumerate().filter(|(_, is)| **is);
+    found.map(|(i, _)| i as u32).collect()
 }
 
 fn locate_lines<R: Read>(

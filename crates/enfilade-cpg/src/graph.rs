@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
+use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
-use crate::{CellId, Locator, PortalId, Pvs};
+use crate::{CellId, Locator, PortalId, Pvs, SourceRuns};
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -110,6 +110,12 @@ pub struct World {
     /// A line for people to look at: the way out of air that should be a room, where it is widest. Of two points or more, in
     /// world space; empty where none was asked for. No matter to anything that reads a world. [Units: wu]
     pub leak_path: Vec<[f32; 3]>,
+    /// The input's own tree of names, which triangles and details refer to. A node comes after the one above it.
+    pub sources: Vec<SourceNode>,
+    /// The input's lights, cameras and marked places.
+    pub fixtures: Vec<Fixture>,
+    /// What the input says of itself as a whole.
+    pub about: About,
     /// What can be seen from each cell, if it was computed. What changes cells or portals drops it.
     pub pvs: Option<Pvs>,
 }
@@ -121,6 +127,8 @@ pub struct Batch {
     pub cells: Vec<CellId>,
     /// The triangles, in world space.
     pub primitive: Primitive,
+    /// Which of [`World::sources`] each triangle comes from; empty where that is not known.
+    pub sources: SourceRuns,
     /// They are seals: no part of the model, but added to close gaps of it. Matter to every consumer.
     pub is_seal: bool,
 }
@@ -136,4 +144,6 @@ pub struct DetailObject {
     pub transform: [f32; 16],
     /// The cells it touches, ascending.
     pub cells: Vec<CellId>,
+    /// What it comes from. Index into [`World::sources`].
+    pub source: Option<u32>,
 }

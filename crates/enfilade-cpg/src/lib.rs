@@ -15,6 +15,7 @@ mod look;
 mod pvs;
 mod seals;
 mod sight_graph;
+mod sources;
 mod validate;
 pub mod wire;
 
@@ -29,4 +30,5 @@ pub use locator::{Locator, LocatorNode};
 pub use pvs::Pvs;
 pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
+pub use sources::SourceRuns;
 pub use validate::{GraphError, MAX_REPORTED};

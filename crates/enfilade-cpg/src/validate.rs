@@ -82,6 +82,9 @@ impl World {
         for (i, detail) in self.details.iter().enumerate() {
             check_detail(i, detail, n_cells, self.detail_meshes.len(), &mut found);
         }
+        crate::sources::check(self, &mut |owner, problem| {
+            found.push(GraphError::Source { owner, problem });
+        });
         let is_finite = self.leak_path.as_flattened().iter().all(|v| v.is_finite());
         if self.leak_path.len() == 1 || !is_finite {
             found.push(GraphError::LeakPath);

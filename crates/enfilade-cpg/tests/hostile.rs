@@ -4,8 +4,8 @@
 mod common;
 
 use common::{two_rooms, two_rooms_with_pvs};
-use enfilade_cpg::World;
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+use enfilade_cpg::{SourceRuns, World};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -324,8 +324,44 @@ fn a_leak_path_that_is_no_line_is_an_error() {
 }
 
 #[test]
+fn sources_that_do_not_hold_together_are_errors() {
+    let bytes = encode_glb(&two_rooms()).unwrap();
+    let n = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let text = String::from_utf8(bytes[20..20 + n].to_vec()).unwrap();
+    let with = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}: {text}");
+        decode_glb(&glb(&text.replacen(from, to, 1), &bytes[28 + n..]))
+    };
+    for (from, to) in [
+        // Runs: more and fewer than there are, and a view of something else.
+        ("\"cells\":[1],\"sources\":2", "\"cells\":[1],\"sources\":3"),
+        ("\"cells\":[1],\"sources\":2", "\"cells\":[1],\"sources\":1"),
+        ("\"cells\":[1],\"sources\":2", "\"cells\":[1]"),
+        ("\"sourceRuns\":", "\"sourceRuns\":99"),
+        ("\"source\":3", "\"source\":4"),
+        // A parent that is no earlier source, and itself.
+        ("{\"parent\":0,", "{\"parent\":2,"),
+        ("{\"parent\":0,", "{\"parent\":77,"),
+        // Fixtures: no such node, no such light, a light that is a camera too.
+        ("\"fixtures\":[", "\"fixtures\":[999,"),
+        ("{\"light\":0}", "{\"light\":7}"),
+        ("\"camera\":0", "\"camera\":3"),
+        (
+            "\"camera\":0",
+            "\"camera\":0,\"extensions\":{\"KHR_lights_punctual\":{\"light\":0}}",
+        ),
+        ("\"cameras\":[{", "\"cameras\":[3,{"),
+    ] {
+        assert!(with(from, to).is_err(), "{from} -> {to}");
+    }
+}
+
+#[test]
 fn a_broken_set_of_what_is_seen_is_an_error() {
-    let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
+    let mut world = two_rooms_with_pvs();
+    // So that the last two buffer views are those of the set.
+    world.batches[0].sources = SourceRuns::default();
+    let bytes = encode_glb(&world).unwrap();
     let n = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
     let text = String::from_utf8(bytes[20..20 + n].to_vec()).unwrap();
     let bin = &bytes[28 + n..];

@@ -162,11 +162,22 @@ fn the_schema_names_every_field_that_is_written() {
         ..two_rooms_with_pvs()
     });
     for (pointer, optional) in [
-        ("", &["portalCorners", "leakPath", "pvs"][..]),
+        (
+            "",
+            &[
+                "portalCorners",
+                "sources",
+                "sourceRuns",
+                "fixtures",
+                "leakPath",
+                "pvs",
+            ][..],
+        ),
         ("/cells/2", &["outdoor"]),
         ("/portals/1", &[]),
-        ("/batches/0", &[]),
-        ("/details/0", &["aabb"]),
+        ("/batches/0", &["sources"]),
+        ("/sources/3", &["name", "parent", "extras"]),
+        ("/details/1", &["aabb", "source"]),
         ("/locator", &["bounds", "outside", "planes", "nodes"]),
         ("/provenance", &[]),
         ("/pvs", &[]),

@@ -4,7 +4,7 @@ mod common;
 
 use common::{floor, nasty_rooms, two_rooms};
 use enfilade_cpg::wire::{EXTENSION, WireError, decode_glb, encode_glb};
-use enfilade_cpg::{Batch, CellId, CellSet, Pvs, World};
+use enfilade_cpg::{Batch, CellId, CellSet, Pvs, SourceRuns, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3};
 use proptest::prelude::*;
@@ -25,10 +25,49 @@ fn a_world_comes_back_as_it_was() {
     let back = decode_glb(&bytes).unwrap();
     assert!(geometry(&back) == geometry(&world), "{}", geometry(&back));
     assert_eq!(encode_glb(&back).unwrap(), bytes);
+    let runs = |w: &World| {
+        w.batches
+            .iter()
+            .map(|b| b.sources.clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(runs(&back), runs(&world));
+    let of_details = |w: &World| w.details.iter().map(|d| d.source).collect::<Vec<_>>();
+    assert_eq!(of_details(&back), of_details(&world));
+    assert_eq!(back.sources, world.sources);
+    assert_eq!(back.fixtures, world.fixtures);
+    assert_eq!(back.about, world.about);
     assert_eq!(
         back.graph.locator.locate(DVec3::new(5.0, 1.0, 1.0)),
         Some(CellId(1))
     );
+}
+
+#[test]
+fn viewers_find_details_below_the_names_they_had_and_lights_once() {
+    let root = json(&encode_glb(&two_rooms()).unwrap());
+    let nodes = root["nodes"].as_array().unwrap();
+    let below = |name: &str| -> Vec<&Value> {
+        let node = nodes.iter().find(|n| n["name"] == name).unwrap();
+        let children = node["children"].as_array().unwrap().iter();
+        children
+            .map(|c| &nodes[c.as_u64().unwrap() as usize])
+            .collect()
+    };
+    assert_eq!(below("details").len(), 2);
+    let storey = below("house")[0];
+    assert_eq!(storey["extras"]["storey"], 0);
+    let chair = &nodes[storey["children"][0].as_u64().unwrap() as usize];
+    assert_eq!(
+        (&chair["name"], &chair["extras"]),
+        (&"chair".into(), &"oak".into())
+    );
+    let lights = &root["extensions"]["KHR_lights_punctual"]["lights"];
+    assert_eq!(lights.as_array().unwrap().len(), 1);
+    let fixtures = below("fixtures");
+    assert_eq!(fixtures.len(), 4);
+    assert_eq!(fixtures[1]["camera"], 0);
+    assert_eq!(fixtures[2]["extras"]["team"], 1);
 }
 
 #[test]
@@ -134,6 +173,7 @@ fn a_batch_with_more_corners_than_u16_comes_back() {
     p.material = None;
     p.indices = vec![0, 1, 69_999];
     world.batches[0].primitive = p;
+    world.batches[0].sources = SourceRuns::from_runs(vec![[1, 1]]);
     let back = decode_glb(&encode_glb(&world).unwrap()).unwrap();
     assert!(geometry(&back) == geometry(&world));
 }
@@ -311,7 +351,7 @@ proptest! {
         world.batches = batches
             .into_iter()
             .map(|(cells, primitive, is_seal)| {
-                Batch { cells: cells.into_iter().map(CellId).collect(), primitive, is_seal }
+                Batch { cells: cells.into_iter().map(CellId).collect(), primitive, is_seal, sources: SourceRuns::default(), }
             })
             .collect();
         world.detail_meshes[0].primitives = mesh;

@@ -23,6 +23,58 @@ pub struct Scene {
     pub solids: Vec<ConvexSolid>,
     /// Named things that are no meshes, as the input had them.
     pub entities: Vec<Entity>,
+    /// The input's own tree of names. A node comes after the one above it.
+    pub nodes: Vec<SourceNode>,
+    /// Lights, cameras and marked places, as the input had them.
+    pub fixtures: Vec<Fixture>,
+    /// What the input says of itself as a whole.
+    pub about: About,
+}
+
+/// What an input says of itself as a whole.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// Whose work it is and under which terms, one line a file; may be empty.
+    pub copyright: String,
+    /// What the scene's root carries for applications: a JSON value as text, or empty.
+    pub extras: String,
+}
+
+/// A node of the input's own tree: what it calls a thing, and what it says of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SourceNode {
+    /// Name, may be empty; names need not be unique.
+    pub name: String,
+    /// The node above. Index into the same list, less than the node's own.
+    pub parent: Option<u32>,
+    /// What the input attaches for applications: a JSON value as text, or empty.
+    pub extras: String,
+}
+
+/// A light, a camera or a marked place, carried through as it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fixture {
+    /// What it is.
+    pub kind: FixtureKind,
+    /// Name of the node that places it, may be empty.
+    pub name: String,
+    /// Its own space, which looks along -z, to world space: a rotation and a translation. [Units: wu]
+    pub transform: DMat4,
+    /// The light (`KHR_lights_punctual`) or camera as a glTF 2.0 JSON object, lengths in meters; empty for a marker.
+    pub gltf: String,
+    /// What the input attaches for applications: a JSON value as text, or empty.
+    pub extras: String,
+}
+
+/// What a [`Fixture`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FixtureKind {
+    /// A point, spot or directional light.
+    Light,
+    /// A perspective or orthographic camera.
+    Camera,
+    /// A place that the input names and puts nothing at: a start, a spawn point, an anchor.
+    Marker,
 }
 
 /// Something that an input names and places without giving it a shape here: a light, a start.
@@ -79,6 +131,8 @@ pub struct Object {
     pub role: Role,
     /// Why it has that role, as shown to the user.
     pub reason: String,
+    /// What the input says it is. Index into [`Scene::nodes`]; several objects may come from one node.
+    pub node: Option<u32>,
 }
 
 /// What an object is to the decomposition.

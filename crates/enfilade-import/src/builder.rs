@@ -1,6 +1,9 @@
 //! Fills one [`Scene`] from several files: merging, limits, mirrored placements, roles.
 
+mod naming;
+
 use crate::mesh::{bytes_of, mirror};
+use crate::origins::Origins;
 use crate::repair::{GridSteps, weld_quantized};
 use crate::roles::{Facts, Verdict};
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
@@ -34,6 +37,7 @@ pub(crate) struct Builder<'a> {
     variants: HashMap<(u32, bool, MeshPart), u32>,
     /// Of the meshes so far.
     steps: GridSteps,
+    origins: Origins,
 }
 
 /// Which primitives of a mesh.
@@ -56,6 +60,8 @@ pub(crate) struct Placement<'n> {
     /// Why it moves, if it does.
     pub(crate) moves: Option<&'static str>,
     pub(crate) place: &'n str,
+    /// What the input says it is, as [`Builder::add_source`] gave it.
+    pub(crate) source: Option<u32>,
 }
 
 impl<'a> Builder<'a> {
@@ -76,6 +82,7 @@ impl<'a> Builder<'a> {
             n_held_bytes: 0,
             variants: HashMap::new(),
             steps: GridSteps::new(),
+            origins: Origins::default(),
         })
     }
 
@@ -163,6 +170,7 @@ impl<'a> Builder<'a> {
             transform,
             role,
             reason: reason.to_owned(),
+            node: None,
         });
         if let Some(file) = self.report.files.last_mut() {
             file.n_objects += 1;
@@ -421,6 +429,7 @@ impl<'a> Builder<'a> {
                     transform,
                     role,
                     reason: format!("{why}{reason}"),
+                    node: placement.source,
                 });
             }
         }
@@ -566,6 +575,7 @@ impl<'a> Builder<'a> {
             );
             self.note("meshes", text);
         }
+        self.origins.move_into(&mut self.scene);
         (self.scene, self.report)
     }
 }

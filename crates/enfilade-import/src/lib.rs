@@ -37,6 +37,7 @@ mod mesh;
 mod mtl;
 mod obj;
 mod options;
+mod origins;
 mod ply;
 mod polygon;
 mod prt;
@@ -57,7 +58,7 @@ pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
 pub use repair::{RepairOptions, RepairReport, repair};
 pub use report::{Example, FileReport, Finding, ImportReport, Note};
-pub use roles::RoleRules;
+pub use roles::{RoleRules, is_match};
 
 use builder::Builder;
 use enfilade_geom::scene::Scene;

@@ -354,8 +354,10 @@ fn matching<'g>(globs: &'g [String], facts: &Facts<'_>) -> Option<&'g str> {
     })
 }
 
-/// Whether the glob fits the whole text, letters of either case. Time: product of the lengths.
-pub(crate) fn is_match(glob: &str, text: &str) -> bool {
+/// Whether a pattern fits the whole text: `*` stands for any letters, `?` for any one, letters of either case are the same.
+/// Time: product of the lengths.
+#[must_use]
+pub fn is_match(glob: &str, text: &str) -> bool {
     let fold = |s: &str| s.chars().flat_map(char::to_lowercase).collect::<Vec<_>>();
     let (glob, text) = (fold(glob), fold(text));
     let (mut g, mut t) = (0, 0);

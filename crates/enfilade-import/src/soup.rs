@@ -50,6 +50,7 @@ pub(crate) fn place(
         transforms: &[transform],
         moves: None,
         place,
+        source: None,
     })
 }
 

@@ -68,6 +68,7 @@ fn grid() -> World {
             mesh,
             transform,
             cells: vec![enfilade_cpg::CellId(i as u32)],
+            source: None,
         });
     }
     world
@@ -230,6 +231,7 @@ fn by_opengl_too_surfaces_stay_apart_far_away() {
             mesh: i,
             transform: glam::Mat4::IDENTITY.to_cols_array(),
             cells: Vec::new(),
+            source: None,
         });
     }
     // A little aslant, so that depths are not the same all over.

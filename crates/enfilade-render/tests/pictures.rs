@@ -230,6 +230,7 @@ fn objects_far_away_have_fewer_triangles_and_look_the_same() {
             mesh: 0,
             transform,
             cells: Vec::new(),
+            source: None,
         });
     }
     let mut studio = Studio::new(gpu(), &world).unwrap();

@@ -256,6 +256,7 @@ fn hostile_names_and_empty_worlds_are_valid_xml() {
             .as_mat4()
             .to_cols_array(),
         cells: vec![CellId(0)],
+        source: None,
     });
     let svg = plan(&world);
     assert_eq!(paths(&svg, "detail").len(), 1);

@@ -83,7 +83,7 @@ pub(super) fn measure(
         holes: list(&graph["suspected_holes"]).len(),
         cracks: cracks_in_one_plane(&graph),
         n_matter: matter.len(),
-        in_matter: n_indoors(&graph, world, &matter)?,
+        in_matter: n_cells_of_matter(&graph, world, &matter, &truth)?,
         seconds,
         broken: if rays > 0 {
             broken(dir, world, rays)
@@ -98,18 +98,41 @@ fn list(v: &Value) -> &[Value] {
     v.as_array().map_or(&[], Vec::as_slice)
 }
 
+/// How many of the points lie in cells indoors that are no rooms: a box taken for furniture stands in a room's air.
+fn n_cells_of_matter(
+    graph: &Value,
+    world: &Path,
+    matter: &[V3],
+    truth: &Value,
+) -> anyhow::Result<usize> {
+    if matter.is_empty() {
+        return Ok(0);
+    }
+    let points = list(&truth["rooms"])
+        .iter()
+        .flat_map(|r| list(&r["sample_points"]));
+    let points: Vec<V3> = points.filter_map(vec3).collect();
+    let rooms: BTreeSet<String> = locate(RELEASE, world, &points)?.into_iter().collect();
+    let indoors = indoor_ids(graph);
+    let cells = locate(RELEASE, world, matter)?;
+    let is_wrong = |id: &&String| indoors.contains(*id) && !rooms.contains(*id);
+    Ok(cells.iter().filter(is_wrong).count())
+}
+
 /// How many of the points lie in cells indoors.
 pub(super) fn n_indoors(graph: &Value, world: &Path, points: &[V3]) -> anyhow::Result<usize> {
     if points.is_empty() {
         return Ok(0);
     }
-    let indoors: BTreeSet<String> = list(&graph["cells"])
-        .iter()
-        .filter(|c| c["outdoor"] != true)
-        .map(|c| c["id"].to_string())
-        .collect();
+    let indoors = indoor_ids(graph);
     let cells = locate(RELEASE, world, points)?;
     Ok(cells.iter().filter(|&id| indoors.contains(id)).count())
+}
+
+fn indoor_ids(graph: &Value) -> BTreeSet<String> {
+    let indoors = list(&graph["cells"]).iter();
+    let indoors = indoors.filter(|c| c["outdoor"] != true);
+    indoors.map(|c| c["id"].to_string()).collect()
 }
 
 /// Promises that `verify` finds broken; lines that the source's triangles block are not tried.

@@ -33,6 +33,7 @@ pub(super) fn batches(cut: &Cut<'_>) -> Vec<Batch> {
             cells,
             primitive,
             is_seal: true,
+            sources: enfilade_cpg::SourceRuns::default(),
         })
         .collect()
 }

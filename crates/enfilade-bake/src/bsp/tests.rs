@@ -310,6 +310,7 @@ fn scene_of(solids: &[ConvexSolid], inside: &[DVec3]) -> Scene {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: "map: brushes of worldspawn".into(),
+            node: None,
         }],
         solids: solids.to_vec(),
         entities: inside

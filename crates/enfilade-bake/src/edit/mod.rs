@@ -12,7 +12,7 @@ mod splice;
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Cell, CellId, Portal, PortalId, World};
+use enfilade_cpg::{Cell, CellId, Portal, PortalId, SourceRuns, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3, Plane, Triangle, Winding};
 
@@ -452,17 +452,22 @@ impl Parts {
         for (b, batch) in out.batches.iter().enumerate() {
             let p = &batch.primitive;
             if batch.cells.binary_search(&self.cell).is_err() {
-                batches.add(batch.cells.clone(), p, batch.is_seal);
+                batches.add(batch.cells.clone(), p, &batch.sources, batch.is_seal);
                 continue;
             }
-            let mut by_list: BTreeMap<Vec<CellId>, Vec<u32>> = BTreeMap::new();
+            let mut by_list: BTreeMap<Vec<CellId>, (Vec<u32>, SourceRuns)> = BTreeMap::new();
+            let mut sources = batch.sources.of_triangles();
             for (t, corners) in p.indices.chunks_exact(3).enumerate() {
                 let sees = sees_of.get(&(b as u32, t as u32));
                 let list = self.relisted(&batch.cells, sees.copied().unwrap_or_default());
-                by_list.entry(list).or_default().extend(corners);
+                let (indices, runs) = by_list.entry(list).or_default();
+                indices.extend(corners);
+                if let Some(source) = sources.next() {
+                    runs.push(source, 1);
+                }
             }
-            for (list, indices) in by_list {
-                batches.add(list, &part_of(p, &indices), batch.is_seal);
+            for (list, (indices, sources)) in by_list {
+                batches.add(list, &part_of(p, &indices), &sources, batch.is_seal);
             }
         }
         out.batches = batches.finish();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, World};
+use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, SourceRuns, World};
 use enfilade_geom::scene::Primitive;
 
 use crate::layout::{Layout, layout_of};
@@ -69,7 +69,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     }
     let mut batches = Batches::default();
     for b in &world.batches {
-        batches.add(renumbered(&b.cells), &b.primitive, b.is_seal);
+        batches.add(renumbered(&b.cells), &b.primitive, &b.sources, b.is_seal);
     }
     let batches = batches.finish();
     for b in batches.iter().filter(|b| !b.is_seal) {
@@ -104,23 +104,39 @@ fn is_numbered(name: &str) -> bool {
 
 /// Batches under way: one for each list of cells, material and set of attributes, seals apart.
 #[derive(Default)]
-pub(crate) struct Batches(BTreeMap<BatchKey, Primitive>);
+pub(crate) struct Batches(BTreeMap<BatchKey, (Primitive, Option<SourceRuns>)>);
 
 impl Batches {
-    /// Adds triangles that `cells`, ascending, see.
-    pub(crate) fn add(&mut self, cells: Vec<CellId>, primitive: &Primitive, is_seal: bool) {
+    /// Adds triangles that `cells`, ascending, see. Where some of a batch have no known source, none has.
+    pub(crate) fn add(
+        &mut self,
+        cells: Vec<CellId>,
+        primitive: &Primitive,
+        sources: &SourceRuns,
+        is_seal: bool,
+    ) {
         let key = (is_seal, cells, primitive.material, layout_of(primitive));
-        append(self.0.entry(key).or_default(), primitive);
+        let new = || (Primitive::default(), Some(SourceRuns::default()));
+        let (to, known) = self.0.entry(key).or_insert_with(new);
+        append(to, primitive);
+        match known {
+            _ if primitive.indices.is_empty() => {}
+            Some(known) if !sources.is_empty() => known.extend(sources),
+            _ => *known = None,
+        }
     }
 
     /// The batches in order of cells, material and attributes, seals last.
     pub(crate) fn finish(self) -> Vec<Batch> {
-        let batch = |((is_seal, cells, ..), primitive): (BatchKey, Primitive)| Batch {
-            cells,
-            primitive,
-            is_seal,
-        };
-        self.0.into_iter().map(batch).collect()
+        let batches = self.0.into_iter();
+        let batch =
+            |((is_seal, cells, ..), (primitive, sources)): (BatchKey, (_, Option<_>))| Batch {
+                cells,
+                primitive,
+                sources: sources.unwrap_or_default(),
+                is_seal,
+            };
+        batches.map(batch).collect()
     }
 }
 

@@ -50,6 +50,14 @@ pub enum GraphError {
     /// The leak path has a single point, or one that is not finite.
     #[error("the leak path must be of two finite points or more, or empty")]
     LeakPath,
+    /// What says where something comes from does not hold together.
+    #[error("{owner}: {problem}")]
+    Source {
+        /// Whose source it is.
+        owner: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A row of the potentially visible set does not fit the graph.
     #[error("potentially visible set, cell {cell}: {problem}")]
     Pvs {

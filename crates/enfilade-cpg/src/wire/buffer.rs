@@ -289,6 +289,13 @@ impl<'a> Layout<'a> {
                 }
             }
         }
+        if world.batches.iter().any(|b| !b.sources.is_empty()) {
+            bulk.align(ALIGNMENT);
+            let runs = world.batches.iter().flat_map(|b| b.sources.runs());
+            for word in runs.flatten() {
+                bulk.out.extend_from_slice(&word.to_le_bytes());
+            }
+        }
         bulk.align(4);
     }
 }

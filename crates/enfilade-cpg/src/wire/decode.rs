@@ -13,12 +13,13 @@ use serde_json::value::RawValue;
 
 use super::boxes;
 use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
-use super::rows::{Row, eight, four};
-use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError};
+use super::origin;
+use super::rows::{Row, eight, four, pairs};
+use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError, broken};
 use crate::look::material_of_text;
 use crate::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
-    PortalKind, Provenance, Pvs, Statistics, World,
+    PortalKind, Provenance, Pvs, SourceRuns, Statistics, World,
 };
 
 /// Decodes a world from one GLB.
@@ -131,12 +132,27 @@ impl<'a> Reader<'a> {
                 "lies in another file; a world is one GLB",
             ));
         }
+        let runs = self.optional_view(graph.source_runs, "sourceRuns")?;
+        self.spend(runs.len() as u64)?;
+        let runs =
+            pairs(runs).ok_or_else(|| broken("sourceRuns", "their buffer view is cut off"))?;
+        let mut runs = &runs[..];
         let batches = graph
             .batches
             .iter()
             .enumerate()
-            .map(|(i, b)| self.batch(i, b));
+            .map(|(i, b)| self.batch(i, b, &mut runs));
         let batches = batches.collect::<Result<_, _>>()?;
+        if !runs.is_empty() {
+            return Err(broken("sourceRuns", "there are more than the batches use"));
+        }
+        let sources = graph.sources.iter().map(origin::source).collect();
+        let fixtures = graph
+            .fixtures
+            .iter()
+            .map(|&node| origin::fixture(self.root, node));
+        let fixtures = fixtures.collect::<Result<_, _>>()?;
+        let about = origin::about(self.root);
         let detail_meshes = graph.detail_meshes.iter().map(|m| match m {
             Some(mesh) => self.mesh(*mesh),
             None => Ok(Mesh::default()),
@@ -180,6 +196,9 @@ impl<'a> Reader<'a> {
             textures,
             images,
             leak_path,
+            sources,
+            fixtures,
+            about,
             pvs,
         })
     }
@@ -210,14 +229,11 @@ impl<'a> Reader<'a> {
         );
         self.spend(rows.len() as u64 + runs.len() as u64)?;
         let (rows, rows_rest) = rows.as_chunks::<4>();
-        let (runs, runs_rest) = runs.as_chunks::<8>();
-        if !rows_rest.is_empty() || !runs_rest.is_empty() {
-            return Err(broken(of, "a buffer view is cut off"));
-        }
-        let run = |r: &[u8; 8]| [0, 4].map(|at| u32::from_le_bytes(four(r, at)));
+        let runs = pairs(runs).filter(|_| rows_rest.is_empty());
+        let runs = runs.ok_or_else(|| broken(of, "a buffer view is cut off"))?;
         Ok(Some(Pvs {
             ends: rows.iter().map(|&r| u32::from_le_bytes(r)).collect(),
-            runs: runs.iter().map(run).collect(),
+            runs,
         }))
     }
 
@@ -345,7 +361,17 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn batch(&mut self, i: usize, batch: &json::BatchJson) -> Result<Batch, WireError> {
+    /// Takes its runs of sources from the front of `runs`.
+    fn batch(
+        &mut self,
+        i: usize,
+        batch: &json::BatchJson,
+        runs: &mut &[[u32; 2]],
+    ) -> Result<Batch, WireError> {
+        let (own, rest) = runs
+            .split_at_checked(batch.sources as usize)
+            .ok_or_else(|| broken(format!("batch {i}"), "has more sources than the file holds"))?;
+        *runs = rest;
         let cells = batch.cells.iter().copied().map(CellId).collect();
         let primitive = match (batch.mesh, batch.primitive) {
             (None, None) => Primitive::default(),
@@ -373,6 +399,7 @@ impl<'a> Reader<'a> {
         Ok(Batch {
             cells,
             primitive,
+            sources: SourceRuns::from_runs(own.to_vec()),
             is_seal: batch.seal,
         })
     }
@@ -415,6 +442,7 @@ impl<'a> Reader<'a> {
             mesh: detail.mesh,
             transform,
             cells: detail.cells.iter().copied().map(CellId).collect(),
+            source: detail.source,
         })
     }
 
@@ -568,12 +596,5 @@ impl<'a> Reader<'a> {
         self.budget =
             left.ok_or_else(|| broken("the file", "decodes to far more than it holds"))?;
         Ok(())
-    }
-}
-
-fn broken(at: impl Into<String>, problem: impl Into<String>) -> WireError {
-    WireError::Structure {
-        at: at.into(),
-        problem: problem.into(),
     }
 }

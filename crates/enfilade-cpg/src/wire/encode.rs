@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_geom::Aabb;
-use enfilade_geom::scene::{Image, Mesh};
+use enfilade_geom::scene::{FixtureKind, Image, Mesh, SourceNode};
 use serde_json::value::RawValue;
 
 use super::boxes;
@@ -15,7 +15,7 @@ use super::buffer::{Layout, image_bytes, mime};
 use super::json::{self, TEXTURE_EXTENSIONS};
 use super::transform::{IDENTITY, is_trs, transformed};
 use super::{
-    CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, LEAK_PATH, VERSION, WireError,
+    CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, LEAK_PATH, LIGHTS, VERSION, WireError,
 };
 use crate::look::{add_extensions, material_text, n_texcoord_sets, sampler_text};
 use crate::{CellId, PortalKind, World};
@@ -83,6 +83,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         lay_out_details(layout, world, &mut meshes, &mut nodes, &mut top);
     let leak_path = lay_out_leak_path(layout, world, &mut meshes, &mut nodes);
     top.extend(leak_path);
+    let placed = lay_out_fixtures(world, &mut nodes, &mut top);
     nodes[0].children = top;
     layout.close_sections();
 
@@ -93,6 +94,9 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         raw(text)
     });
     let materials = materials.collect();
+    if placed.lights.is_some() {
+        used.insert(LIGHTS.to_owned());
+    }
     let (textures, samplers) = lay_out_textures(world, &mut used);
     let images = lay_out_images(layout, world);
 
@@ -107,14 +111,20 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         rows: layout.view(pvs.ends.len() as u64 * 4),
         runs: layout.view(pvs.runs.len() as u64 * 8),
     });
+    let n_runs: usize = world.batches.iter().map(|b| b.sources.runs().len()).sum();
+    let source_runs = layout.view(n_runs as u64 * 8);
     let n_bin = layout.len.next_multiple_of(4);
     json::Root {
         asset: asset(world),
         extensions_used: used.into_iter().collect(),
         scene: 0,
-        scenes: vec![json::Scene { nodes: vec![0] }],
+        scenes: vec![json::Scene {
+            nodes: vec![0],
+            extras: optional_raw(&world.about.extras),
+        }],
         nodes,
         meshes,
+        cameras: placed.cameras,
         materials,
         textures,
         samplers,
@@ -138,11 +148,15 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 details,
                 detail_meshes,
                 locator,
+                sources: sources(world),
+                source_runs,
+                fixtures: placed.nodes,
                 leak_path,
                 pvs,
                 provenance: provenance(world),
                 statistics: statistics(layout, world),
             },
+            lights: placed.lights,
         },
     }
 }
@@ -162,6 +176,7 @@ fn lay_out_batches<'a>(
             mesh: None,
             primitive: None,
             cells: ids(&b.cells),
+            sources: b.sources.runs().len() as u32,
             seal: b.is_seal,
         })
         .collect();
@@ -237,7 +252,8 @@ fn lay_out_details<'a>(
     let boxes: Vec<Aabb> = (world.detail_meshes.iter())
         .map(|mesh| boxes::of_mesh(drawn(mesh)))
         .collect();
-    let (mut details, mut children) = (Vec::new(), Vec::new());
+    let mut details = Vec::new();
+    let mut tree = NameTree::default();
     for detail in &world.details {
         let mut local = boxes[detail.mesh as usize];
         let mut mesh = detail.mesh;
@@ -257,19 +273,111 @@ fn lay_out_details<'a>(
             name: detail.name.clone(),
             mesh: detail_meshes[mesh as usize],
             matrix: (transform != IDENTITY).then(|| transform.map(f64::from)),
+            extras: detail
+                .source
+                .and_then(|s| optional_raw(&world.sources[s as usize].extras)),
             ..Default::default()
         });
         let node = nodes.len() as u32 - 1;
-        children.push(node);
+        tree.add(world, nodes, node, detail.source);
         details.push(json::Detail {
             node,
             mesh,
             cells: ids(&detail.cells),
+            source: detail.source,
             aabb: boxes::placed(&local, &transform),
         });
     }
-    push_parent(nodes, top, "details", children);
+    push_parent(nodes, top, "details", tree.top);
     (details, detail_meshes)
+}
+
+/// The input's nodes above those of details, so that viewers show them in groups. They move nothing.
+#[derive(Default)]
+struct NameTree {
+    /// Node by source.
+    nodes: BTreeMap<u32, u32>,
+    /// Nodes without one above.
+    top: Vec<u32>,
+}
+
+impl NameTree {
+    /// Puts `node`, which comes from `source`, below the nodes of all sources above that.
+    fn add(&mut self, world: &World, nodes: &mut Vec<json::Node>, node: u32, source: Option<u32>) {
+        let mut below = node;
+        let mut above = source.and_then(|s| world.sources[s as usize].parent);
+        while let Some(s) = above {
+            if let Some(&known) = self.nodes.get(&s) {
+                nodes[known as usize].children.push(below);
+                return;
+            }
+            let source = &world.sources[s as usize];
+            nodes.push(json::Node {
+                name: source.name.clone(),
+                children: vec![below],
+                extras: optional_raw(&source.extras),
+                ..Default::default()
+            });
+            below = nodes.len() as u32 - 1;
+            self.nodes.insert(s, below);
+            above = source.parent;
+        }
+        self.top.push(below);
+    }
+}
+
+/// Where lights, cameras and marked places went.
+struct Placed {
+    nodes: Vec<u32>,
+    lights: Option<json::Lights>,
+    cameras: Vec<Box<RawValue>>,
+}
+
+/// A node a light, camera or marked place; equal lights and cameras are written once.
+fn lay_out_fixtures(world: &World, nodes: &mut Vec<json::Node>, top: &mut Vec<u32>) -> Placed {
+    let mut number_of: BTreeMap<(FixtureKind, &str), u32> = BTreeMap::new();
+    let (mut lights, mut cameras, mut placed) = (Vec::new(), Vec::new(), Vec::new());
+    for fixture in &world.fixtures {
+        let mut number_in = |list: &mut Vec<Box<RawValue>>| {
+            let key = (fixture.kind, fixture.gltf.as_str());
+            *number_of.entry(key).or_insert_with(|| {
+                list.push(raw(fixture.gltf.clone()));
+                list.len() as u32 - 1
+            })
+        };
+        let transform = fixture.transform.to_cols_array().map(|v| v as f32);
+        let mut node = json::Node {
+            name: fixture.name.clone(),
+            matrix: (transform != IDENTITY).then(|| transform.map(f64::from)),
+            extras: optional_raw(&fixture.extras),
+            ..Default::default()
+        };
+        match fixture.kind {
+            FixtureKind::Light => {
+                let light = number_in(&mut lights);
+                node.extensions.light = Some(json::LightRef { light });
+            }
+            FixtureKind::Camera => node.camera = Some(number_in(&mut cameras)),
+            FixtureKind::Marker => {}
+        }
+        nodes.push(node);
+        placed.push(nodes.len() as u32 - 1);
+    }
+    push_parent(nodes, top, "fixtures", placed.clone());
+    Placed {
+        nodes: placed,
+        lights: (!lights.is_empty()).then_some(json::Lights { lights }),
+        cameras,
+    }
+}
+
+fn sources(world: &World) -> Vec<json::SourceJson> {
+    let source = |node: &SourceNode| json::SourceJson {
+        name: node.name.clone(),
+        parent: node.parent,
+        extras: optional_raw(&node.extras),
+    };
+    world.sources.iter().map(source).collect()
 }
 
 fn lay_out_leak_path<'a>(
@@ -357,6 +465,7 @@ fn asset(world: &World) -> json::Asset {
     json::Asset {
         version: "2.0".into(),
         generator: generator.into(),
+        copyright: world.about.copyright.clone(),
     }
 }
 
@@ -421,6 +530,11 @@ fn statistics(layout: &Layout, world: &World) -> BTreeMap<String, f64> {
 
 fn ids(cells: &[CellId]) -> Vec<u32> {
     cells.iter().map(|c| c.0).collect()
+}
+
+/// Embeds JSON text as it is, unless it is empty.
+fn optional_raw(text: &str) -> Option<Box<RawValue>> {
+    (!text.is_empty()).then(|| raw(text.to_owned()))
 }
 
 /// Embeds JSON text as it is. The world was validated, so that it parses.

@@ -23,6 +23,8 @@ pub(super) struct Root {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) meshes: Vec<Mesh>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) cameras: Vec<Box<RawValue>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) materials: Vec<Box<RawValue>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) textures: Vec<Texture>,
@@ -44,12 +46,16 @@ pub(super) struct Asset {
     pub(super) version: String,
     #[serde(default)]
     pub(super) generator: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) copyright: String,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct Scene {
     #[serde(default)]
     pub(super) nodes: Vec<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) extras: Option<Box<RawValue>>,
 }
 
 #[derive(Default, Serialize, Deserialize)]
@@ -69,6 +75,34 @@ pub(super) struct Node {
     pub(super) rotation: Option<[f64; 4]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) scale: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) camera: Option<u32>,
+    #[serde(default, skip_serializing_if = "NodeExtensions::is_empty")]
+    pub(super) extensions: NodeExtensions,
+    /// Of details, they are written for other programs; ours are in the table of sources.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) extras: Option<Box<RawValue>>,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct NodeExtensions {
+    #[serde(
+        rename = "KHR_lights_punctual",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub(super) light: Option<LightRef>,
+}
+
+impl NodeExtensions {
+    fn is_empty(&self) -> bool {
+        self.light.is_none()
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct LightRef {
+    pub(super) light: u32,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -156,6 +190,17 @@ pub(super) struct Buffer {
 pub(super) struct RootExtensions {
     #[serde(rename = "ENFILADE_cell_portal_graph")]
     pub(super) graph: Graph,
+    #[serde(
+        rename = "KHR_lights_punctual",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub(super) lights: Option<Lights>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Lights {
+    pub(super) lights: Vec<Box<RawValue>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -172,6 +217,14 @@ pub(super) struct Graph {
     /// glTF mesh by detail mesh; null for a mesh without triangles.
     pub(super) detail_meshes: Vec<Option<u32>>,
     pub(super) locator: LocatorJson,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) sources: Vec<SourceJson>,
+    /// Buffer view of all batches' runs of sources.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) source_runs: Option<u32>,
+    /// Nodes of lights, cameras and marked places.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) fixtures: Vec<u32>,
     /// Node of the leak path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) leak_path: Option<u32>,
@@ -223,8 +276,21 @@ pub(super) struct BatchJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) primitive: Option<u32>,
     pub(super) cells: Vec<u32>,
+    /// Runs of sources.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(super) sources: u32,
     #[serde(default, skip_serializing_if = "is_false")]
     pub(super) seal: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct SourceJson {
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) parent: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) extras: Option<Box<RawValue>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -233,6 +299,8 @@ pub(super) struct Detail {
     /// Index into `detailMeshes`.
     pub(super) mesh: u32,
     pub(super) cells: Vec<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) source: Option<u32>,
     /// Absent for a mesh without vertices, and in files of before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) aabb: Option<[[f64; 3]; 2]>,
@@ -276,6 +344,11 @@ pub(super) struct ProvenanceJson {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
 fn is_false(value: &bool) -> bool {
     !*value
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_zero(value: &u32) -> bool {
+    *value == 0
 }
 
 /// `FLOAT` of glTF.

@@ -9,6 +9,7 @@
 //!        ├─ shared ── shared-0, …   one node a set of cells: what is seen from several
 //!        ├─ unseen                  what no cell sees, such as the inside of walls
 //!        ├─ details ── …            placed detail objects; instances share their mesh
+//!        ├─ fixtures ── …           the input's lights, cameras and marked places
 //!        └─ enfilade leak path      a polyline for people, only where it was asked for
 //! ```
 //!
@@ -34,6 +35,7 @@ mod buffer;
 mod decode;
 mod encode;
 mod json;
+mod origin;
 mod rows;
 mod transform;
 
@@ -47,6 +49,9 @@ pub const EXTENSION: &str = "ENFILADE_cell_portal_graph";
 
 /// Name of the node that draws [`World::leak_path`](crate::World::leak_path).
 pub const LEAK_PATH: &str = "enfilade leak path";
+
+/// Name of the glTF extension that lights are in.
+const LIGHTS: &str = "KHR_lights_punctual";
 
 /// Version of the extension that this program writes and reads.
 pub const VERSION: u64 = 1;
@@ -119,4 +124,11 @@ fn list(errors: &[GraphError]) -> String {
         String::new()
     };
     shown.join("; ") + &tail
+}
+
+fn broken(at: impl Into<String>, problem: impl Into<String>) -> WireError {
+    WireError::Structure {
+        at: at.into(),
+        problem: problem.into(),
+    }
 }

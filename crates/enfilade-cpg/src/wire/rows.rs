@@ -28,3 +28,10 @@ pub(super) fn four(bytes: &[u8], at: usize) -> [u8; 4] {
 pub(super) fn eight(bytes: &[u8], at: usize) -> [u8; 8] {
     std::array::from_fn(|i| bytes[at + i])
 }
+
+/// All bytes as pairs of `u32`; `None` where they end amid one.
+pub(super) fn pairs(bytes: &[u8]) -> Option<Vec<[u32; 2]>> {
+    let (pairs, rest) = bytes.as_chunks::<8>();
+    let pair = |p: &[u8; 8]| [0, 4].map(|at| u32::from_le_bytes(four(p, at)));
+    rest.is_empty().then(|| pairs.iter().map(pair).collect())
+}

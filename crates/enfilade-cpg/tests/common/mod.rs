@@ -3,10 +3,12 @@
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Locator, LocatorNode, Portal,
-    PortalId, PortalKind, Provenance, Pvs, Statistics, World,
+    PortalId, PortalKind, Provenance, Pvs, SourceRuns, Statistics, World,
 };
-use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::scene::{
+    About, Fixture, FixtureKind, Image, Material, Mesh, Primitive, SourceNode, Texture,
+};
+use enfilade_geom::{Aabb, DMat4, DVec3};
 
 /// Four corners as two triangles, with normals and texture coordinates.
 pub(crate) fn quad(corners: [[f32; 3]; 4], normal: [f32; 3]) -> Primitive {
@@ -121,7 +123,22 @@ pub(crate) fn two_rooms() -> World {
         cells: cells.iter().copied().map(CellId).collect(),
         primitive,
         is_seal: false,
+        sources: SourceRuns::default(),
     };
+    let source = |name: &str, parent, extras: &str| SourceNode {
+        name: name.into(),
+        parent,
+        extras: extras.into(),
+    };
+    let fixture = |kind, name: &str, x, gltf: &str, extras: &str| Fixture {
+        kind,
+        name: name.into(),
+        transform: DMat4::from_translation(DVec3::new(x, 2.0, 1.0)),
+        gltf: gltf.into(),
+        extras: extras.into(),
+    };
+    let lamp = r#"{"color":[1,0.5,0.25],"intensity":40,"range":8,"type":"point"}"#;
+    let camera = r#"{"perspective":{"yfov":1,"znear":0.1},"type":"perspective"}"#;
     let turned = [
         0.0, 0.0, -2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 1.0,
     ];
@@ -130,6 +147,7 @@ pub(crate) fn two_rooms() -> World {
         mesh: 0,
         transform,
         cells: cells.iter().copied().map(CellId).collect(),
+        source: None,
     };
     let mut identity = [0.0; 16];
     [0, 5, 10, 15].into_iter().for_each(|i| identity[i] = 1.0);
@@ -137,7 +155,10 @@ pub(crate) fn two_rooms() -> World {
     World {
         graph,
         batches: vec![
-            batch(&[1], floor(4.0, 8.0)),
+            Batch {
+                sources: SourceRuns::from_runs(vec![[1, 1], [0, 1]]),
+                ..batch(&[1], floor(4.0, 8.0))
+            },
             batch(&[0], floor(0.0, 4.0)),
             batch(&[0, 1], floor(3.0, 5.0)),
             batch(&[], floor(-1.0, 0.0)),
@@ -159,8 +180,27 @@ pub(crate) fn two_rooms() -> World {
         ],
         details: vec![
             chair("chair", identity, &[0]),
-            chair("chair", turned, &[0, 1]),
+            DetailObject {
+                source: Some(3),
+                ..chair("chair", turned, &[0, 1])
+            },
         ],
+        sources: vec![
+            source("house", None, r#"{"site": [1, {"a": null}]}"#),
+            source("floor", Some(0), ""),
+            source("", Some(0), r#"{"storey":0}"#),
+            source("chair", Some(2), "\"oak\""),
+        ],
+        fixtures: vec![
+            fixture(FixtureKind::Light, "lamp", 1.0, lamp, ""),
+            fixture(FixtureKind::Camera, "entrance", 0.5, camera, "[2]"),
+            fixture(FixtureKind::Marker, "start", 0.0, "", r#"{"team":1}"#),
+            fixture(FixtureKind::Light, "lamp", 5.0, lamp, ""),
+        ],
+        about: About {
+            copyright: "2026 A. Mason, CC-BY 4.0".into(),
+            extras: r#"{"project":7}"#.into(),
+        },
         detail_meshes: vec![Mesh {
             name: "chair".into(),
             primitives: vec![Primitive {
@@ -251,6 +291,7 @@ pub(crate) fn nasty_rooms() -> World {
         cells: vec![CellId(2)],
         primitive: more,
         is_seal: true,
+        sources: enfilade_cpg::SourceRuns::default(),
     });
     world.batches.push(Batch {
         cells: vec![CellId(1)],
@@ -266,6 +307,7 @@ pub(crate) fn nasty_rooms() -> World {
         mesh,
         transform,
         cells: vec![CellId(0)],
+        source: None,
     };
     let mut identity = [0.0; 16];
     [0, 5, 10, 15].into_iter().for_each(|i| identity[i] = 1.0);

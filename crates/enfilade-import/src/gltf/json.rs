@@ -6,6 +6,7 @@
 
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde_json::Value;
+use serde_json::value::RawValue;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
@@ -82,6 +83,11 @@ pub(super) struct Root {
     #[serde(default)]
     pub(super) animations: List<Animation>,
     #[serde(default)]
+    pub(super) cameras: List<Value>,
+    #[serde(default)]
+    pub(super) skins: List<Skin>,
+    pub(super) extensions: Option<Box<RootExtensions>>,
+    #[serde(default)]
     pub(super) extensions_required: List<String>,
 }
 
@@ -89,12 +95,32 @@ pub(super) struct Root {
 #[serde(rename_all = "camelCase")]
 pub(super) struct Asset {
     pub(super) version: String,
+    pub(super) copyright: Option<String>,
+}
+
+#[derive(serde::Deserialize)]
+pub(super) struct RootExtensions {
+    #[serde(rename = "KHR_lights_punctual")]
+    pub(super) lights: Option<Lights>,
+}
+
+#[derive(serde::Deserialize)]
+pub(super) struct Lights {
+    #[serde(default)]
+    pub(super) lights: List<Value>,
+}
+
+#[derive(serde::Deserialize)]
+pub(super) struct Skin {
+    #[serde(default)]
+    pub(super) joints: List<u32>,
 }
 
 #[derive(serde::Deserialize)]
 pub(super) struct SceneDef {
     #[serde(default)]
     pub(super) nodes: List<usize>,
+    pub(super) extras: Option<Box<RawValue>>,
 }
 
 #[derive(serde::Deserialize)]
@@ -103,6 +129,7 @@ pub(super) struct Node {
     pub(super) name: Option<Box<str>>,
     pub(super) mesh: Option<u32>,
     pub(super) skin: Option<u32>,
+    pub(super) camera: Option<u32>,
     /// In place of the mesh's, where given.
     pub(super) weights: Option<Box<List<f64>>>,
     #[serde(default)]
@@ -112,6 +139,7 @@ pub(super) struct Node {
     pub(super) rotation: Option<Box<[f64; 4]>>,
     pub(super) scale: Option<Box<[f64; 3]>>,
     pub(super) extensions: Option<Box<NodeExtensions>>,
+    pub(super) extras: Option<Box<RawValue>>,
 }
 
 #[derive(serde::Deserialize)]
@@ -120,6 +148,13 @@ pub(super) struct NodeExtensions {
     pub(super) instancing: Option<Instancing>,
     #[serde(rename = "KHR_node_visibility")]
     pub(super) visibility: Option<Visibility>,
+    #[serde(rename = "KHR_lights_punctual")]
+    pub(super) light: Option<LightRef>,
+}
+
+#[derive(serde::Deserialize)]
+pub(super) struct LightRef {
+    pub(super) light: u32,
 }
 
 #[derive(serde::Deserialize)]

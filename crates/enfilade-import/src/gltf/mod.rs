@@ -10,6 +10,7 @@ mod json;
 mod look;
 mod meshopt;
 mod morph;
+mod origin;
 mod primitive;
 
 use crate::builder::{Builder, Placement};
@@ -246,6 +247,8 @@ struct Visit {
     parent: DMat4,
     depth: u32,
     moves: Option<&'static str>,
+    /// The parent in the tree of names.
+    source: Option<u32>,
 }
 
 impl GltfReader<'_, '_, '_> {
@@ -254,6 +257,7 @@ impl GltfReader<'_, '_, '_> {
         let parents = self.parents()?;
         let starts = self.starts(&parents)?;
         let animated = self.animated_nodes();
+        let is_joint = origin::joints(root);
         let mut is_visited = vec![false; root.nodes.len()];
         let mut stack: Vec<Visit> = Vec::new();
         for &start in starts.iter().rev() {
@@ -265,6 +269,7 @@ impl GltfReader<'_, '_, '_> {
                 parent: self.builder.base,
                 depth: 1,
                 moves: None,
+                source: None,
             });
         }
         while let Some(visit) = stack.pop() {
@@ -285,15 +290,18 @@ impl GltfReader<'_, '_, '_> {
             let moves = visit
                 .moves
                 .or(if animated[i] { Some("animated") } else { None });
+            let source = origin::add_node(root, i, visit.source, self.builder)?;
             if let Some(mesh) = node.mesh {
-                self.place_node(i, mesh, world, moves, &parents)?;
+                self.place_node(i, mesh, world, moves, &parents, source)?;
             }
+            origin::add_fixtures(root, i, &world, is_joint[i], self.builder)?;
             for &child in node.children.iter().rev() {
                 stack.push(Visit {
                     node: child,
                     parent: world,
                     depth: visit.depth + 1,
                     moves,
+                    source,
                 });
             }
         }
@@ -328,6 +336,7 @@ impl GltfReader<'_, '_, '_> {
     fn starts(&mut self, parents: &[u32]) -> Result<Vec<usize>, ImportError> {
         let root = &self.document.root;
         if root.scenes.is_empty() {
+            origin::add_about(root, None, self.builder);
             let tops = (0..parents.len()).filter(|&i| parents[i] == u32::MAX);
             return Ok(tops.collect());
         }
@@ -341,6 +350,7 @@ impl GltfReader<'_, '_, '_> {
                 "several scenes; only the default one is read",
             );
         }
+        origin::add_about(root, Some(index), self.builder);
         Ok(scene.nodes.to_vec())
     }
 
@@ -397,6 +407,7 @@ impl GltfReader<'_, '_, '_> {
         world: DMat4,
         moves: Option<&'static str>,
         parents: &[u32],
+        source: Option<u32>,
     ) -> Result<(), ImportError> {
         let document = self.document;
         let root = &document.root;
@@ -452,6 +463,7 @@ impl GltfReader<'_, '_, '_> {
             transforms: &transforms,
             moves,
             place: &place,
+            source,
         })
     }
 

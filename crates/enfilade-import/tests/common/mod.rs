@@ -93,6 +93,7 @@ pub(crate) fn scene_of(primitive: Primitive, transforms: &[DMat4]) -> Scene {
                 transform,
                 role: Role::Structural,
                 reason: String::new(),
+                node: None,
             })
             .collect(),
         ..Scene::default()

@@ -186,6 +186,7 @@ fn details_of(grid: &Grid, furniture: &[(u32, Aabb)]) -> Vec<DetailObject> {
             mesh: 0,
             transform: std::array::from_fn(|k| transform[k / 4][k % 4]),
             cells: vec![CellId(*label)],
+            source: None,
         }
     };
     furniture.iter().enumerate().map(placed).collect()

@@ -103,6 +103,7 @@ pub(crate) fn batch(cells: &[CellId], quads: Vec<Vec<Quad>>) -> Batch {
         cells: cells.to_vec(),
         primitive,
         is_seal: false,
+        sources: enfilade_cpg::SourceRuns::default(),
     }
 }
 

@@ -1,0 +1,68 @@
+//! What the input calls its things, counted and checked as it comes in.
+
+use enfilade_geom::scene::{Fixture, SourceNode};
+
+use super::Builder;
+use crate::ImportError;
+use crate::origins::is_shallow;
+
+impl Builder<'_> {
+    /// Adds a node to the tree of names, below `parent`; its number there, or that of `parent` where it says nothing.
+    pub(crate) fn add_source(
+        &mut self,
+        place: &str,
+        parent: Option<u32>,
+        name: &str,
+        extras: &str,
+    ) -> Result<Option<u32>, ImportError> {
+        let extras = self.kept_extras(place, extras);
+        let n_bytes = size_of::<SourceNode>() + name.len() + extras.len();
+        self.charge_memory(place, 1, n_bytes as u64)?;
+        Ok(self.origins.add(parent, name, extras))
+    }
+
+    /// Keeps a light, a camera or a marked place.
+    pub(crate) fn add_fixture(
+        &mut self,
+        place: &str,
+        mut fixture: Fixture,
+    ) -> Result<(), ImportError> {
+        fixture.extras = self.kept_extras(place, &fixture.extras).to_owned();
+        let n_text = fixture.name.len() + fixture.gltf.len() + fixture.extras.len();
+        self.charge_memory(place, 1, (size_of::<Fixture>() + n_text) as u64)?;
+        if fixture.transform.is_finite() && is_shallow(&fixture.gltf) {
+            self.origins.add_fixture(fixture);
+        } else {
+            self.note(
+                place,
+                "a light or camera nowhere, or nested too deep; left out",
+            );
+        }
+        Ok(())
+    }
+
+    /// Keeps what the file says of itself as a whole.
+    pub(crate) fn add_about(&mut self, copyright: &str, extras: &str) {
+        let extras = self.kept_extras("scene", extras);
+        if self.origins.add_about(copyright, extras) {
+            self.note(
+                "scene",
+                "extras of the scene; a file before it has some, and these are left out",
+            );
+        }
+    }
+
+    /// Extras as a world can hold them.
+    fn kept_extras<'t>(&mut self, place: &str, extras: &'t str) -> &'t str {
+        if is_shallow(extras) {
+            return extras;
+        }
+        self.note(place, "extras that nest too deep; left out");
+        ""
+    }
+
+    /// The input's unit, as far as it was given. [Units: m]
+    pub(crate) fn unit(&self) -> f64 {
+        self.options.unit.unwrap_or(1.0)
+    }
+}
