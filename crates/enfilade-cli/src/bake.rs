@@ -184,6 +184,14 @@ fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow:
     if verbose || cleaning.findings().iter().any(|(_, f)| f.n > 0) {
         writeln!(err, "{title}:\n{cleaning}")?;
     }
+    if let Some(hole) = cleaning.holes.examples.first() {
+        let (n, p) = (cleaning.holes.n, hole.position);
+        writeln!(
+            err,
+            "triangles are missing in {n} places, most at {:.2} {:.2} {:.2} in '{}': --repair-holes 10 fills holes of up to 10 m",
+            p.x, p.y, p.z, hole.name
+        )?;
+    }
     Ok(())
 }
 

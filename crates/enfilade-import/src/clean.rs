@@ -3,6 +3,7 @@
 //! Corners closer than the welding distance count as one. Edges are sorted, not hashed, and the
 //! only search in space is bounded by a budget, so that a million triangles take seconds.
 
+use crate::repair::holes_of;
 use crate::report::Finding;
 use crate::shells::Shells;
 use crate::{ImportError, ImportReport};
@@ -54,6 +55,11 @@ pub struct CleaningReport {
     pub is_complete: bool,
     /// Edges used by one triangle only, over all objects.
     pub open_edges: Finding,
+    /// Loops of open edges across which the surface around them goes on, the largest first: triangles are missing. Rims of
+    /// sheets are none, and neither is a whole face that is missing: a box may be meant to be open.
+    pub holes: Finding,
+    /// Whether holes were looked for: not among more than two million triangles.
+    pub has_holes: bool,
     /// Edges used by more than two triangles of one object.
     pub non_manifold_edges: Finding,
     /// Triangles turned against most of those that they hang together with.
@@ -94,13 +100,14 @@ pub struct ShellCounts {
 impl CleaningReport {
     /// The findings with what to call them, in the order shown.
     #[must_use]
-    pub fn findings(&self) -> [(&'static str, &Finding); 13] {
+    pub fn findings(&self) -> [(&'static str, &Finding); 14] {
         [
             ("duplicate vertices", &self.duplicate_vertices),
             ("duplicate triangles", &self.duplicate_triangles),
             ("degenerate triangles", &self.degenerate_triangles),
             ("T-junctions", &self.t_junctions),
             ("open edges", &self.open_edges),
+            ("holes in surfaces", &self.holes),
             ("non-manifold edges", &self.non_manifold_edges),
             ("flipped triangles", &self.flipped_triangles),
             ("inverted shells", &self.inverted_shells),
@@ -132,6 +139,12 @@ impl fmt::Display for CleaningReport {
         }
         if !self.is_crossing_complete {
             writeln!(f, "crossing triangles: at least; the search was stopped")?;
+        }
+        if !self.has_holes {
+            writeln!(
+                f,
+                "holes in surfaces: not looked for among so many triangles"
+            )?;
         }
         let ShellCounts {
             solids,
@@ -187,7 +200,22 @@ pub fn cleaning_report(
     find_odd_triangles(&mut report, scene, &soup, options.weld);
     find_odd_edges(&mut report, scene, &soup, options);
     find_crossing(&mut report, scene, &soup, options);
+    find_holes(&mut report, scene);
     Ok(report)
+}
+
+/// Most triangles among which holes are looked for: it takes 300 bytes a triangle.
+const MAX_HOLE_TRIANGLES: u64 = 2_000_000;
+
+fn find_holes(report: &mut CleaningReport, scene: &Scene) {
+    report.has_holes = report.n_triangles <= MAX_HOLE_TRIANGLES;
+    if !report.has_holes || report.open_edges.n == 0 {
+        return;
+    }
+    for hole in holes_of(scene).into_iter().filter(|h| h.is_torn) {
+        let name = || scene.objects[hole.object as usize].name.clone();
+        report.holes.add(hole.position, name);
+    }
 }
 
 /// Triangles over welded points.

@@ -46,7 +46,10 @@ fn a_closed_box_is_clean_also_with_a_vertex_a_face() {
 fn faults_are_told_apart() {
     let mut open = cube();
     open.indices.truncate(33);
-    assert_eq!(counts(&of(open)), [("open edges", 3)]);
+    assert_eq!(
+        counts(&of(open)),
+        [("open edges", 3), ("holes in surfaces", 1)]
+    );
 
     let mut flipped = cube();
     flipped.indices.swap(0, 1);
@@ -275,6 +278,29 @@ proptest! {
         prop_assert_eq!(n_open(0.9e-5), 4);
         prop_assert_eq!(n_open(1.1e-5), 6);
     }
+}
+
+#[test]
+fn missing_triangles_are_holes_and_rims_of_sheets_are_none() {
+    assert_eq!(of(cube()).holes.n, 0);
+    let mut open = cube();
+    open.indices.drain(0..3);
+    let report = of(open.clone());
+    assert!(report.has_holes);
+    assert_eq!((report.holes.n, report.open_edges.n), (1, 3));
+    let corners = cube().indices[0..3].to_vec();
+    let missing = corners
+        .iter()
+        .map(|&i| DVec3::from(open.positions[i as usize].map(f64::from)));
+    let middle = missing.sum::<DVec3>() / 3.0;
+    assert!(report.holes.examples[0].position.distance(middle) < 1e-6);
+    // A box without a face may be meant so, and a single face has a rim and no hole.
+    let mut faceless = cube();
+    faceless.indices.drain(0..6);
+    assert_eq!(of(faceless).holes.n, 0);
+    let mut sheet = cube();
+    sheet.indices.truncate(6);
+    assert_eq!(of(sheet).holes.n, 0);
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub(super) struct Measured {
     pub(super) windows: Option<f64>,
     pub(super) extra: Option<f64>,
     pub(super) portals: usize,
-    /// Openings to outdoors that are listed as possible holes.
+    /// Openings to outdoors that are listed as possible holes, and holes in surfaces.
     pub(super) holes: usize,
     /// Most crack portals between one pair of cells in one plane.
     pub(super) cracks: usize,
@@ -80,7 +80,7 @@ pub(super) fn measure(
         windows,
         extra,
         portals: list(&graph["portals"]).len(),
-        holes: list(&graph["suspected_holes"]).len(),
+        holes: list(&graph["suspected_holes"]).len() + n_missing(&said),
         cracks: cracks_in_one_plane(&graph),
         n_matter: matter.len(),
         in_matter: n_cells_of_matter(&graph, world, &matter, &truth)?,
@@ -133,6 +133,16 @@ fn indoor_ids(graph: &Value) -> BTreeSet<String> {
     let indoors = list(&graph["cells"]).iter();
     let indoors = indoors.filter(|c| c["outdoor"] != true);
     indoors.map(|c| c["id"].to_string()).collect()
+}
+
+/// Holes in surfaces that the bake counts.
+fn n_missing(said: &str) -> usize {
+    let rows = said.lines();
+    let count = |row: &str| {
+        let count = row.strip_prefix("holes in surfaces")?;
+        count.split_whitespace().next()?.parse().ok()
+    };
+    rows.filter_map(count).sum()
 }
 
 /// Promises that `verify` finds broken; lines that the source's triangles block are not tried.

@@ -24,6 +24,21 @@ pub(super) struct Filled {
     pub(super) n_triangles: u64,
     /// Loops that stay open.
     pub(super) n_left: u64,
+    /// What was filled, one by one.
+    pub(super) holes: Vec<Hole>,
+}
+
+/// A loop of open edges that a surface could be continued across.
+pub(crate) struct Hole {
+    /// The middle of its corners. [Units: wu]
+    pub(crate) position: DVec3,
+    /// Of the triangles that fill it. [Units: wu²]
+    pub(crate) area: f64,
+    /// The object of an edge of it.
+    pub(crate) object: u32,
+    /// Across one edge at least the surface goes straight on, within 45 degrees: a part of a face is missing, not a whole face of
+    /// a box that was meant to be open.
+    pub(crate) is_torn: bool,
 }
 
 /// One loop of open edges: corners, and the use of the edge from each to the next.
@@ -76,9 +91,24 @@ pub(super) fn fill_holes(surface: &mut Surface, size: f64) -> Filled {
         }
         filled.n_holes += 1;
         filled.n_triangles += triangles.len() as u64;
+        filled.holes.push(hole_of(surface, &rim, &triangles));
         add(surface, &rim, &triangles);
     }
     filled
+}
+
+fn hole_of(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> Hole {
+    let at = |i: usize| surface.points[rim.points[i] as usize];
+    let sum: DVec3 = (0..rim.points.len()).map(at).sum();
+    let area = |t: &[usize; 3]| 0.5 * triangle_area_normal(&t.map(at)).length();
+    Hole {
+        position: sum / rim.points.len() as f64,
+        area: triangles.iter().map(area).sum(),
+        object: rim.edges[0].object,
+        is_torn: bends(surface, rim, triangles)
+            .iter()
+            .any(|b| b.cos < -FOLDED),
+    }
 }
 
 fn sorted(mut corners: [u32; 3]) -> [u32; 3] {
@@ -263,9 +293,23 @@ fn triangulated(
 
 /// Whether most of the loop's length has its new triangle folded on the old one.
 fn is_folded(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> bool {
+    let bends = bends(surface, rim, triangles);
+    let all: f64 = bends.iter().map(|b| b.length).sum();
+    let folded = bends.iter().filter(|b| b.cos > FOLDED);
+    2.0 * folded.map(|b| b.length).sum::<f64>() > all
+}
+
+/// How the surface would go on across an edge of a loop.
+struct Bend {
+    length: f64,
+    /// 1 where the new triangle would lie folded on the old one, -1 where it goes straight on.
+    cos: f64,
+}
+
+fn bends(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> Vec<Bend> {
     let n = rim.points.len();
     let at = |p: u32| surface.points[p as usize];
-    let (mut folded, mut all) = (0.0, 0.0);
+    let mut bends = Vec::with_capacity(n);
     for t in triangles {
         for k in 0..3 {
             let (i, j, apex) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
@@ -285,13 +329,11 @@ fn is_folded(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> bool {
                 (v - along * v.dot(along)).normalize_or_zero()
             };
             let length = at(ends[1]).distance(from);
-            all += length;
-            if away(at(rim.points[apex])).dot(away(at(*other))) > FOLDED {
-                folded += length;
-            }
+            let cos = away(at(rim.points[apex])).dot(away(at(*other)));
+            bends.push(Bend { length, cos });
         }
     }
-    2.0 * folded > all
+    bends
 }
 
 /// Adds the triangles to the part that has most of the rim; corners take what its vertices have there, or nearest along
