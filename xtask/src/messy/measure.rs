@@ -140,7 +140,7 @@ fn n_missing(said: &str) -> usize {
     let rows = said.lines();
     let count = |row: &str| {
         let count = row.strip_prefix("holes in surfaces")?;
-        count.split_whitespace().next()?.parse().ok()
+        count.split_whitespace().next()?.parse::<usize>().ok()
     };
     rows.filter_map(count).sum()
 }
