@@ -3,6 +3,7 @@
 mod cracks;
 pub(crate) mod delaunay;
 mod doorless;
+mod found;
 mod leak_path;
 pub(crate) mod settings;
 mod values;
@@ -16,12 +17,11 @@ use enfilade::bake::delaunay::LEAST_BALL;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
-use enfilade::geom::scene::{Role, Scene};
-use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
+use enfilade::geom::scene::Scene;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{Outputs, Told, write_whole, wrote};
+use crate::output::{Outputs, Told, Warned, write_whole, wrote};
 use crate::progress::{BakeBar, StageBar};
 use enfilade_cli::input::import_scene;
 
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
     outputs.read(&imported.report.references)?;
-    report_import(&imported.scene, &imported.report, options.verbose)?;
+    found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
     let config = &settings.config_for(scene);
     config.costs.cost.check(&scene.materials)?;
@@ -80,13 +80,13 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     write_whole(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
     if let Some(path) = &leak_path {
-        path.write(&mut Told)?;
+        path.write(&mut path.says())?;
     }
     if baked.world.graph.statistics.counts.get("separators") == Some(&0.0)
         && baked.world.graph.cells.len() > 1
     {
         writeln!(
-            Told,
+            Warned,
             "no separator parts the scene: its openings lie in no plane of its surfaces, if it has rooms; \
              --method watershed or delaunay needs no planes"
         )?;
@@ -135,7 +135,7 @@ fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result
         },
     );
     if options.allow_leak {
-        writeln!(Told, "{text}")?;
+        writeln!(Warned, "{text}")?;
         return Ok(());
     }
     bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
@@ -156,37 +156,6 @@ pub(crate) fn bake_scene(
     Ok(baked)
 }
 
-fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow::Result<()> {
-    let mut err = Told;
-    if verbose {
-        writeln!(err, "{report}")?;
-        for o in &scene.objects {
-            let role = match o.role {
-                Role::Structural => "structural",
-                Role::Detail => "detail",
-            };
-            writeln!(err, "{role:<10} {}: {}", o.name, o.reason)?;
-        }
-    }
-    if let Some(doubt) = &report.unit_doubt {
-        writeln!(err, "{doubt}")?;
-    }
-    let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
-    let title = if let Some(repair) = &report.repair {
-        writeln!(
-            err,
-            "repaired (leave out --repair to have the model as it was):\n{repair}"
-        )?;
-        "what is left of the model's faults"
-    } else {
-        "the model as found (nothing was changed)"
-    };
-    if verbose || cleaning.findings().iter().any(|(_, f)| f.n > 0) {
-        writeln!(err, "{title}:\n{cleaning}")?;
-    }
-    Ok(())
-}
-
 /// Leaks worth a line: wide enough that they may be meant.
 const LEAKS_SHOWN: usize = 10;
 
@@ -201,7 +170,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             let wanted = config.min_opening * LEAST_BALL;
             if radius > wanted {
                 writeln!(
-                    err,
+                    Warned,
                     "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \
                      narrower openings are found, but may be weighed wrongly"
                 )?;
@@ -211,7 +180,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         Resolution::Voxels { .. } | Resolution::Planes => {}
     }
     for note in &baked.notes {
-        writeln!(err, "{note}")?;
+        writeln!(Warned, "{note}")?;
     }
     if verbose || io::stderr().is_terminal() {
         for (stage, time) in &baked.times {
@@ -243,11 +212,11 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
         }
     }
-    cracks::write_cracks(&mut err, baked)?;
+    cracks::write_cracks(&mut Warned, baked)?;
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
-    doorless::write_roomless(&mut err, &baked.world.graph)?;
-    doorless::write_doorless(&mut err, &baked.world.graph)?;
+    doorless::write_roomless(&mut Warned, &baked.world.graph)?;
+    doorless::write_doorless(&mut Warned, &baked.world.graph)?;
     Ok(())
 }
 

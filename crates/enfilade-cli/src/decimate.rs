@@ -16,7 +16,7 @@ use enfilade::geom::scene::Scene;
 use crate::bake::delaunay::choices_text;
 use crate::bake::{print_summary, settings};
 use crate::formats::Format;
-use crate::output::{Outputs, Told, refuse_stream, write_whole, wrote};
+use crate::output::{Outputs, Warned, refuse_stream, write_whole, wrote};
 use enfilade_cli::input::{import_scene, is_stream};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         }
         if !walk.is_saved {
             writeln!(
-                Told,
+                Warned,
                 "the last decisions were not saved; `save FILE.toml` before the end does"
             )?;
         }

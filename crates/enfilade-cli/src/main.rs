@@ -1,7 +1,8 @@
 //! The `enfilade` command: arguments → library calls → report.
 //!
 //! Results go to standard output, progress and messages to standard error; `-` is standard input among inputs and standard
-//! output among outputs, and then the results go to standard error, too. Exit code 0: done;
+//! output among outputs, and then the results go to standard error, too; `--quiet` leaves errors and warnings alone there.
+//! Exit code 0: done;
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
 mod bake;
@@ -29,12 +30,16 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use output::Told;
+use output::{Warned, be_quiet};
 
 /// Finds the rooms and doorways of a 3D scene; answers what can be seen from where.
 #[derive(Parser)]
-#[command(version, about)]
+// The name and version that worlds have as their generator.
+#[command(name = "enfilade", version, about)]
 struct Cli {
+    /// Say nothing on standard error but errors, and warnings about the result.
+    #[arg(short, long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -59,6 +64,9 @@ enum Command {
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
+    if cli.quiet {
+        be_quiet();
+    }
     match cli.command {
         Command::Bake(args) => bake::run(&args),
         Command::Decimate(args) => decimate::run(&args),
@@ -84,7 +92,7 @@ fn main() -> ExitCode {
         // The reader of our output has seen enough, as in `enfilade inspect X.glb | head`.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            let _ = writeln!(Told, "enfilade: {error:#}");
+            let _ = writeln!(Warned, "enfilade: {error:#}");
             ExitCode::FAILURE
         }
     }

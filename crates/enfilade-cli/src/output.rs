@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, bail};
 use enfilade::whole;
@@ -38,11 +39,40 @@ pub(crate) fn wrote(path: &Path, bytes: &[u8]) -> String {
     format!("wrote {to} ({:.1} MB)", bytes.len() as f64 / 1e6)
 }
 
-/// Standard error, for what is said beside the work. Where nobody reads it any more, as in `enfilade bake … 2>&1 | head -2`,
-/// the work goes on.
+/// Whether `--quiet` was given: once, before any command runs.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From now on [`Told`] says nothing.
+pub(crate) fn be_quiet() {
+    IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether nothing but errors and warnings is to be said.
+pub(crate) fn is_quiet() -> bool {
+    IS_QUIET.load(Ordering::Relaxed)
+}
+
+/// Standard error, for what is said beside the work; `--quiet` silences it. Where nobody reads it any more, as in
+/// `enfilade bake … 2>&1 | head -2`, the work goes on.
 pub(crate) struct Told;
 
+/// The same for errors, and for warnings: the result is not what was asked for, or probably not what was meant.
+pub(crate) struct Warned;
+
 impl Write for Told {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if is_quiet() {
+            return Ok(bytes.len());
+        }
+        Warned.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Write for Warned {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let _ = io::stderr().write_all(bytes);
         Ok(bytes.len())

@@ -9,6 +9,13 @@ use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
+use crate::output::{Told, Warned, is_quiet};
+
+/// Whether bars are drawn.
+fn is_shown() -> bool {
+    stderr().is_terminal() && !is_quiet()
+}
+
 /// A line on the terminal that shows the stage under way, how far it is and the time left.
 ///
 /// Shows nothing when standard error is no terminal. The line disappears when dropped.
@@ -19,7 +26,7 @@ pub(crate) struct StageBar {
 impl StageBar {
     /// A bar without a stage.
     pub(crate) fn new() -> Self {
-        let bar = if stderr().is_terminal() {
+        let bar = if is_shown() {
             ProgressBar::new(0)
         } else {
             ProgressBar::hidden()
@@ -184,7 +191,7 @@ impl BakeBar {
     /// A bar for a bake of `scene`; it shows nothing where standard error is no terminal.
     pub(crate) fn new(scene: &Scene, config: &BakeConfig) -> Self {
         let now = Instant::now();
-        let is_shown = stderr().is_terminal();
+        let is_shown = is_shown();
         let work = work_of(scene, config);
         let state = Arc::new(Mutex::new(Clock {
             stages: &[],
@@ -246,7 +253,7 @@ impl Progress for BakeBar {
     fn method(&self, method: Method, reason: &str) {
         // Whoever closed standard error does not want to know.
         self.bar.suspend(|| {
-            let _ = writeln!(stderr(), "method {}: {reason}", method.name());
+            let _ = writeln!(Told, "method {}: {reason}", method.name());
         });
         let mut clock = self.state.lock().expect("no panic holds it");
         clock.stages = method.stages();
@@ -279,32 +286,33 @@ impl Progress for BakeBar {
             clock.left.expected.iter().sum::<f64>()
         };
         self.bar.suspend(|| {
-            let _ = write!(
-                stderr(),
-                "{}",
-                plan(edge, dims, memory, seconds, self.wanted)
-            );
+            let _ = write!(Told, "{}", plan(edge, dims, memory, seconds));
+            let _ = write!(Warned, "{}", coarser(edge, self.wanted));
         });
     }
 }
 
 /// What will be done, before it is done.
-fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64, wanted: f64) -> String {
+fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64) -> String {
     let n = (nx * ny * nz) as f64 / 1e6;
     let memory = memory / 1e6;
-    let mut text = format!(
+    format!(
         "voxels of {edge:.3} m, {nx} × {ny} × {nz}: {n:.1} million, about {memory:.0} MB and {}\n",
         in_words(seconds)
-    );
+    )
+}
+
+/// That voxels are larger than was asked for, if they are.
+fn coarser(edge: f64, wanted: f64) -> String {
     // The grid grows its voxels by tenths, if at all.
-    if edge > wanted * 1.05 {
-        text += &format!(
-            "not the {} m that were wanted: those would be more voxels than are allowed (--max-memory, \
-             and max_voxels in a --config file)\n",
-            (wanted * 1e9).round() / 1e9
-        );
+    if edge <= wanted * 1.05 {
+        return String::new();
     }
-    text
+    format!(
+        "not the {} m that were wanted: those would be more voxels than are allowed (--max-memory, and max_voxels in a \
+         --config file)\n",
+        (wanted * 1e9).round() / 1e9
+    )
 }
 
 impl Drop for BakeBar {

@@ -13,7 +13,7 @@ use enfilade_render::{
 use serde_json::json;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Told, refuse_stream, write_whole};
+use crate::output::{Outputs, Warned, refuse_stream, write_whole};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::input::name_of;
 use enfilade_cli::values::{point, size};
@@ -131,7 +131,7 @@ pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(Worl
     let n = studio.world.n_missing_pictures();
     if n > 0 {
         writeln!(
-            Told,
+            Warned,
             "enfilade: {n} pictures of textures are missing or damaged; drawn without"
         )?;
     }

@@ -14,7 +14,7 @@ use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Told, write_whole};
+use crate::output::{Outputs, Warned, write_whole};
 use crate::render::{above, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::input::{is_stream, name_of};
@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         match enfilade_cli::adapter::open(&args.adapter) {
             Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
             Err(why @ RenderError::NoAdapter) => {
-                let _ = writeln!(Told, "enfilade: the report has no pictures: {why}");
+                let _ = writeln!(Warned, "enfilade: the report has no pictures: {why}");
                 parts.notes.push(format!("No pictures: {why}."));
             }
             Err(why) => bail!(why),

@@ -11,7 +11,7 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};
 
 use crate::formats::Format;
-use crate::output::{Outputs, Told, write_whole, wrote};
+use crate::output::{Outputs, Warned, write_whole, wrote};
 use crate::pvs::sight_graph;
 use enfilade_cli::input::{name_of, read};
 
@@ -135,7 +135,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         &costs_text(bounded.costs),
     )?;
     if let Some(note) = bounded.note() {
-        writeln!(Told, "{note}")?;
+        writeln!(Warned, "{note}")?;
     }
     Ok(())
 }
@@ -143,7 +143,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
 fn warn_of_costs(args: &Simplify, max_cost: f64) -> anyhow::Result<()> {
     if let Some(max) = args.max_cost.filter(|m| max_cost > *m) {
         writeln!(
-            Told,
+            Warned,
             "a cell costs {max_cost:.0}, more than {max}, and did before; only a bake can cut it"
         )?;
     }
