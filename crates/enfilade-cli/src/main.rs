@@ -13,6 +13,7 @@ mod exact;
 mod formats;
 mod inspect;
 mod locate;
+mod manual;
 mod output;
 mod plan;
 mod progress;
@@ -28,7 +29,7 @@ mod view;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use output::{Warned, be_quiet};
 
@@ -47,11 +48,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Bake(bake::Bake),
+    Completions(manual::Completions),
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Edit(edit::Edit),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
+    Man(manual::Man),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
     Render(render::Render),
@@ -69,11 +72,13 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     }
     match cli.command {
         Command::Bake(args) => bake::run(&args),
+        Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
+        Command::Man(args) => manual::man(&args, Cli::command()),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::Render(args) => render::run(&args),
