@@ -8,6 +8,7 @@ mod leak_path;
 pub(crate) mod settings;
 mod values;
 
+use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
@@ -18,10 +19,11 @@ use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
+use serde::Serialize;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{Outputs, Told, Warned, write_whole, wrote};
+use crate::output::{Outputs, Told, Warned, Written, print_json, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use enfilade_cli::input::import_scene;
 
@@ -34,6 +36,9 @@ pub(crate) struct Bake {
     /// World to write, one GLB; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     options: settings::BakeOptions,
 }
@@ -92,8 +97,12 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         )?;
     }
     let mut out = outputs.printed();
+    let written = Written::new(&args.output, &bytes);
+    if args.json {
+        return print_json(out, &BakeReport::new(&baked, written));
+    }
     print_summary(&mut out, &baked.world)?;
-    writeln!(out, "{}", wrote(&args.output, &bytes))?;
+    writeln!(out, "{written}")?;
     Ok(())
 }
 
@@ -220,31 +229,80 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     Ok(())
 }
 
-/// The summary table: what was found, in one glance.
+/// What was found, in one glance.
+#[derive(Serialize)]
+pub(crate) struct Summary {
+    triangles: usize,
+    cells_indoors: usize,
+    portals: usize,
+    doors: usize,
+    windows: usize,
+    open: usize,
+    cracks: usize,
+    detail_objects: usize,
+}
+
+impl Summary {
+    pub(crate) fn of(world: &World) -> Self {
+        let graph = &world.graph;
+        let count = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
+        let triangles = graph.statistics.counts.get("input_triangles");
+        Self {
+            triangles: triangles.copied().unwrap_or(0.0) as usize,
+            cells_indoors: graph.indoor_cells().count(),
+            portals: graph.portals.len(),
+            doors: count(PortalKind::Door),
+            windows: count(PortalKind::Window),
+            open: count(PortalKind::Open),
+            cracks: count(PortalKind::Crack),
+            detail_objects: world.details.len(),
+        }
+    }
+}
+
+/// The summary as a table.
 pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<()> {
-    let graph = &world.graph;
-    let count = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
-    let indoor = graph.indoor_cells().count();
-    let rows = [
-        (
-            "triangles",
-            graph
-                .statistics
-                .counts
-                .get("input_triangles")
-                .copied()
-                .unwrap_or(0.0) as usize,
-        ),
-        ("cells indoors", indoor),
-        ("portals", graph.portals.len()),
-        ("  doors", count(PortalKind::Door)),
-        ("  windows", count(PortalKind::Window)),
-        ("  open", count(PortalKind::Open)),
-        ("  cracks", count(PortalKind::Crack)),
-        ("detail objects", world.details.len()),
-    ];
-    for (name, n) in rows {
+    let summary = Summary::of(world);
+    for (name, n) in [
+        ("triangles", summary.triangles),
+        ("cells indoors", summary.cells_indoors),
+        ("portals", summary.portals),
+        ("  doors", summary.doors),
+        ("  windows", summary.windows),
+        ("  open", summary.open),
+        ("  cracks", summary.cracks),
+        ("detail objects", summary.detail_objects),
+    ] {
         writeln!(out, "{name:<16} {n:>9}")?;
     }
     Ok(())
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct BakeReport<'a> {
+    #[serde(flatten)]
+    written: Written,
+    #[serde(flatten)]
+    summary: Summary,
+    method: &'static str,
+    notes: &'a [String],
+    /// Gaps in the model that became portals.
+    gaps: usize,
+    /// By stage.
+    seconds: BTreeMap<&'static str, f64>,
+}
+
+impl<'a> BakeReport<'a> {
+    fn new(baked: &'a BakeOutput, written: Written) -> Self {
+        let times = baked.times.iter();
+        Self {
+            written,
+            summary: Summary::of(&baked.world),
+            method: baked.method.name(),
+            notes: &baked.notes,
+            gaps: baked.leaks.len(),
+            seconds: times.map(|(s, t)| (s.name(), t.as_secs_f64())).collect(),
+        }
+    }
 }

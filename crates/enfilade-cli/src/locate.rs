@@ -7,6 +7,7 @@ use anyhow::{Context, bail};
 use enfilade::cpg::Locator;
 use enfilade::geom::DVec3;
 
+use crate::output::print_json;
 use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
 
@@ -16,6 +17,15 @@ use enfilade_cli::world::read_world;
 pub(crate) struct Locate {
     /// World written by `enfilade bake`.
     world: PathBuf,
+    /// Print JSON for machines: the ids of all points, `null` where there is no cell, when all lines are read.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+struct LocateReport {
+    cells: Vec<Option<u32>>,
 }
 
 /// Longest line that is read; three numbers never take as much, and a file without line ends must
@@ -29,13 +39,43 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     let world = read_world(&args.world)?;
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
     let output = BufWriter::with_capacity(1 << 16, io::stdout().lock());
-    locate_lines(&world.graph.locator, input, output)
+    let locator = &world.graph.locator;
+    if args.json {
+        let mut cells = Vec::new();
+        each_point(input, |p, _| {
+            cells.push(locator.locate(p).map(|c| c.0));
+            Ok(())
+        })?;
+        return print_json(output, &LocateReport { cells });
+    }
+    locate_lines(locator, input, output)
 }
 
 fn locate_lines<R: Read>(
     locator: &Locator,
-    mut input: BufReader<R>,
+    input: BufReader<R>,
     mut output: impl Write,
+) -> anyhow::Result<()> {
+    let done = each_point(input, |p, is_waiting| {
+        match locator.locate(p) {
+            Some(cell) => writeln!(output, "{}", cell.0)?,
+            None => output.write_all(b"-\n")?,
+        }
+        // Someone who asks one point at a time is waiting for the answer.
+        if is_waiting {
+            output.flush()?;
+        }
+        Ok(())
+    });
+    // The answers before a line that is no point are answers.
+    output.flush()?;
+    done
+}
+
+/// Calls `answer` for the point of each line, with whether no other has come yet.
+fn each_point<R: Read>(
+    mut input: BufReader<R>,
+    mut answer: impl FnMut(DVec3, bool) -> io::Result<()>,
 ) -> anyhow::Result<()> {
     let mut line = Vec::new();
     for number in 1_u64.. {
@@ -45,19 +85,10 @@ fn locate_lines<R: Read>(
             break;
         }
         let Some(p) = parse_point(&line) else {
-            output.flush()?;
             bail!("standard input, line {number}: expected three numbers `x y z`");
         };
-        match locator.locate(p) {
-            Some(cell) => writeln!(output, "{}", cell.0)?,
-            None => output.write_all(b"-\n")?,
-        }
-        // Someone who asks one point at a time is waiting for the answer.
-        if input.buffer().is_empty() {
-            output.flush()?;
-        }
+        answer(p, input.buffer().is_empty())?;
     }
-    output.flush()?;
     Ok(())
 }
 
