@@ -17,6 +17,7 @@ mod manual;
 mod output;
 mod plan;
 mod progress;
+mod progress_lines;
 mod pvs;
 mod render;
 mod report;
