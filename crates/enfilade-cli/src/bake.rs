@@ -3,10 +3,12 @@
 mod cracks;
 pub(crate) mod delaunay;
 mod doorless;
+mod found;
 mod leak_path;
 pub(crate) mod settings;
 mod values;
 
+use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
@@ -16,12 +18,12 @@ use enfilade::bake::delaunay::LEAST_BALL;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalKind, World};
-use enfilade::geom::scene::{Role, Scene};
-use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
+use enfilade::geom::scene::Scene;
+use serde::Serialize;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{Outputs, Told, write_whole, wrote};
+use crate::output::{Outputs, Told, Warned, Written, print_json, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use enfilade_cli::input::import_scene;
 
@@ -34,6 +36,9 @@ pub(crate) struct Bake {
     /// World to write, one GLB; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     options: settings::BakeOptions,
 }
@@ -51,7 +56,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
     outputs.read(&imported.report.references)?;
-    report_import(&imported.scene, &imported.report, options.verbose)?;
+    found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
     let config = &settings.config_for(scene);
     config.costs.cost.check(&scene.materials)?;
@@ -80,20 +85,24 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     write_whole(&args.output, &bytes)?;
     report_bake(&baked, config, options.verbose)?;
     if let Some(path) = &leak_path {
-        path.write(&mut Told)?;
+        path.write(&mut path.says())?;
     }
     if baked.world.graph.statistics.counts.get("separators") == Some(&0.0)
         && baked.world.graph.cells.len() > 1
     {
         writeln!(
-            Told,
+            Warned,
             "no separator parts the scene: its openings lie in no plane of its surfaces, if it has rooms; \
              --method watershed or delaunay needs no planes"
         )?;
     }
     let mut out = outputs.printed();
+    let written = Written::new(&args.output, &bytes);
+    if args.json {
+        return print_json(out, &BakeReport::new(&baked, written));
+    }
     print_summary(&mut out, &baked.world)?;
-    writeln!(out, "{}", wrote(&args.output, &bytes))?;
+    writeln!(out, "{written}")?;
     Ok(())
 }
 
@@ -135,7 +144,7 @@ fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result
         },
     );
     if options.allow_leak {
-        writeln!(Told, "{text}")?;
+        writeln!(Warned, "{text}")?;
         return Ok(());
     }
     bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
@@ -156,45 +165,6 @@ pub(crate) fn bake_scene(
     Ok(baked)
 }
 
-fn report_import(scene: &Scene, report: &ImportReport, verbose: bool) -> anyhow::Result<()> {
-    let mut err = Told;
-    if verbose {
-        writeln!(err, "{report}")?;
-        for o in &scene.objects {
-            let role = match o.role {
-                Role::Structural => "structural",
-                Role::Detail => "detail",
-            };
-            writeln!(err, "{role:<10} {}: {}", o.name, o.reason)?;
-        }
-    }
-    if let Some(doubt) = &report.unit_doubt {
-        writeln!(err, "{doubt}")?;
-    }
-    let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
-    let title = if let Some(repair) = &report.repair {
-        writeln!(
-            err,
-            "repaired (leave out --repair to have the model as it was):\n{repair}"
-        )?;
-        "what is left of the model's faults"
-    } else {
-        "the model as found (nothing was changed)"
-    };
-    if verbose || cleaning.findings().iter().any(|(_, f)| f.n > 0) {
-        writeln!(err, "{title}:\n{cleaning}")?;
-    }
-    if let Some(hole) = cleaning.holes.examples.first() {
-        let (n, p) = (cleaning.holes.n, hole.position);
-        writeln!(
-            err,
-            "triangles are missing in {n} places, most at {:.2} {:.2} {:.2} in '{}': --repair-holes 10 fills holes of up to 10 m",
-            p.x, p.y, p.z, hole.name
-        )?;
-    }
-    Ok(())
-}
-
 /// Leaks worth a line: wide enough that they may be meant.
 const LEAKS_SHOWN: usize = 10;
 
@@ -209,7 +179,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             let wanted = config.min_opening * LEAST_BALL;
             if radius > wanted {
                 writeln!(
-                    err,
+                    Warned,
                     "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \
                      narrower openings are found, but may be weighed wrongly"
                 )?;
@@ -219,7 +189,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         Resolution::Voxels { .. } | Resolution::Planes => {}
     }
     for note in &baked.notes {
-        writeln!(err, "{note}")?;
+        writeln!(Warned, "{note}")?;
     }
     if verbose || io::stderr().is_terminal() {
         for (stage, time) in &baked.times {
@@ -251,39 +221,88 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
         }
     }
-    cracks::write_cracks(&mut err, baked)?;
+    cracks::write_cracks(&mut Warned, baked)?;
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
-    doorless::write_roomless(&mut err, &baked.world.graph)?;
-    doorless::write_doorless(&mut err, &baked.world.graph)?;
+    doorless::write_roomless(&mut Warned, &baked.world.graph)?;
+    doorless::write_doorless(&mut Warned, &baked.world.graph)?;
     Ok(())
 }
 
-/// The summary table: what was found, in one glance.
+/// What was found, in one glance.
+#[derive(Serialize)]
+pub(crate) struct Summary {
+    triangles: usize,
+    cells_indoors: usize,
+    portals: usize,
+    doors: usize,
+    windows: usize,
+    open: usize,
+    cracks: usize,
+    detail_objects: usize,
+}
+
+impl Summary {
+    pub(crate) fn of(world: &World) -> Self {
+        let graph = &world.graph;
+        let count = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
+        let triangles = graph.statistics.counts.get("input_triangles");
+        Self {
+            triangles: triangles.copied().unwrap_or(0.0) as usize,
+            cells_indoors: graph.indoor_cells().count(),
+            portals: graph.portals.len(),
+            doors: count(PortalKind::Door),
+            windows: count(PortalKind::Window),
+            open: count(PortalKind::Open),
+            cracks: count(PortalKind::Crack),
+            detail_objects: world.details.len(),
+        }
+    }
+}
+
+/// The summary as a table.
 pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<()> {
-    let graph = &world.graph;
-    let count = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
-    let indoor = graph.indoor_cells().count();
-    let rows = [
-        (
-            "triangles",
-            graph
-                .statistics
-                .counts
-                .get("input_triangles")
-                .copied()
-                .unwrap_or(0.0) as usize,
-        ),
-        ("cells indoors", indoor),
-        ("portals", graph.portals.len()),
-        ("  doors", count(PortalKind::Door)),
-        ("  windows", count(PortalKind::Window)),
-        ("  open", count(PortalKind::Open)),
-        ("  cracks", count(PortalKind::Crack)),
-        ("detail objects", world.details.len()),
-    ];
-    for (name, n) in rows {
+    let summary = Summary::of(world);
+    for (name, n) in [
+        ("triangles", summary.triangles),
+        ("cells indoors", summary.cells_indoors),
+        ("portals", summary.portals),
+        ("  doors", summary.doors),
+        ("  windows", summary.windows),
+        ("  open", summary.open),
+        ("  cracks", summary.cracks),
+        ("detail objects", summary.detail_objects),
+    ] {
         writeln!(out, "{name:<16} {n:>9}")?;
     }
     Ok(())
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct BakeReport<'a> {
+    #[serde(flatten)]
+    written: Written,
+    #[serde(flatten)]
+    summary: Summary,
+    method: &'static str,
+    notes: &'a [String],
+    /// Gaps in the model that became portals.
+    gaps: usize,
+    /// By stage.
+    seconds: BTreeMap<&'static str, f64>,
+}
+
+impl<'a> BakeReport<'a> {
+    fn new(baked: &'a BakeOutput, written: Written) -> Self {
+        let times = baked.times.iter();
+        Self {
+            written,
+            summary: Summary::of(&baked.world),
+            method: baked.method.name(),
+            notes: &baked.notes,
+            gaps: baked.leaks.len(),
+            seconds: times.map(|(s, t)| (s.name(), t.as_secs_f64())).collect(),
+        }
+    }
 }

@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::bake::delaunay::{JOINED, Session, Step, bake_session};
-use enfilade::bake::{BakeConfig, BakeContext, Method, Silent};
+use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Method, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 
 use crate::bake::delaunay::choices_text;
-use crate::bake::{print_summary, settings};
+use crate::bake::{Summary, print_summary, settings};
 use crate::formats::Format;
-use crate::output::{Outputs, Told, refuse_stream, write_whole, wrote};
+use crate::output::{Outputs, Warned, Written, print_json, refuse_stream, write_whole};
 use enfilade_cli::input::{import_scene, is_stream};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
@@ -36,6 +36,9 @@ pub(crate) struct Decimate {
     /// Bake the rooms that are left then; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
+    /// Print JSON for machines: the steps, what is left and what was baked.
+    #[arg(long, conflicts_with = "steps")]
+    json: bool,
     #[command(flatten)]
     options: settings::BakeOptions,
 }
@@ -75,6 +78,9 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         outputs,
         choices,
     };
+    if args.json {
+        return walk.print_json(out, args.output.as_deref());
+    }
     if args.steps {
         walk.show(&mut out)?;
         for line in io::stdin().lock().lines() {
@@ -84,7 +90,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         }
         if !walk.is_saved {
             writeln!(
-                Told,
+                Warned,
                 "the last decisions were not saved; `save FILE.toml` before the end does"
             )?;
         }
@@ -107,6 +113,37 @@ fn weight_of(step: &Step) -> String {
         w if step.is_mouth => format!("weight {w:.3}, a branch"),
         w => format!("weight {w:.3}"),
     }
+}
+
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+struct WalkReport {
+    steps: Vec<StepReport>,
+    /// Steps taken, and those after which it stops by itself.
+    at: usize,
+    stop: usize,
+    cells_indoors: usize,
+    others: usize,
+    /// What was baked, with `-o`.
+    baked: Option<Baked>,
+}
+
+#[derive(serde::Serialize)]
+struct StepReport {
+    /// In words.
+    weight: String,
+    from: usize,
+    into: usize,
+    position: [f64; 3],
+}
+
+#[derive(serde::Serialize)]
+struct Baked {
+    #[serde(flatten)]
+    written: Written,
+    #[serde(flatten)]
+    summary: Summary,
+    notes: Vec<String>,
 }
 
 struct Walk<'a> {
@@ -292,17 +329,48 @@ impl Walk<'_> {
     }
 
     fn bake(&self, path: &Path, out: &mut impl Write) -> anyhow::Result<()> {
-        let context = BakeContext::new(&Silent, None);
-        let baked = bake_session(self.scene, &self.session, self.at, &self.config, &context)?;
+        let (baked, written) = self.bake_to(path)?;
         for note in &baked.notes {
             writeln!(out, "{note}")?;
         }
+        print_summary(out, &baked.world)?;
+        writeln!(out, "{written}")?;
+        Ok(())
+    }
+
+    fn bake_to(&self, path: &Path) -> anyhow::Result<(BakeOutput, Written)> {
+        let context = BakeContext::new(&Silent, None);
+        let baked = bake_session(self.scene, &self.session, self.at, &self.config, &context)?;
         let bytes =
             encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
         write_whole(path, &bytes)?;
-        print_summary(out, &baked.world)?;
-        writeln!(out, "{}", wrote(path, &bytes))?;
-        Ok(())
+        let written = Written::new(path, &bytes);
+        Ok((baked, written))
+    }
+
+    fn print_json(&self, out: impl Write, output: Option<&Path>) -> anyhow::Result<()> {
+        let d = &self.session.decimation;
+        let [cells_indoors, others] = self.left();
+        let steps = d.steps.iter().map(|s| StepReport {
+            weight: weight_of(s),
+            from: s.from as usize,
+            into: s.into as usize,
+            position: s.position.to_array(),
+        });
+        let baked = output.map(|path| self.bake_to(path)).transpose()?;
+        let report = WalkReport {
+            steps: steps.collect(),
+            at: self.at,
+            stop: d.stop,
+            cells_indoors,
+            others,
+            baked: baked.map(|(baked, written)| Baked {
+                written,
+                summary: Summary::of(&baked.world),
+                notes: baked.notes,
+            }),
+        };
+        print_json(out, &report)
     }
 }
 

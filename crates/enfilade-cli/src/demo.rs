@@ -10,9 +10,9 @@ use enfilade::import::export_glb;
 use enfilade_report::{PlanOptions, plan_svg};
 use enfilade_testkit::furnished_house;
 
-use crate::bake::{bake_scene, print_summary};
+use crate::bake::{Summary, bake_scene, print_summary};
 use crate::formats::Format;
-use crate::output::{Outputs, make_folder, write_whole};
+use crate::output::{Outputs, make_folder, print_json, write_whole};
 
 /// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
 #[derive(clap::Args)]
@@ -20,6 +20,17 @@ pub(crate) struct Demo {
     /// Folder to write `house.glb`, `world.glb` and `plan.svg` to.
     #[arg(short, long, default_value = ".", value_name = "DIR")]
     output: PathBuf,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+struct DemoReport {
+    files: [PathBuf; 3],
+    #[serde(flatten)]
+    summary: Summary,
 }
 
 pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
@@ -41,6 +52,13 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
     let plan = plan_svg(&baked.world, &PlanOptions::default());
     write_whole(&path("plan.svg"), plan.as_bytes())?;
     let mut out = io::stdout().lock();
+    if args.json {
+        let report = DemoReport {
+            files: ["house.glb", "world.glb", "plan.svg"].map(path),
+            summary: Summary::of(&baked.world),
+        };
+        return print_json(out, &report);
+    }
     print_summary(&mut out, &baked.world)?;
     let (house, world, plan) = (path("house.glb"), path("world.glb"), path("plan.svg"));
     let (house, world, plan) = (house.display(), world.display(), plan.display());

@@ -1,6 +1,5 @@
 //! `enfilade edit`: portals taken out of a world and put in.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -11,7 +10,7 @@ use enfilade::geom::DVec3;
 
 use crate::formats::Format;
 use crate::output::Outputs;
-use crate::simplify::{cost_line, write};
+use crate::simplify::{Done, write};
 use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 
@@ -38,6 +37,9 @@ pub(crate) struct Edit {
         allow_hyphen_values = true
     )]
     add_portal: Vec<Polygon>,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Corners of a polygon.
@@ -81,11 +83,11 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
     let mut outputs = Outputs::reading([&args.input])?;
     outputs.write("-o", Format::World, &args.output)?;
     let before = read_world(&args.input)?;
-    let mut note = String::new();
+    let mut done = Done::default();
     let mut world: Option<World> = None;
     if !args.delete_portal.is_empty() {
         let simpler = without_portals(args, &before)?;
-        note += &cost_line(&simpler);
+        done.costs = Some([simpler.min_cost, simpler.max_cost]);
         world = Some(simpler.world);
     }
     for (i, polygon) in args.add_portal.iter().enumerate() {
@@ -99,18 +101,18 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
             .sum();
         let cells = [added.cell, added.new_cell].map(|c| &added.world.graph[c]);
         let [(one, v1), (other, v2)] = cells.map(|c| (&c.name, c.volume));
-        writeln!(
-            note,
+        done.notes.push(format!(
             "{} of {area:.2} m² parts {one}: now {one} ({v1:.1} m³) and {other} ({v2:.1} m³)",
             added.portals[0]
-        )?;
+        ));
         for (kept, new) in &added.halved {
-            writeln!(note, "{kept} is cut in two: now {kept} and {new}")?;
+            done.notes
+                .push(format!("{kept} is cut in two: now {kept} and {new}"));
         }
         world = Some(added.world);
     }
     let world = world.context("no portal was taken away")?;
-    write(&outputs, &args.output, &before, &world, &note)
+    write(&outputs, &args.output, [&before, &world], done, args.json)
 }
 
 /// The world without the portals that are to be taken away.

@@ -20,6 +20,7 @@ pub(crate) enum Format {
     Statistics,
     Evidence,
     Search,
+    Manual,
 }
 
 struct Row {
@@ -43,7 +44,7 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 13] = [
+const TABLE: [Row; 14] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(Format::Plan, "a floor plan as SVG", &["svg"]),
@@ -65,6 +66,7 @@ const TABLE: [Row; 13] = [
         "a search to go on with",
         &["search", "checkpoint"],
     ),
+    row(Format::Manual, "a manual page", &["1"]),
 ];
 
 /// Extensions of what no command writes.

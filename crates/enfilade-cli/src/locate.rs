@@ -9,6 +9,7 @@ use enfilade::cpg::{Locator, World};
 use enfilade::geom::DVec3;
 use enfilade::import::is_match;
 
+use crate::output::print_json;
 use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
 
@@ -22,6 +23,16 @@ pub(crate) struct Locate {
     /// for other letters, and it may name the nodes above, as in 'storey 2/*/IfcDoor*'.
     #[arg(long, value_name = "PATTERN")]
     object: Option<String>,
+    /// Print JSON for machines: the ids of all points, `null` where there is no cell, when all lines are read; with `--object` those
+    /// of its cells.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+struct LocateReport {
+    cells: Vec<Option<u32>>,
 }
 
 /// Longest line that is read; three numbers never take as much, and a file without line ends must
@@ -30,7 +41,7 @@ const MAX_LINE: u64 = 4096;
 
 pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     if let Some(pattern) = &args.object {
-        return locate_object(&read_world(&args.world)?, pattern);
+        return locate_object(&read_world(&args.world)?, pattern, args.json);
     }
     if is_stream(&args.world) {
         bail!("standard input has the points; give the world as a file, not '-'");
@@ -38,11 +49,20 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     let world = read_world(&args.world)?;
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
     let output = BufWriter::with_capacity(1 << 16, io::stdout().lock());
-    locate_lines(&world.graph.locator, input, output)
+    let locator = &world.graph.locator;
+    if args.json {
+        let mut cells = Vec::new();
+        each_point(input, |p, _| {
+            cells.push(locator.locate(p).map(|c| c.0));
+            Ok(())
+        })?;
+        return print_json(output, &LocateReport { cells });
+    }
+    locate_lines(locator, input, output)
 }
 
 /// Prints the cells of all sources whose name or path fits.
-fn locate_object(world: &World, pattern: &str) -> anyhow::Result<()> {
+fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()> {
     let found = sources_named(world, pattern);
     if found.is_empty() {
         bail!(
@@ -54,6 +74,10 @@ fn locate_object(world: &World, pattern: &str) -> anyhow::Result<()> {
         .flat_map(|source| world.cells_of_source(source))
         .collect();
     let mut output = BufWriter::new(io::stdout().lock());
+    if json {
+        let cells = cells.into_iter().map(|c| Some(c.0)).collect();
+        return print_json(output, &LocateReport { cells });
+    }
     for cell in cells {
         writeln!(output, "{}", cell.0)?;
     }
@@ -74,8 +98,29 @@ fn sources_named(world: &World, pattern: &str) -> Vec<u32> {
 
 fn locate_lines<R: Read>(
     locator: &Locator,
-    mut input: BufReader<R>,
+    input: BufReader<R>,
     mut output: impl Write,
+) -> anyhow::Result<()> {
+    let done = each_point(input, |p, is_waiting| {
+        match locator.locate(p) {
+            Some(cell) => writeln!(output, "{}", cell.0)?,
+            None => output.write_all(b"-\n")?,
+        }
+        // Someone who asks one point at a time is waiting for the answer.
+        if is_waiting {
+            output.flush()?;
+        }
+        Ok(())
+    });
+    // The answers before a line that is no point are answers.
+    output.flush()?;
+    done
+}
+
+/// Calls `answer` for the point of each line, with whether no other has come yet.
+fn each_point<R: Read>(
+    mut input: BufReader<R>,
+    mut answer: impl FnMut(DVec3, bool) -> io::Result<()>,
 ) -> anyhow::Result<()> {
     let mut line = Vec::new();
     for number in 1_u64.. {
@@ -85,19 +130,10 @@ fn locate_lines<R: Read>(
             break;
         }
         let Some(p) = parse_point(&line) else {
-            output.flush()?;
             bail!("standard input, line {number}: expected three numbers `x y z`");
         };
-        match locator.locate(p) {
-            Some(cell) => writeln!(output, "{}", cell.0)?,
-            None => output.write_all(b"-\n")?,
-        }
-        // Someone who asks one point at a time is waiting for the answer.
-        if input.buffer().is_empty() {
-            output.flush()?;
-        }
+        answer(p, input.buffer().is_empty())?;
     }
-    output.flush()?;
     Ok(())
 }
 

@@ -1,7 +1,8 @@
 //! The `enfilade` command: arguments → library calls → report.
 //!
 //! Results go to standard output, progress and messages to standard error; `-` is standard input among inputs and standard
-//! output among outputs, and then the results go to standard error, too. Exit code 0: done;
+//! output among outputs, and then the results go to standard error, too; `--quiet` leaves errors and warnings alone there.
+//! Exit code 0: done;
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
 mod bake;
@@ -12,9 +13,11 @@ mod exact;
 mod formats;
 mod inspect;
 mod locate;
+mod manual;
 mod output;
 mod plan;
 mod progress;
+mod progress_lines;
 mod pvs;
 mod render;
 mod report;
@@ -27,14 +30,18 @@ mod view;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
-use output::Told;
+use output::{Warned, be_quiet};
 
 /// Finds the rooms and doorways of a 3D scene; answers what can be seen from where.
 #[derive(Parser)]
-#[command(version, about)]
+// The name and version that worlds have as their generator.
+#[command(name = "enfilade", version, about)]
 struct Cli {
+    /// Say nothing on standard error but errors, and warnings about the result.
+    #[arg(short, long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -42,11 +49,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Bake(bake::Bake),
+    Completions(manual::Completions),
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Edit(edit::Edit),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
+    Man(manual::Man),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
     Render(render::Render),
@@ -59,13 +68,18 @@ enum Command {
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
+    if cli.quiet {
+        be_quiet();
+    }
     match cli.command {
         Command::Bake(args) => bake::run(&args),
+        Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Edit(args) => edit::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
+        Command::Man(args) => manual::man(&args, Cli::command()),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::Render(args) => render::run(&args),
@@ -84,7 +98,7 @@ fn main() -> ExitCode {
         // The reader of our output has seen enough, as in `enfilade inspect X.glb | head`.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            let _ = writeln!(Told, "enfilade: {error:#}");
+            let _ = writeln!(Warned, "enfilade: {error:#}");
             ExitCode::FAILURE
         }
     }

@@ -1,9 +1,11 @@
 //! Where the commands write: files whole or not at all, none of them an input, and standard output for `-`.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, bail};
 use enfilade::whole;
@@ -28,21 +30,77 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     })
 }
 
-/// The line that says what was written.
-pub(crate) fn wrote(path: &Path, bytes: &[u8]) -> String {
-    let to = if is_stream(path) {
-        "to standard output".into()
-    } else {
-        path.display().to_string()
-    };
-    format!("wrote {to} ({:.1} MB)", bytes.len() as f64 / 1e6)
+/// Whether `--quiet` was given: once, before any command runs.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From now on [`Told`] says nothing.
+pub(crate) fn be_quiet() {
+    IS_QUIET.store(true, Ordering::Relaxed);
 }
 
-/// Standard error, for what is said beside the work. Where nobody reads it any more, as in `enfilade bake … 2>&1 | head -2`,
-/// the work goes on.
+/// Whether nothing but errors and warnings is to be said.
+pub(crate) fn is_quiet() -> bool {
+    IS_QUIET.load(Ordering::Relaxed)
+}
+
+/// What was written.
+#[derive(serde::Serialize)]
+pub(crate) struct Written {
+    /// `None` for standard output.
+    file: Option<PathBuf>,
+    bytes: usize,
+}
+
+impl Written {
+    pub(crate) fn new(path: &Path, bytes: &[u8]) -> Self {
+        Self {
+            file: (!is_stream(path)).then(|| path.to_owned()),
+            bytes: bytes.len(),
+        }
+    }
+}
+
+/// The line that says so.
+impl fmt::Display for Written {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "wrote ")?;
+        match &self.file {
+            Some(file) => write!(f, "{}", file.display())?,
+            None => write!(f, "to standard output")?,
+        }
+        write!(f, " ({:.1} MB)", self.bytes as f64 / 1e6)
+    }
+}
+
+/// Prints one object as one line.
+pub(crate) fn print_json(mut out: impl Write, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    serde_json::to_writer(&mut out, value).map_err(io::Error::from)?;
+    writeln!(out)
+        .and_then(|()| out.flush())
+        .context("cannot write to standard output")
+}
+
+/// Standard error, for what is said beside the work; `--quiet` silences it. Where nobody reads it any more, as in
+/// `enfilade bake … 2>&1 | head -2`, the work goes on.
 pub(crate) struct Told;
 
+/// The same for errors, and for warnings: the result is not what was asked for, or probably not what was meant.
+pub(crate) struct Warned;
+
 impl Write for Told {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if is_quiet() {
+            return Ok(bytes.len());
+        }
+        Warned.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Write for Warned {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let _ = io::stderr().write_all(bytes);
         Ok(bytes.len())

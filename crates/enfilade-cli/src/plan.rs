@@ -6,7 +6,7 @@ use anyhow::bail;
 use enfilade_report::{PlanOptions, plan_svg};
 
 use crate::formats::Format;
-use crate::output::{Outputs, write_whole};
+use crate::output::{Outputs, Written, print_json, write_whole};
 use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 
@@ -21,10 +21,14 @@ pub(crate) struct Plan {
     /// Height of the cut above each storey's floor, in meters.
     #[arg(long, default_value_t = 1.2, value_name = "METERS", value_parser = height)]
     height: f64,
+    /// Print what was written as JSON for machines; nothing is printed otherwise.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
-    Outputs::reading([&args.world])?.write("-o", Format::Plan, &args.output)?;
+    let mut outputs = Outputs::reading([&args.world])?;
+    outputs.write("-o", Format::Plan, &args.output)?;
     let world = read_world(&args.world)?;
     if let Err(errors) = world.validate() {
         let first = errors.first().map(ToString::to_string).unwrap_or_default();
@@ -39,7 +43,14 @@ pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
             cut_height: args.height,
         },
     );
-    write_whole(&args.output, svg.as_bytes())
+    write_whole(&args.output, svg.as_bytes())?;
+    if args.json {
+        print_json(
+            outputs.printed(),
+            &Written::new(&args.output, svg.as_bytes()),
+        )?;
+    }
+    Ok(())
 }
 
 fn height(text: &str) -> Result<f64, String> {

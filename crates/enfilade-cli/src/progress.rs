@@ -1,4 +1,4 @@
-//! Progress on standard error, when that is a terminal.
+//! Progress on standard error: a bar on a terminal, lines now and then in a log.
 
 use std::io::{IsTerminal, Write as _, stderr};
 use std::sync::{Arc, Mutex};
@@ -9,22 +9,58 @@ use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
+use crate::output::{Told, Warned, is_quiet};
+use crate::progress_lines::{Now, Pace, Ticker};
+
+/// Whether bars are drawn.
+fn is_shown() -> bool {
+    stderr().is_terminal() && !is_quiet()
+}
+
+/// Writes what is under way into a log now and then, where there is one to write to and no bar.
+fn log(now: impl Fn() -> Option<Now> + Send + 'static) -> Option<Ticker> {
+    let is_logged = !stderr().is_terminal() && !is_quiet();
+    is_logged.then(|| Ticker::start(Pace::default(), now, Told))
+}
+
 /// A line on the terminal that shows the stage under way, how far it is and the time left.
 ///
-/// Shows nothing when standard error is no terminal. The line disappears when dropped.
+/// Where standard error is no terminal, a line of the log now and then. The line disappears when dropped.
 pub(crate) struct StageBar {
     bar: ProgressBar,
+    _log: Option<Ticker>,
+}
+
+/// What a line of the log says of a stage without an estimate of its own.
+fn stage_line(bar: &ProgressBar) -> Option<Now> {
+    let stage = bar.message();
+    if bar.is_finished() || stage.is_empty() {
+        return None;
+    }
+    let gone = clock(bar.elapsed().as_secs_f64());
+    let share = match bar.length() {
+        Some(n) if n > 0 => format!(", {} %", bar.position().saturating_mul(100) / n),
+        _ => String::new(),
+    };
+    Some(Now {
+        line: format!("{stage}{share}, {gone} gone"),
+        stage,
+    })
 }
 
 impl StageBar {
     /// A bar without a stage.
     pub(crate) fn new() -> Self {
-        let bar = if stderr().is_terminal() {
+        let bar = if is_shown() {
             ProgressBar::new(0)
         } else {
             ProgressBar::hidden()
         };
-        Self { bar }
+        let logged = bar.clone();
+        Self {
+            bar,
+            _log: log(move || stage_line(&logged)),
+        }
     }
 
     /// Begins a stage of `total` steps; 0 where nobody knows how many.
@@ -157,6 +193,7 @@ fn in_words(seconds: f64) -> String {
 /// The progress of a bake: stages by name, the share done and the time left.
 pub(crate) struct BakeBar {
     bar: ProgressBar,
+    _log: Option<Ticker>,
     state: Arc<Mutex<Clock>>,
     /// Voxels and triangles that there are to do with.
     work: (f64, f64),
@@ -175,16 +212,32 @@ impl Clock {
     fn elapsed(&self) -> f64 {
         self.stage_began.elapsed().as_secs_f64()
     }
+
+    /// What a line of the log says of the stage under way.
+    fn line(&self) -> Option<Now> {
+        let at = self.left.at;
+        let stage = self.stages.get(at)?.name();
+        Some(Now {
+            stage: stage.to_owned(),
+            line: format!(
+                "{}/{} {stage}, {} gone, about {} left",
+                at + 1,
+                self.stages.len(),
+                clock(self.began.elapsed().as_secs_f64()),
+                clock(self.left.left(self.elapsed()))
+            ),
+        })
+    }
 }
 
 impl BakeBar {
     /// Cells of the drawn bar.
     const CELLS: usize = 30;
 
-    /// A bar for a bake of `scene`; it shows nothing where standard error is no terminal.
+    /// A bar for a bake of `scene`; where standard error is no terminal, lines of a log.
     pub(crate) fn new(scene: &Scene, config: &BakeConfig) -> Self {
         let now = Instant::now();
-        let is_shown = stderr().is_terminal();
+        let is_shown = is_shown();
         let work = work_of(scene, config);
         let state = Arc::new(Mutex::new(Clock {
             stages: &[],
@@ -233,8 +286,10 @@ impl BakeBar {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
         let wanted = config.voxel.unwrap_or(config.min_opening / 6.0);
+        let logged = Arc::clone(&state);
         Self {
             bar,
+            _log: log(move || logged.lock().ok()?.line()),
             state,
             work,
             wanted,
@@ -246,7 +301,7 @@ impl Progress for BakeBar {
     fn method(&self, method: Method, reason: &str) {
         // Whoever closed standard error does not want to know.
         self.bar.suspend(|| {
-            let _ = writeln!(stderr(), "method {}: {reason}", method.name());
+            let _ = writeln!(Told, "method {}: {reason}", method.name());
         });
         let mut clock = self.state.lock().expect("no panic holds it");
         clock.stages = method.stages();
@@ -279,32 +334,33 @@ impl Progress for BakeBar {
             clock.left.expected.iter().sum::<f64>()
         };
         self.bar.suspend(|| {
-            let _ = write!(
-                stderr(),
-                "{}",
-                plan(edge, dims, memory, seconds, self.wanted)
-            );
+            let _ = write!(Told, "{}", plan(edge, dims, memory, seconds));
+            let _ = write!(Warned, "{}", coarser(edge, self.wanted));
         });
     }
 }
 
 /// What will be done, before it is done.
-fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64, wanted: f64) -> String {
+fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64) -> String {
     let n = (nx * ny * nz) as f64 / 1e6;
     let memory = memory / 1e6;
-    let mut text = format!(
+    format!(
         "voxels of {edge:.3} m, {nx} × {ny} × {nz}: {n:.1} million, about {memory:.0} MB and {}\n",
         in_words(seconds)
-    );
+    )
+}
+
+/// That voxels are larger than was asked for, if they are.
+fn coarser(edge: f64, wanted: f64) -> String {
     // The grid grows its voxels by tenths, if at all.
-    if edge > wanted * 1.05 {
-        text += &format!(
-            "not the {} m that were wanted: those would be more voxels than are allowed (--max-memory, \
-             and max_voxels in a --config file)\n",
-            (wanted * 1e9).round() / 1e9
-        );
+    if edge <= wanted * 1.05 {
+        return String::new();
     }
-    text
+    format!(
+        "not the {} m that were wanted: those would be more voxels than are allowed (--max-memory, and max_voxels in a \
+         --config file)\n",
+        (wanted * 1e9).round() / 1e9
+    )
 }
 
 impl Drop for BakeBar {
@@ -390,6 +446,33 @@ mod tests {
         }
         let t = TimeLeft::new(Method::Watershed.stages(), 0.0, 0.0);
         assert!(t.left(0.0) > 0.0 && t.left(0.0) < 0.1);
+    }
+
+    #[test]
+    fn a_line_of_a_log_says_the_stage_and_how_far_it_is() {
+        let now = Instant::now();
+        let mut state = Clock {
+            stages: &[],
+            left: of_stages(&[2.0, 10.0, 8.0]),
+            began: now,
+            stage_began: now,
+        };
+        assert!(state.line().is_none(), "no method has begun");
+        state.stages = Method::Watershed.stages();
+        state.left.begin(1, 2.0);
+        let line = state.line().unwrap().line;
+        let name = Method::Watershed.stages()[1].name();
+        let n = Method::Watershed.stages().len();
+        assert_eq!(line, format!("2/{n} {name}, 0:00 gone, about 0:18 left"));
+
+        let bar = ProgressBar::hidden();
+        assert!(stage_line(&bar).is_none(), "no stage has begun");
+        bar.set_length(200);
+        bar.set_message("searching");
+        bar.set_position(50);
+        assert_eq!(stage_line(&bar).unwrap().line, "searching, 25 %, 0:00 gone");
+        bar.finish_and_clear();
+        assert!(stage_line(&bar).is_none());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `enfilade render`: pictures, without a display.
 
+use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,7 @@ use enfilade_render::{
 use serde_json::json;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Told, refuse_stream, write_whole};
+use crate::output::{Outputs, Warned, print_json, refuse_stream, write_whole};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::input::name_of;
 use enfilade_cli::values::{point, size};
@@ -86,7 +87,7 @@ pub(crate) struct Render {
     /// What draws: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
-    /// Print what was drawn as JSON for machines.
+    /// Print what was drawn as JSON for machines; of a path, its pictures one by one in a list.
     #[arg(long)]
     json: bool,
 }
@@ -131,7 +132,7 @@ pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(Worl
     let n = studio.world.n_missing_pictures();
     if n > 0 {
         writeln!(
-            Told,
+            Warned,
             "enfilade: {n} pictures of textures are missing or damaged; drawn without"
         )?;
     }
@@ -211,6 +212,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         cut_above: args.cut.unwrap_or(f32::INFINITY),
     };
     let mut out = outputs.printed();
+    let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
         let picture = smooth(args.size, |size| {
             // As many pixels for one as pictures are drawn larger.
@@ -239,12 +241,21 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             args.output.clone()
         };
         write_whole(&to, &picture.to_png()?)?;
-        report(&mut out, args, &mut studio, &world, camera, &to)?;
+        let drawn = Drawn::new(args, &mut studio, &world, camera, to)?;
+        if args.json {
+            all.push(drawn);
+        } else {
+            writeln!(out, "{drawn}")?;
+        }
     }
     if let Some(record) = &args.record {
         write_whole(record, path_text(&cameras).as_bytes())?;
     }
-    Ok(())
+    match &all[..] {
+        _ if !args.json => Ok(()),
+        [one] if !is_path => print_json(out, one),
+        all => print_json(out, &json!({ "pictures": all })),
+    }
 }
 
 fn numbered(path: &Path, n: usize) -> PathBuf {
@@ -252,41 +263,63 @@ fn numbered(path: &Path, n: usize) -> PathBuf {
     path.with_file_name(format!("{stem}-{n:04}.png"))
 }
 
-fn report(
-    out: &mut impl Write,
-    args: &Render,
-    studio: &mut Studio,
-    world: &World,
-    camera: &Camera,
-    to: &Path,
-) -> anyhow::Result<()> {
-    let view = camera.view(args.size[0] as f32 / args.size[1] as f32)?;
-    let list = studio.list(&view, camera.eye, args.mode.culling(), args.size);
-    let (n_triangles, n_draws) = (list.n_triangles(), list.n_draws());
-    let cell = studio.sight.locate(camera.eye);
-    let name = cell.map(|c| world.graph[c].name.as_str());
-    let look = [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]);
-    if args.json {
-        let line = json!({
-            "file": to, "eye": camera.eye, "look": look, "cell": cell.map(|c| c.0),
-            "triangles": n_triangles, "of_triangles": studio.world.n_triangles(),
-            "draws": n_draws, "adapter": studio.gpu.name(),
-        });
-        writeln!(out, "{line}")?;
-    } else {
-        let text = |p: [f32; 3]| p.map(|x| format!("{x:.2}")).join(",");
-        writeln!(
-            out,
-            "{}: --eye {} --look {}, in {}, {n_triangles} of {} triangles in {n_draws} draws, {}",
-            to.display(),
-            text(camera.eye),
-            text(look),
-            name.unwrap_or("no cell"),
-            studio.world.n_triangles(),
-            studio.gpu.name()
-        )?;
+/// What was drawn.
+#[derive(serde::Serialize)]
+struct Drawn {
+    file: PathBuf,
+    eye: [f32; 3],
+    look: [f32; 3],
+    cell: Option<u32>,
+    #[serde(skip)]
+    cell_name: Option<String>,
+    triangles: u64,
+    of_triangles: u64,
+    draws: usize,
+    adapter: String,
+}
+
+impl Drawn {
+    fn new(
+        args: &Render,
+        studio: &mut Studio,
+        world: &World,
+        camera: &Camera,
+        file: PathBuf,
+    ) -> anyhow::Result<Self> {
+        let view = camera.view(args.size[0] as f32 / args.size[1] as f32)?;
+        let list = studio.list(&view, camera.eye, args.mode.culling(), args.size);
+        let (triangles, draws) = (list.n_triangles(), list.n_draws());
+        let cell = studio.sight.locate(camera.eye);
+        Ok(Self {
+            file,
+            eye: camera.eye,
+            look: [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]),
+            cell: cell.map(|c| c.0),
+            cell_name: cell.map(|c| world.graph[c].name.clone()),
+            triangles,
+            of_triangles: studio.world.n_triangles(),
+            draws,
+            adapter: studio.gpu.name(),
+        })
     }
-    Ok(())
+}
+
+impl fmt::Display for Drawn {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = |p: [f32; 3]| p.map(|x| format!("{x:.2}")).join(",");
+        write!(
+            f,
+            "{}: --eye {} --look {}, in {}, {} of {} triangles in {} draws, {}",
+            self.file.display(),
+            text(self.eye),
+            text(self.look),
+            self.cell_name.as_deref().unwrap_or("no cell"),
+            self.triangles,
+            self.of_triangles,
+            self.draws,
+            self.adapter
+        )
+    }
 }
 
 /// Outlines of the portals seen through, and the rectangles they narrow the view to.

@@ -14,7 +14,7 @@ use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Told, write_whole};
+use crate::output::{Outputs, Warned, Written, print_json, write_whole};
 use crate::render::{above, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::input::{is_stream, name_of};
@@ -37,6 +37,18 @@ pub(crate) struct Report {
     /// No pictures: nothing is needed to draw them.
     #[arg(long)]
     no_pictures: bool,
+    /// Print what was written as JSON for machines; nothing is printed otherwise.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+struct PageReport<'a> {
+    #[serde(flatten)]
+    written: Written,
+    pictures: usize,
+    notes: &'a [String],
 }
 
 const SIZE: [u32; 2] = [960, 540];
@@ -44,7 +56,8 @@ const SIZE: [u32; 2] = [960, 540];
 const BUDGET: Duration = Duration::from_secs(20);
 
 pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
-    Outputs::reading([&args.world])?.write("-o", Format::Page, &args.output)?;
+    let mut outputs = Outputs::reading([&args.world])?;
+    outputs.write("-o", Format::Page, &args.output)?;
     let world = read_world(&args.world)?;
     let name = if is_stream(&args.world) {
         "world".into()
@@ -68,13 +81,23 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         match enfilade_cli::adapter::open(&args.adapter) {
             Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
             Err(why @ RenderError::NoAdapter) => {
-                let _ = writeln!(Told, "enfilade: the report has no pictures: {why}");
+                let _ = writeln!(Warned, "enfilade: the report has no pictures: {why}");
                 parts.notes.push(format!("No pictures: {why}."));
             }
             Err(why) => bail!(why),
         }
     }
-    write_whole(&args.output, report_html(&world, &parts).as_bytes())
+    let page = report_html(&world, &parts);
+    write_whole(&args.output, page.as_bytes())?;
+    if args.json {
+        let report = PageReport {
+            written: Written::new(&args.output, page.as_bytes()),
+            pictures: parts.figures.len(),
+            notes: &parts.notes,
+        };
+        print_json(outputs.printed(), &report)?;
+    }
+    Ok(())
 }
 
 fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {

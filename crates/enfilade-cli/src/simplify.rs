@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::bake::bound::keep_bounds;
-use enfilade::bake::simplify::{CostModel, Metric, Simplified, SimplifySettings, simplify_graph};
+use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings, simplify_graph};
 use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};
+use serde::Serialize;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Told, write_whole, wrote};
+use crate::output::{Outputs, Warned, Written, print_json, write_whole};
 use crate::pvs::sight_graph;
 use enfilade_cli::input::{name_of, read};
 
@@ -56,6 +57,9 @@ pub(crate) struct Simplify {
     /// Multiplies the cost of a material, e.g. `--material-cost water=3`.
     #[arg(long, value_name = "NAME=FACTOR", value_parser = parse_material)]
     material_cost: Vec<(String, f64)>,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -127,27 +131,26 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     let world = decode_glb(&bytes).with_context(|| name_of(&args.input))?;
     settings.cost.check(&world.materials)?;
     let bounded = keep_bounds(&world, &settings);
+    let done = Done {
+        costs: Some(bounded.costs),
+        notes: Vec::new(),
+        warning: bounded.note(),
+    };
     write(
         &outputs,
         &args.output,
-        &world,
-        &bounded.world,
-        &costs_text(bounded.costs),
-    )?;
-    if let Some(note) = bounded.note() {
-        writeln!(Told, "{note}")?;
-    }
-    Ok(())
+        [&world, &bounded.world],
+        done,
+        args.json,
+    )
 }
 
-fn warn_of_costs(args: &Simplify, max_cost: f64) -> anyhow::Result<()> {
-    if let Some(max) = args.max_cost.filter(|m| max_cost > *m) {
-        writeln!(
-            Told,
-            "a cell costs {max_cost:.0}, more than {max}, and did before; only a bake can cut it"
-        )?;
-    }
-    Ok(())
+/// That a cell of a portal file costs more than it may, if one does.
+fn over_bound(args: &Simplify, max_cost: f64) -> Option<String> {
+    let max = args.max_cost.filter(|m| max_cost > *m)?;
+    Some(format!(
+        "a cell costs {max_cost:.0}, more than {max}, and did before; only a bake can cut it"
+    ))
 }
 
 /// Merges the clusters of a portal file.
@@ -173,18 +176,15 @@ fn simplify_portal_file(
     let merged = file.merged(&simple.cell_of, simple.n_cells);
     let merged_text = write_prt(&merged);
     write_whole(&args.output, merged_text.as_bytes())?;
-    let mut out = outputs.printed();
-    writeln!(
-        out,
-        "clusters {:>7} → {}",
-        file.n_clusters, merged.n_clusters
-    )?;
-    let (before, after) = (file.portals.len(), merged.portals.len());
-    writeln!(out, "portals  {before:>7} → {after}")?;
-    let (least, most) = (simple.min_cost, simple.max_cost);
-    writeln!(out, "cost of a cluster {least:.0} to {most:.0}")?;
-    writeln!(out, "{}", wrote(&args.output, merged_text.as_bytes()))?;
-    warn_of_costs(args, simple.max_cost)
+    let compared = Compared {
+        written: Written::new(&args.output, merged_text.as_bytes()),
+        cells: [file.n_clusters as usize, merged.n_clusters as usize],
+        portals: [file.portals.len(), merged.portals.len()],
+        costs: Some([simple.min_cost, simple.max_cost]),
+        notes: Vec::new(),
+        warning: over_bound(args, simple.max_cost),
+    };
+    compared.print(outputs.printed(), args.json, ["clusters", "cluster"])
 }
 
 /// What the clusters of a portal file cost: by their solid faces, which Quake 3's files have, else by their leaves.
@@ -201,31 +201,71 @@ fn cluster_costs(file: &PrtFile, cost: &CostModel) -> Vec<f64> {
     costs
 }
 
-/// What its cells cost.
-pub(crate) fn cost_line(s: &Simplified) -> String {
-    costs_text([s.min_cost, s.max_cost])
+/// What a file made from another one has, compared with it.
+#[derive(Serialize)]
+pub(crate) struct Compared {
+    #[serde(flatten)]
+    written: Written,
+    /// Before and after.
+    cells: [usize; 2],
+    portals: [usize; 2],
+    /// The least and the most that a cell costs, where cells were merged.
+    costs: Option<[f64; 2]>,
+    /// What was done, in words.
+    notes: Vec<String>,
+    /// What could not be met.
+    warning: Option<String>,
 }
 
-fn costs_text([min, max]: [f64; 2]) -> String {
-    format!("cost of a cell {min:.0} to {max:.0}\n")
+impl Compared {
+    /// Prints what differs; what could not be met is a warning, too.
+    fn print(&self, mut out: Box<dyn Write>, is_json: bool, what: [&str; 2]) -> anyhow::Result<()> {
+        if let Some(warning) = &self.warning {
+            writeln!(Warned, "{warning}")?;
+        }
+        if is_json {
+            return print_json(out, self);
+        }
+        let [cells, cell] = what;
+        writeln!(out, "{cells:<8}{:>7} → {}", self.cells[0], self.cells[1])?;
+        let [before, after] = self.portals;
+        writeln!(out, "portals {before:>7} → {after}")?;
+        if let Some([least, most]) = self.costs {
+            writeln!(out, "cost of a {cell} {least:.0} to {most:.0}")?;
+        }
+        for note in &self.notes {
+            writeln!(out, "{note}")?;
+        }
+        writeln!(out, "{}", self.written)?;
+        Ok(())
+    }
+}
+
+/// What was done to a world, and what it gave.
+#[derive(Default)]
+pub(crate) struct Done {
+    pub(crate) costs: Option<[f64; 2]>,
+    pub(crate) notes: Vec<String>,
+    pub(crate) warning: Option<String>,
 }
 
 /// Writes a world made from another one, and says how they compare.
 pub(crate) fn write(
     outputs: &Outputs,
     path: &Path,
-    before: &World,
-    after: &World,
-    note: &str,
+    [before, after]: [&World; 2],
+    done: Done,
+    is_json: bool,
 ) -> anyhow::Result<()> {
     let bytes = encode_glb(after).context("the new world breaks an invariant (a bug)")?;
     write_whole(path, &bytes)?;
-    let count = |w: &World| (w.graph.cells.len(), w.graph.portals.len());
-    let ((cells, portals), (c, p)) = (count(before), count(after));
-    let mut out = outputs.printed();
-    writeln!(out, "cells   {cells:>7} → {c}")?;
-    writeln!(out, "portals {portals:>7} → {p}")?;
-    write!(out, "{note}")?;
-    writeln!(out, "{}", wrote(path, &bytes))?;
-    Ok(())
+    let compared = Compared {
+        written: Written::new(path, &bytes),
+        cells: [before, after].map(|w| w.graph.cells.len()),
+        portals: [before, after].map(|w| w.graph.portals.len()),
+        costs: done.costs,
+        notes: done.notes,
+        warning: done.warning,
+    };
+    compared.print(outputs.printed(), is_json, ["cells", "cell"])
 }

@@ -205,6 +205,21 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
+fn the_command_and_the_worlds_that_it_makes_name_one_version() {
+    let done = enfilade(&["--version"], "");
+    let version = text(&done.stdout).trim_end();
+    assert!(version.starts_with("enfilade 0."), "{version}");
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("version");
+    fs::create_dir_all(&dir).unwrap();
+    let dir = dir.to_str().unwrap();
+    let done = enfilade(&["demo", "-q", "-o", dir], "");
+    assert_eq!(text(&done.stderr), "");
+    let made = enfilade(&["inspect", "--json", &format!("{dir}/world.glb")], "");
+    let made: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(made["stats"]["generator"], json!(version));
+}
+
+#[test]
 fn wrong_usage_exits_with_2() {
     assert_eq!(enfilade(&["inspect"], "").status.code(), Some(2));
     assert_eq!(enfilade(&["dance"], "").status.code(), Some(2));

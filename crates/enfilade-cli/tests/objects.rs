@@ -34,7 +34,8 @@ fn objects_are_found_by_cell_and_cells_by_object() {
 
     let listed = enfilade(&["inspect", &world, "--objects", "cell-1", "--json"]);
     assert!(listed.status.success(), "{}", text(&listed.stderr));
-    let objects: Value = serde_json::from_slice(&listed.stdout).unwrap();
+    let listed: Value = serde_json::from_slice(&listed.stdout).unwrap();
+    let objects = &listed["objects"];
     assert_eq!(objects[0]["name"], name.as_str());
     assert_eq!(objects[0]["detail"], false);
     assert!(objects[0]["triangles"].as_u64().unwrap() > 0);
@@ -46,6 +47,9 @@ fn objects_are_found_by_cell_and_cells_by_object() {
 
     let found = enfilade(&["locate", &world, "--object", name]);
     assert!(text(&found.stdout).lines().any(|l| l == "1"), "{found:?}");
+    let found = enfilade(&["locate", &world, "--object", name, "--json"]);
+    let found: Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert!(found["cells"].as_array().unwrap().contains(&1.into()));
     let wrong = enfilade(&["locate", &world, "--object", "no such thing"]);
     assert_eq!(wrong.status.code(), Some(1));
     assert!(text(&wrong.stderr).contains("no object is called"));

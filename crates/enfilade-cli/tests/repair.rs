@@ -47,10 +47,7 @@ fn a_bake_repairs_on_request_and_says_what_it_changed() {
     // Less than the gap closes nothing; what is no distance is refused.
     let done = enfilade(&["bake", "--repair=0.0001", &obj, "-o", &better]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(
-        said.contains(&format!("{:<30} {:>9}", "corners welded", 0)),
-        "{said}"
-    );
+    assert!(!said.contains("corners welded"), "{said}");
     let done = enfilade(&["bake", "--repair=5", &obj, "-o", &better]);
     assert_eq!(done.status.code(), Some(2));
 }

@@ -120,10 +120,18 @@ impl CleaningReport {
     }
 }
 
+/// Rows of what there is; what is nowhere has none.
 impl fmt::Display for CleaningReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{:<22} {:>9}  example", "finding", "count")?;
-        for (name, finding) in self.findings() {
+        let mut found = self
+            .findings()
+            .into_iter()
+            .filter(|(_, f)| f.n > 0)
+            .peekable();
+        if found.peek().is_some() {
+            writeln!(f, "{:<22} {:>9}  example", "finding", "count")?;
+        }
+        for (name, finding) in found {
             write!(f, "{name:<22} {:>9}", finding.n)?;
             if let Some(e) = finding.examples.first() {
                 let p = e.position;
@@ -152,7 +160,9 @@ impl fmt::Display for CleaningReport {
             open,
         } = self.shells;
         for (name, n) in [("solids", solids), ("rooms", rooms), ("open", open)] {
-            writeln!(f, "{:<22} {n:>9}", format!("shells: {name}"))?;
+            if n > 0 {
+                writeln!(f, "{:<22} {n:>9}", format!("shells: {name}"))?;
+            }
         }
         write!(f, "{:<22} {:>9}", "of triangles", self.n_triangles)
     }

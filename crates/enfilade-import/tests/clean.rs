@@ -167,6 +167,12 @@ fn what_the_import_found_is_in_the_report_and_the_table() {
         table.contains("non-planar polygons            1  0.500 0.500 0.025"),
         "{table}"
     );
+    // What is nowhere has no row.
+    assert!(
+        !table.contains("duplicate") && !table.contains("rooms"),
+        "{table}"
+    );
+    assert!(table.lines().all(|row| !row.ends_with(" 0")), "{table}");
 }
 
 #[test]

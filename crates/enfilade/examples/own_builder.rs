@@ -93,7 +93,7 @@ fn floor(i: u32) -> Batch {
             indices: vec![0, 1, 2, 0, 2, 3],
             ..Primitive::default()
         },
-        is_seal: false,
+        ..Batch::default()
     }
 }
 

@@ -7,6 +7,7 @@ use enfilade::bake::leak::{LeakTrail, NoTrail, find_leak_trail};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::Scene;
 
+use crate::output::{Told, Warned};
 use crate::progress::StageBar;
 
 /// A way out that was looked for, or why there is none to show.
@@ -75,6 +76,15 @@ impl LeakPath {
                 trail.points.iter().map(rounded).collect()
             }
             _ => Vec::new(),
+        }
+    }
+
+    /// Where that is said: unasked, it tells why there is no room.
+    pub(super) fn says(&self) -> Box<dyn Write> {
+        if self.is_asked {
+            Box::new(Told)
+        } else {
+            Box::new(Warned)
         }
     }
 

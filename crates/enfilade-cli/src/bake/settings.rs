@@ -115,7 +115,7 @@ pub(crate) struct BakeOptions {
     /// Threads to use; as many as there are cores if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) threads: Option<u16>,
-    /// Print the role of each object with its reason, notes of the import and stage times.
+    /// Print the roles of the objects by their reasons, notes of the import and stage times.
     #[arg(short, long)]
     pub(super) verbose: bool,
 }

@@ -1,11 +1,19 @@
 //! The objects that a cell sees, by the names that the input has for them.
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use anyhow::Context;
 use enfilade::cpg::{CellId, CellPortalGraph, World};
 use serde::Serialize;
 use serde_json::value::RawValue;
+
+use crate::output::print_json;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    objects: Vec<Object<'a>>,
+}
 
 #[derive(Serialize)]
 struct Object<'a> {
@@ -44,9 +52,7 @@ pub(super) fn write(
         .collect();
     objects.sort_by(|a, b| (b.triangles, a.source).cmp(&(a.triangles, b.source)));
     if json {
-        serde_json::to_writer(&mut *out, &objects).map_err(io::Error::from)?;
-        writeln!(out)?;
-        return Ok(());
+        return print_json(out, &Report { objects });
     }
     writeln!(out, "triangles  kind       object")?;
     for object in objects {

@@ -301,7 +301,7 @@ impl App<'_> {
                         // What was walked stays, and so does the window.
                         Err(why) => {
                             open.recorded = Some(path);
-                            open.say(format!("{why:#}"));
+                            open.warn(format!("{why:#}"));
                         }
                     }
                 }
@@ -369,6 +369,12 @@ impl Open {
     /// In the window, and on standard error for who comes back to the terminal.
     fn say(&mut self, message: String) {
         let _ = writeln!(crate::output::Told, "enfilade: {message}");
+        self.shown.message = message;
+    }
+
+    /// The same for what could not be done.
+    fn warn(&mut self, message: String) {
+        let _ = writeln!(crate::output::Warned, "enfilade: {message}");
         self.shown.message = message;
     }
 
@@ -511,7 +517,7 @@ impl Open {
         let written = outputs.write("--screenshot", Format::Picture, &to);
         if let Err(why) = written.and_then(|()| write_whole(&to, &png)) {
             // The walk goes on.
-            self.say(format!("{why:#}"));
+            self.warn(format!("{why:#}"));
             return Ok(());
         }
         let [drawn, ..] = self.shown.counts;

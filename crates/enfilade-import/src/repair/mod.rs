@@ -114,9 +114,12 @@ impl fmt::Display for RepairReport {
         if self.is_of_brushes {
             return write!(f, "brushes are exact: nothing to repair");
         }
-        for (i, (name, n)) in self.counts().into_iter().enumerate() {
-            write!(f, "{}{name:<30} {n:>9}", if i == 0 { "" } else { "\n" })?;
+        let rows = self.counts().into_iter().filter(|(_, n)| *n > 0);
+        let rows: Vec<String> = rows.map(|(name, n)| format!("{name:<30} {n:>9}")).collect();
+        if rows.is_empty() {
+            write!(f, "nothing to repair")?;
         }
+        write!(f, "{}", rows.join("\n"))?;
         if !self.is_settled {
             write!(
                 f,

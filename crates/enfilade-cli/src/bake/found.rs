@@ -1,0 +1,183 @@
+//! What a bake says of its scene before the work: the files, what each object counts as, the model's faults.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::io::Write;
+
+use enfilade::geom::scene::{Role, Scene};
+use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
+
+use crate::output::{Told, Warned};
+
+/// Says what was read; with `verbose`, the roles of the objects and all that was noticed, too.
+pub(super) fn report_import(
+    scene: &Scene,
+    report: &ImportReport,
+    verbose: bool,
+) -> anyhow::Result<()> {
+    let mut err = Told;
+    if verbose {
+        writeln!(err, "{report}")?;
+        write!(err, "{}", roles(scene))?;
+    }
+    if let Some(doubt) = &report.unit_doubt {
+        writeln!(Warned, "{doubt}")?;
+    }
+    let title = if let Some(repair) = &report.repair {
+        writeln!(
+            err,
+            "repaired (leave out --repair to have the model as it was):\n{repair}"
+        )?;
+        "what is left of the model's faults"
+    } else {
+        "the model as found (nothing was changed)"
+    };
+    let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
+    if cleaning.findings().iter().any(|(_, f)| f.n > 0) {
+        writeln!(err, "{title}:\n{cleaning}")?;
+    }
+    if let Some(hole) = cleaning.holes.examples.first() {
+        let (n, p) = (cleaning.holes.n, hole.position);
+        writeln!(
+            Warned,
+            "triangles are missing in {n} places, most at {:.2} {:.2} {:.2} in '{}': --repair-holes 10 fills holes of up to 10 m",
+            p.x, p.y, p.z, hole.name
+        )?;
+    }
+    Ok(())
+}
+
+/// Names of objects that are given for a reason.
+const NAMES: usize = 3;
+/// Reasons of a role that have a line.
+const REASONS: usize = 30;
+
+/// Objects of a role that have it for one reason.
+struct Group<'a> {
+    /// As the first of them has it.
+    reason: &'a str,
+    /// Not all have the same numbers in it.
+    is_mixed: bool,
+    n: usize,
+    /// The first few different ones.
+    names: Vec<&'a str>,
+    has_more_names: bool,
+}
+
+/// The objects by role and reason, a line each: how many they are, and the names of a few. Most come first.
+fn roles(scene: &Scene) -> String {
+    let mut text = String::new();
+    for (role, name) in [(Role::Structural, "structural"), (Role::Detail, "detail")] {
+        let groups = groups(scene, role);
+        for g in groups.iter().take(REASONS) {
+            let masked = without_numbers(g.reason);
+            let reason = if g.is_mixed { &masked } else { g.reason };
+            let more = if g.has_more_names { ", …" } else { "" };
+            let names = g.names.join(", ");
+            let _ = writeln!(text, "{name:<10} {:>7}  {reason}: {names}{more}", g.n);
+        }
+        let rest = groups.get(REASONS..).unwrap_or_default();
+        if !rest.is_empty() {
+            let n: usize = rest.iter().map(|g| g.n).sum();
+            let _ = writeln!(text, "{name:<10} {n:>7}  for {} other reasons", rest.len());
+        }
+    }
+    text
+}
+
+fn groups(scene: &Scene, role: Role) -> Vec<Group<'_>> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
+    let mut by_reason: HashMap<String, usize> = HashMap::new();
+    for o in scene.objects.iter().filter(|o| o.role == role) {
+        let at = *by_reason
+            .entry(without_numbers(&o.reason))
+            .or_insert(groups.len());
+        if at == groups.len() {
+            groups.push(Group {
+                reason: &o.reason,
+                is_mixed: false,
+                n: 0,
+                names: Vec::new(),
+                has_more_names: false,
+            });
+        }
+        let g = &mut groups[at];
+        g.n += 1;
+        g.is_mixed |= g.reason != o.reason;
+        if !g.names.contains(&o.name.as_str()) {
+            if g.names.len() < NAMES {
+                g.names.push(&o.name);
+            } else {
+                g.has_more_names = true;
+            }
+        }
+    }
+    // A stable sort: of equals, the one that came first.
+    groups.sort_by_key(|g| std::cmp::Reverse(g.n));
+    groups
+}
+
+/// A reason with `…` for each number: what is said of many objects of different size.
+fn without_numbers(reason: &str) -> String {
+    let mut out = String::new();
+    let mut is_in_number = false;
+    for c in reason.chars() {
+        if c.is_ascii_digit() {
+            if !is_in_number {
+                out.push('…');
+            }
+            is_in_number = true;
+        } else if c != '.' || !is_in_number {
+            out.push(c);
+            is_in_number = false;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_testkit::furnished_house;
+
+    #[test]
+    fn objects_are_told_by_role_and_reason_and_not_one_by_one() {
+        let mut scene = furnished_house().scene;
+        let first = scene.objects[0].clone();
+        scene.objects.clear();
+        for i in 0..1000 {
+            let mut o = first.clone();
+            o.role = [Role::Structural, Role::Detail][i % 2];
+            o.name = format!("part {i}");
+            o.reason = match i % 4 {
+                0 => "name: 'wall'".into(),
+                2 => "default".into(),
+                _ => format!("fills an opening of 0.{i} m"),
+            };
+            scene.objects.push(o);
+        }
+        scene.objects[0].reason = "default".into();
+        let text = roles(&scene);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines,
+            [
+                "structural     251  default: part 0, part 2, part 6, …",
+                "structural     249  name: 'wall': part 4, part 8, part 12, …",
+                "detail         500  fills an opening of … m: part 1, part 3, part 5, …",
+            ]
+        );
+        // Each for a reason of its own: the rest is a line, too.
+        for (i, o) in scene.objects.iter_mut().enumerate() {
+            o.role = Role::Detail;
+            o.reason = format!("below '{}'", "x".repeat(i + 1));
+            o.name = "one".into();
+        }
+        let text = roles(&scene);
+        assert_eq!(text.lines().count(), REASONS + 1);
+        assert!(
+            text.ends_with("detail         970  for 970 other reasons\n"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,54 @@
+//! `enfilade completions` and `enfilade man`: what shells and manuals know of the commands, from the commands themselves.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap_complete::Shell;
+
+use crate::formats::Format;
+use crate::output::{Outputs, make_folder, write_whole};
+
+/// Prints what a shell needs to complete commands and options.
+#[derive(clap::Args)]
+pub(crate) struct Completions {
+    /// The shell; e.g. `enfilade completions bash > ~/.local/share/bash-completion/completions/enfilade`.
+    shell: Shell,
+}
+
+/// Writes manual pages, one for each command.
+#[derive(clap::Args)]
+pub(crate) struct Man {
+    /// Folder to write `enfilade.1`, `enfilade-bake.1` and so on to; made if it is not there.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+pub(crate) fn completions(args: &Completions, mut command: clap::Command) -> anyhow::Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut command, "enfilade", &mut script);
+    // By ourselves: the generator ends the program where the reader went away.
+    let mut out = io::stdout().lock();
+    out.write_all(&script)
+        .and_then(|()| out.flush())
+        .context("cannot write to standard output")
+}
+
+pub(crate) fn man(args: &Man, command: clap::Command) -> anyhow::Result<()> {
+    make_folder("DIR", &args.folder)?;
+    let mut command = command.disable_help_subcommand(true);
+    command.build();
+    let all = [&command].into_iter().chain(command.get_subcommands());
+    let pages: Vec<clap_mangen::Man> = all.cloned().map(clap_mangen::Man::new).collect();
+    let paths: Vec<PathBuf> = pages
+        .iter()
+        .map(|page| args.folder.join(page.get_filename()))
+        .collect();
+    Outputs::default().write_all("DIR", Format::Manual, &paths)?;
+    for (page, path) in pages.iter().zip(&paths) {
+        let mut text = Vec::new();
+        page.render(&mut text)?;
+        write_whole(path, &text)?;
+    }
+    Ok(())
+}

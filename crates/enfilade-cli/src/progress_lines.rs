@@ -1,0 +1,158 @@
+//! Progress in logs: a line now and then, where no bar can be drawn.
+
+use std::io::Write;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How often a line may come, and how often one comes at least.
+#[derive(Clone, Copy)]
+pub(crate) struct Pace {
+    /// A stage that ends sooner has no line.
+    pub(crate) least: Duration,
+    /// A stage that goes on for longer has another line.
+    pub(crate) most: Duration,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self {
+            least: Duration::from_secs(5),
+            most: Duration::from_secs(60),
+        }
+    }
+}
+
+/// What is under way: the stage, and a line about it.
+pub(crate) struct Now {
+    pub(crate) stage: String,
+    pub(crate) line: String,
+}
+
+/// Which lines are due.
+struct Lines {
+    pace: Pace,
+    /// The stage of the last line, and when it came.
+    last: Option<(String, Duration)>,
+}
+
+impl Lines {
+    /// The line to write `at` this time, if any; asked every [`Pace::least`].
+    fn due(&mut self, now: Option<Now>, at: Duration) -> Option<String> {
+        let Now { stage, line } = now?;
+        let is_due = self.last.as_ref().is_none_or(|(last, when)| {
+            // Clocks differ by a little from one tick to the next.
+            *last != stage || at + self.pace.least / 2 >= *when + self.pace.most
+        });
+        is_due.then(|| {
+            self.last = Some((stage, at));
+            line
+        })
+    }
+}
+
+/// Writes lines until it is dropped, on a thread of its own.
+pub(crate) struct Ticker {
+    /// Nothing is sent: it ends when this goes.
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Ticker {
+    /// Asks `now` what is under way, and writes that to `out` as often as `pace` says.
+    pub(crate) fn start(
+        pace: Pace,
+        now: impl Fn() -> Option<Now> + Send + 'static,
+        mut out: impl Write + Send + 'static,
+    ) -> Self {
+        let (end, ended) = mpsc::channel::<()>();
+        let began = Instant::now();
+        let mut lines = Lines { pace, last: None };
+        let tick = move || {
+            while ended.recv_timeout(pace.least) == Err(RecvTimeoutError::Timeout) {
+                if let Some(line) = lines.due(now(), began.elapsed()) {
+                    // Whoever closed it does not want to know.
+                    let _ = writeln!(out, "{line}");
+                }
+            }
+        };
+        Self {
+            end: Some(end),
+            // Without a thread there is no progress to read, and the work goes on.
+            thread: std::thread::Builder::new().spawn(tick).ok(),
+        }
+    }
+}
+
+impl Drop for Ticker {
+    fn drop(&mut self) {
+        drop(self.end.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::{Arc, Mutex};
+
+    fn now(stage: &str) -> Option<Now> {
+        Some(Now {
+            stage: stage.to_owned(),
+            line: format!("at {stage}"),
+        })
+    }
+
+    #[test]
+    fn a_stage_has_a_line_and_a_long_one_a_line_a_minute() {
+        let mut lines = Lines {
+            pace: Pace::default(),
+            last: None,
+        };
+        assert_eq!(lines.due(None, Duration::from_secs(5)), None);
+        let mut said = Vec::new();
+        // Two hours: ten seconds of the first stage, the rest of the second.
+        for tick in 1..=1440 {
+            let stage = if tick <= 2 { "flood" } else { "rooms" };
+            let line = lines.due(now(stage), Duration::from_millis(5001 * tick));
+            said.extend(line);
+        }
+        assert_eq!(said[..2], ["at flood", "at rooms"]);
+        assert_eq!(said.len(), 121);
+    }
+
+    #[test]
+    fn a_ticker_writes_until_it_is_dropped_and_not_afterwards() {
+        #[derive(Clone, Default)]
+        struct Kept(Arc<Mutex<Vec<u8>>>);
+        impl Write for Kept {
+            fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+                self.0.lock().unwrap().write(bytes)
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let kept = Kept::default();
+        let text = || String::from_utf8(kept.0.lock().unwrap().clone()).unwrap();
+        let pace = Pace {
+            least: Duration::from_millis(1),
+            most: Duration::from_secs(3600),
+        };
+        let ticker = Ticker::start(pace, || now("work"), kept.clone());
+        let start = Instant::now();
+        while text().is_empty() && start.elapsed() < Duration::from_secs(60) {
+            std::thread::yield_now();
+        }
+        drop(ticker);
+        assert_eq!(text(), "at work\n");
+        assert_eq!(Arc::strong_count(&kept.0), 1, "the thread is gone");
+        // One that is never due ends at once.
+        let start = Instant::now();
+        drop(Ticker::start(Pace::default(), || now("work"), kept.clone()));
+        assert!(start.elapsed() < Pace::default().least);
+        assert_eq!(text(), "at work\n");
+    }
+}

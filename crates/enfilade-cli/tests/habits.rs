@@ -1,0 +1,178 @@
+//! What all commands have in common: JSON for machines, quiet, completions and manual pages.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use enfilade::import::export_glb;
+use enfilade_testkit::{Variant, gjorup_rooms};
+use serde_json::Value;
+
+/// What `--json` of each command has in it, among other things; files are those that the rows before left.
+const COMMANDS: [(&str, &[&str]); 16] = [
+    ("demo", &["files", "triangles", "cells_indoors"]),
+    (
+        "bake house.glb --voxel 0.2 -o w.glb",
+        &["file", "bytes", "doors", "method", "notes", "seconds"],
+    ),
+    (
+        "bake house.glb --voxel 0.2 -v -o w.glb",
+        &["file", "cells_indoors"],
+    ),
+    ("decimate rooms.glb", &["steps", "stop", "cells_indoors"]),
+    ("decimate rooms.glb -o r.glb", &["steps", "baked"]),
+    (
+        "edit world.glb --delete-portal 0 -o e.glb",
+        &["file", "cells", "portals", "costs"],
+    ),
+    ("inspect world.glb", &["cells", "portals", "stats"]),
+    ("locate world.glb", &["cells"]),
+    ("plan world.glb -o p.svg", &["file", "bytes"]),
+    ("pvs world.glb -o p.pvs", &["cells", "pairs", "complete"]),
+    (
+        "render world.glb --size 64x36 --plain --adapter software -o x.png",
+        &["file", "eye", "triangles"],
+    ),
+    (
+        "render world.glb --size 64x36 --plain --adapter software --walk 2 -o x.png",
+        &["pictures"],
+    ),
+    (
+        "report world.glb --no-pictures --views 2 -o r.html",
+        &["file", "pictures", "notes"],
+    ),
+    ("see world.glb --eye 2,1,2 --look 3,1,2", &["visits"]),
+    (
+        "simplify world.glb --max-cells 6 -o s.glb",
+        &["file", "cells", "portals", "warning"],
+    ),
+    (
+        "verify world.glb --rays 100 --sight 10",
+        &["unsealed", "sight"],
+    ),
+];
+
+/// What prints nothing that a machine would read: a script for a shell, files, a window.
+const OTHERS: [&str; 4] = ["completions", "help", "man", "view"];
+
+/// A folder of this test alone.
+fn folder(name: &str) -> PathBuf {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("habits-{name}"));
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(&dir).unwrap();
+    let rooms = gjorup_rooms(Variant::Optimised, [0.0; 3]).scene;
+    fs::write(dir.join("rooms.glb"), export_glb(&rooms)).unwrap();
+    dir
+}
+
+fn run(dir: &Path, args: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(args.split_whitespace())
+        .current_dir(dir)
+        // A layer of Mesa's Vulkan looks for a display otherwise, and says that there is none.
+        .env("NODEVICE_SELECT", "1")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Two points for `locate`, one of them in the floor; nobody else reads them.
+    let _ = child.stdin.take().unwrap().write_all(b"2 1 2\n2 -0.1 2\n");
+    child.wait_with_output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+/// The names of all commands, as the help lists them.
+fn names(dir: &Path) -> BTreeSet<String> {
+    let help = run(dir, "--help");
+    let help = text(&help.stdout);
+    let (_, list) = help.split_once("Commands:\n").unwrap();
+    let (list, _) = list.split_once("\n\n").unwrap();
+    let first = |line: &str| line.split_whitespace().next().unwrap().to_owned();
+    list.lines().map(first).collect()
+}
+
+#[test]
+fn every_command_that_prints_answers_in_one_json_object_and_quietly_if_asked() {
+    let dir = folder("json");
+    let mut without = names(&dir);
+    for (args, keys) in COMMANDS {
+        without.remove(args.split(' ').next().unwrap());
+        let done = run(&dir, &format!("{args} --json --quiet"));
+        assert!(done.status.success(), "{args}: {}", text(&done.stderr));
+        assert_eq!(text(&done.stderr), "", "{args}");
+        let printed = text(&done.stdout);
+        assert_eq!(printed.lines().count(), 1, "{args}: {printed}");
+        let value: Value = serde_json::from_str(printed).unwrap();
+        let object = value
+            .as_object()
+            .unwrap_or_else(|| panic!("{args}: {value}"));
+        for key in keys {
+            assert!(object.contains_key(*key), "{args}: no {key} in {value}");
+        }
+    }
+    let others: BTreeSet<String> = OTHERS.map(str::to_owned).into();
+    let others = others.intersection(&without).cloned().collect();
+    assert_eq!(without, others, "not in the table");
+    let located = run(&dir, "locate world.glb --json");
+    let located: Value = serde_json::from_slice(&located.stdout).unwrap();
+    let cells = located["cells"].as_array().unwrap();
+    assert!(cells.len() == 2 && cells[0].is_u64() && cells[1].is_null());
+    // Where a file goes to standard output, what is printed goes aside.
+    let done = run(&dir, "plan world.glb --json -o -");
+    assert!(text(&done.stdout).contains("<svg"));
+    let _: Value = serde_json::from_slice(&done.stderr).unwrap();
+}
+
+#[test]
+fn quiet_leaves_errors_and_warnings() {
+    let dir = folder("quiet");
+    let done = run(&dir, "inspect -q none.glb");
+    assert!(text(&done.stderr).contains("none.glb"));
+    fs::write(dir.join("flat.obj"), "v 0 0 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\n").unwrap();
+    let done = run(&dir, "bake flat.obj -o flat.glb");
+    let all = text(&done.stderr);
+    assert!(
+        all.contains("no room was found") && all.contains("method "),
+        "{all}"
+    );
+    let done = run(&dir, "--quiet bake flat.obj -o flat.glb");
+    let left = text(&done.stderr);
+    assert!(left.starts_with("no room was found"), "{left}");
+    assert!(
+        !left.contains("method ") && !left.contains("model as found"),
+        "{left}"
+    );
+}
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let dir = folder("manual");
+    let names = names(&dir);
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let done = run(&dir, &format!("completions {shell}"));
+        let script = text(&done.stdout);
+        for word in names.iter().map(String::as_str).chain(["max-cells"]) {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+    assert_eq!(run(&dir, "completions dos").status.code(), Some(2));
+    let done = run(&dir, "man pages");
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let page = |name: &str| fs::read_to_string(dir.join("pages").join(name)).unwrap();
+    for name in names.iter().filter(|n| *n != "help") {
+        let page = page(&format!("enfilade-{name}.1"));
+        assert!(page.contains(".TH") && page.contains("quiet"), "{name}");
+    }
+    assert!(page("enfilade.1").contains("enfilade 0."));
+    assert_eq!(
+        fs::read_dir(dir.join("pages")).unwrap().count(),
+        names.len()
+    );
+    assert_eq!(run(&dir, "man -").status.code(), Some(1));
+}
