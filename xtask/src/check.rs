@@ -61,6 +61,7 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("build", || {
         run_to_end(&mut GATE.cargo("build", &["--workspace"]))
     })?;
+    steps.step("package", package)?;
     steps.step("demo", demo)?;
     let scenes = scenes();
     for scene in &scenes {
@@ -171,6 +172,20 @@ fn verify(world: &Path, scene: Option<&Path>) -> anyhow::Result<()> {
     }
     print!("{}", output_of(&mut command, None)?);
     Ok(())
+}
+
+/// Packs every crate that is to be published, as if those that it uses were published already; builds none of them.
+fn package() -> anyhow::Result<()> {
+    let args = [
+        "package",
+        "--workspace",
+        "--exclude=xtask",
+        "--exclude=enfilade-bench",
+        "--no-verify",
+        "--allow-dirty",
+        "--quiet",
+    ];
+    run_to_end(&mut cargo(&args))
 }
 
 fn demo() -> anyhow::Result<()> {

@@ -177,17 +177,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         studio.state.close(PortalId(p));
     }
-    let cameras = match (given, args.walk, args.eye.zip(args.look)) {
-        (Some(path), ..) => path,
-        (_, Some(n), _) => walk_cameras(&world, &studio.sight, n, fov),
-        (.., Some((eye, look))) => vec![Camera {
-            fov_y: fov,
-            ..Camera::looking_at(eye, look)
-        }],
-        _ => vec![Camera {
-            fov_y: fov,
-            ..good_camera(&mut studio, &world)?
-        }],
+    let cameras = match given {
+        Some(path) => path,
+        None => cameras(args, &mut studio, &world)?,
     };
     if cameras.is_empty() {
         bail!("{}: no room to walk in", name_of(&args.world));
@@ -256,6 +248,19 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         [one] if !is_path => print_json(out, one),
         all => print_json(out, &json!({ "pictures": all })),
     }
+}
+
+/// Where to draw from, if no path says it.
+fn cameras(args: &Render, studio: &mut Studio, world: &World) -> anyhow::Result<Vec<Camera>> {
+    let fov_y = args.fov.to_radians();
+    if let Some(n) = args.walk {
+        return Ok(walk_cameras(world, &studio.sight, n, fov_y));
+    }
+    let camera = match args.eye.zip(args.look) {
+        Some((eye, look)) => Camera::looking_at(eye, look),
+        None => good_camera(studio, world)?,
+    };
+    Ok(vec![Camera { fov_y, ..camera }])
 }
 
 fn numbered(path: &Path, n: usize) -> PathBuf {
