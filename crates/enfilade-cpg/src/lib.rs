@@ -12,6 +12,7 @@ mod holes;
 mod ids;
 mod locator;
 mod look;
+mod named;
 mod pvs;
 mod seals;
 mod sight_graph;

@@ -1,22 +1,16 @@
-//! What things were called before the bake: which of the input's objects each triangle comes from.
-
-use std::collections::{BTreeMap, BTreeSet};
-
-use enfilade_geom::scene::FixtureKind;
-
-use crate::{Batch, CellId, World};
+//! Which of the input's objects each triangle comes from.
 
 /// Which source each of a list of triangles comes from, as runs of triangles of one source.
 ///
 /// Triangles of one object mostly follow each other, so that this is far shorter than a number a triangle.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SourceRuns {
-    /// Index into [`World::sources`], and how many triangles: at least one.
+    /// Index into [`World::sources`](crate::World::sources), and how many triangles: at least one.
     runs: Vec<[u32; 2]>,
 }
 
 impl SourceRuns {
-    /// The runs as they are, e.g. from a file; [`World::validate`] judges them.
+    /// The runs as they are, e.g. from a file; [`World::validate`](crate::World::validate) judges them.
     #[must_use]
     pub fn from_runs(runs: Vec<[u32; 2]>) -> Self {
         Self { runs }
@@ -68,7 +62,7 @@ impl SourceRuns {
     }
 
     /// What is wrong with them, if they are to be the sources of `n_triangles`.
-    fn problem(&self, n_triangles: usize, n_sources: usize) -> Option<String> {
+    pub(crate) fn problem(&self, n_triangles: usize, n_sources: usize) -> Option<String> {
         if let Some([source, _]) = self.runs.iter().find(|r| r[0] as usize >= n_sources) {
             return Some(format!("source {source} of {n_sources}"));
         }
@@ -81,129 +75,9 @@ impl SourceRuns {
     }
 }
 
-impl World {
-    /// Names of a source and of all above it, from the top, with `/` between; nodes without a name are left out.
-    #[must_use]
-    pub fn source_path(&self, source: u32) -> String {
-        let mut names = Vec::new();
-        let mut at = Some(source);
-        while let Some(node) = at.and_then(|i| self.sources.get(i as usize)) {
-            if !node.name.is_empty() {
-                names.push(node.name.as_str());
-            }
-            at = node.parent;
-        }
-        names.reverse();
-        names.join("/")
-    }
-
-    /// The sources that a cell sees without passing a portal, with how many of their triangles: structure by the triangles that
-    /// list the cell, details by all of theirs. O(batches + runs + details).
-    #[must_use]
-    pub fn sources_in(&self, cell: CellId) -> BTreeMap<u32, u32> {
-        let mut found = BTreeMap::new();
-        for batch in self.batches_of(cell) {
-            for &[source, n] in batch.sources.runs() {
-                *found.entry(source).or_default() += n;
-            }
-        }
-        let is_in = |cells: &[CellId]| cells.binary_search(&cell).is_ok();
-        for detail in self.details.iter().filter(|d| is_in(&d.cells)) {
-            let mesh = &self.detail_meshes[detail.mesh as usize];
-            let n: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
-            if let Some(source) = detail.source {
-                *found.entry(source).or_default() += n as u32;
-            }
-        }
-        found
-    }
-
-    /// The cells from which a source is seen without passing a portal, ascending. O(batches + runs + details).
-    #[must_use]
-    pub fn cells_of_source(&self, source: u32) -> Vec<CellId> {
-        let holds = |b: &&Batch| b.sources.runs().iter().any(|r| r[0] == source);
-        let batches = self.batches.iter().filter(holds);
-        let details = self.details.iter().filter(|d| d.source == Some(source));
-        let mut cells: BTreeSet<CellId> = batches.flat_map(|b| b.cells.iter().copied()).collect();
-        cells.extend(details.flat_map(|d| d.cells.iter().copied()));
-        cells.into_iter().collect()
-    }
-}
-
-/// Checks the tree of sources and all that refers to it.
-pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
-    let n = world.sources.len();
-    for (i, node) in world.sources.iter().enumerate() {
-        if let Some(parent) = node.parent.filter(|&p| p as usize >= i) {
-            broken(
-                format!("source {i} ({})", node.name),
-                format!("its parent {parent} does not come before it"),
-            );
-        }
-        if let Err(why) = check_json(&node.extras) {
-            broken(
-                format!("source {i} ({})", node.name),
-                format!("extras: {why}"),
-            );
-        }
-    }
-    for (i, batch) in world.batches.iter().enumerate() {
-        let n_triangles = batch.primitive.indices.len() / 3;
-        if let Some(problem) = batch.sources.problem(n_triangles, n) {
-            broken(format!("batch {i}"), problem);
-        }
-    }
-    for (i, detail) in world.details.iter().enumerate() {
-        if let Some(source) = detail.source.filter(|&s| s as usize >= n) {
-            broken(
-                format!("detail {i} ({})", detail.name),
-                format!("source {source} of {n}"),
-            );
-        }
-    }
-    if let Err(why) = check_json(&world.about.extras) {
-        broken("the scene".into(), format!("extras: {why}"));
-    }
-    for (i, fixture) in world.fixtures.iter().enumerate() {
-        let owner = || format!("fixture {i} ({})", fixture.name);
-        if !fixture.transform.is_finite() {
-            broken(owner(), "its transform is not finite".into());
-        }
-        let is_object = fixture.gltf.trim_start().starts_with('{');
-        let is_marker = fixture.kind == FixtureKind::Marker;
-        let fits = if is_marker {
-            fixture.gltf.is_empty()
-        } else {
-            is_object
-        };
-        if !fits {
-            broken(owner(), "is no JSON object, or a marker that is one".into());
-        }
-        for text in [&fixture.gltf, &fixture.extras] {
-            if let Err(why) = check_json(text) {
-                broken(owner(), why);
-            }
-        }
-    }
-}
-
-/// Brackets around a value in the file, at most: a reader must not find more than it takes.
-const NESTING: usize = 8;
-
-/// Whether the text is a JSON value, or empty, that fits into the JSON of a file.
-fn check_json(text: &str) -> Result<(), String> {
-    if text.is_empty() {
-        return Ok(());
-    }
-    let nested = format!("{}{text}{}", "[".repeat(NESTING), "]".repeat(NESTING));
-    let read: Result<serde_json::Value, _> = serde_json::from_str(&nested);
-    read.map(|_| ()).map_err(|e| e.to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade_geom::scene::SourceNode;
 
     #[test]
     fn each_triangle_finds_its_source() {
@@ -230,33 +104,5 @@ mod tests {
         assert!(problem(&[[2, 5]]).is_some());
         assert!(problem(&[[1, 5], [0, 0]]).is_some());
         assert!(problem(&[[1, u32::MAX], [0, 6]]).is_some());
-    }
-
-    #[test]
-    fn a_path_leads_from_the_top_to_the_source() {
-        let node = |name: &str, parent| SourceNode {
-            name: name.into(),
-            parent,
-            extras: String::new(),
-        };
-        let world = World {
-            sources: vec![
-                node("house", None),
-                node("", Some(0)),
-                node("door", Some(1)),
-            ],
-            ..World::default()
-        };
-        assert_eq!(world.source_path(2), "house/door");
-        assert_eq!(world.source_path(9), "");
-    }
-
-    #[test]
-    fn json_that_a_reader_would_refuse_is_not_written() {
-        let deep = |n: usize| "[".repeat(n) + &"]".repeat(n);
-        assert!(check_json(&deep(100)).is_ok());
-        assert!(check_json(&deep(125)).is_err());
-        assert!(check_json("{} {}").is_err());
-        assert!(check_json("").is_ok());
     }
 }

@@ -8,6 +8,7 @@ mod error;
 mod extent;
 mod geometry;
 mod locator;
+mod origin;
 mod portal;
 
 use std::collections::HashMap;
@@ -82,7 +83,7 @@ impl World {
         for (i, detail) in self.details.iter().enumerate() {
             check_detail(i, detail, n_cells, self.detail_meshes.len(), &mut found);
         }
-        crate::sources::check(self, &mut |owner, problem| {
+        origin::check(self, &mut |owner, problem| {
             found.push(GraphError::Source { owner, problem });
         });
         let is_finite = self.leak_path.as_flattened().iter().all(|v| v.is_finite());

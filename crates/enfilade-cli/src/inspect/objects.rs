@@ -11,7 +11,7 @@ use crate::output::print_json;
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Report<'a> {
+struct Objects<'a> {
     objects: Vec<Object<'a>>,
 }
 
@@ -52,7 +52,7 @@ pub(super) fn write(
         .collect();
     objects.sort_by(|a, b| (b.triangles, a.source).cmp(&(a.triangles, b.source)));
     if json {
-        return print_json(out, &Report { objects });
+        return print_json(out, &Objects { objects });
     }
     writeln!(out, "triangles  kind       object")?;
     for object in objects {

@@ -1,0 +1,79 @@
+//! What things were called before the bake, and where they are seen from.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::{Batch, CellId, World};
+
+impl World {
+    /// Names of a source and of all above it, from the top, with `/` between; nodes without a name are left out.
+    #[must_use]
+    pub fn source_path(&self, source: u32) -> String {
+        let mut names = Vec::new();
+        let mut at = Some(source);
+        while let Some(node) = at.and_then(|i| self.sources.get(i as usize)) {
+            if !node.name.is_empty() {
+                names.push(node.name.as_str());
+            }
+            at = node.parent;
+        }
+        names.reverse();
+        names.join("/")
+    }
+
+    /// The sources that a cell sees without passing a portal, with how many of their triangles: structure by the triangles that
+    /// list the cell, details by all of theirs. O(batches + runs + details).
+    #[must_use]
+    pub fn sources_in(&self, cell: CellId) -> BTreeMap<u32, u32> {
+        let mut found = BTreeMap::new();
+        for batch in self.batches_of(cell) {
+            for &[source, n] in batch.sources.runs() {
+                *found.entry(source).or_default() += n;
+            }
+        }
+        let is_in = |cells: &[CellId]| cells.binary_search(&cell).is_ok();
+        for detail in self.details.iter().filter(|d| is_in(&d.cells)) {
+            let mesh = &self.detail_meshes[detail.mesh as usize];
+            let n: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
+            if let Some(source) = detail.source {
+                *found.entry(source).or_default() += n as u32;
+            }
+        }
+        found
+    }
+
+    /// The cells from which a source is seen without passing a portal, ascending. O(batches + runs + details).
+    #[must_use]
+    pub fn cells_of_source(&self, source: u32) -> Vec<CellId> {
+        let holds = |b: &&Batch| b.sources.runs().iter().any(|r| r[0] == source);
+        let batches = self.batches.iter().filter(holds);
+        let details = self.details.iter().filter(|d| d.source == Some(source));
+        let mut cells: BTreeSet<CellId> = batches.flat_map(|b| b.cells.iter().copied()).collect();
+        cells.extend(details.flat_map(|d| d.cells.iter().copied()));
+        cells.into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::scene::SourceNode;
+
+    #[test]
+    fn a_path_leads_from_the_top_to_the_source() {
+        let node = |name: &str, parent| SourceNode {
+            name: name.into(),
+            parent,
+            extras: String::new(),
+        };
+        let world = World {
+            sources: vec![
+                node("house", None),
+                node("", Some(0)),
+                node("door", Some(1)),
+            ],
+            ..World::default()
+        };
+        assert_eq!(world.source_path(2), "house/door");
+        assert_eq!(world.source_path(9), "");
+    }
+}

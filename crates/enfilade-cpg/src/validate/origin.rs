@@ -1,0 +1,89 @@
+//! Whether what the input said of itself holds together: names, lights, cameras, marked places.
+
+use enfilade_geom::scene::FixtureKind;
+
+use crate::World;
+
+/// Checks the tree of sources and all that refers to it.
+pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
+    let n = world.sources.len();
+    for (i, node) in world.sources.iter().enumerate() {
+        if let Some(parent) = node.parent.filter(|&p| p as usize >= i) {
+            broken(
+                format!("source {i} ({})", node.name),
+                format!("its parent {parent} does not come before it"),
+            );
+        }
+        if let Err(why) = check_json(&node.extras) {
+            broken(
+                format!("source {i} ({})", node.name),
+                format!("extras: {why}"),
+            );
+        }
+    }
+    for (i, batch) in world.batches.iter().enumerate() {
+        let n_triangles = batch.primitive.indices.len() / 3;
+        if let Some(problem) = batch.sources.problem(n_triangles, n) {
+            broken(format!("batch {i}"), problem);
+        }
+    }
+    for (i, detail) in world.details.iter().enumerate() {
+        if let Some(source) = detail.source.filter(|&s| s as usize >= n) {
+            broken(
+                format!("detail {i} ({})", detail.name),
+                format!("source {source} of {n}"),
+            );
+        }
+    }
+    if let Err(why) = check_json(&world.about.extras) {
+        broken("the scene".into(), format!("extras: {why}"));
+    }
+    for (i, fixture) in world.fixtures.iter().enumerate() {
+        let owner = || format!("fixture {i} ({})", fixture.name);
+        if !fixture.transform.is_finite() {
+            broken(owner(), "its transform is not finite".into());
+        }
+        let is_object = fixture.gltf.trim_start().starts_with('{');
+        let is_marker = fixture.kind == FixtureKind::Marker;
+        let fits = if is_marker {
+            fixture.gltf.is_empty()
+        } else {
+            is_object
+        };
+        if !fits {
+            broken(owner(), "is no JSON object, or a marker that is one".into());
+        }
+        for text in [&fixture.gltf, &fixture.extras] {
+            if let Err(why) = check_json(text) {
+                broken(owner(), why);
+            }
+        }
+    }
+}
+
+/// Brackets around a value in the file, at most: a reader must not find more than it takes.
+const NESTING: usize = 8;
+
+/// Whether the text is a JSON value, or empty, that fits into the JSON of a file.
+fn check_json(text: &str) -> Result<(), String> {
+    if text.is_empty() {
+        return Ok(());
+    }
+    let nested = format!("{}{text}{}", "[".repeat(NESTING), "]".repeat(NESTING));
+    let read: Result<serde_json::Value, _> = serde_json::from_str(&nested);
+    read.map(|_| ()).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_json;
+
+    #[test]
+    fn json_that_a_reader_would_refuse_is_not_written() {
+        let deep = |n: usize| "[".repeat(n) + &"]".repeat(n);
+        assert!(check_json(&deep(100)).is_ok());
+        assert!(check_json(&deep(125)).is_err());
+        assert!(check_json("{} {}").is_err());
+        assert!(check_json("").is_ok());
+    }
+}
