@@ -227,9 +227,10 @@ impl Compared {
             return print_json(out, self);
         }
         let [cells, cell] = what;
-        writeln!(out, "{cells:<8}{:>7} → {}", self.cells[0], self.cells[1])?;
-        let [before, after] = self.portals;
-        writeln!(out, "portals {before:>7} → {after}")?;
+        let width = cells.len().max("portals".len());
+        for (name, [before, after]) in [(cells, self.cells), ("portals", self.portals)] {
+            writeln!(out, "{name:<width$} {before:>7} → {after}")?;
+        }
         if let Some([least, most]) = self.costs {
             writeln!(out, "cost of a {cell} {least:.0} to {most:.0}")?;
         }
