@@ -3,7 +3,7 @@
 //! Exact but for the rounding of `f64`: no box and no tolerance decides. A portal is shut where it is closed, or beyond a plane
 //! that narrows it ([`SightState::narrow`]).
 
-use enfilade_cpg::{CellId, PortalId};
+use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{DVec3, Ray, Triangle};
 
 use crate::point::point;
@@ -37,6 +37,23 @@ pub enum Target {
     },
     /// A portal that is closed, or narrowed so that it is shut there.
     Portal(PortalId),
+}
+
+impl Target {
+    /// The input's object that was met: index into `World::sources`, for its name and `extras`. `None` for seals, portals, and
+    /// where the world does not know it. O(objects of the batch).
+    ///
+    /// # Panics
+    ///
+    /// When the target is none of this world's.
+    #[must_use]
+    pub fn source(&self, world: &World) -> Option<u32> {
+        match *self {
+            Self::Wall { batch, triangle } => world.batches[batch as usize].sources.of(triangle),
+            Self::Detail { detail, .. } => world.details[detail.0 as usize].source,
+            Self::Portal(_) => None,
+        }
+    }
 }
 
 /// Where a segment ends, and at what.

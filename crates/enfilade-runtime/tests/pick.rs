@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use enfilade_cpg::{DetailObject, PortalId, World};
 use enfilade_geom::ray::hit_triangle;
+use enfilade_geom::scene::SourceNode;
 use enfilade_geom::{DMat4, DVec3, Ray, Triangle};
 use enfilade_runtime::{DetailId, DrawList, Sight, SightState, Sightlines, Target, View, Viewer};
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -158,6 +159,57 @@ fn what_is_picked_is_what_brute_force_meets_first() {
     // Otherwise the comparison says nothing.
     let counts = [n_walls, n_details, n_portals, n_none];
     assert!(counts.iter().all(|&n| n > 300), "{counts:?}");
+}
+
+#[test]
+fn what_is_picked_tells_the_object_that_it_comes_from() {
+    let mut world = room_grid(&GridParams {
+        furniture: 6,
+        ..GridParams::offices(4, 3)
+    });
+    // A source a triangle of structure, and one a detail behind them.
+    let mut n = 0;
+    for batch in &mut world.batches {
+        for _ in 0..batch.primitive.indices.len() / 3 {
+            batch.sources.push(n, 1);
+            n += 1;
+        }
+    }
+    let n_walls = n;
+    for detail in &mut world.details {
+        detail.source = Some(n);
+        n += 1;
+    }
+    let named = |i: u32| SourceNode {
+        name: i.to_string(),
+        ..SourceNode::default()
+    };
+    world.sources = (0..n).map(named).collect();
+    let lines = Sightlines::build(&world);
+    let state = SightState::new(&Sight::build(&world).unwrap());
+    let mut rng = Rng::new(1);
+    let mut counts = [0, 0];
+    for _ in 0..1_000 {
+        let (a, b) = (point(&mut rng, &world), point(&mut rng, &world));
+        let Some(hit) = lines.pick(&state, a, b).unwrap() else {
+            continue;
+        };
+        let source = hit.target.source(&world).unwrap();
+        match hit.target {
+            Target::Wall { batch, triangle } => {
+                let before = world.batches[..batch as usize].iter();
+                let before: usize = before.map(|b| b.primitive.indices.len() / 3).sum();
+                assert_eq!(source, before as u32 + triangle);
+                counts[0] += 1;
+            }
+            Target::Detail { detail, .. } => {
+                assert_eq!(source, n_walls + detail.0);
+                counts[1] += 1;
+            }
+            Target::Portal(_) => unreachable!("all are open"),
+        }
+    }
+    assert!(counts.iter().all(|&n| n > 50), "{counts:?}");
 }
 
 #[test]
