@@ -147,6 +147,7 @@ mod tests {
     use super::*;
     use crate::{Connectivity, Labels, Watershed, distance_squared_near, flood};
     use proptest::prelude::*;
+    use std::collections::BTreeMap;
 
     const DIMS: [usize; 3] = [150, 90, 120];
 
@@ -192,11 +193,20 @@ mod tests {
         })
     }
 
-    fn flooded(voxels: &BitVolume, squared: Vec<u16>, far: Option<&BitVolume>) -> Watershed {
+    /// How much deeper a hall must be than its way out, so that rounding to blocks does not hide it: what counts as noise, and half
+    /// the diagonals of two blocks for each of both depths. [Units: vx]
+    const ROUNDED: f64 = (NOISE + 2.0 * 1.733) * EDGE as f64;
+
+    fn flooded(
+        voxels: &BitVolume,
+        squared: Vec<u16>,
+        far: Option<&BitVolume>,
+        h: f64,
+    ) -> Watershed {
         let mut outdoors = border(DIMS);
         far.into_iter().for_each(|far| outdoors.union_with(far));
         let options = WatershedOptions {
-            h: 0.5,
+            h,
             outdoors: Some(outdoors),
         };
         assert_eq!(squared.len(), voxels.n_voxels());
@@ -206,7 +216,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
         #[test]
-        fn far_air_is_free_and_hangs_together_with_the_border_and_no_hall_loses_a_voxel(
+        fn far_air_is_free_and_hangs_together_with_the_border_and_no_hall_is_lost(
             voxels in halls()
         ) {
             let squared = distance_squared(&voxels);
@@ -216,8 +226,8 @@ mod tests {
             prop_assert!(far.iter_set().all(|v| open.get_index(v)), "open to the border");
 
             let near = distance_squared_near(&voxels, &far);
-            let plain = flooded(&voxels, squared.clone(), None);
-            let fast = flooded(&voxels, near.clone(), Some(&far));
+            let plain = flooded(&voxels, squared.clone(), None, 0.5);
+            let fast = flooded(&voxels, near.clone(), Some(&far), 0.5);
             for v in 0..squared.len() {
                 // A basin of another label may be the same: outdoors is 1 in both.
                 let is_indoors = |labels: &Labels| labels.get(v) > 1;
@@ -226,10 +236,19 @@ mod tests {
                     prop_assert_eq!(near[v], squared[v], "distance of voxel {}", v);
                 }
             }
-            // What is lost are hills of the distance in the open, where no wall is near.
-            let lost = |v: usize| plain.labels.get(v) > 1 && fast.labels.get(v) == 1;
-            let walled = (0..squared.len()).filter(|&v| lost(v) && squared[v] < 49).count();
-            prop_assert!(walled == 0, "{walled} voxels near walls");
+            // Blocks round distances, so what opens nearly as wide as it is itself may be outdoors: an alcove. A hall is
+            // not, whatever its blocks say.
+            let halls = flooded(&voxels, squared.clone(), None, ROUNDED);
+            let mut middles: BTreeMap<u32, usize> = BTreeMap::new();
+            for v in (0..squared.len()).filter(|&v| halls.labels.get(v) > 1) {
+                let middle = middles.entry(halls.labels.get(v)).or_insert(v);
+                if squared[v] > squared[*middle] {
+                    *middle = v;
+                }
+            }
+            for (hall, &middle) in &middles {
+                prop_assert!(fast.labels.get(middle) > 1, "the middle of hall {hall}");
+            }
         }
     }
 
