@@ -92,7 +92,9 @@ fn scene(numbers: &mut Numbers<'_>, is_any: bool) -> Scene {
             mesh: 0,
             transform: DMat4::IDENTITY,
             role: Role::Structural,
-            reason: String::new(), node: None, }],
+            reason: String::new(),
+            node: None,
+        }],
         ..Scene::default()
     }
 }

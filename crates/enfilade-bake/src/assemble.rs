@@ -297,21 +297,12 @@ fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
     drop(1.0).min(drop(-1.0))
 }
 
+#[derive(Default)]
 struct BatchBuilder {
     primitive: Primitive,
     vertices: HashMap<(u32, u32, u32), u32>,
-    /// Of its triangles, where all of them have one.
-    sources: Option<SourceRuns>,
-}
-
-impl BatchBuilder {
-    fn new() -> Self {
-        Self {
-            primitive: Primitive::default(),
-            vertices: HashMap::new(),
-            sources: Some(SourceRuns::default()),
-        }
-    }
+    /// Of those of its triangles that have one.
+    sources: SourceRuns,
 }
 
 fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
@@ -333,10 +324,9 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         let layout = layout_of(from);
         let builder = builders
             .entry((seen_from, from.material, layout))
-            .or_insert_with(BatchBuilder::new);
-        match (&mut builder.sources, object.node) {
-            (Some(sources), Some(node)) => sources.push(node, 1),
-            _ => builder.sources = None,
+            .or_default();
+        if let Some(node) = object.node {
+            builder.sources.push(node, 1);
         }
         let to = &mut builder.primitive;
         to.material = from.material;
@@ -370,8 +360,8 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         .into_iter()
         .map(|((cells, _, _), b)| Batch {
             cells: cells.into_iter().map(CellId).collect(),
+            sources: b.sources.of_all(b.primitive.indices.len() / 3),
             primitive: b.primitive,
-            sources: b.sources.unwrap_or_default(),
             is_seal: false,
         })
         .collect()

@@ -1,6 +1,5 @@
 //! `enfilade locate`: points in, cells out.
 
-use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 
@@ -64,15 +63,12 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
 /// Prints the cells of all sources whose name or path fits.
 fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()> {
     let found = sources_named(world, pattern);
-    if found.is_empty() {
+    if !found.contains(&true) {
         bail!(
             "no object is called '{pattern}'; `enfilade inspect --objects CELL` lists those that a cell sees"
         );
     }
-    let cells: BTreeSet<_> = found
-        .into_iter()
-        .flat_map(|source| world.cells_of_source(source))
-        .collect();
+    let cells = world.cells_of_sources(|source| found[source as usize]);
     let mut output = BufWriter::new(io::stdout().lock());
     if json {
         let cells = cells.into_iter().map(|c| Some(c.0)).collect();
@@ -84,16 +80,15 @@ fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()>
     output.flush().context("cannot write to standard output")
 }
 
-/// Sources whose name or path fits the pattern, and all below them: the cells of a storey are those of what it holds.
-fn sources_named(world: &World, pattern: &str) -> Vec<u32> {
+/// By source, whether its name or path fits the pattern, or that of one above it: the cells of a storey are those of what it holds.
+fn sources_named(world: &World, pattern: &str) -> Vec<bool> {
     let fits = |text: &str| is_match(pattern, text);
     let mut is_found: Vec<bool> = Vec::with_capacity(world.sources.len());
     for (i, node) in world.sources.iter().enumerate() {
         let is_below = node.parent.is_some_and(|p| is_found[p as usize]);
         is_found.push(is_below || fits(&node.name) || fits(&world.source_path(i as u32)));
     }
-    let found = is_found.iter().enumerate().filter(|(_, is)| **is);
-    found.map(|(i, _)| i as u32).collect()
+    is_found
 }
 
 fn locate_lines<R: Read>(

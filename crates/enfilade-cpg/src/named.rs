@@ -44,9 +44,19 @@ impl World {
     /// The cells from which a source is seen without passing a portal, ascending. O(batches + runs + details).
     #[must_use]
     pub fn cells_of_source(&self, source: u32) -> Vec<CellId> {
-        let holds = |b: &&Batch| b.sources.runs().iter().any(|r| r[0] == source);
+        self.cells_of_sources(|s| s == source)
+    }
+
+    /// The cells from which any of some sources is seen without passing a portal, ascending; `is_one` says which these are.
+    /// O(batches + runs + details).
+    #[must_use]
+    pub fn cells_of_sources(&self, is_one: impl Fn(u32) -> bool) -> Vec<CellId> {
+        let holds = |b: &&Batch| b.sources.runs().iter().any(|r| is_one(r[0]));
         let batches = self.batches.iter().filter(holds);
-        let details = self.details.iter().filter(|d| d.source == Some(source));
+        let details = self
+            .details
+            .iter()
+            .filter(|d| d.source.is_some_and(&is_one));
         let mut cells: BTreeSet<CellId> = batches.flat_map(|b| b.cells.iter().copied()).collect();
         cells.extend(details.flat_map(|d| d.cells.iter().copied()));
         cells.into_iter().collect()

@@ -44,6 +44,17 @@ impl SourceRuns {
         }
     }
 
+    /// These runs if they are the sources of all of `n_triangles`, and none if some triangles came without.
+    #[must_use]
+    pub fn of_all(self, n_triangles: usize) -> Self {
+        let n: u64 = self.runs.iter().map(|r| u64::from(r[1])).sum();
+        if n == n_triangles as u64 {
+            self
+        } else {
+            Self::default()
+        }
+    }
+
     /// The source of each triangle, in their order.
     pub fn of_triangles(&self) -> impl Iterator<Item = u32> {
         let run = |&[source, n]: &[u32; 2]| std::iter::repeat_n(source, n as usize);
@@ -93,6 +104,13 @@ mod tests {
             one_by_one,
             [Some(3), Some(3), Some(3), Some(1), Some(1), None]
         );
+    }
+
+    #[test]
+    fn where_some_triangles_have_no_source_none_has() {
+        let runs = SourceRuns::from_runs(vec![[0, 2], [7, 1]]);
+        assert_eq!(runs.clone().of_all(3), runs);
+        assert!(runs.of_all(4).is_empty());
     }
 
     #[test]

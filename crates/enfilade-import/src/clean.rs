@@ -58,8 +58,8 @@ pub struct CleaningReport {
     /// Loops of open edges across which the surface around them goes on, the largest first: triangles are missing. Rims of
     /// sheets are none, and neither is a whole face that is missing: a box may be meant to be open.
     pub holes: Finding,
-    /// Whether holes were looked for: not among more than two million triangles.
-    pub has_holes: bool,
+    /// Whether the search for them went through to its end; none is made among more than two million triangles.
+    pub is_holes_complete: bool,
     /// Edges used by more than two triangles of one object.
     pub non_manifold_edges: Finding,
     /// Triangles turned against most of those that they hang together with.
@@ -148,11 +148,8 @@ impl fmt::Display for CleaningReport {
         if !self.is_crossing_complete {
             writeln!(f, "crossing triangles: at least; the search was stopped")?;
         }
-        if !self.has_holes {
-            writeln!(
-                f,
-                "holes in surfaces: not looked for among so many triangles"
-            )?;
+        if !self.is_holes_complete {
+            writeln!(f, "holes in surfaces: at least; the search was stopped")?;
         }
         let ShellCounts {
             solids,
@@ -218,11 +215,13 @@ pub fn cleaning_report(
 const MAX_HOLE_TRIANGLES: u64 = 2_000_000;
 
 fn find_holes(report: &mut CleaningReport, scene: &Scene) {
-    report.has_holes = report.n_triangles <= MAX_HOLE_TRIANGLES;
-    if !report.has_holes || report.open_edges.n == 0 {
+    report.is_holes_complete = report.open_edges.n == 0;
+    if report.is_holes_complete || report.n_triangles > MAX_HOLE_TRIANGLES {
         return;
     }
-    for hole in holes_of(scene).into_iter().filter(|h| h.is_torn) {
+    let (holes, is_complete) = holes_of(scene);
+    report.is_holes_complete = is_complete;
+    for hole in holes.into_iter().filter(|h| h.is_torn) {
         let name = || scene.objects[hole.object as usize].name.clone();
         report.holes.add(hole.position, name);
     }

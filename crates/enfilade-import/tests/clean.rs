@@ -292,7 +292,7 @@ fn missing_triangles_are_holes_and_rims_of_sheets_are_none() {
     let mut open = cube();
     open.indices.drain(0..3);
     let report = of(open.clone());
-    assert!(report.has_holes);
+    assert!(report.is_holes_complete);
     assert_eq!((report.holes.n, report.open_edges.n), (1, 3));
     let corners = cube().indices[0..3].to_vec();
     let missing = corners

@@ -11,14 +11,15 @@ fn house() -> Value {
         "scene": 0,
         "scenes": [{ "nodes": [0], "extras": { "project": 7 } }],
         "nodes": [
-            { "name": "house", "children": [1, 4, 5, 6, 7], "scale": [2, 2, 2] },
+            { "name": "house", "children": [1, 4, 5, 6, 7, 8], "scale": [2, 2, 2] },
             { "name": "storey", "children": [2, 3], "extras": { "level": 1 } },
             { "name": "wall", "mesh": 0, "extras": { "fire": [60] } },
             { "mesh": 0 },
             { "name": "lamp", "translation": [1, 2, 3], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
             { "name": "entrance", "camera": 0 },
             { "name": "start", "translation": [4, 0, 0], "extras": { "team": 1 } },
-            { "name": "hidden", "extensions": { "KHR_lights_punctual": { "light": 3 } } }
+            { "name": "hidden", "extensions": { "KHR_lights_punctual": { "light": 3 } } },
+            { "translation": [9, 9, 9] }
         ],
         "meshes": [{ "name": "panel", "primitives": [{ "attributes": { "POSITION": 0 } }] }],
         "cameras": [{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 10.0 } }],

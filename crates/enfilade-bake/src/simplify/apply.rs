@@ -104,7 +104,7 @@ fn is_numbered(name: &str) -> bool {
 
 /// Batches under way: one for each list of cells, material and set of attributes, seals apart.
 #[derive(Default)]
-pub(crate) struct Batches(BTreeMap<BatchKey, (Primitive, Option<SourceRuns>)>);
+pub(crate) struct Batches(BTreeMap<BatchKey, (Primitive, SourceRuns)>);
 
 impl Batches {
     /// Adds triangles that `cells`, ascending, see. Where some of a batch have no known source, none has.
@@ -116,25 +116,22 @@ impl Batches {
         is_seal: bool,
     ) {
         let key = (is_seal, cells, primitive.material, layout_of(primitive));
-        let new = || (Primitive::default(), Some(SourceRuns::default()));
-        let (to, known) = self.0.entry(key).or_insert_with(new);
+        let (to, known) = self.0.entry(key).or_default();
         append(to, primitive);
-        match known {
-            _ if primitive.indices.is_empty() => {}
-            Some(known) if !sources.is_empty() => known.extend(sources),
-            _ => *known = None,
-        }
+        known.extend(sources);
     }
 
     /// The batches in order of cells, material and attributes, seals last.
     pub(crate) fn finish(self) -> Vec<Batch> {
         let batches = self.0.into_iter();
         let batch =
-            |((is_seal, cells, ..), (primitive, sources)): (BatchKey, (_, Option<_>))| Batch {
-                cells,
-                primitive,
-                sources: sources.unwrap_or_default(),
-                is_seal,
+            |((is_seal, cells, ..), (primitive, sources)): (BatchKey, (Primitive, SourceRuns))| {
+                Batch {
+                    cells,
+                    sources: sources.of_all(primitive.indices.len() / 3),
+                    primitive,
+                    is_seal,
+                }
             };
         batches.map(batch).collect()
     }

@@ -1,5 +1,6 @@
 //! The objects that a cell sees, by the names that the input has for them.
 
+use std::collections::BTreeSet;
 use std::io::Write;
 
 use anyhow::Context;
@@ -34,7 +35,7 @@ pub(super) fn write(
     json: bool,
 ) -> anyhow::Result<()> {
     let cell = cell_of(&world.graph, cell)?;
-    let is_detail = |source| world.details.iter().any(|d| d.source == Some(source));
+    let details: BTreeSet<u32> = world.details.iter().filter_map(|d| d.source).collect();
     let mut objects: Vec<Object<'_>> = world
         .sources_in(cell)
         .into_iter()
@@ -45,7 +46,7 @@ pub(super) fn write(
                 name: &node.name,
                 path: world.source_path(source),
                 triangles,
-                detail: is_detail(source),
+                detail: details.contains(&source),
                 extras: serde_json::from_str(&node.extras).ok(),
             }
         })

@@ -97,6 +97,9 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
     if placed.lights.is_some() {
         used.insert(LIGHTS.to_owned());
     }
+    for fixture in &world.fixtures {
+        add_extensions(&mut used, &fixture.gltf);
+    }
     let (textures, samplers) = lay_out_textures(world, &mut used);
     let images = lay_out_images(layout, world);
 

@@ -258,6 +258,7 @@ impl GltfReader<'_, '_, '_> {
         let starts = self.starts(&parents)?;
         let animated = self.animated_nodes();
         let is_joint = origin::joints(root);
+        origin::add_about(root, self.builder);
         let mut is_visited = vec![false; root.nodes.len()];
         let mut stack: Vec<Visit> = Vec::new();
         for &start in starts.iter().rev() {
@@ -336,7 +337,6 @@ impl GltfReader<'_, '_, '_> {
     fn starts(&mut self, parents: &[u32]) -> Result<Vec<usize>, ImportError> {
         let root = &self.document.root;
         if root.scenes.is_empty() {
-            origin::add_about(root, None, self.builder);
             let tops = (0..parents.len()).filter(|&i| parents[i] == u32::MAX);
             return Ok(tops.collect());
         }
@@ -350,7 +350,6 @@ impl GltfReader<'_, '_, '_> {
                 "several scenes; only the default one is read",
             );
         }
-        origin::add_about(root, Some(index), self.builder);
         Ok(scene.nodes.to_vec())
     }
 

@@ -25,7 +25,8 @@ pub(super) fn add_node(
     builder.add_source(&place, parent, name, text(node.extras.as_deref()))
 }
 
-/// Adds the light, the camera and the marker that a node places: a node without anything on or below it marks a place.
+/// Adds the light, the camera and the marker that a node places: a node with a name or extras and
+/// nothing on or below it marks a place.
 pub(super) fn add_fixtures(
     root: &Root,
     i: usize,
@@ -39,6 +40,7 @@ pub(super) fn add_fixtures(
         && node.camera.is_none()
         && node.mesh.is_none()
         && node.children.is_empty()
+        && (node.name.as_deref().is_some_and(|n| !n.is_empty()) || node.extras.is_some())
         && !is_joint;
     let lights = root.extensions.as_ref().and_then(|e| e.lights.as_ref());
     let light = light.map(|l| lights.and_then(|all| all.lights.get(l.light as usize)));
@@ -117,8 +119,8 @@ pub(super) fn text(extras: Option<&RawValue>) -> &str {
 }
 
 /// What the document says of itself as a whole.
-pub(super) fn add_about(root: &Root, scene: Option<usize>, builder: &mut Builder<'_>) {
+pub(super) fn add_about(root: &Root, builder: &mut Builder<'_>) {
     let copyright = root.asset.copyright.as_deref().unwrap_or("");
-    let scene = scene.and_then(|i| root.scenes.get(i));
+    let scene = root.scenes.get(root.scene.unwrap_or(0));
     builder.add_about(copyright, text(scene.and_then(|s| s.extras.as_deref())));
 }

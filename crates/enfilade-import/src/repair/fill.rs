@@ -26,6 +26,8 @@ pub(super) struct Filled {
     pub(super) n_left: u64,
     /// What was filled, one by one.
     pub(super) holes: Vec<Hole>,
+    /// There were steps left for all loops.
+    pub(super) is_complete: bool,
 }
 
 /// A loop of open edges that a surface could be continued across.
@@ -47,13 +49,17 @@ struct Loop {
     edges: Vec<Use>,
 }
 
-/// Fills each loop of open edges whose box has a diagonal of `size` at most. [Units: wu]
+/// Fills each loop of open edges whose box has a diagonal of `size` at most [Units: wu], while there are `steps` left: one for
+/// each three corners of a loop, in any order.
 ///
 /// Time: `n log n` for all triangles, and the cube of a loop's corners, of which it may have 128.
-pub(super) fn fill_holes(surface: &mut Surface, size: f64) -> Filled {
+pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Filled {
     let uses = surface.uses();
     let loops = loops(&uses, &open_of(&uses));
-    let mut filled = Filled::default();
+    let mut filled = Filled {
+        is_complete: true,
+        ..Filled::default()
+    };
     if loops.is_empty() {
         return filled;
     }
@@ -68,6 +74,15 @@ pub(super) fn fill_holes(surface: &mut Surface, size: f64) -> Filled {
             .iter()
             .fold(Aabb::EMPTY, |b, p| b.including(at(p)));
         let is_small = bounds.size().length() <= size && rim.points.len() <= MAX_CORNERS;
+        if is_small {
+            match steps.checked_sub((rim.points.len() as u64).pow(3)) {
+                Some(left) => steps = left,
+                None => {
+                    filled.is_complete = false;
+                    break;
+                }
+            }
+        }
         turn_against_faces(surface, &mut rim);
         let triangles = is_small
             .then(|| triangulated(surface, &rim.points, &edges))
@@ -390,4 +405,43 @@ fn add(surface: &mut Surface, rim: &Loop, triangles: &[[usize; 3]]) {
     }
     let object = surface.parts[part as usize].object;
     surface.is_changed[object as usize] = true;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::DMat4;
+    use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
+
+    /// A tetrahedron without its base: one loop of three corners.
+    fn open_tetrahedron() -> Surface {
+        let primitive = Primitive {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.3, 1.0, 0.3]],
+            indices: vec![0, 3, 1, 1, 3, 2, 2, 3, 0],
+            ..Primitive::default()
+        };
+        Surface::of_scene(&Scene {
+            meshes: vec![Mesh {
+                name: String::new(),
+                primitives: vec![primitive],
+            }],
+            objects: vec![Object {
+                name: String::new(),
+                mesh: 0,
+                transform: DMat4::IDENTITY,
+                role: Role::Structural,
+                reason: String::new(),
+                node: None,
+            }],
+            ..Scene::default()
+        })
+    }
+
+    #[test]
+    fn a_search_without_steps_left_ends_and_says_so() {
+        let all = fill_holes(&mut open_tetrahedron(), 10.0, 27);
+        assert_eq!((all.n_holes, all.is_complete), (1, true));
+        let none = fill_holes(&mut open_tetrahedron(), 10.0, 26);
+        assert_eq!((none.n_holes, none.is_complete), (0, false));
+    }
 }

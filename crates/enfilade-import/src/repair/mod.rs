@@ -180,15 +180,20 @@ pub fn repair(scene: &mut Scene, options: &RepairOptions) -> Result<RepairReport
     Ok(report)
 }
 
-/// Loops of open edges that a repair could fill, the largest first, as large as any may be. `n log n` for `n` triangles, with
-/// about 300 bytes a triangle.
-pub(crate) fn holes_of(scene: &Scene) -> Vec<Hole> {
+/// Steps that are spent on a look at holes: about three seconds.
+const STEPS_TO_LOOK: u64 = 1_000_000_000;
+
+/// Loops of open edges that a repair could fill, the largest first, as large as any may be, and whether all were looked at.
+/// `n log n` for `n` triangles and a bounded number of steps, with about 300 bytes a triangle.
+pub(crate) fn holes_of(scene: &Scene) -> (Vec<Hole>, bool) {
     if !scene.solids.is_empty() {
-        return Vec::new();
+        return (Vec::new(), true);
     }
-    let mut holes = fill::fill_holes(&mut Surface::of_scene(scene), LARGEST_HOLE).holes;
+    let mut surface = Surface::of_scene(scene);
+    let filled = fill::fill_holes(&mut surface, LARGEST_HOLE, STEPS_TO_LOOK);
+    let mut holes = filled.holes;
     holes.sort_by(|a, b| b.area.total_cmp(&a.area));
-    holes
+    (holes, filled.is_complete)
 }
 
 fn pass(surface: &mut Surface, options: &RepairOptions, report: &mut RepairReport) {
@@ -209,7 +214,7 @@ fn pass(surface: &mut Surface, options: &RepairOptions, report: &mut RepairRepor
     report.shells_outwards += turned.n_outwards;
     report.shells_rooms = turned.n_rooms;
     report.shells_one_sided = turned.n_one_sided;
-    let filled = fill::fill_holes(surface, options.hole);
+    let filled = fill::fill_holes(surface, options.hole, u64::MAX);
     report.filled_holes += filled.n_holes;
     report.filling_triangles += filled.n_triangles;
     report.open_rims = filled.n_left;
