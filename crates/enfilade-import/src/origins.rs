@@ -18,7 +18,7 @@ pub(crate) struct Origins {
 }
 
 impl Origins {
-    /// Adds a node below `parent` and gives its number; a node that says nothing is its parent.
+    /// Adds a node below `parent` and returns its number. A node without name and extras is left out: it returns `parent`.
     pub(crate) fn add(&mut self, parent: Option<u32>, name: &str, extras: &str) -> Option<u32> {
         if name.is_empty() && extras.is_empty() {
             return parent;
@@ -35,8 +35,8 @@ impl Origins {
         self.fixtures.push(fixture);
     }
 
-    /// Adds what one more file says of itself: a line of terms unless it is there, and what its scene carries if no file before
-    /// it had any. Whether something was left out.
+    /// Adds the copyright of one more file, as a line unless it is there already, and the extras of its scene if no file before it had
+    /// any. Returns whether extras were left out.
     pub(crate) fn add_about(&mut self, copyright: &str, extras: &str) -> bool {
         let known = &mut self.about.copyright;
         if !copyright.is_empty() && !known.lines().any(|l| l == copyright) {
@@ -52,7 +52,8 @@ impl Origins {
         !is_first && !extras.is_empty()
     }
 
-    /// Gives the scene its names: objects that no node made get one of their own, and what names nothing goes.
+    /// Hands everything to the scene. Objects without a node get one of their own name, and nodes with no object at or below them
+    /// are removed.
     pub(crate) fn move_into(mut self, scene: &mut Scene) {
         let entities = scene.entities.iter();
         let entity_of: HashMap<u32, &Entity> =

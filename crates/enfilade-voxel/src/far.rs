@@ -236,8 +236,8 @@ mod tests {
                     prop_assert_eq!(near[v], squared[v], "distance of voxel {}", v);
                 }
             }
-            // Blocks round distances, so what opens nearly as wide as it is itself may be outdoors: an alcove. A hall is
-            // not, whatever its blocks say.
+            // Blocks round distances. So an alcove, whose opening is nearly as wide as itself, may become outdoors; a hall,
+            // which is deeper than its way out by more than that rounding, must not.
             let halls = flooded(&voxels, squared.clone(), None, ROUNDED);
             let mut middles: BTreeMap<u32, usize> = BTreeMap::new();
             for v in (0..squared.len()).filter(|&v| halls.labels.get(v) > 1) {

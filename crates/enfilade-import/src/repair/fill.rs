@@ -49,8 +49,8 @@ struct Loop {
     edges: Vec<Use>,
 }
 
-/// Fills each loop of open edges whose box has a diagonal of `size` at most [Units: wu], while there are `steps` left: one for
-/// each three corners of a loop, in any order.
+/// Fills each loop of open edges whose box has a diagonal of `size` at most [Units: wu], while there are `steps` left: a
+/// loop of n corners takes n³.
 ///
 /// Time: `n log n` for all triangles, and the cube of a loop's corners, of which it may have 128.
 pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Filled {
