@@ -64,6 +64,8 @@ fn viewers_find_details_below_the_names_they_had_and_lights_once() {
     );
     let lights = &root["extensions"]["KHR_lights_punctual"]["lights"];
     assert_eq!(lights.as_array().unwrap().len(), 1);
+    let used = root["extensionsUsed"].as_array().unwrap();
+    assert!(used.contains(&"EXT_shutter".into()) && used.contains(&"KHR_lights_punctual".into()));
     let fixtures = below("fixtures");
     assert_eq!(fixtures.len(), 4);
     assert_eq!(fixtures[1]["camera"], 0);

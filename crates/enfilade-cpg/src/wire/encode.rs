@@ -94,12 +94,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         raw(text)
     });
     let materials = materials.collect();
-    if placed.lights.is_some() {
-        used.insert(LIGHTS.to_owned());
-    }
-    for fixture in &world.fixtures {
-        add_extensions(&mut used, &fixture.gltf);
-    }
+    add_fixture_extensions(&mut used, world);
     let (textures, samplers) = lay_out_textures(world, &mut used);
     let images = lay_out_images(layout, world);
 
@@ -371,6 +366,16 @@ fn lay_out_fixtures(world: &World, nodes: &mut Vec<json::Node>, top: &mut Vec<u3
         nodes: placed,
         lights: (!lights.is_empty()).then_some(json::Lights { lights }),
         cameras,
+    }
+}
+
+/// The extension of lights, and those that lights and cameras use.
+fn add_fixture_extensions(used: &mut BTreeSet<String>, world: &World) {
+    for fixture in &world.fixtures {
+        if fixture.kind == FixtureKind::Light {
+            used.insert(LIGHTS.to_owned());
+        }
+        add_extensions(used, &fixture.gltf);
     }
 }
 

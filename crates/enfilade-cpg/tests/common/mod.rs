@@ -138,7 +138,7 @@ pub(crate) fn two_rooms() -> World {
         extras: extras.into(),
     };
     let lamp = r#"{"color":[1,0.5,0.25],"intensity":40,"range":8,"type":"point"}"#;
-    let camera = r#"{"perspective":{"yfov":1,"znear":0.1},"type":"perspective"}"#;
+    let camera = r#"{"extensions":{"EXT_shutter":{}},"perspective":{"yfov":1,"znear":0.1},"type":"perspective"}"#;
     let turned = [
         0.0, 0.0, -2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 1.0,
     ];
