@@ -81,7 +81,7 @@ pub(crate) struct Render {
     /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     lod: f32,
-    /// No shadows and no dark corners: quicker.
+    /// No shadows, no dark corners, the same daylight everywhere: quicker.
     #[arg(long)]
     plain: bool,
     /// What draws: `best`, `gpu`, `software`, or part of a name.
@@ -193,6 +193,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     if args.lod > 0.0 {
         studio.add_levels(&world)?;
     }
+    if !args.plain || args.above || args.paint == Colors::Cells {
+        studio.add_light(&world)?;
+    }
     let style = Style {
         paint: match args.paint {
             Colors::Lit => Paint::Lit,
@@ -201,6 +204,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         },
         dark_corners: !args.plain,
         shadows: !args.plain,
+        daylight: !args.plain,
         cut_above: args.cut.unwrap_or(f32::INFINITY),
     };
     let mut out = outputs.printed();
@@ -377,7 +381,8 @@ pub(crate) fn above(
 ) -> anyhow::Result<Picture> {
     let aspect = size[0] as f32 / size[1] as f32;
     let view = camera.view(aspect.max(1.0))?;
-    let list = studio.explained(&view);
+    studio.add_light(world)?;
+    let list = studio.everything();
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let cut = cut.unwrap_or(camera.eye[1] + 0.5);
     let width = size[1] as f32 / 260.0;
@@ -443,6 +448,7 @@ pub(crate) fn above(
     let projection = Projection::parallel(center, toward, height, aspect, reach.max(50.0) * 2.0);
     let style = Style {
         shadows: false,
+        daylight: false,
         cut_above: cut,
         ..Style::default()
     };
@@ -453,7 +459,7 @@ pub(crate) fn above(
         style,
         marks: &marks,
     };
-    Ok(studio.picture_of(&frame, size)?)
+    Ok(studio.explained(&view, &frame, size)?)
 }
 
 /// Where a level plane cuts the structure.

@@ -10,7 +10,8 @@ pub enum Paint {
     /// As they look.
     #[default]
     Lit,
-    /// In the color of a cell that sees them.
+    /// In the color of the cell before them: by point where light [was added](crate::Studio::add_light), else each
+    /// triangle in the color of one that sees it.
     Cells,
     /// By how many times each pixel is drawn.
     Overdraw,
@@ -25,6 +26,9 @@ pub struct Style {
     pub dark_corners: bool,
     /// Whether the sun casts shadows; their picture is made with the first frame of a world.
     pub shadows: bool,
+    /// Whether each place has the light that reaches it, where that [was computed](crate::Studio::add_light); else all have
+    /// the same.
+    pub daylight: bool,
     /// What is higher is not drawn: a ceiling taken off. [Units: wu]
     pub cut_above: f32,
 }
@@ -35,6 +39,7 @@ impl Default for Style {
             paint: Paint::Lit,
             dark_corners: true,
             shadows: true,
+            daylight: true,
             cut_above: f32::INFINITY,
         }
     }

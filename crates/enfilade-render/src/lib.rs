@@ -6,15 +6,17 @@
 //!
 //! # What is not promised
 //!
-//! Looks are meant to be clear, not physical: base color, emission, alpha, one sun with shadows, sky
-//! light and dark corners. Metal, roughness and normal maps are not drawn.
+//! Looks are meant to be clear, not physical: base color, emission, alpha, one sun with shadows, daylight that comes
+//! through portals ([`Studio::add_light`]), dark corners, and glass. Metal, roughness and normal maps are not drawn.
 
 mod camera;
+mod explain;
 mod formats;
 mod frame;
 mod gpu;
 mod ids;
 mod levels;
+mod light;
 mod list;
 mod marks;
 mod materials;

@@ -10,7 +10,7 @@ use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
 pub(crate) struct Layouts {
-    /// Globals, shadow map and its sampler.
+    /// Globals; shadow map and its sampler; which cell points are in, and the light there.
     pub(crate) world: wgpu::BindGroupLayout,
     /// A base color texture.
     texture: wgpu::BindGroupLayout,
@@ -29,8 +29,10 @@ pub(crate) enum Shading {
     Textured,
     /// With holes.
     Masked,
-    /// Seen through.
+    /// A pane: seen through, and reflecting.
     Glass,
+    /// A picture that is seen through in parts: a leaf, a curtain.
+    Sheer,
     /// How many times each pixel is drawn.
     Count,
 }
@@ -41,6 +43,7 @@ pub(crate) struct Variant {
     pub(crate) shading: Shading,
     pub(crate) is_smooth: bool,
     pub(crate) casts_shadows: bool,
+    pub(crate) has_light: bool,
     pub(crate) explains: bool,
     /// Whether it draws to the output, or to what is made a picture of later.
     pub(crate) is_last: bool,
@@ -106,6 +109,15 @@ fn texture(binding: u32, sample_type: wgpu::TextureSampleType) -> wgpu::BindGrou
     entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
 }
 
+fn volume(binding: u32, sample_type: wgpu::TextureSampleType) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Texture {
+        sample_type,
+        view_dimension: wgpu::TextureViewDimension::D3,
+        multisampled: false,
+    };
+    entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
+}
+
 impl Layouts {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
@@ -116,6 +128,7 @@ impl Layouts {
                 })
         };
         let compare = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
+        let filtering = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let depth = wgpu::TextureSampleType::Depth;
         let unfiltered = wgpu::TextureSampleType::Float { filterable: false };
         Self {
@@ -125,6 +138,11 @@ impl Layouts {
                     uniform(0),
                     texture(1, depth),
                     entry(2, wgpu::ShaderStages::FRAGMENT, compare),
+                    texture(3, wgpu::TextureSampleType::Uint),
+                    volume(4, wgpu::TextureSampleType::Sint),
+                    volume(5, wgpu::TextureSampleType::Float { filterable: true }),
+                    entry(6, wgpu::ShaderStages::FRAGMENT, filtering),
+                    texture(7, wgpu::TextureSampleType::Uint),
                 ],
             ),
             texture: texture_layout(gpu),
@@ -246,7 +264,10 @@ impl Modules {
                     source: wgpu::ShaderSource::Wgsl(source.into()),
                 })
         };
-        let surface = module("surface", &[include_str!("shaders/surface.wgsl")]);
+        let sky = include_str!("shaders/sky.wgsl");
+        let light = include_str!("shaders/light.wgsl");
+        let surface = include_str!("shaders/surface.wgsl");
+        let surface = module("surface", &[sky, light, surface]);
         let corner = if gpu.fetches() {
             include_str!("shaders/ids_fetched.wgsl")
         } else {
@@ -254,7 +275,6 @@ impl Modules {
         };
         let ids = module("ids", &[include_str!("shaders/ids.wgsl"), corner]);
         let depth = module("depth", &[include_str!("shaders/depth.wgsl")]);
-        let sky = include_str!("shaders/sky.wgsl");
         let post = module("post", &[sky, include_str!("shaders/post.wgsl")]);
         let lines = module("lines", &[include_str!("shaders/lines.wgsl")]);
         Self {
@@ -383,7 +403,12 @@ impl Pipelines {
             Shading::Plain => ("plain", None, true),
             Shading::Textured => ("textured", None, true),
             Shading::Masked => ("masked", None, true),
-            Shading::Glass => ("glass", Some(wgpu::BlendState::ALPHA_BLENDING), false),
+            Shading::Glass => (
+                "glass",
+                Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                false,
+            ),
+            Shading::Sheer => ("sheer", Some(wgpu::BlendState::ALPHA_BLENDING), false),
             Shading::Count => {
                 let both = wgpu::BlendState {
                     color: add,
@@ -407,6 +432,7 @@ impl Pipelines {
                 depth: Some((writes, NEARER)),
                 constants: &[
                     ("CASTS_SHADOWS", number(variant.casts_shadows)),
+                    ("HAS_LIGHT", number(variant.has_light)),
                     ("IS_SMOOTH", number(variant.is_smooth)),
                     ("EXPLAINS", number(variant.explains)),
                 ],

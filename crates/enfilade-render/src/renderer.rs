@@ -8,6 +8,7 @@ use crate::camera::Projection;
 use crate::formats::{COLOR, DEPTH};
 use crate::frame::{Frame, Paint, Style};
 use crate::gpu::{Gpu, RenderError};
+use crate::light::{Light, LightGlobals};
 use crate::list::{DrawList, Run};
 use crate::marks::Mark;
 use crate::picture::Picture;
@@ -30,6 +31,7 @@ struct Globals {
     sun: [f32; 4],
     size: [f32; 4],
     style: [u32; 4],
+    light: LightGlobals,
 }
 
 /// What frames of one size are drawn to on their way.
@@ -53,13 +55,16 @@ pub struct Renderer {
     shadow_map: wgpu::TextureView,
     shadow_sampler: wgpu::Sampler,
     /// Direction to the sun.
-    sun: Vec3,
+    pub(crate) sun: Vec3,
+    /// What explains why things are seen or not, while it is asked for.
+    explanation: Option<wgpu::TextureView>,
     format: wgpu::TextureFormat,
 }
 
 /// A world's bind groups and the sun's picture of it.
 pub struct Stage {
     world: wgpu::BindGroup,
+    pub(crate) light: Light,
     shadow_from_world: Mat4,
     /// Of a texel of the shadow map. [Units: wu]
     texel: f32,
@@ -107,6 +112,7 @@ impl Renderer {
             shadow_map: shadow_map.create_view(&wgpu::TextureViewDescriptor::default()),
             shadow_sampler,
             sun: Vec3::new(0.45, 0.75, 0.32).normalize(),
+            explanation: None,
             format,
         }
     }
@@ -116,30 +122,62 @@ impl Renderer {
     }
 
     /// Makes a world ready to be drawn by this renderer: bind groups, and what the sun sees.
-    /// `everything` is the list of all. One world at a time: the sun's picture is of the last.
-    pub fn set_stage(&mut self, gpu: &Gpu, world: &GpuWorld, everything: &DrawList) -> Stage {
+    /// `everything` is the list of all, `light` what falls where. One world at a time: the sun's picture is of the
+    /// last.
+    pub(crate) fn set_stage(
+        &mut self,
+        gpu: &Gpu,
+        world: &GpuWorld,
+        light: Light,
+        everything: &DrawList,
+    ) -> Stage {
         let (shadow_from_world, texel) = self.sun_view(world);
         let stage = Stage {
-            world: gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("world"),
-                layout: &self.layouts.world,
-                entries: &[
-                    bound(0, &self.globals),
-                    wgpu::BindGroupEntry {
-                        binding: 1,
-                        resource: wgpu::BindingResource::TextureView(&self.shadow_map),
-                    },
-                    wgpu::BindGroupEntry {
-                        binding: 2,
-                        resource: wgpu::BindingResource::Sampler(&self.shadow_sampler),
-                    },
-                ],
-            }),
+            world: self.world_group(gpu, &light),
+            light,
             shadow_from_world,
             texel,
         };
         self.draw_shadows(gpu, world, &stage, everything);
         stage
+    }
+
+    fn world_group(&self, gpu: &Gpu, light: &Light) -> wgpu::BindGroup {
+        let view = |binding, view| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view),
+        };
+        let sampler = |binding, sampler| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::Sampler(sampler),
+        };
+        // A table of the same kind, which nobody looks at, where nothing is explained.
+        let explanation = self.explanation.as_ref().unwrap_or(&light.table);
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("world"),
+            layout: &self.layouts.world,
+            entries: &[
+                bound(0, &self.globals),
+                view(1, &self.shadow_map),
+                sampler(2, &self.shadow_sampler),
+                view(3, &light.table),
+                view(4, &light.starts),
+                view(5, &light.probes),
+                sampler(6, &light.sampler),
+                view(7, explanation),
+            ],
+        })
+    }
+
+    /// From now on, surfaces are colored by why they are seen or not; `None` ends that.
+    pub(crate) fn explain(
+        &mut self,
+        gpu: &Gpu,
+        stage: &mut Stage,
+        explanation: Option<wgpu::TextureView>,
+    ) {
+        self.explanation = explanation;
+        stage.world = self.world_group(gpu, &stage.light);
     }
 
     /// Parallel light over the whole world.
@@ -214,7 +252,13 @@ impl Renderer {
                 .to_array(),
             sun: self.sun.extend(stage.texel).to_array(),
             size: [w, h, 1.0 / w, 1.0 / h],
-            style: [u32::from(style.paint == Paint::Cells), 0, 0, 0],
+            style: [
+                u32::from(style.paint == Paint::Cells),
+                u32::from(self.explanation.is_some()),
+                0,
+                0,
+            ],
+            light: stage.light.globals(projection.origin),
         };
         gpu.queue
             .write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
@@ -280,7 +324,7 @@ impl Renderer {
         self.write_instances(gpu, world, list);
         let marks = self.write_marks(gpu, world, frame, size);
         let globals = self.globals_group(gpu);
-        let shadings = Shadings::of(frame);
+        let shadings = Shadings::of(frame, stage.light.is_known(), self.explanation.is_some());
         shadings.prepare(gpu, &self.layouts, &mut self.pipelines, list);
         let mut encoder = gpu
             .device

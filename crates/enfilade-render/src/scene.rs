@@ -22,6 +22,7 @@ use placed::{Placed, bounds_of, placed};
 use textures::load_textures;
 
 pub use color::cell_color;
+pub(crate) use color::packed_cell_color;
 pub(crate) use filling::{CORNER_LAYOUT, Finish};
 pub(crate) use placed::{INSTANCE_LAYOUT, Instance};
 pub(crate) use textures::texture_layout;

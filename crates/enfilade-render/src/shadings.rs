@@ -18,13 +18,15 @@ pub(crate) struct Shadings {
     pub(crate) is_count: bool,
     pub(crate) is_last: bool,
     casts_shadows: bool,
+    /// Whether light is known by place.
+    has_light: bool,
     explains: bool,
     /// A cut makes holes in everything.
     has_cut: bool,
 }
 
 impl Shadings {
-    pub(crate) fn of(frame: &Frame<'_>) -> Self {
+    pub(crate) fn of(frame: &Frame<'_>, knows_places: bool, has_explanation: bool) -> Self {
         let style = &frame.style;
         let is_count = style.paint == Paint::Overdraw;
         let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
@@ -32,7 +34,10 @@ impl Shadings {
             is_count,
             is_last: !is_count && !style.dark_corners,
             casts_shadows: style.shadows,
-            explains: style.paint == Paint::Cells || frame.list.instances.iter().any(is_reasoned),
+            has_light: style.daylight && knows_places,
+            explains: has_explanation
+                || style.paint == Paint::Cells
+                || frame.list.instances.iter().any(is_reasoned),
             has_cut: style.cut_above < f32::INFINITY,
         }
     }
@@ -43,6 +48,7 @@ impl Shadings {
                 shading: Shading::Count,
                 is_smooth: false,
                 casts_shadows: false,
+                has_light: false,
                 explains: false,
                 is_last: false,
             };
@@ -51,6 +57,7 @@ impl Shadings {
             shading,
             is_smooth,
             casts_shadows: self.casts_shadows,
+            has_light: self.has_light,
             explains: self.explains,
             is_last,
         }
@@ -66,7 +73,13 @@ impl Shadings {
     }
 
     pub(crate) fn glass(&self, run: &Run) -> Variant {
-        self.variant(Shading::Glass, run.is_smooth, true)
+        // A picture that is seen through is a leaf or a curtain, no pane.
+        let shading = if run.finish == Finish::Plain {
+            Shading::Glass
+        } else {
+            Shading::Sheer
+        };
+        self.variant(shading, run.is_smooth, true)
     }
 
     /// Makes those that a list needs.

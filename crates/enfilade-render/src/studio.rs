@@ -4,9 +4,11 @@ use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
 
 use crate::camera::Camera;
+use crate::explain::Explanation;
 use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::ids::IdPicture;
+use crate::light::{Light, sun_of};
 use crate::list::{DrawList, Lister, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
@@ -73,9 +75,11 @@ impl Studio {
         let sight = Sight::build(world)?;
         let on_gpu = GpuWorld::load(&gpu, world, &sight)?;
         let mut renderer = Renderer::with_format(&gpu, format);
+        renderer.sun = sun_of(world);
         let mut lister = Lister::new();
         let all = lister.everything(&on_gpu, &sight, [0.0; 3]);
-        let stage = renderer.set_stage(&gpu, &on_gpu, all);
+        let light = Light::uniform(&gpu)?;
+        let stage = renderer.set_stage(&gpu, &on_gpu, light, all);
         Ok(Self {
             state: SightState::new(&sight),
             viewer: Viewer::new(&sight),
@@ -96,9 +100,35 @@ impl Studio {
     /// As [`Studio::new`].
     pub fn add_levels(&mut self, world: &World) -> Result<(), RenderError> {
         self.world = GpuWorld::load_with_levels(&self.gpu, world, &self.sight)?;
+        let light = if self.stage.light.is_known() {
+            self.light_of(world)?
+        } else {
+            Light::uniform(&self.gpu)?
+        };
         let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
-        self.stage = self.renderer.set_stage(&self.gpu, &self.world, all);
+        self.stage = self.renderer.set_stage(&self.gpu, &self.world, light, all);
         Ok(())
+    }
+
+    /// Computes which light falls where: daylight through portals, from room to room. `world` is the one that the studio
+    /// was made of. Without it, all rooms are lit alike. Takes a second at most for a world of a thousand rooms; once is
+    /// enough.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::new`].
+    pub fn add_light(&mut self, world: &World) -> Result<(), RenderError> {
+        if self.stage.light.is_known() {
+            return Ok(());
+        }
+        let light = self.light_of(world)?;
+        let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
+        self.stage = (self.renderer).set_stage(&self.gpu, &self.world, light, all);
+        Ok(())
+    }
+
+    fn light_of(&self, world: &World) -> Result<Light, RenderError> {
+        Light::of_world(&self.gpu, world, &self.sight, self.renderer.sun)
     }
 
     /// What is drawn of a view.
@@ -297,44 +327,42 @@ impl Studio {
             .ids(&self.gpu, &self.world, &self.stage, &projection, list, size)
     }
 
-    /// Chunks and details colored by why they are drawn, for pictures that explain what is culled.
-    pub fn explained(&mut self, view: &View) -> DrawList {
-        use crate::list::Reason;
-        use std::collections::BTreeSet;
-        let sets = |seen: enfilade_runtime::Seen<'_>| -> [BTreeSet<u32>; 2] {
-            [
-                seen.chunks().iter().map(|c| c.0).collect(),
-                seen.details().iter().map(|d| d.0).collect(),
-            ]
-        };
-        let occlusion = self.viewer.options_mut().occlusion;
-        self.viewer.options_mut().occlusion = true;
-        let seen = sets(self.viewer.see(&self.sight, &self.state, view));
-        self.viewer.options_mut().occlusion = false;
-        let behind = sets(self.viewer.see(&self.sight, &self.state, view));
-        self.viewer.options_mut().occlusion = occlusion;
-        let in_view = sets(self.viewer.see_through_walls(&self.sight, view));
-        let all = [
-            (0..self.world.chunks.len() as u32).collect(),
-            (0..self.world.details.len() as u32).collect(),
-        ];
-        let none = [BTreeSet::new(), BTreeSet::new()];
-        let mut out = DrawList::default();
-        let steps = [
-            (Reason::Seen, &seen, &none),
-            (Reason::Occluded, &behind, &seen),
-            (Reason::BehindWalls, &in_view, &behind),
-            (Reason::OutOfView, &all, &in_view),
-        ];
-        for (reason, these, without) in steps {
-            let left = |k: usize| these[k].iter().filter(move |i| !without[k].contains(i));
-            let chunks = left(0).map(|&c| enfilade_runtime::ChunkId(c));
-            let details = left(1).map(|&d| enfilade_runtime::DetailId(d));
-            let list = self
-                .lister
-                .chosen(&self.world, &self.sight, chunks, details, reason);
-            out.append(list);
+    /// A picture of everything that `projection` shows, colored by why each point is seen from another camera's view or is
+    /// not: what is seen looks as it does, what is out of view is dark, what walls hide is red, what a large polygon
+    /// hides is orange; solid matter, where it is cut, is black.
+    ///
+    /// Needs [`Studio::add_light`], which tells which cell a point is in; without it, the picture explains nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::picture_of`].
+    pub fn explained(
+        &mut self,
+        view: &View,
+        frame: &Frame<'_>,
+        size: [u32; 2],
+    ) -> Result<Picture, RenderError> {
+        if self.stage.light.is_known() {
+            let explanation = Explanation::new(
+                &mut self.viewer,
+                &self.sight,
+                &self.state,
+                view,
+                self.stage.light.origin(),
+            );
+            let table = explanation.table(&self.gpu)?;
+            self.renderer
+                .explain(&self.gpu, &mut self.stage, Some(table));
         }
-        out
+        let picture = self.picture_of(frame, size);
+        self.renderer.explain(&self.gpu, &mut self.stage, None);
+        picture
+    }
+
+    /// The list of all that there is.
+    pub fn everything(&mut self) -> DrawList {
+        (self.lister)
+            .everything(&self.world, &self.sight, [0.0; 3])
+            .clone()
     }
 }

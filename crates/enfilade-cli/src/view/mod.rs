@@ -421,6 +421,7 @@ impl Open {
             paint: self.shown.paint,
             dark_corners: !self.shown.plain,
             shadows: !self.shown.plain,
+            daylight: !self.shown.plain,
             ..Style::default()
         }
     }

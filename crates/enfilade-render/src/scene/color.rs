@@ -18,6 +18,11 @@ pub(super) fn packed(c: [f32; 3]) -> u32 {
     r | g << 8 | b << 16 | 0xff << 24
 }
 
+/// The same as a shader unpacks it.
+pub(crate) fn packed_cell_color(cell: CellId) -> u32 {
+    packed(cell_color(cell))
+}
+
 pub(super) fn color_of(cells: &[CellId]) -> u32 {
     packed(cells.first().map_or([0.35; 3], |&c| cell_color(c)))
 }

@@ -13,8 +13,14 @@ struct Globals {
     sun: vec4<f32>,
     // Width, height, 1 / width, 1 / height.
     size: vec4<f32>,
-    // x: 1 where surfaces are painted by cell.
+    // x: 1 where surfaces are painted by cell; y: 1 where it is explained why they are seen.
     style: vec4<u32>,
+    // As in `light.rs`: from relative points to those of the field.
+    field_shift: vec4<f32>,
+    starts_low: vec4<f32>,
+    starts_density: vec4<f32>,
+    // Outside; where cells begin in the table; 1 where there is a field; number of cells.
+    light: vec4<i32>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;

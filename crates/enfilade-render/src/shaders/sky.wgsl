@@ -13,15 +13,19 @@ fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
     return q.xyz / q.w;
 }
 
-fn sky(p: vec2<i32>) -> vec3<f32> {
-    if globals.eye.w > 0.5 {
-        return vec3(0.93, 0.94, 0.96);
-    }
-    let ray = normalize(point_at(p, 0.5));
+// What is seen of the sky, and of the ground far below, along a line.
+fn sky_along(ray: vec3<f32>) -> vec3<f32> {
     let t = clamp(ray.y, -0.15, 1.0);
     let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.52, 0.52, 0.50), min(-t / 0.12, 1.0));
     let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
     return select(above, below, t < 0.0);
+}
+
+fn sky(p: vec2<i32>) -> vec3<f32> {
+    if globals.eye.w > 0.5 {
+        return vec3(0.93, 0.94, 0.96);
+    }
+    return sky_along(normalize(point_at(p, 0.5)));
 }
 
 @fragment

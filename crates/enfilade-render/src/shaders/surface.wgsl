@@ -5,6 +5,8 @@
 // than all else. For the same reason whatever is the same along a surface comes with its corners.
 
 override CASTS_SHADOWS: bool = false;
+// Whether the light of each place is known.
+override HAS_LIGHT: bool = false;
 // Whether corners have normals.
 override IS_SMOOTH: bool = false;
 // Whether cells, or the reasons why something is drawn, may give the color.
@@ -91,7 +93,16 @@ fn sunlit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     return lit / 9.0;
 }
 
-fn shaded(in: Surface, texel: vec4<f32>) -> vec4<f32> {
+// What a surface sends to the eye, and what it takes to add a reflection.
+struct Shaded {
+    color: vec4<f32>,
+    normal: vec3<f32>,
+    toward_eye: vec3<f32>,
+    // The cell before it, or -1.
+    cell: i32,
+}
+
+fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     // From an eye at the camera's place, or along parallel lines.
     let eye = (globals.eye.xyz - globals.origin.xyz) - in.relative * (1.0 - globals.eye.w);
     let toward_eye = normalize(eye);
@@ -108,27 +119,39 @@ fn shaded(in: Surface, texel: vec4<f32>) -> vec4<f32> {
 
     var base = in.color * texel;
     var emissive = in.emissive.rgb;
+    var cell = -1;
+    let place = in.relative + globals.field_shift.xyz;
+    if HAS_LIGHT || EXPLAINS {
+        if globals.light.z != 0 {
+            cell = cell_before(place, normal, toward_eye);
+        }
+    }
     if EXPLAINS {
-        let reason = in.explained.y;
+        var reason = in.explained.y;
+        if globals.style.y != 0u { reason = reason_of(cell, place); }
         if globals.style.x != 0u || reason != 0u {
-            base = vec4(unpacked(in.explained.x), base.a);
+            var color = in.explained.x;
+            if cell >= 0 { color = color_of_cell(cell); }
+            base = vec4(unpacked(color), base.a);
             emissive = vec3(0.0);
-            // Why it is not drawn: out of view, behind no open portals, behind an occluder.
+            // Why it is not seen: out of view, behind no open portals, behind an occluder; or no surface of a room.
             if reason == 1u { base = vec4(0.10, 0.10, 0.11, base.a); }
             if reason == 2u { base = vec4(0.42, 0.10, 0.07, base.a); }
             if reason == 3u { base = vec4(0.62, 0.36, 0.05, base.a); }
+            if reason == 4u { base = vec4(0.015, 0.015, 0.018, base.a); }
         }
     }
-    // The sky above, the ground's reflection below; walls by where they face, so that corners show.
-    let up = normal.y * 0.5 + 0.5;
-    let ambient = mix(vec3(0.30, 0.28, 0.26), vec3(0.50, 0.54, 0.60), up)
-        * (0.90 + 0.10 * normal.x - 0.06 * normal.z);
+    // Flat light, which shows what faces the eye; or what falls there.
+    var ambient = open_light(normal) + vec3(0.16 * facing);
+    if HAS_LIGHT {
+        ambient = light_in(cell, place, normal) + vec3(0.05 * facing);
+    }
     var sun = max(dot(normal, globals.sun.xyz), 0.0);
     if CASTS_SHADOWS {
         sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
-    let light = ambient + vec3(0.16 * facing) + vec3(1.25, 1.13, 0.92) * sun;
-    return vec4(base.rgb * light + emissive, base.a);
+    let light = ambient + vec3(1.25, 1.13, 0.92) * sun;
+    return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
 }
 
 // Bright is compressed rather than cut off.
@@ -151,19 +174,19 @@ fn cut(in: Surface, texel: vec4<f32>) {
 
 @fragment
 fn plain(in: Surface) -> Drawn {
-    return drawn(in.clip, vec4(toned(shaded(in, vec4(1.0)).rgb), 1.0));
+    return drawn(in.clip, vec4(toned(shaded(in, vec4(1.0)).color.rgb), 1.0));
 }
 
 @fragment
 fn textured(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
-    return drawn(in.clip, vec4(toned(shaded(in, texel).rgb), 1.0));
+    return drawn(in.clip, vec4(toned(shaded(in, texel).color.rgb), 1.0));
 }
 
 @fragment
 fn masked(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
-    let c = shaded(in, texel);
+    let c = shaded(in, texel).color;
     cut(in, texel);
     return drawn(in.clip, vec4(toned(c.rgb), 1.0));
 }
@@ -171,7 +194,30 @@ fn masked(in: Surface) -> Drawn {
 @fragment
 fn glass(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
-    let c = shaded(in, texel);
+    let s = shaded(in, texel);
+    cut(in, texel);
+    // Schlick, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), of glass with two faces.
+    let grazing = 1.0 - abs(dot(s.normal, s.toward_eye));
+    let mirror = 0.08 + 0.92 * pow(grazing, 5.0);
+    // Outdoors the sky is reflected, or the ground; indoors the room.
+    let along = reflect(-s.toward_eye, s.normal);
+    var around = sky_along(along);
+    if HAS_LIGHT {
+        let place = in.relative + globals.field_shift.xyz;
+        if s.cell >= 0 && entry(globals.light.y + s.cell * CELL_TEXELS).w == 0u {
+            around = 0.7 * light_in(s.cell, place, along);
+        }
+    }
+    // A pane's own color is thin: what is behind it shows, mostly.
+    let alpha = s.color.a * 0.6;
+    let body = toned(s.color.rgb) * alpha * (1.0 - mirror);
+    return drawn(in.clip, vec4(body + around * mirror, alpha + (1.0 - alpha) * mirror));
+}
+
+@fragment
+fn sheer(in: Surface) -> Drawn {
+    let texel = textureSample(base_texture, base_sampler, in.uv);
+    let c = shaded(in, texel).color;
     cut(in, texel);
     return drawn(in.clip, vec4(toned(c.rgb), c.a));
 }

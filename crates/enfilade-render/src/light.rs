@@ -1,0 +1,219 @@
+//! The light of a world by place: which cell a point is in, and what light the air there holds.
+//!
+//! Both are functions of the point alone, so that what is culled has no say in how the rest looks, and a floor that reaches
+//! through five rooms is lit, and painted, by each of them up to its borders.
+
+mod balance;
+mod field;
+mod form;
+mod probes;
+
+use enfilade_cpg::World;
+use enfilade_runtime::Sight;
+use glam::{DVec3, UVec3, Vec3};
+use wgpu::util::DeviceExt;
+
+use crate::gpu::{Gpu, RenderError};
+use crate::scene::packed_cell_color;
+use field::Field;
+use probes::Probes;
+
+pub(crate) use balance::sun_of;
+
+/// Texels in a row of a table: a shader knows it, too.
+const ROW: u32 = 1024;
+/// Texels of a cell in the table.
+const CELL_TEXELS: usize = 4;
+
+/// What a shader needs to know besides the textures. As in `common.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct LightGlobals {
+    /// From the camera's place to the field's: added to relative points.
+    pub(crate) shift: [f32; 4],
+    low: [f32; 4],
+    density: [f32; 4],
+    /// What stands for outside, where cells begin in the table, whether there is a field, number of cells.
+    info: [i32; 4],
+}
+
+/// The light of a world on the adapter.
+pub(crate) struct Light {
+    origin: DVec3,
+    globals: LightGlobals,
+    pub(crate) table: wgpu::TextureView,
+    pub(crate) starts: wgpu::TextureView,
+    pub(crate) probes: wgpu::TextureView,
+    pub(crate) sampler: wgpu::Sampler,
+}
+
+fn volume(
+    gpu: &Gpu,
+    label: &str,
+    size: UVec3,
+    format: wgpu::TextureFormat,
+    bytes: &[u8],
+) -> wgpu::TextureView {
+    let texture = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: size.x,
+                height: size.y,
+                depth_or_array_layers: size.z,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D3,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::LayerMajor,
+        bytes,
+    );
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// Words that a shader looks up by number, four to a texel.
+pub(crate) fn table(
+    gpu: &Gpu,
+    what: &'static str,
+    texels: &[[u32; 4]],
+) -> Result<wgpu::TextureView, RenderError> {
+    let rows = (texels.len() as u32).div_ceil(ROW).max(1);
+    Gpu::check(what, rows.into(), gpu.device.limits().max_texture_dimension_2d)?;
+    let mut texels = texels.to_vec();
+    texels.resize((rows * ROW) as usize, [0; 4]);
+    let texture = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some(what),
+            size: wgpu::Extent3d {
+                width: ROW,
+                height: rows,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Uint,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::LayerMajor,
+        bytemuck::cast_slice(&texels),
+    );
+    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+}
+
+impl Light {
+    fn new(
+        gpu: &Gpu,
+        field: &Field,
+        (texels, first_cell, n_cells): (&[[u32; 4]], usize, usize),
+        probes: &Probes,
+        has_field: bool,
+    ) -> Result<Self, RenderError> {
+        let linear = wgpu::FilterMode::Linear;
+        Ok(Self {
+            origin: field.origin,
+            globals: LightGlobals {
+                shift: [0.0; 4],
+                low: field.low.extend(0.0).to_array(),
+                density: field.density.extend(0.0).to_array(),
+                info: [
+                    field.outside,
+                    first_cell as i32,
+                    i32::from(has_field),
+                    n_cells as i32,
+                ],
+            },
+            table: table(gpu, "the locator's tree", texels)?,
+            starts: volume(
+                gpu,
+                "where to begin in the locator",
+                field.n,
+                wgpu::TextureFormat::R32Sint,
+                bytemuck::cast_slice(&field.starts),
+            ),
+            probes: volume(
+                gpu,
+                "light",
+                probes.size,
+                wgpu::TextureFormat::Rgb9e5Ufloat,
+                bytemuck::cast_slice(&probes.texels),
+            ),
+            sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                mag_filter: linear,
+                min_filter: linear,
+                ..wgpu::SamplerDescriptor::default()
+            }),
+        })
+    }
+
+    /// All places alike, until the light of a world is [computed](Light::of_world).
+    pub(crate) fn uniform(gpu: &Gpu) -> Result<Self, RenderError> {
+        let field = Field::build(&enfilade_cpg::Locator::default(), 1);
+        let probes = Probes {
+            grids: Vec::new(),
+            size: UVec3::ONE,
+            texels: vec![0],
+        };
+        Self::new(gpu, &field, (&[], 0, 0), &probes, false)
+    }
+
+    /// The light of a world, under a sun in direction `sun`.
+    pub(crate) fn of_world(
+        gpu: &Gpu,
+        world: &World,
+        sight: &Sight,
+        sun: Vec3,
+    ) -> Result<Self, RenderError> {
+        // Larger boxes of texels save nothing.
+        let side = gpu.device.limits().max_texture_dimension_3d.min(512);
+        let field = Field::build(&world.graph.locator, side);
+        let probes = Probes::build(world, sight, sun, side);
+        let mut texels = field.nodes.clone();
+        let first = texels.len();
+        for (id, (cell, grid)) in (0..).zip(world.graph.cells.iter().zip(&probes.grids)) {
+            let words = |v: Vec3, w: u32| [v.x.to_bits(), v.y.to_bits(), v.z.to_bits(), w];
+            let color = packed_cell_color(enfilade_cpg::CellId(id));
+            let entry: [[u32; 4]; CELL_TEXELS] = match grid {
+                Some(g) => {
+                    let low = (g.low.as_dvec3() - field.origin).as_vec3();
+                    [
+                        words(low, u32::from(cell.outdoor)),
+                        words(g.density, color),
+                        words(g.n.as_vec3(), 0),
+                        words(g.at.as_vec3(), 0),
+                    ]
+                }
+                None => [[0, 0, 0, 1], [0, 0, 0, color], [0; 4], [0; 4]],
+            };
+            texels.extend(entry);
+        }
+        let n_cells = world.graph.cells.len();
+        Self::new(gpu, &field, (&texels, first, n_cells), &probes, true)
+    }
+
+    /// What the shader needs to know, for a camera at `origin`.
+    pub(crate) fn globals(&self, origin: Vec3) -> LightGlobals {
+        let shift = (origin.as_dvec3() - self.origin).as_vec3();
+        LightGlobals {
+            shift: shift.extend(0.0).to_array(),
+            ..self.globals
+        }
+    }
+
+    /// What points of the field are relative to. [Units: wu]
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Whether it is that of a world.
+    pub(crate) fn is_known(&self) -> bool {
+        self.globals.info[2] != 0
+    }
+}

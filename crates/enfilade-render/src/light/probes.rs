@@ -1,0 +1,331 @@
+//! Light in the air of each cell, at the points of a grid: what would fall there on a surface that faces one of six ways.
+//!
+//! Probes stand in boxes, one for each cell, so that no light leaks through a wall however thin. A probe's light is what it
+//! sees through portals, by exact [form factors](super::form), through up to three portals in a row as a view is narrowed,
+//! and the light of the [walls](super::balance) all around. Six colors to a probe are the ambient cube of McTaggart, "Half-Life
+//! 2 / Valve Source Shading" (GDC 2004). What is shown is a power of it, as eyes adapt: Stevens, "To Honor Fechner and Repeal
+//! His Law" (Science 133, 1961); so that a cellar and a winter garden may be in one picture.
+
+use enfilade_cpg::{CellId, World};
+use enfilade_runtime::{Sight, Sightlines};
+use glam::{UVec3, Vec3};
+
+use super::balance::{Balance, GROUND, Hole, SKY, balance, holes, is_clear, spread};
+use super::form::{Polygon, clip_into, clip_through, form_factor};
+
+/// Between probes. [Units: wu]
+const SPACING: f32 = 0.7;
+/// Most probes of a cell along each axis: a hall has no more.
+const MOST: [u32; 3] = [14, 4, 14];
+/// Most probes in all; where there were more, they stand farther apart.
+const MOST_IN_ALL: u64 = 30_000;
+/// A portal behind a portal is looked through where it gives so large a share of the light at least.
+const WORTH: f32 = 0.004;
+/// Brightness over light, as an exponent.
+const ADAPTATION: f32 = 0.5;
+/// Of a surface under the open sky.
+const BRIGHTEST: f32 = 0.78;
+
+/// The six ways that surfaces may face, in the order of the slabs of a box.
+const WAYS: [Vec3; 6] = [
+    Vec3::X,
+    Vec3::NEG_X,
+    Vec3::Y,
+    Vec3::NEG_Y,
+    Vec3::Z,
+    Vec3::NEG_Z,
+];
+
+/// The probes of one cell: a box of texels, six slabs above each other, one for each way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    /// Least corner of the space it stands for. [Units: wu]
+    pub(super) low: Vec3,
+    /// Probes in a meter.
+    pub(super) density: Vec3,
+    /// Probes along each axis.
+    pub(super) n: UVec3,
+    /// Where its first texel is.
+    pub(super) at: UVec3,
+}
+
+/// The probes of a world.
+pub(super) struct Probes {
+    /// By cell; none outdoors.
+    pub(super) grids: Vec<Option<Grid>>,
+    /// Texels along each axis.
+    pub(super) size: UVec3,
+    /// Shared-exponent colors, x fastest, then y.
+    pub(super) texels: Vec<u32>,
+}
+
+/// Where probes stand: at most `side` texels along each axis.
+fn grids(world: &World, side: u32) -> (Vec<Option<Grid>>, UVec3) {
+    let mut spacing = SPACING;
+    loop {
+        let mut out = Vec::new();
+        let (mut x, mut z, mut row, mut n_all) = (0, 0, 0, 0);
+        let mut size = UVec3::ONE;
+        for cell in &world.graph.cells {
+            let [low, high] = cell.aabb.map(Vec3::from);
+            let extent = high - low;
+            if cell.outdoor || !extent.is_finite() {
+                out.push(None);
+                continue;
+            }
+            let n = |k: usize| ((extent[k] / spacing).round() as u32).clamp(1, MOST[k]);
+            let n = UVec3::new(n(0), n(1), n(2));
+            if x + n.x > side {
+                (x, z, row) = (0, z + row, 0);
+            }
+            out.push(Some(Grid {
+                low,
+                density: n.as_vec3() / extent.max(Vec3::splat(1e-3)),
+                n,
+                at: UVec3::new(x, 0, z),
+            }));
+            x += n.x;
+            row = row.max(n.z);
+            n_all += u64::from(n.x * n.y * n.z);
+            size = size.max(UVec3::new(x, 6 * n.y, z + row));
+        }
+        // One to a cell is the least there can be.
+        if (n_all <= MOST_IN_ALL && size.max_element() <= side) || spacing > 1e6 {
+            return (out, size);
+        }
+        spacing *= 1.4;
+    }
+}
+
+/// What is asked about while probes are computed.
+struct Room<'a> {
+    world: &'a World,
+    lines: &'a Sightlines,
+    holes: &'a [Hole],
+    balance: &'a Balance,
+}
+
+/// Light that falls on six surfaces, and the share of all they see that it came from.
+#[derive(Clone, Copy, Default)]
+struct Falling {
+    light: [Vec3; 6],
+    share: [f32; 6],
+}
+
+impl Room<'_> {
+    /// Adds what comes through the portals of `cell` to the point `p`, as far as `through` shows them.
+    fn add(
+        &self,
+        out: &mut Falling,
+        p: Vec3,
+        cell: CellId,
+        through: Option<(&[Vec3], f32)>,
+        path: &mut Vec<u32>,
+    ) {
+        for portal in &self.world.graph[cell].portals {
+            let hole = &self.holes[portal.idx()];
+            if path.contains(&portal.0) || hole.pieces.is_empty() {
+                continue;
+            }
+            // Portals are looked at from their cell's side.
+            let side = if hole.cells[0] == cell { 1.0 } else { -1.0 };
+            let ahead = hole.normal * side;
+            if ahead.dot(hole.pieces[0][0] - p) <= 1e-4 {
+                continue;
+            }
+            for piece in &hole.pieces {
+                let mut seen: Polygon = piece.iter().map(|&q| q - p).collect();
+                let mut passes = hole.passes;
+                if let Some((window, before)) = through {
+                    seen = clip_through(&seen, window);
+                    passes *= before;
+                }
+                if seen.len() >= 3 {
+                    let clear = self.clear_share(p, &seen, path.is_empty());
+                    self.add_seen(out, p, (cell, portal.0), &seen, passes * clear, path);
+                }
+            }
+        }
+    }
+
+    /// The share of a polygon that nothing of the structure hides; of portals behind portals, all of it: they are
+    /// clipped by what is seen, and rays are dear.
+    fn clear_share(&self, p: Vec3, seen: &[Vec3], is_near: bool) -> f32 {
+        if !is_near {
+            return 1.0;
+        }
+        let (mut n, mut clear) = (0_u32, 0_u32);
+        for q in spread(seen) {
+            n += 1;
+            clear += u32::from(is_clear(self.world, self.lines, p, p + q * 0.995));
+        }
+        clear as f32 / n.max(1) as f32
+    }
+
+    fn add_seen(
+        &self,
+        out: &mut Falling,
+        p: Vec3,
+        (cell, portal): (CellId, u32),
+        seen: &[Vec3],
+        passes: f32,
+        path: &mut Vec<u32>,
+    ) {
+        let behind = self.holes[portal as usize].other(cell);
+        let (mut scratch, mut part) = (Vec::new(), Vec::new());
+        if self.world.graph[behind].outdoor {
+            for (color, up) in [(SKY, Vec3::Y), (GROUND, Vec3::NEG_Y)] {
+                clip_into(seen, up, &mut part);
+                for (k, &way) in WAYS.iter().enumerate() {
+                    let share = form_factor(&part, way, &mut scratch) * passes;
+                    out.light[k] += color * share;
+                    out.share[k] += share;
+                }
+            }
+            return;
+        }
+        // The walls behind, and whatever is seen through these.
+        let mut beyond = Falling::default();
+        let shares = WAYS.map(|way| form_factor(seen, way, &mut scratch) * passes);
+        if path.len() < 2 && shares.iter().any(|&s| s > WORTH) {
+            path.push(portal);
+            self.add(&mut beyond, p, behind, Some((seen, passes)), path);
+            path.pop();
+        }
+        for k in 0..6 {
+            let walls = (shares[k] - beyond.share[k]).max(0.0);
+            out.light[k] += beyond.light[k] + self.balance.sent[behind.idx()] * walls;
+            out.share[k] += shares[k];
+        }
+    }
+
+    /// What falls on surfaces at a point of a cell. Linear, in skies.
+    fn falling(&self, p: Vec3, cell: CellId) -> [Vec3; 6] {
+        let mut out = Falling::default();
+        self.add(&mut out, p, cell, None, &mut Vec::new());
+        let walls = self.balance.sent[cell.idx()];
+        let lamp = self.balance.lamps[cell.idx()];
+        std::array::from_fn(|k| {
+            // Lamps hang below the ceiling.
+            let from_lamp = lamp * (1.0 + 0.45 * WAYS[k].y);
+            out.light[k] + walls * (1.0 - out.share[k]).max(0.0) + from_lamp
+        })
+    }
+}
+
+/// Where in its cell a probe stands: in the middle of what it stands for, or near that.
+fn place(sight: &Sight, cell: CellId, grid: &Grid, i: UVec3) -> Option<Vec3> {
+    let size = 1.0 / grid.density;
+    let middle = grid.low + (i.as_vec3() + 0.5) * size;
+    let offsets = [
+        [0.0, 0.0, 0.0],
+        [0.3, 0.0, 0.0],
+        [-0.3, 0.0, 0.0],
+        [0.0, 0.0, 0.3],
+        [0.0, 0.0, -0.3],
+        [0.0, 0.3, 0.0],
+        [0.0, -0.3, 0.0],
+    ];
+    (offsets.iter())
+        .map(|&o| middle + size * Vec3::from(o))
+        .find(|p| sight.locate(p.to_array()) == Some(cell))
+}
+
+/// What eyes make of light.
+fn adapted(light: Vec3) -> Vec3 {
+    let sum = light.dot(Vec3::new(0.21, 0.72, 0.07)).max(1e-4);
+    light * (BRIGHTEST * sum.powf(ADAPTATION - 1.0))
+}
+
+/// Fills probes that stand in no air from their neighbors, nearest first.
+fn spread_into_gaps(n: UVec3, values: &mut [Option<[Vec3; 6]>]) {
+    let index = |x: u32, y: u32, z: u32| ((z * n.y + y) * n.x + x) as usize;
+    for _ in 0..n.x.max(n.y).max(n.z) {
+        let before = values.to_vec();
+        let mut is_done = true;
+        for (z, y, x) in
+            (0..n.z).flat_map(|z| (0..n.y).flat_map(move |y| (0..n.x).map(move |x| (z, y, x))))
+        {
+            if before[index(x, y, z)].is_some() {
+                continue;
+            }
+            let (mut sum, mut count) = ([Vec3::ZERO; 6], 0.0);
+            let mut take = |x: u32, y: u32, z: u32| {
+                let is_inside = x < n.x && y < n.y && z < n.z;
+                if let Some(v) = is_inside.then(|| before[index(x, y, z)]).flatten() {
+                    (0..6).for_each(|k| sum[k] += v[k]);
+                    count += 1.0;
+                }
+            };
+            for step in [1, u32::MAX] {
+                take(x.wrapping_add(step), y, z);
+                take(x, y.wrapping_add(step), z);
+                take(x, y, z.wrapping_add(step));
+            }
+            if count > 0.0 {
+                values[index(x, y, z)] = Some(sum.map(|s| s / count));
+            } else {
+                is_done = false;
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+}
+
+/// A color as `RGB9E5` stores it: nine bits each, and an exponent for the three.
+fn shared_exponent(c: Vec3) -> u32 {
+    const BIAS: i32 = 15;
+    let c = c.clamp(Vec3::ZERO, Vec3::splat(65408.0));
+    let exponent = (c.max_element().max(1e-30).log2().floor() as i32).max(-BIAS - 1) + 1 + BIAS;
+    let scale = |e: i32| f32::powi(2.0, 9 + BIAS - e);
+    // Rounded up to 512, the greatest takes the next exponent.
+    let e = exponent + i32::from((c.max_element() * scale(exponent)).round() >= 512.0);
+    let [r, g, b] = (c * scale(e)).to_array().map(|x| x.round() as u32);
+    r | g << 9 | b << 18 | (e as u32) << 27
+}
+
+impl Probes {
+    /// Computes the light of a world under a sun in direction `sun`, in a picture of at most `side` texels along each
+    /// axis. Time grows with the probes, 30,000 at most, and the portals that each sees: mostly below a second.
+    pub(super) fn build(world: &World, sight: &Sight, sun: Vec3, side: u32) -> Self {
+        let lines = Sightlines::build(world);
+        let holes = holes(world);
+        let balance = balance(world, &lines, &holes, sun);
+        let room = Room {
+            world,
+            lines: &lines,
+            holes: &holes,
+            balance: &balance,
+        };
+        let (grids, size) = grids(world, side);
+        let mut texels = vec![0; size.element_product() as usize];
+        for (cell, grid) in (0..).map(CellId).zip(&grids) {
+            let Some(grid) = grid else { continue };
+            let n = grid.n;
+            let mut values = Vec::new();
+            for i in 0..n.element_product() {
+                let at = UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y));
+                let p = place(sight, cell, grid, at);
+                values.push(p.map(|p| room.falling(p, cell).map(adapted)));
+            }
+            spread_into_gaps(n, &mut values);
+            // A cell without air at any probe: as its walls.
+            let walls = [adapted(balance.sent[cell.idx()] + balance.lamps[cell.idx()]); 6];
+            for (i, value) in (0..).zip(values) {
+                let at = grid.at + UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y));
+                for (k, color) in (0..).zip(value.unwrap_or(walls)) {
+                    let y = at.y + k * n.y;
+                    let texel = (at.z * size.y + y) * size.x + at.x;
+                    texels[texel as usize] = shared_exponent(color);
+                }
+            }
+        }
+        Self {
+            grids,
+            size,
+            texels,
+        }
+    }
+}
