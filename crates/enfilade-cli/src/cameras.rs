@@ -27,34 +27,29 @@ fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
     Some([p[0], floor + EYE_HEIGHT, p[2]])
 }
 
-/// A camera with much to see: of those that stand in large rooms, the one whose picture shows most
-/// different things, far away, with nothing right before it. Draws some 300 small pictures.
+/// Rooms that a photographer looks into.
+const ROOMS: usize = 8;
+/// How far from walls a photographer stands, at least. [Units: wu]
+const ELBOW: f32 = 0.45;
+/// Directions that are measured for the longest view.
+const HEADINGS: usize = 24;
+
+/// Where a photographer would stand: in a corner of a large room, rather a furnished one, a person's height above the floor,
+/// looking along one of its longest views; of these places, the one whose picture shows most things and openings, far away,
+/// with nothing right before it. Of a world without rooms, all of it from outside. Draws some 200 small pictures.
 ///
 /// # Errors
 ///
 /// A picture that cannot be drawn.
 pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
     let lines = Sightlines::build(world);
-    let mut cells: Vec<(u32, &Cell)> = (0..).zip(&world.graph.cells).collect();
-    cells.retain(|(_, c)| !c.outdoor && c.volume > 0.0);
-    cells.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     let mut best = (f32::NEG_INFINITY, overview(studio));
-    for &(id, cell) in cells.iter().take(8) {
-        let [low, high] = cell.aabb;
-        for [u, v] in [[0.5, 0.5], [0.2, 0.2], [0.8, 0.2], [0.2, 0.8], [0.8, 0.8]] {
-            let at = |k: usize, t: f32| low[k] + (high[k] - low[k]) * t;
-            let p = [at(0, u), at(1, 0.5), at(2, v)];
-            if studio.sight.locate(p) != Some(CellId(id)) {
-                continue;
-            }
-            let eye = standing(&lines, p)
-                .filter(|&e| studio.sight.locate(e) == Some(CellId(id)))
-                .unwrap_or(p);
-            for i in 0..8 {
-                let angle = (i as f32 + 0.5) * std::f32::consts::FRAC_PI_4;
+    for (id, cell) in rooms(world) {
+        for eye in corners(&studio.sight, &lines, id, cell) {
+            for toward in headings(&lines, cell, eye) {
                 let camera = Camera {
                     eye,
-                    toward: [angle.cos(), -0.08, angle.sin()],
+                    toward,
                     fov_y: FOV,
                 };
                 let score = interest(studio, &camera)?;
@@ -67,6 +62,106 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
     Ok(best.1)
 }
 
+/// The rooms with the most floor, each object in them worth a part of that.
+fn rooms(world: &World) -> Vec<(CellId, &Cell)> {
+    let mut objects = vec![0_u32; world.graph.cells.len()];
+    for cell in world.details.iter().flat_map(|d| &d.cells) {
+        objects[cell.idx()] += 1;
+    }
+    let worth = |id: CellId, cell: &Cell| {
+        let height = (cell.aabb[1][1] - cell.aabb[0][1]).clamp(2.0, 4.0);
+        let floor = cell.volume / height;
+        // A hall is no better for being larger still.
+        floor.min(150.0) * (1.0 + (objects[id.idx()] as f32).ln_1p())
+    };
+    let mut out: Vec<_> = (world.graph.indoor_cells())
+        .filter(|(_, cell)| cell.volume > 0.0)
+        .collect();
+    out.sort_by(|a, b| {
+        let by_worth = worth(b.0, b.1).total_cmp(&worth(a.0, a.1));
+        by_worth.then(a.0.cmp(&b.0))
+    });
+    out.truncate(ROOMS);
+    out
+}
+
+/// Where somebody can stand in the corners of a room, and in its middle: eyes.
+fn corners(sight: &Sight, lines: &Sightlines, id: CellId, cell: &Cell) -> Vec<[f32; 3]> {
+    let [low, high] = cell.aabb;
+    let middle = center(cell);
+    let is_clear = |eye: [f32; 3]| {
+        (0..8).all(|i| {
+            let (z, x) = (i as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
+            let arm = [eye[0] + x * ELBOW, eye[1], eye[2] + z * ELBOW];
+            lines.first_hit(eye, arm).is_none()
+        })
+    };
+    let stand = |p: [f32; 3]| {
+        let is_here = |e: &[f32; 3]| sight.locate(*e) == Some(id);
+        if !is_here(&p) {
+            return None;
+        }
+        // Where it is lower than a person, or there is no floor: at half its height.
+        Some(standing(lines, p).filter(is_here).unwrap_or(p))
+    };
+    let mut out: Vec<[f32; 3]> = Vec::new();
+    for [u, v] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+        let corner = [[low[0], high[0]][u], middle[1], [low[2], high[2]][v]];
+        // From the corner to the middle, the first place with room for elbows.
+        let place = (1..=10).find_map(|step| {
+            let t = step as f32 * 0.05;
+            let p = [0, 1, 2].map(|k| corner[k] + (middle[k] - corner[k]) * t);
+            stand(p).filter(|&eye| is_clear(eye))
+        });
+        out.extend(place);
+    }
+    out.extend(stand(middle));
+    out
+}
+
+/// Directions worth a picture: across the room, along the longest view, and between the two; a little downwards.
+fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
+    let angle = |i: usize| i as f32 * std::f32::consts::TAU / HEADINGS as f32;
+    let free: Vec<f32> = (0..HEADINGS)
+        .map(|i| {
+            let (z, x) = angle(i).sin_cos();
+            let end = [eye[0] + x * 40.0, eye[1], eye[2] + z * 40.0];
+            lines
+                .first_hit(eye, end)
+                .map_or(40.0, |h| h.t as f32 * 40.0)
+        })
+        .collect();
+    // Of a view, what is beside its middle counts, too.
+    let open = |i: usize| {
+        let at = |d: usize| free[(i + HEADINGS + d - 2) % HEADINGS];
+        (0..5).map(at).sum::<f32>()
+    };
+    let mut longest = 0;
+    for i in 1..HEADINGS {
+        if open(i) > open(longest) + 1e-3 {
+            longest = i;
+        }
+    }
+    let (z, x) = angle(longest).sin_cos();
+    let along = [x, z];
+    let to = center(cell);
+    let across = [to[0] - eye[0], to[2] - eye[2]];
+    let length = across[0].hypot(across[1]);
+    let level = |[x, z]: [f32; 2]| [x, -0.07, z];
+    let mut out = vec![level(along)];
+    // In the middle of a room, no direction leads across it.
+    if length > 0.5 {
+        let across = across.map(|d| d / length);
+        out.push(level(across));
+        let between = [along[0] + across[0], along[1] + across[1]];
+        let length = between[0].hypot(between[1]);
+        if length > 0.3 {
+            out.push(level(between.map(|d| d / length)));
+        }
+    }
+    out
+}
+
 /// The whole world from above, aside.
 fn overview(studio: &Studio) -> Camera {
     let [low, high] = studio.world.bounds();
@@ -77,28 +172,46 @@ fn overview(studio: &Studio) -> Camera {
     Camera::looking_at([0, 1, 2].map(|k| center[k] + back[k]), center)
 }
 
+/// How much a picture shows: objects most of all, openings of the room, depth; less where something is right before the eye.
 fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
-    let [solid, _] = studio.ids(camera, Culling::Portals, [48, 27])?;
-    let mut things = Vec::new();
-    let (mut near, mut far, mut sky) = (0, 0, 0);
-    for (shown, depth) in solid.pixels {
-        match shown {
+    const SMALL: [u32; 2] = [48, 27];
+    let [solid, _] = studio.ids(camera, Culling::Portals, SMALL)?;
+    let (mut walls, mut objects) = (Vec::new(), Vec::new());
+    let (mut near, mut sky, mut depths) = (0_u32, 0_u32, 0.0);
+    for (shown, depth) in &solid.pixels {
+        match *shown {
             Shown::Sky => sky += 1,
             Shown::Structure { triangle } => {
                 let chunk = studio.world.chunk_of_triangle(triangle);
-                things.push((0, chunk.and_then(|c| studio.world.batch_of_chunk(c))));
+                walls.push(chunk.and_then(|c| studio.world.batch_of_chunk(c)));
             }
-            Shown::Detail { detail, .. } => things.push((1, Some(detail))),
+            Shown::Detail { detail, .. } => objects.push(detail),
         }
-        let distance = Camera::distance_of(depth);
-        near += u32::from(distance < 1.0);
-        far += u32::from(depth > 0.0 && distance > 6.0);
+        if *depth > 0.0 {
+            let distance = Camera::distance_of(*depth);
+            near += u32::from(distance < 1.2);
+            depths += distance.min(30.0).ln_1p();
+        }
     }
-    things.sort_unstable();
-    things.dedup();
-    let n = 48.0 * 27.0;
+    walls.sort_unstable();
+    walls.dedup();
+    objects.sort_unstable();
+    objects.dedup();
+    let view = camera.view(SMALL[0] as f32 / SMALL[1] as f32)?;
+    let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
+    // Those of a pixel are no openings that one sees.
+    let is_wide = |r: [f32; 4]| (r[2] - r[0]) * (r[3] - r[1]) > 0.01;
+    let openings = (seen.visits().iter())
+        .filter(|v| v.via.is_some() && is_wide(v.rectangle))
+        .count();
+    let n = (SMALL[0] * SMALL[1]) as f32;
     let share = |count: u32| count as f32 / n;
-    Ok((things.len() as f32).ln_1p() + 2.0 * share(far) - 4.0 * share(near) - share(sky))
+    Ok(1.2 * (objects.len() as f32).ln_1p()
+        + 0.4 * (walls.len() as f32).ln_1p()
+        + 0.35 * (openings.min(8) as f32)
+        + 1.5 * depths / n
+        - 5.0 * share(near)
+        - share(sky))
 }
 
 /// A walk through the doorways of a world, a meter a view: points on the way, with the way onwards. [Units: wu]

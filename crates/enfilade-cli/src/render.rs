@@ -210,7 +210,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let mut out = outputs.printed();
     let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
-        let picture = smooth(args.size, |size| {
+        let mut drawn_size = args.size;
+        let mut picture = smooth(args.size, |size| {
+            drawn_size = size;
             // As many pixels for one as pictures are drawn larger.
             let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
             studio.sparing = Sparing {
@@ -236,8 +238,11 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         } else {
             args.output.clone()
         };
+        if args.paint == Colors::Overdraw && !args.above {
+            picture.add_overdraw_scale();
+        }
         write_whole(&to, &picture.to_png()?)?;
-        let drawn = Drawn::new(args, &mut studio, &world, camera, to)?;
+        let drawn = Drawn::new(args, &mut studio, &world, camera, (to, drawn_size))?;
         if args.json {
             all.push(drawn);
         } else {
@@ -293,10 +298,11 @@ impl Drawn {
         studio: &mut Studio,
         world: &World,
         camera: &Camera,
-        file: PathBuf,
+        // The picture as it was drawn, before it was halved: what is spared depends on its pixels.
+        (file, size): (PathBuf, [u32; 2]),
     ) -> anyhow::Result<Self> {
-        let view = camera.view(args.size[0] as f32 / args.size[1] as f32)?;
-        let list = studio.list(&view, camera.eye, args.mode.culling(), args.size);
+        let view = camera.view(size[0] as f32 / size[1] as f32)?;
+        let list = studio.list(&view, camera.eye, args.mode.culling(), size);
         let (triangles, draws) = (list.n_triangles(), list.n_draws());
         let cell = studio.sight.locate(camera.eye);
         Ok(Self {
@@ -339,11 +345,22 @@ pub(crate) fn portal_marks(
     size: [u32; 2],
 ) -> anyhow::Result<Vec<Mark>> {
     let view = camera.view(size[0] as f32 / size[1] as f32)?;
-    let width = size[1] as f32 / 240.0;
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let mut marks = Vec::new();
     for p in seen.portals() {
         let outline = &world.graph[*p].outline;
+        // As thick as a frame of 20 mm, so that far ones are thin; and none thinner than a pixel of the finished picture.
+        let focal = size[1] as f32 * 0.5 / (camera.fov_y * 0.5).tan();
+        let nearest = (outline.iter())
+            .map(|c| {
+                (0..3)
+                    .map(|k| (c[k] - camera.eye[k]).powi(2))
+                    .sum::<f32>()
+                    .sqrt()
+            })
+            .fold(f32::INFINITY, f32::min);
+        let (least, most) = (size[1] as f32 / 540.0, size[1] as f32 / 110.0);
+        let width = (0.02 * focal / nearest.max(0.1)).clamp(least, most);
         let mark = |shape, color, width, on_top| Mark {
             shape,
             color,
@@ -364,7 +381,7 @@ pub(crate) fn portal_marks(
         marks.push(Mark {
             shape: Shape::Rectangle(v.rectangle),
             color: [0.05, 0.55, 0.9, 0.8],
-            width: width * 0.5,
+            width: size[1] as f32 / 480.0,
             on_top: true,
         });
     }

@@ -26,6 +26,7 @@ mod pipelines;
 mod queries;
 mod renderer;
 mod resources;
+mod scale;
 mod scene;
 mod shadings;
 mod studio;

@@ -22,6 +22,10 @@ pub(crate) use balance::sun_of;
 
 /// Texels in a row of a table: a shader knows it, too.
 const ROW: u32 = 1024;
+/// How bright a room is in its pictures on average, as a share of what lies under the open sky.
+const MIDDLE: f32 = 0.6;
+/// The longest exposure, of the shortest.
+const LONGEST: f32 = 4.0;
 /// Texels of a cell in the table.
 const CELL_TEXELS: usize = 4;
 
@@ -29,7 +33,7 @@ const CELL_TEXELS: usize = 4;
 #[repr(C)]
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct LightGlobals {
-    /// From the camera's place to the field's: added to relative points.
+    /// From the camera's place to the field's: added to relative points; w: exposure.
     pub(crate) shift: [f32; 4],
     low: [f32; 4],
     density: [f32; 4],
@@ -39,7 +43,9 @@ pub(crate) struct LightGlobals {
 
 /// The light of a world on the adapter.
 pub(crate) struct Light {
-    origin: DVec3,
+    field: Field,
+    /// By cell: how bright its air is; 0 outdoors.
+    brightness: Vec<f32>,
     globals: LightGlobals,
     pub(crate) table: wgpu::TextureView,
     pub(crate) starts: wgpu::TextureView,
@@ -83,7 +89,11 @@ pub(crate) fn table(
     texels: &[[u32; 4]],
 ) -> Result<wgpu::TextureView, RenderError> {
     let rows = (texels.len() as u32).div_ceil(ROW).max(1);
-    Gpu::check(what, rows.into(), gpu.device.limits().max_texture_dimension_2d)?;
+    Gpu::check(
+        what,
+        rows.into(),
+        gpu.device.limits().max_texture_dimension_2d,
+    )?;
     let mut texels = texels.to_vec();
     texels.resize((rows * ROW) as usize, [0; 4]);
     let texture = gpu.device.create_texture_with_data(
@@ -111,14 +121,13 @@ pub(crate) fn table(
 impl Light {
     fn new(
         gpu: &Gpu,
-        field: &Field,
+        field: Field,
         (texels, first_cell, n_cells): (&[[u32; 4]], usize, usize),
-        probes: &Probes,
+        probes: Probes,
         has_field: bool,
     ) -> Result<Self, RenderError> {
         let linear = wgpu::FilterMode::Linear;
         Ok(Self {
-            origin: field.origin,
             globals: LightGlobals {
                 shift: [0.0; 4],
                 low: field.low.extend(0.0).to_array(),
@@ -150,6 +159,8 @@ impl Light {
                 min_filter: linear,
                 ..wgpu::SamplerDescriptor::default()
             }),
+            field,
+            brightness: probes.brightness,
         })
     }
 
@@ -160,8 +171,9 @@ impl Light {
             grids: Vec::new(),
             size: UVec3::ONE,
             texels: vec![0],
+            brightness: Vec::new(),
         };
-        Self::new(gpu, &field, (&[], 0, 0), &probes, false)
+        Self::new(gpu, field, (&[], 0, 0), probes, false)
     }
 
     /// The light of a world, under a sun in direction `sun`.
@@ -195,21 +207,35 @@ impl Light {
             texels.extend(entry);
         }
         let n_cells = world.graph.cells.len();
-        Self::new(gpu, &field, (&texels, first, n_cells), &probes, true)
+        Self::new(gpu, field, (&texels, first, n_cells), probes, true)
     }
 
-    /// What the shader needs to know, for a camera at `origin`.
-    pub(crate) fn globals(&self, origin: Vec3) -> LightGlobals {
-        let shift = (origin.as_dvec3() - self.origin).as_vec3();
+    /// How much more light a camera takes in at a place: rooms are photographed for longer than gardens, so that what is
+    /// outdoors, seen from in there, is too bright.
+    fn exposure(&self, eye: Vec3) -> f32 {
+        let cell = self.field.locate(eye.to_array());
+        let brightness = usize::try_from(cell)
+            .ok()
+            .and_then(|c| self.brightness.get(c));
+        match brightness {
+            Some(&b) if b > 0.0 => (MIDDLE / b).clamp(1.0, LONGEST),
+            _ => 1.0,
+        }
+    }
+
+    /// What the shader needs to know, for a camera at `origin`; `is_eye` where an eye is there.
+    pub(crate) fn globals(&self, origin: Vec3, is_eye: bool) -> LightGlobals {
+        let shift = (origin.as_dvec3() - self.field.origin).as_vec3();
+        let exposure = if is_eye { self.exposure(origin) } else { 1.0 };
         LightGlobals {
-            shift: shift.extend(0.0).to_array(),
+            shift: shift.extend(exposure).to_array(),
             ..self.globals
         }
     }
 
     /// What points of the field are relative to. [Units: wu]
     pub(crate) fn origin(&self) -> DVec3 {
-        self.origin
+        self.field.origin
     }
 
     /// Whether it is that of a world.

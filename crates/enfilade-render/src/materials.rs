@@ -34,6 +34,20 @@ impl Default for Look {
     }
 }
 
+/// Whether a material is a pane by its name, though it says nothing of what shows through: converters of building
+/// models name materials by the class of the object, and lose the rest.
+fn is_pane(name: &str) -> bool {
+    const PANES: [&str; 5] = ["ifcwindow", "window", "glass", "glazing", "pane"];
+    let is_part = |c: char| !c.is_alphanumeric();
+    let words = || name.split(is_part).filter(|w| !w.is_empty());
+    // Of one word, or one beside a number: "glass wool" is no glass.
+    let mut named = words().filter(|w| !w.chars().all(|c| c.is_ascii_digit()));
+    let first = named
+        .next()
+        .is_some_and(|w| PANES.contains(&w.to_lowercase().as_str()));
+    first && named.next().is_none()
+}
+
 impl Look {
     pub(crate) fn of(material: &Material) -> Self {
         let value: Value = serde_json::from_str(&material.gltf).unwrap_or(Value::Null);
@@ -69,6 +83,32 @@ impl Look {
         }
         look
     }
+}
+
+/// The looks of a world's materials.
+///
+/// What is a pane by its name is seen through, unless structure is made of it, too: structure that hides was baked as such, and
+/// what is behind it is not drawn.
+pub(crate) fn looks_of(world: &World) -> Vec<Look> {
+    let mut looks: Vec<Look> = world.materials.iter().map(Look::of).collect();
+    let mut is_structural = vec![false; looks.len()];
+    for batch in &world.batches {
+        let material = batch.primitive.material.map_or(usize::MAX, |m| m as usize);
+        if let Some(is_so) = is_structural.get_mut(material) {
+            *is_so = true;
+        }
+    }
+    for ((look, material), is_structural) in
+        looks.iter_mut().zip(&world.materials).zip(is_structural)
+    {
+        let is_plain = look.cutoff <= 0.0 && look.texture.is_none();
+        if !is_structural && is_plain && !look.is_transparent && is_pane(&material.name) {
+            look.is_transparent = true;
+            // Its frame is drawn alike, and in depth there are several faces.
+            look.base_color[3] = look.base_color[3].min(0.12);
+        }
+    }
+    looks
 }
 
 /// A picture decoded: RGBA, and smaller and smaller copies.
@@ -145,6 +185,36 @@ mod tests {
         assert_eq!((l.cutoff, l.emissive), (0.5, [1.0, 0.5, 0.0]));
         assert_eq!((l.texture, l.uv_set), (Some(3), 1));
         assert_eq!(look("no JSON").texture, None);
+    }
+
+    #[test]
+    fn a_window_that_says_nothing_of_its_pane_is_seen_through() {
+        let seen_through = |names: &[&str], structural: Option<u32>| -> Vec<bool> {
+            let material = |name: &&str| Material {
+                name: (*name).into(),
+                base_color: [0.5, 0.7, 0.9, 1.0],
+                ..Material::default()
+            };
+            let mut world = World {
+                materials: names.iter().map(material).collect(),
+                ..World::default()
+            };
+            if structural.is_some() {
+                let mut batch = enfilade_cpg::Batch::default();
+                batch.primitive.material = structural;
+                world.batches.push(batch);
+            }
+            looks_of(&world).iter().map(|l| l.is_transparent).collect()
+        };
+        let panes = ["IfcWindow", "Glass.001", "glazing 2"];
+        assert_eq!(seen_through(&panes, None), [true; 3]);
+        let others = ["Glass wool", "IfcWall", "Window frame", ""];
+        assert_eq!(seen_through(&others, None), [false; 4]);
+        assert_eq!(
+            seen_through(&panes, Some(1)),
+            [true, false, true],
+            "structure hides"
+        );
     }
 
     #[test]

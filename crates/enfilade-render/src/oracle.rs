@@ -13,6 +13,7 @@ use enfilade_runtime::Sight;
 
 use crate::camera::Camera;
 use crate::ids::Shown;
+use crate::materials::looks_of;
 
 /// How far a sight line is moved, in pixels: a little over what adapters round by.
 const NUDGE: f64 = 1.0 / 64.0;
@@ -37,16 +38,15 @@ impl Oracle {
     /// Of a world; `sight`, which was made of the same, numbers the triangles as pictures do.
     #[must_use]
     pub fn new(world: &World, sight: &Sight) -> Self {
+        let looks = looks_of(world);
         let mut triangles: [Vec<Triangle>; 2] = [Vec::new(), Vec::new()];
         let mut keys: [Vec<Shown>; 2] = [Vec::new(), Vec::new()];
         let mut add = |primitive: &Primitive,
                        indices: &[u32],
                        place: &dyn Fn(DVec3) -> DVec3,
                        key: &dyn Fn(u32) -> Shown| {
-            let material = primitive
-                .material
-                .and_then(|m| world.materials.get(m as usize));
-            let to = usize::from(material.is_some_and(|m| m.transparent));
+            let look = (primitive.material).and_then(|m| looks.get(m as usize));
+            let to = usize::from(look.is_some_and(|l| l.is_transparent));
             for (i, t) in (0..).zip(indices.chunks_exact(3)) {
                 let corners = [0, 1, 2].map(|k| place(dvec(primitive.positions[t[k] as usize])));
                 triangles[to].push(corners);

@@ -258,7 +258,11 @@ impl Renderer {
                 0,
                 0,
             ],
-            light: stage.light.globals(projection.origin),
+            light: {
+                // Flat light has no rooms that are darker than others.
+                let is_eye = !projection.is_parallel && style.daylight;
+                stage.light.globals(projection.origin, is_eye)
+            },
         };
         gpu.queue
             .write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));

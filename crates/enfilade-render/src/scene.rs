@@ -16,7 +16,7 @@ use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
 use crate::marks::{Mark, Shape};
-use crate::materials::Look;
+use crate::materials::{Look, looks_of};
 use filling::{Filling, Level, Span};
 use placed::{Placed, bounds_of, placed};
 use textures::load_textures;
@@ -84,7 +84,7 @@ impl GpuWorld {
         sight: &Sight,
         has_levels: bool,
     ) -> Result<Self, RenderError> {
-        let mut looks: Vec<Look> = world.materials.iter().map(Look::of).collect();
+        let mut looks: Vec<Look> = looks_of(world);
         looks.push(Look::default());
         let (textures, texture_of, n_missing_pictures) = load_textures(gpu, world, &looks)?;
         let mut filling = Filling {

@@ -26,7 +26,7 @@ pub(super) const GROUND: Vec3 = Vec3::new(0.30, 0.28, 0.24);
 /// What the sun adds on a surface that faces it. Linear, in skies.
 const SUN: Vec3 = Vec3::new(3.2, 2.9, 2.4);
 /// Where no daylight comes, somebody has switched on a light: so much falls on the walls at least. Linear, in skies.
-const LAMP: f32 = 0.035;
+const LAMP: f32 = 0.05;
 /// The light of that lamp.
 const LAMP_COLOR: Vec3 = Vec3::new(1.25, 0.98, 0.70);
 const ROUNDS: usize = 80;
@@ -50,6 +50,11 @@ impl Hole {
     pub(super) fn other(&self, cell: CellId) -> CellId {
         self.cells[usize::from(self.cells[0] == cell)]
     }
+}
+
+/// How bright a color is. Linear.
+pub(super) fn luminance(c: Vec3) -> f32 {
+    c.dot(Vec3::new(0.21, 0.72, 0.07))
 }
 
 /// The openings by portal.
@@ -89,8 +94,8 @@ pub(super) fn is_clear(world: &World, lines: &Sightlines, a: Vec3, b: Vec3) -> b
             return true;
         };
         let material = world.batches[hit.batch as usize].primitive.material;
-        let is_glass = material.is_some_and(|m| world.materials[m as usize].transparent);
-        if !is_glass {
+        let material = material.and_then(|m| world.materials.get(m as usize));
+        if !material.is_some_and(|m| m.transparent) {
             return false;
         }
         from += (b - from) * (hit.t as f32 + 1e-4);
@@ -145,7 +150,9 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
     }
     let mean = |(area, sum): (f32, Vec3)| {
         if area > 0.0 {
-            (area, sum / area)
+            // Half its tint: eyes take the light of a room for white.
+            let color = sum / area;
+            (area, color.lerp(Vec3::splat(luminance(color)), 0.5))
         } else {
             (1.0, Vec3::splat(0.5))
         }
@@ -212,7 +219,7 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
     let mut lamps = vec![Vec3::ZERO; cells.len()];
     let by_day = solve(&lamps);
     for (i, cell) in cells.iter().enumerate() {
-        let falls = (by_day[i] / walls[i].1).dot(Vec3::new(0.21, 0.72, 0.07));
+        let falls = luminance(by_day[i] / walls[i].1);
         if !cell.outdoor {
             lamps[i] = LAMP_COLOR * (LAMP - falls).max(0.0);
         }

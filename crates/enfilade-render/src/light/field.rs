@@ -121,9 +121,13 @@ impl Field {
         }
     }
 
-    /// What the shader answers, for tests of it.
-    #[cfg(test)]
-    fn locate(&self, p: [f32; 3]) -> i32 {
+    /// What the shader answers of a point of the world: a cell, or -1.
+    pub(super) fn locate(&self, p: [f32; 3]) -> i32 {
+        let leaf = self.leaf(p);
+        if leaf < -1 { -2 - leaf } else { -1 }
+    }
+
+    fn leaf(&self, p: [f32; 3]) -> i32 {
         let p = (Vec3::from(p).as_dvec3() - self.origin).as_vec3();
         let q = ((p - self.low) * self.density).floor();
         if q.min_element() < 0.0 || (0..3).any(|k| q[k] >= self.n[k] as f32) {
@@ -156,7 +160,7 @@ mod tests {
         for _ in 0..20_000 {
             let p = [0, 1, 2].map(|k| rng.range(low[k], high[k]) as f32);
             let want = Locator::leaf(locator.locate(DVec3::from(p.map(f64::from))));
-            same += u32::from(field.locate(p) == want);
+            same += u32::from(field.leaf(p) == want);
             indoors += u32::from(want < -2);
         }
         assert!(indoors > 2000, "{indoors} points indoors");

@@ -10,7 +10,7 @@ use enfilade_cpg::{CellId, World};
 use enfilade_runtime::{Sight, Sightlines};
 use glam::{UVec3, Vec3};
 
-use super::balance::{Balance, GROUND, Hole, SKY, balance, holes, is_clear, spread};
+use super::balance::{Balance, GROUND, Hole, SKY, balance, holes, is_clear, luminance, spread};
 use super::form::{Polygon, clip_into, clip_through, form_factor};
 
 /// Between probes. [Units: wu]
@@ -22,9 +22,9 @@ const MOST_IN_ALL: u64 = 30_000;
 /// A portal behind a portal is looked through where it gives so large a share of the light at least.
 const WORTH: f32 = 0.004;
 /// Brightness over light, as an exponent.
-const ADAPTATION: f32 = 0.5;
+const ADAPTATION: f32 = 0.72;
 /// Of a surface under the open sky.
-const BRIGHTEST: f32 = 0.78;
+const BRIGHTEST: f32 = 1.0;
 
 /// The six ways that surfaces may face, in the order of the slabs of a box.
 const WAYS: [Vec3; 6] = [
@@ -57,6 +57,8 @@ pub(super) struct Probes {
     pub(super) size: UVec3,
     /// Shared-exponent colors, x fastest, then y.
     pub(super) texels: Vec<u32>,
+    /// By cell: how bright its air is on average; 0 outdoors.
+    pub(super) brightness: Vec<f32>,
 }
 
 /// Where probes stand: at most `side` texels along each axis.
@@ -233,7 +235,7 @@ fn place(sight: &Sight, cell: CellId, grid: &Grid, i: UVec3) -> Option<Vec3> {
 
 /// What eyes make of light.
 fn adapted(light: Vec3) -> Vec3 {
-    let sum = light.dot(Vec3::new(0.21, 0.72, 0.07)).max(1e-4);
+    let sum = luminance(light).max(1e-4);
     light * (BRIGHTEST * sum.powf(ADAPTATION - 1.0))
 }
 
@@ -301,6 +303,7 @@ impl Probes {
         };
         let (grids, size) = grids(world, side);
         let mut texels = vec![0; size.element_product() as usize];
+        let mut brightness = vec![0.0; grids.len()];
         for (cell, grid) in (0..).map(CellId).zip(&grids) {
             let Some(grid) = grid else { continue };
             let n = grid.n;
@@ -311,6 +314,9 @@ impl Probes {
                 values.push(p.map(|p| room.falling(p, cell).map(adapted)));
             }
             spread_into_gaps(n, &mut values);
+            let lights = || values.iter().flatten().flatten();
+            let sum: f32 = lights().map(|&light| luminance(light)).sum();
+            brightness[cell.idx()] = sum / lights().count().max(1) as f32;
             // A cell without air at any probe: as its walls.
             let walls = [adapted(balance.sent[cell.idx()] + balance.lamps[cell.idx()]); 6];
             for (i, value) in (0..).zip(values) {
@@ -326,6 +332,7 @@ impl Probes {
             grids,
             size,
             texels,
+            brightness,
         }
     }
 }

@@ -15,7 +15,7 @@ struct Globals {
     size: vec4<f32>,
     // x: 1 where surfaces are painted by cell; y: 1 where it is explained why they are seen.
     style: vec4<u32>,
-    // As in `light.rs`: from relative points to those of the field.
+    // As in `light.rs`: from relative points to those of the field; w: exposure.
     field_shift: vec4<f32>,
     starts_low: vec4<f32>,
     starts_density: vec4<f32>,

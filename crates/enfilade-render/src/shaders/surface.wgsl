@@ -144,13 +144,13 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     // Flat light, which shows what faces the eye; or what falls there.
     var ambient = open_light(normal) + vec3(0.16 * facing);
     if HAS_LIGHT {
-        ambient = light_in(cell, place, normal) + vec3(0.05 * facing);
+        ambient = light_in(cell, place, normal) * (0.94 + 0.08 * facing);
     }
     var sun = max(dot(normal, globals.sun.xyz), 0.0);
     if CASTS_SHADOWS {
         sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
-    let light = ambient + vec3(1.25, 1.13, 0.92) * sun;
+    let light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * globals.field_shift.w;
     return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
 }
 
@@ -205,7 +205,7 @@ fn glass(in: Surface) -> Drawn {
     if HAS_LIGHT {
         let place = in.relative + globals.field_shift.xyz;
         if s.cell >= 0 && entry(globals.light.y + s.cell * CELL_TEXELS).w == 0u {
-            around = 0.7 * light_in(s.cell, place, along);
+            around = 0.7 * toned(light_in(s.cell, place, along) * globals.field_shift.w);
         }
     }
     // A pane's own color is thin: what is behind it shows, mostly.
