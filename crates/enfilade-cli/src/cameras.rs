@@ -44,7 +44,7 @@ const HEADINGS: usize = 24;
 pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
     let lines = Sightlines::build(world);
     let mut best = (f32::NEG_INFINITY, overview(studio));
-    for (id, cell) in rooms(world) {
+    for (id, cell, worth) in rooms(world) {
         for eye in corners(&studio.sight, &lines, id, cell) {
             for toward in headings(&lines, cell, eye) {
                 let camera = Camera {
@@ -52,7 +52,7 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
                     toward,
                     fov_y: FOV,
                 };
-                let score = interest(studio, &camera)?;
+                let score = interest(studio, &camera)? + 0.5 * worth.ln_1p();
                 if score > best.0 {
                     best = (score, camera);
                 }
@@ -62,8 +62,8 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
     Ok(best.1)
 }
 
-/// The rooms with the most floor, each object in them worth a part of that.
-fn rooms(world: &World) -> Vec<(CellId, &Cell)> {
+/// The rooms with the most floor, each object in them worth a part of that; and what they are worth.
+fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
     let mut objects = vec![0_u32; world.graph.cells.len()];
     for cell in world.details.iter().flat_map(|d| &d.cells) {
         objects[cell.idx()] += 1;
@@ -76,11 +76,9 @@ fn rooms(world: &World) -> Vec<(CellId, &Cell)> {
     };
     let mut out: Vec<_> = (world.graph.indoor_cells())
         .filter(|(_, cell)| cell.volume > 0.0)
+        .map(|(id, cell)| (id, cell, worth(id, cell)))
         .collect();
-    out.sort_by(|a, b| {
-        let by_worth = worth(b.0, b.1).total_cmp(&worth(a.0, a.1));
-        by_worth.then(a.0.cmp(&b.0))
-    });
+    out.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
     out.truncate(ROOMS);
     out
 }
@@ -177,7 +175,7 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     const SMALL: [u32; 2] = [48, 27];
     let [solid, _] = studio.ids(camera, Culling::Portals, SMALL)?;
     let (mut walls, mut objects) = (Vec::new(), Vec::new());
-    let (mut near, mut sky, mut depths) = (0_u32, 0_u32, 0.0);
+    let (mut near, mut sky, mut depths) = (0_u32, 0_u32, Vec::new());
     for (shown, depth) in &solid.pixels {
         match *shown {
             Shown::Sky => sky += 1,
@@ -190,13 +188,17 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
         if *depth > 0.0 {
             let distance = Camera::distance_of(*depth);
             near += u32::from(distance < 1.2);
-            depths += distance.min(30.0).ln_1p();
+            depths.push(distance.min(30.0).ln_1p());
         }
     }
     walls.sort_unstable();
     walls.dedup();
+    let furnished = objects.len() as u32;
     objects.sort_unstable();
     objects.dedup();
+    // Deep as a whole, and no wall that fills a side of it.
+    depths.sort_unstable_by(f32::total_cmp);
+    let quarter = depths.get(depths.len() / 4).copied().unwrap_or_default();
     let view = camera.view(SMALL[0] as f32 / SMALL[1] as f32)?;
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     // Those of a pixel are no openings that one sees.
@@ -209,7 +211,9 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     Ok(1.2 * (objects.len() as f32).ln_1p()
         + 0.4 * (walls.len() as f32).ln_1p()
         + 0.35 * (openings.min(8) as f32)
-        + 1.5 * depths / n
+        + 1.5 * depths.iter().sum::<f32>() / n
+        + 1.5 * quarter
+        + 2.0 * share(furnished).min(0.4)
         - 5.0 * share(near)
         - share(sky))
 }

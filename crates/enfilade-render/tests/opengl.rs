@@ -134,9 +134,11 @@ fn pictures_by_opengl_equal_those_by_vulkan() {
     };
     let world = grid();
     let mut expected = Studio::new(vulkan, &world).unwrap();
+    expected.add_light(&world).unwrap();
     for gl in by_opengl() {
         assert!(gl.name().ends_with("(gl)"), "{}", gl.name());
         let mut found = Studio::new(gl, &world).unwrap();
+        found.add_light(&world).unwrap();
         let mut rng = Rng::new(6);
         let mut n = 0;
         for _ in 0..12 {

@@ -221,7 +221,9 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
     for (i, cell) in cells.iter().enumerate() {
         let falls = luminance(by_day[i] / walls[i].1);
         if !cell.outdoor {
-            lamps[i] = LAMP_COLOR * (LAMP - falls).max(0.0);
+            // What walls send back comes on top.
+            let own = 1.0 - luminance(walls[i].1);
+            lamps[i] = LAMP_COLOR * ((LAMP - falls).max(0.0) * own);
         }
     }
     Balance {

@@ -336,3 +336,140 @@ impl Probes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_cpg::{Cell, Portal, PortalId, PortalKind};
+    use enfilade_testkit::{GridParams, room_grid};
+
+    const SUN: Vec3 = Vec3::new(0.0, 0.6, -0.8);
+
+    /// Two rooms in a row along x, 4 m a side, 3 m high, in an air without walls: a window in the first at x = 0, a doorway
+    /// between them. Nothing but the graph: what light passes is what portals say.
+    fn two_rooms(window: bool, doorway: bool) -> World {
+        let cell = |name: &str, low: f32, high: f32, outdoor| Cell {
+            name: name.into(),
+            aabb: [[low, 0.0, 0.0], [high, 3.0, 4.0]],
+            volume: (high - low) * 12.0,
+            outdoor,
+            ..Cell::default()
+        };
+        let portal = |cells: [u32; 2], x: f32, [from, to]: [f32; 2], kind| Portal {
+            cells: cells.map(CellId),
+            kind,
+            normal: [1.0, 0.0, 0.0],
+            outline: vec![[x, from, 1.5], [x, to, 1.5], [x, to, 2.5], [x, from, 2.5]],
+            pieces: Vec::new(),
+            area: to - from,
+        };
+        let mut world = World::default();
+        world.graph.cells = vec![
+            cell("outdoors", -9.0, 9.0, true),
+            cell("a", 0.0, 4.0, false),
+            cell("b", 4.0, 8.0, false),
+        ];
+        let window = window.then(|| portal([0, 1], 0.0, [1.0, 2.0], PortalKind::Window));
+        let doorway = doorway.then(|| portal([1, 2], 4.0, [0.0, 2.0], PortalKind::Open));
+        for portal in window.into_iter().chain(doorway) {
+            let id = PortalId(world.graph.portals.len() as u32);
+            for cell in portal.cells {
+                world.graph.cells[cell.idx()].portals.push(id);
+            }
+            world.graph.portals.push(portal);
+        }
+        world
+    }
+
+    /// What falls on surfaces at a point of a cell of such rooms.
+    fn falling(world: &World, p: [f32; 3], cell: u32) -> [f32; 6] {
+        let lines = Sightlines::build(world);
+        let holes = holes(world);
+        let balance = balance(world, &lines, &holes, SUN);
+        let room = Room {
+            world,
+            lines: &lines,
+            holes: &holes,
+            balance: &balance,
+        };
+        room.falling(p.into(), CellId(cell)).map(luminance)
+    }
+
+    #[test]
+    fn it_is_brighter_at_a_window_and_on_what_faces_it() {
+        let world = two_rooms(true, true);
+        let (near, far) = ([0.5, 1.5, 2.0], [3.5, 1.5, 2.0]);
+        let (near, far) = (falling(&world, near, 1), falling(&world, far, 1));
+        // Slab 1 faces the window, slab 0 turns its back to it.
+        assert!(near[1] > 3.0 * far[1], "{near:?} {far:?}");
+        assert!(far[1] > 1.3 * far[0], "{far:?}");
+    }
+
+    #[test]
+    fn light_comes_from_room_to_room_through_doorways_alone() {
+        let p = [4.5, 1.5, 2.0];
+        let [lit, dark] = [true, false].map(|doorway| falling(&two_rooms(true, doorway), p, 2));
+        // Before the doorway, the window two rooms away is seen.
+        assert!(
+            lit[1] > 1.5 * lit[0] && lit[1] > 1.2 * dark[1],
+            "{lit:?} {dark:?}"
+        );
+        // Behind a wall, no window changes anything: the lamp is all there is.
+        assert_eq!(dark, falling(&two_rooms(false, false), p, 2));
+        assert!(
+            dark.iter().all(|&x| x > 0.01),
+            "somebody switched a light on"
+        );
+    }
+
+    #[test]
+    fn a_room_sends_back_less_than_it_gets_and_more_with_a_window() {
+        let of = |window| {
+            let world = two_rooms(window, false);
+            let lines = Sightlines::build(&world);
+            balance(&world, &lines, &holes(&world), SUN)
+        };
+        let (day, night) = (of(true), of(false));
+        assert!(luminance(day.sent[1]) > luminance(night.sent[1]));
+        assert!(luminance(day.sent[1]) < luminance(SKY), "{:?}", day.sent);
+        assert!(luminance(day.lamps[1]) < luminance(night.lamps[1]));
+    }
+
+    #[test]
+    fn every_texel_is_filled_and_the_same_each_time() {
+        let world = room_grid(&GridParams::offices(30, 3));
+        let sight = Sight::build(&world).unwrap();
+        let [a, b] = [(), ()].map(|()| Probes::build(&world, &sight, SUN, 512));
+        assert_eq!(a.texels, b.texels);
+        for grid in a.grids.iter().flatten() {
+            for z in 0..grid.n.z {
+                for y in 0..6 * grid.n.y {
+                    let row = ((grid.at.z + z) * a.size.y + y) * a.size.x + grid.at.x;
+                    let row = &a.texels[row as usize..(row + grid.n.x) as usize];
+                    assert!(row.iter().all(|&t| t != 0), "{grid:?}");
+                }
+            }
+        }
+        // In a picture of few texels, fewer probes stand.
+        let small = Probes::build(&world, &sight, SUN, 32);
+        assert!(small.size.max_element() <= 32, "{}", small.size);
+    }
+
+    #[test]
+    fn colors_come_back_from_nine_bits_and_an_exponent() {
+        for c in [
+            [1.0, 0.5, 0.25],
+            [0.01, 0.02, 0.0],
+            [511.6, 3.0, 900.0],
+            [0.999_9, 0.0, 0.0],
+        ] {
+            let word = shared_exponent(c.into());
+            let scale = f32::powi(2.0, (word >> 27) as i32 - 24);
+            for (k, want) in c.into_iter().enumerate() {
+                let got = (word >> (9 * k) & 511) as f32 * scale;
+                let largest = c.into_iter().fold(0.0, f32::max);
+                assert!((got - want).abs() <= largest / 256.0, "{c:?}: {got}");
+            }
+        }
+    }
+}
