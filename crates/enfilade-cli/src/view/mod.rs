@@ -1,31 +1,36 @@
 //! `enfilade view`: a walk in a window.
 
+mod map;
+mod mode;
+mod open;
 mod panel;
 mod walker;
 
 use std::collections::{BTreeSet, VecDeque};
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
-use enfilade::cpg::{PortalId, World};
+use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
-use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Mark, Paint, Shape, Studio, Style};
+use enfilade_render::{AdapterChoice, Camera, Paint, Sparing, Studio};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
-use winit::event::{ElementState, KeyEvent, MouseButton, WindowEvent};
+use winit::event::{
+    DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent,
+};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
 
+use self::mode::Mode;
+use self::open::{Open, name_ahead};
 use self::panel::{Panel, Shown};
 use self::walker::Walker;
 use crate::formats::Format;
 use crate::output::{Outputs, refuse_stream, write_whole};
-use crate::render::portal_marks;
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
 use enfilade_cli::values::{point, size};
@@ -51,6 +56,15 @@ pub(crate) struct View {
     /// Size of the window.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     size: [u32; 2],
+    /// Leave the mouse free at first: drag to look around; Tab captures it.
+    #[arg(long)]
+    free_mouse: bool,
+    /// Portals that cover fewer pixels are not looked through, as in `render`; L turns that off and on.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    stop: f32,
+    /// Objects in cells that are seen through fewer pixels are not drawn, as in `render`; L turns that off and on.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
+    objects: f32,
     /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     lod: f32,
@@ -106,35 +120,18 @@ struct App<'a> {
     failed: Option<anyhow::Error>,
 }
 
-/// What there is once the window is.
-struct Open {
-    window: Arc<Window>,
-    surface: wgpu::Surface<'static>,
-    config: wgpu::SurfaceConfiguration,
-    studio: Studio,
-    panel: Panel,
-    walker: Walker,
-    yaw: f32,
-    pitch: f32,
-    keys: BTreeSet<KeyCode>,
-    /// Where the pointer is, and where it went down, in pixels.
-    pointer: [f64; 2],
-    pressed_at: Option<[f64; 2]>,
-    shown: Shown,
-    culling: Culling,
-    closed: BTreeSet<PortalId>,
-    recorded: Option<Vec<Camera>>,
-    n_shots: u32,
-    last: Instant,
-}
-
 impl ApplicationHandler for App<'_> {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if self.open.is_some() {
             return;
         }
         match self.open_window(events) {
-            Ok(open) => self.open = Some(open),
+            Ok(mut open) => {
+                if !self.args.free_mouse && self.args.path.is_none() {
+                    open.capture(true);
+                }
+                self.open = Some(open);
+            }
             Err(why) => self.fail(events, why),
         }
     }
@@ -145,17 +142,27 @@ impl ApplicationHandler for App<'_> {
         match event {
             WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => open.resize(size),
-            WindowEvent::KeyboardInput { event, .. } if !is_taken => {
+            // The panel has nothing that Tab could go to.
+            WindowEvent::KeyboardInput { event, .. }
+                if !is_taken || event.physical_key == KeyCode::Tab =>
+            {
                 if let Err(why) = self.on_key(events, &event) {
                     self.fail(events, why);
                 }
             }
+            WindowEvent::Focused(is_focused) => {
+                open.keys.clear();
+                // Who is away has the mouse; who comes back gets what was chosen.
+                open.hold(is_focused && open.wants_mouse);
+            }
+            WindowEvent::MouseWheel { delta, .. } if !is_taken => open.zoom(match delta {
+                MouseScrollDelta::LineDelta(_, y) => y,
+                MouseScrollDelta::PixelDelta(by) => by.y as f32 / 40.0,
+            }),
             WindowEvent::CursorMoved { position, .. } => {
                 let to = [position.x, position.y];
-                if open.pressed_at.is_some() && !is_taken {
-                    open.yaw += (to[0] - open.pointer[0]) as f32 * 0.004;
-                    let pitch = open.pitch - (to[1] - open.pointer[1]) as f32 * 0.004;
-                    open.pitch = pitch.clamp(-1.5, 1.5);
+                if open.pressed_at.is_some() && !is_taken && !open.is_captured {
+                    open.turn([to[0] - open.pointer[0], to[1] - open.pointer[1]], 0.004);
                 }
                 open.pointer = to;
             }
@@ -168,7 +175,7 @@ impl ApplicationHandler for App<'_> {
                 ElementState::Released => {
                     let from = open.pressed_at.take().unwrap_or(open.pointer);
                     let moved = (from[0] - open.pointer[0]).hypot(from[1] - open.pointer[1]);
-                    if moved < 4.0 {
+                    if open.is_captured || moved < 4.0 {
                         self.toggle_portal();
                     }
                 }
@@ -179,6 +186,14 @@ impl ApplicationHandler for App<'_> {
                 }
             }
             _ => {}
+        }
+    }
+
+    fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
+        if let (Some(open), DeviceEvent::MouseMotion { delta }) = (&mut self.open, event)
+            && open.is_captured
+        {
+            open.turn(delta.into(), 0.002);
         }
     }
 
@@ -220,8 +235,8 @@ impl App<'_> {
         let mut studio = Studio::with_format(gpu, &self.world, config.format)?;
         if self.args.lod > 0.0 {
             studio.add_levels(&self.world)?;
-            studio.sparing.lod = self.args.lod;
         }
+        studio.sparing = self.sparing();
         let start = match self.args.eye {
             Some(eye) => Camera {
                 eye,
@@ -234,6 +249,8 @@ impl App<'_> {
         let shown = Shown {
             // Software draws the plain picture several times as fast.
             plain: studio.gpu.is_software(),
+            spares: studio.sparing != Sparing::default(),
+            zoom: 1.0,
             ..Shown::default()
         };
         Ok(Open {
@@ -249,7 +266,9 @@ impl App<'_> {
             pointer: [0.0; 2],
             pressed_at: None,
             shown,
-            culling: Culling::Portals,
+            mode: Mode::default(),
+            is_captured: false,
+            wants_mouse: false,
             closed: BTreeSet::new(),
             recorded: None,
             n_shots: 0,
@@ -258,6 +277,7 @@ impl App<'_> {
     }
 
     fn on_key(&mut self, events: &ActiveEventLoop, event: &KeyEvent) -> anyhow::Result<()> {
+        let asked = self.sparing();
         let (Some(open), PhysicalKey::Code(key)) = (&mut self.open, event.physical_key) else {
             return Ok(());
         };
@@ -274,13 +294,27 @@ impl App<'_> {
             KeyCode::Escape => events.exit(),
             KeyCode::F1 => shown.help = !shown.help,
             KeyCode::KeyF => open.walker.flies = !open.walker.flies,
-            KeyCode::KeyM => {
-                open.culling = match open.culling {
-                    Culling::Portals => Culling::Frustum,
-                    Culling::Frustum => Culling::Everything,
-                    Culling::Everything => Culling::Portals,
+            KeyCode::KeyM => open.mode = open.mode.next(),
+            KeyCode::KeyL => {
+                let on = open.studio.sparing == Sparing::default();
+                open.studio.sparing = match (on, asked == Sparing::default()) {
+                    (false, _) => Sparing::default(),
+                    (true, false) => asked,
+                    // Nothing was asked for: portals of 16 by 16 pixels, objects seen through twice that.
+                    (true, true) => Sparing {
+                        stop_below: 256.0,
+                        objects_below: 1024.0,
+                        ..Sparing::default()
+                    },
                 };
+                shown.spares = on;
             }
+            KeyCode::Tab => {
+                let on = !open.wants_mouse;
+                open.capture(on);
+            }
+            KeyCode::Equal | KeyCode::NumpadAdd => open.zoom(1.0),
+            KeyCode::Minus | KeyCode::NumpadSubtract => open.zoom(-1.0),
             KeyCode::KeyC => {
                 shown.paint = match shown.paint {
                     Paint::Lit => Paint::Cells,
@@ -306,7 +340,13 @@ impl App<'_> {
                     }
                 }
             }
-            KeyCode::F12 => open.shot(self.args, &self.world, &mut self.outputs)?,
+            KeyCode::F12 => {
+                // The walk goes on, whatever becomes of its pictures.
+                let asked_of_it = (self.args.screenshot.as_path(), &self.args.adapter);
+                if let Err(why) = open.shot(asked_of_it, &self.world, &mut self.outputs) {
+                    open.warn(format!("no picture: {why:#}"));
+                }
+            }
             _ => {}
         }
         Ok(())
@@ -316,11 +356,16 @@ impl App<'_> {
     fn toggle_portal(&mut self) {
         let Some(open) = &mut self.open else { return };
         let [w, h] = [open.config.width, open.config.height].map(f64::from);
+        let at = if open.is_captured {
+            [w * 0.5, h * 0.5]
+        } else {
+            open.pointer
+        };
         let camera = open.camera();
         let [right, up, forward] = camera.axes();
         let tan = (camera.fov_y * 0.5).tan();
-        let x = (open.pointer[0] / w * 2.0 - 1.0) as f32 * tan * (w / h) as f32;
-        let y = (1.0 - open.pointer[1] / h * 2.0) as f32 * tan;
+        let x = (at[0] / w * 2.0 - 1.0) as f32 * tan * (w / h) as f32;
+        let y = (1.0 - at[1] / h * 2.0) as f32 * tan;
         let ray = Camera {
             toward: (forward + right * x + up * y).to_array(),
             ..camera
@@ -361,168 +406,17 @@ impl App<'_> {
         if let Some(recorded) = &mut open.recorded {
             recorded.push(camera);
         }
+        open.shown.ahead = name_ahead(&self.world, &self.lines, &camera);
         open.draw(&self.world, &camera, seconds)
     }
-}
 
-impl Open {
-    /// In the window, and on standard error for who comes back to the terminal.
-    fn say(&mut self, message: String) {
-        let _ = writeln!(crate::output::Told, "enfilade: {message}");
-        self.shown.message = message;
-    }
-
-    /// The same for what could not be done.
-    fn warn(&mut self, message: String) {
-        let _ = writeln!(crate::output::Warned, "enfilade: {message}");
-        self.shown.message = message;
-    }
-
-    fn resize(&mut self, size: PhysicalSize<u32>) {
-        let limit = self.studio.gpu.device.limits().max_texture_dimension_2d;
-        self.config.width = size.width.clamp(1, limit);
-        self.config.height = size.height.clamp(1, limit);
-        self.surface
-            .configure(&self.studio.gpu.device, &self.config);
-    }
-
-    fn camera(&self) -> Camera {
-        let (sin, cos) = self.yaw.sin_cos();
-        let level = self.pitch.cos();
-        Camera {
-            eye: self.walker.eye.as_vec3().to_array(),
-            toward: [cos * level, self.pitch.sin(), sin * level],
-            fov_y: FOV,
+    /// What of far away rooms is spared, as asked for.
+    fn sparing(&self) -> Sparing {
+        Sparing {
+            stop_below: self.args.stop,
+            objects_below: self.args.objects,
+            lod: self.args.lod,
+            ..Sparing::default()
         }
-    }
-
-    /// Where the keys lead. [Units: wu/s]
-    fn wish(&self) -> DVec3 {
-        let [right, _, forward] = self.camera().axes().map(|v| v.as_dvec3());
-        let key = |code| f64::from(u8::from(self.keys.contains(&code)));
-        let ahead = key(KeyCode::KeyW) - key(KeyCode::KeyS);
-        let aside = key(KeyCode::KeyD) - key(KeyCode::KeyA);
-        let up = key(KeyCode::KeyE) - key(KeyCode::KeyQ);
-        let forward = if self.walker.flies {
-            forward
-        } else {
-            DVec3::new(forward.x, 0.0, forward.z).normalize_or_zero()
-        };
-        let speed = if self.keys.contains(&KeyCode::ShiftLeft) {
-            5.0
-        } else {
-            1.8
-        };
-        (forward * ahead + right * aside + DVec3::Y * up).normalize_or_zero() * speed
-    }
-
-    fn style(&self) -> Style {
-        Style {
-            paint: self.shown.paint,
-            dark_corners: !self.shown.plain,
-            shadows: !self.shown.plain,
-            daylight: !self.shown.plain,
-            ..Style::default()
-        }
-    }
-
-    fn draw(&mut self, world: &World, camera: &Camera, seconds: f64) -> anyhow::Result<()> {
-        use wgpu::CurrentSurfaceTexture as Got;
-        let size = [self.config.width, self.config.height];
-        let target = match self.surface.get_current_texture() {
-            Got::Success(t) | Got::Suboptimal(t) => t,
-            Got::Outdated | Got::Lost => {
-                self.surface
-                    .configure(&self.studio.gpu.device, &self.config);
-                return Ok(());
-            }
-            // Hidden, or late: the next frame will do.
-            _ => return Ok(()),
-        };
-        let aspect = size[0] as f32 / size[1] as f32;
-        let view = camera.view(aspect)?;
-        let mut marks = self.leaves(world);
-        if self.shown.portals {
-            marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
-        }
-        let list = self.studio.take_list(&view, camera.eye, self.culling, size);
-        let output = target
-            .texture
-            .create_view(&wgpu::TextureViewDescriptor::default());
-        let frame = Frame {
-            projection: camera.projection(aspect)?,
-            list: &list,
-            style: self.style(),
-            marks: &marks,
-        };
-        self.studio.draw(&frame, &output, size)?;
-        let seen = self
-            .studio
-            .viewer
-            .see(&self.studio.sight, &self.studio.state, &view);
-        self.shown.cells = seen.cells().iter().map(|c| c.0).collect();
-        self.shown.seconds(seconds);
-        self.shown.counts = [
-            list.n_triangles(),
-            self.studio.world.n_triangles(),
-            list.n_draws() as u64,
-        ];
-        self.shown.camera = Some(*camera);
-        self.shown.culling = self.culling;
-        self.shown.closed = self.closed.iter().map(|p| p.0).collect();
-        self.shown.is_recording = self.recorded.is_some();
-        self.shown.flies = self.walker.flies;
-        self.studio.give_list(list);
-        self.panel
-            .draw(&self.studio.gpu, &self.window, &output, size, &self.shown);
-        self.window.pre_present_notify();
-        self.studio.gpu.queue.present(target);
-        Ok(())
-    }
-
-    /// What fills the portals that are closed: else one would see the sky through them.
-    fn leaves(&self, world: &World) -> Vec<Mark> {
-        let portals = &world.graph.portals;
-        let closed = self.closed.iter();
-        closed
-            .map(|p| Mark {
-                shape: Shape::Area(portals[p.0 as usize].outline.clone()),
-                color: [0.23, 0.13, 0.07, 1.0],
-                width: 0.0,
-                on_top: false,
-            })
-            .collect()
-    }
-
-    /// A picture of the world as it is shown now, without the panel.
-    fn shot(&mut self, args: &View, world: &World, outputs: &mut Outputs) -> anyhow::Result<()> {
-        self.n_shots += 1;
-        let stem = args
-            .screenshot
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy();
-        let to = args
-            .screenshot
-            .with_file_name(format!("{stem}-{}.png", self.n_shots));
-        let camera = self.camera();
-        // In a studio of its own: a window's pictures do not come back.
-        let mut studio = Studio::new(adapter::open(&args.adapter)?, world)?;
-        for &p in &self.closed {
-            studio.state.close(p);
-        }
-        let size = [self.config.width, self.config.height];
-        let leaves = self.leaves(world);
-        let picture = studio.picture(&camera, self.culling, self.style(), &leaves, size)?;
-        let png = picture.to_png()?;
-        let written = outputs.write("--screenshot", Format::Picture, &to);
-        if let Err(why) = written.and_then(|()| write_whole(&to, &png)) {
-            // The walk goes on.
-            self.warn(format!("{why:#}"));
-            return Ok(());
-        }
-        let [drawn, ..] = self.shown.counts;
-        self.say(format!("wrote {}, {drawn} triangles", to.display()));
-        Ok(())
     }
 }

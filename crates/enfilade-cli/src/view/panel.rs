@@ -1,13 +1,15 @@
-//! What lies over the picture: counters, frame times, a small map, help.
+//! What lies over the picture: counters, frame times, a crosshair, a small map, help.
 
 use std::collections::VecDeque;
 
 use egui::{Align2, Color32, Pos2, Rect, Stroke, Vec2};
-use enfilade::cpg::CellId;
 use enfilade::cpg::World;
-use enfilade_render::{Camera, Culling, Gpu, Paint, cell_color};
+use enfilade_render::{Camera, Gpu, Paint};
 use winit::event::WindowEvent;
 use winit::window::Window;
+
+use super::map::{Map, MapShown};
+use super::mode::Mode;
 
 /// What the panel shows.
 #[derive(Default)]
@@ -21,7 +23,15 @@ pub(super) struct Shown {
     /// Triangles drawn, of all, and draws.
     pub(super) counts: [u64; 3],
     pub(super) camera: Option<Camera>,
-    pub(super) culling: Culling,
+    pub(super) mode: Mode,
+    /// Waits for the adapter and queries, where it was asked about portals.
+    pub(super) queries: Option<[u32; 2]>,
+    /// Name of the cell at the crosshair.
+    pub(super) ahead: String,
+    /// Whether far away rooms and objects are spared.
+    pub(super) spares: bool,
+    /// Of the map, over showing all of it.
+    pub(super) zoom: f32,
     pub(super) is_recording: bool,
     pub(super) flies: bool,
     pub(super) message: String,
@@ -38,97 +48,6 @@ impl Shown {
     }
 }
 
-/// Cells and portals as seen from above.
-struct Map {
-    /// By cell, none for outdoors: least and greatest corner.
-    cells: Vec<Option<[[f32; 3]; 2]>>,
-    /// By portal: two ends and the height.
-    portals: Vec<([f32; 2], [f32; 2], [f32; 2])>,
-    low: [f32; 2],
-    high: [f32; 2],
-}
-
-impl Map {
-    fn new(world: &World) -> Self {
-        let cells: Vec<_> = world
-            .graph
-            .cells
-            .iter()
-            .map(|c| (!c.outdoor).then_some(c.aabb))
-            .collect();
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for [a, b] in cells.iter().flatten() {
-            for (k, axis) in [0, 2].into_iter().enumerate() {
-                low[k] = low[k].min(a[axis]);
-                high[k] = high[k].max(b[axis]);
-            }
-        }
-        let portals = world.graph.portals.iter().map(|p| {
-            let flat = |c: &[f32; 3]| [c[0], c[2]];
-            // The two corners farthest apart, seen from above.
-            let mut ends = ([0.0; 2], [0.0; 2]);
-            let mut longest = -1.0;
-            let (mut bottom, mut top) = (f32::INFINITY, f32::NEG_INFINITY);
-            for a in &p.outline {
-                (bottom, top) = (bottom.min(a[1]), top.max(a[1]));
-                for b in &p.outline {
-                    let d = (a[0] - b[0]).hypot(a[2] - b[2]);
-                    if d > longest {
-                        (longest, ends) = (d, (flat(a), flat(b)));
-                    }
-                }
-            }
-            (ends.0, ends.1, [bottom, top])
-        });
-        Self {
-            portals: portals.collect(),
-            cells,
-            low,
-            high,
-        }
-    }
-
-    fn draw(&self, painter: &egui::Painter, area: Rect, shown: &Shown) {
-        painter.rect_filled(area, 4.0, Color32::from_black_alpha(170));
-        let Some(camera) = shown.camera.filter(|_| self.low[0] < self.high[0]) else {
-            return;
-        };
-        let size = [self.high[0] - self.low[0], self.high[1] - self.low[1]];
-        let scale = ((area.width() - 12.0) / size[0]).min((area.height() - 12.0) / size[1]);
-        let place = |p: [f32; 2]| {
-            let middle = [0, 1].map(|k| p[k] - (self.low[k] + self.high[k]) * 0.5);
-            area.center() + Vec2::from(middle) * scale
-        };
-        let y = camera.eye[1];
-        for (i, cell) in (0..).zip(&self.cells) {
-            let Some([low, high]) = cell else { continue };
-            if y < low[1] || y > high[1] {
-                continue;
-            }
-            let is_seen = shown.cells.contains(&i);
-            let [r, g, b] = cell_color(CellId(i)).map(|c| (c * 255.0) as u8);
-            let rect = Rect::from_two_pos(place([low[0], low[2]]), place([high[0], high[2]]));
-            let alpha = if is_seen { 200 } else { 50 };
-            painter.rect_filled(rect, 0.0, Color32::from_rgba_unmultiplied(r, g, b, alpha));
-        }
-        for (i, (a, b, [bottom, top])) in (0..).zip(&self.portals) {
-            if y < *bottom - 1.0 || y > *top + 1.0 {
-                continue;
-            }
-            let color = if shown.closed.contains(&i) {
-                Color32::RED
-            } else {
-                Color32::from_rgb(255, 150, 30)
-            };
-            painter.line_segment([place(*a), place(*b)], Stroke::new(2.0, color));
-        }
-        let eye = place([camera.eye[0], camera.eye[2]]);
-        let ahead = Vec2::new(camera.toward[0], camera.toward[2]).normalized() * 14.0;
-        painter.line_segment([eye, eye + ahead], Stroke::new(2.0, Color32::WHITE));
-        painter.circle_filled(eye, 4.0, Color32::WHITE);
-    }
-}
-
 /// Draws with egui over a picture.
 pub(super) struct Panel {
     context: egui::Context,
@@ -139,10 +58,13 @@ pub(super) struct Panel {
 
 const HELP: &str = "\
 W A S D        walk; Shift: run
-mouse, drag    look around
+mouse          look around; Tab: let go of it, then drag
 click          open or close the doorway there
+wheel, + -     zoom of the map
 F              fly; Q and E: down and up
-M              drawn: portals, frustum, everything
+M              drawn: portals, portals asked of the adapter,
+               frustum, everything
+L              spare small portals and what is behind them
 C              paint: lit, cells, overdraw
 O              outline doorways and narrowed views
 P              plain: no shadows, no dark corners
@@ -182,10 +104,14 @@ impl Panel {
         window: &Window,
         output: &wgpu::TextureView,
         size: [u32; 2],
+        world: &World,
         shown: &Shown,
     ) {
         let input = self.state.take_egui_input(window);
-        let map = &self.map;
+        if let Some(camera) = shown.camera {
+            self.map.follow(world, camera.eye);
+        }
+        let map = &mut self.map;
         let full = self.context.run_ui(input, |ui| paint(ui, map, shown));
         self.state
             .handle_platform_output(window, full.platform_output);
@@ -232,7 +158,7 @@ impl Panel {
     }
 }
 
-fn paint(ui: &egui::Ui, map: &Map, shown: &Shown) {
+fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
     let painter = ui.painter();
     let screen = ui.max_rect();
     let font = egui::FontId::monospace(13.0);
@@ -248,13 +174,13 @@ fn paint(ui: &egui::Ui, map: &Map, shown: &Shown) {
         "{drawn} of {all} triangles ({:.2} %), {draws} draws\n{} cells seen, {mean:.1} ms, {}",
         100.0 * drawn as f64 / all.max(1) as f64,
         shown.cells.len(),
-        match shown.culling {
-            Culling::Everything => "everything",
-            Culling::Frustum => "frustum culling",
-            Culling::Portals => "portals",
-        }
+        shown.mode.words()
     );
+    if let Some([rounds, queries]) = shown.queries {
+        text += &format!("\n{queries} portals asked about in {rounds} rounds");
+    }
     for (is_so, words) in [
+        (shown.spares, "small portals spared"),
         (shown.flies, "flying"),
         (shown.is_recording, "recording (F5 writes)"),
     ] {
@@ -275,7 +201,43 @@ fn paint(ui: &egui::Ui, map: &Map, shown: &Shown) {
         Align2::LEFT_TOP,
         text,
     );
-    // Frame times: a bar each, a line at 16.7 ms.
+    draw_crosshair(painter, screen.center(), &shown.ahead);
+    draw_times(painter, screen, &shown.times);
+    let area = Rect::from_min_size(
+        screen.right_bottom() - Vec2::splat(290.0),
+        Vec2::splat(280.0),
+    );
+    if let Some(camera) = shown.camera {
+        let shown = MapShown {
+            camera,
+            cells: &shown.cells,
+            closed: &shown.closed,
+            zoom: shown.zoom,
+        };
+        map.draw(painter, area, &shown);
+    }
+    if shown.help {
+        write(screen.center(), Align2::CENTER_CENTER, HELP.into());
+    }
+}
+
+/// What a click is at, and the cell that is there.
+fn draw_crosshair(painter: &egui::Painter, at: Pos2, name: &str) {
+    for (width, color) in [(3.0, Color32::from_black_alpha(140)), (1.0, Color32::WHITE)] {
+        for d in [Vec2::new(8.0, 0.0), Vec2::new(0.0, 8.0)] {
+            painter.line_segment([at - d, at + d], Stroke::new(width, color));
+        }
+    }
+    let font = egui::FontId::proportional(13.0);
+    let below = at + Vec2::new(0.0, 16.0);
+    for (shift, color) in [(1.0, Color32::BLACK), (0.0, Color32::WHITE)] {
+        let at = below + Vec2::splat(shift);
+        painter.text(at, Align2::CENTER_TOP, name, font.clone(), color);
+    }
+}
+
+/// Frame times: a bar each, up to 50 ms, a line at 16.7 ms.
+fn draw_times(painter: &egui::Painter, screen: Rect, times: &VecDeque<f32>) {
     let graph = Rect::from_min_size(
         screen.left_bottom() + Vec2::new(10.0, -70.0),
         Vec2::new(240.0, 60.0),
@@ -288,7 +250,7 @@ fn paint(ui: &egui::Ui, map: &Map, shown: &Shown) {
             Pos2::new(x, graph.bottom() - height),
         ]
     };
-    for (i, &ms) in shown.times.iter().enumerate() {
+    for (i, &ms) in times.iter().enumerate() {
         let color = if ms > 33.4 {
             Color32::LIGHT_RED
         } else {
@@ -304,12 +266,13 @@ fn paint(ui: &egui::Ui, map: &Map, shown: &Shown) {
         [Pos2::new(graph.left(), y), Pos2::new(graph.right(), y)],
         Stroke::new(1.0, Color32::from_white_alpha(120)),
     );
-    let area = Rect::from_min_size(
-        screen.right_bottom() - Vec2::splat(230.0),
-        Vec2::splat(220.0),
-    );
-    map.draw(painter, area, shown);
-    if shown.help {
-        write(screen.center(), Align2::CENTER_CENTER, HELP.into());
+    let font = egui::FontId::proportional(10.0);
+    for (ms, y) in [
+        ("16.7 ms", y),
+        ("50 ms", graph.top() + 6.0),
+        ("0", graph.bottom() - 5.0),
+    ] {
+        let at = Pos2::new(graph.right() + 4.0, y);
+        painter.text(at, Align2::LEFT_CENTER, ms, font.clone(), Color32::WHITE);
     }
 }

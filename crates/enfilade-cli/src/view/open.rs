@@ -1,0 +1,287 @@
+//! The window, while it is open: what is in it, and how it is drawn.
+
+use std::collections::BTreeSet;
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use enfilade::cpg::{PortalId, World};
+use enfilade::geom::DVec3;
+use enfilade::runtime::Sightlines;
+use enfilade_render::{AdapterChoice, Camera, Frame, Mark, Paint, Shape, Sparing, Studio, Style};
+use winit::dpi::PhysicalSize;
+use winit::keyboard::KeyCode;
+use winit::window::{CursorGrabMode, Window};
+
+use super::mode::Mode;
+use super::panel::{Panel, Shown};
+use super::walker::Walker;
+use crate::formats::Format;
+use crate::output::{Outputs, write_whole};
+use crate::render::portal_marks;
+use enfilade_cli::cameras::FOV;
+
+/// What there is once the window is.
+pub(super) struct Open {
+    pub(super) window: Arc<Window>,
+    pub(super) surface: wgpu::Surface<'static>,
+    pub(super) config: wgpu::SurfaceConfiguration,
+    pub(super) studio: Studio,
+    pub(super) panel: Panel,
+    pub(super) walker: Walker,
+    pub(super) yaw: f32,
+    pub(super) pitch: f32,
+    pub(super) keys: BTreeSet<KeyCode>,
+    /// Where the pointer is, and where it went down, in pixels.
+    pub(super) pointer: [f64; 2],
+    pub(super) pressed_at: Option<[f64; 2]>,
+    pub(super) shown: Shown,
+    pub(super) mode: Mode,
+    /// Whether the pointer is held in the window, and its movements turn the view.
+    pub(super) is_captured: bool,
+    /// Whether it is meant to be, while the window has the keyboard.
+    pub(super) wants_mouse: bool,
+    pub(super) closed: BTreeSet<PortalId>,
+    pub(super) recorded: Option<Vec<Camera>>,
+    pub(super) n_shots: u32,
+    pub(super) last: Instant,
+}
+
+/// The name of the cell that the middle of the picture shows: the air before what is met there.
+pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> String {
+    const FAR: f32 = 1000.0;
+    let [.., forward] = camera.axes();
+    let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * FAR);
+    let t = lines.first_hit(camera.eye, end).map_or(1.0, |h| h.t as f32);
+    let away = (t * FAR - 0.02).max(0.0);
+    let p = [0, 1, 2].map(|k| f64::from(camera.eye[k] + forward[k] * away));
+    let cell = world.graph.locator.locate(DVec3::from(p));
+    cell.map_or_else(|| "no cell".into(), |c| world.graph[c].name.clone())
+}
+
+impl Open {
+    pub(super) fn turn(&mut self, by: [f64; 2], speed: f32) {
+        self.yaw += by[0] as f32 * speed;
+        self.pitch = (self.pitch - by[1] as f32 * speed).clamp(-1.5, 1.5);
+    }
+
+    pub(super) fn zoom(&mut self, notches: f32) {
+        self.shown.zoom = (self.shown.zoom * 1.25_f32.powf(notches)).clamp(1.0, 40.0);
+    }
+
+    /// Holds the pointer in the window, or lets go of it; returns whether that could be done.
+    pub(super) fn hold(&mut self, on: bool) -> bool {
+        // Some systems lock it in its place, others only keep it inside.
+        self.is_captured = on
+            && (self.window.set_cursor_grab(CursorGrabMode::Locked))
+                .or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined))
+                .is_ok();
+        if !self.is_captured {
+            // Nothing is lost where there was nothing to let go of.
+            let _ = self.window.set_cursor_grab(CursorGrabMode::None);
+        }
+        self.window.set_cursor_visible(!self.is_captured);
+        self.is_captured == on
+    }
+
+    /// The same for good, and says so.
+    pub(super) fn capture(&mut self, on: bool) {
+        self.wants_mouse = on;
+        match (self.hold(on), on) {
+            (true, true) => self.say("the mouse is captured; Tab lets go of it".into()),
+            (true, false) => self.say("the mouse is free; Tab captures it".into()),
+            (false, _) => {
+                self.warn("the mouse cannot be captured here: drag to look around".into());
+            }
+        }
+    }
+
+    /// In the window, and on standard error for who comes back to the terminal.
+    pub(super) fn say(&mut self, message: String) {
+        let _ = writeln!(crate::output::Told, "enfilade: {message}");
+        self.shown.message = message;
+    }
+
+    /// The same for what could not be done.
+    pub(super) fn warn(&mut self, message: String) {
+        let _ = writeln!(crate::output::Warned, "enfilade: {message}");
+        self.shown.message = message;
+    }
+
+    pub(super) fn resize(&mut self, size: PhysicalSize<u32>) {
+        let limit = self.studio.gpu.device.limits().max_texture_dimension_2d;
+        self.config.width = size.width.clamp(1, limit);
+        self.config.height = size.height.clamp(1, limit);
+        self.surface
+            .configure(&self.studio.gpu.device, &self.config);
+    }
+
+    pub(super) fn camera(&self) -> Camera {
+        let (sin, cos) = self.yaw.sin_cos();
+        let level = self.pitch.cos();
+        Camera {
+            eye: self.walker.eye.as_vec3().to_array(),
+            toward: [cos * level, self.pitch.sin(), sin * level],
+            fov_y: FOV,
+        }
+    }
+
+    /// Where the keys lead. [Units: wu/s]
+    pub(super) fn wish(&self) -> DVec3 {
+        let [right, _, forward] = self.camera().axes().map(|v| v.as_dvec3());
+        let key = |code| f64::from(u8::from(self.keys.contains(&code)));
+        let ahead = key(KeyCode::KeyW) - key(KeyCode::KeyS);
+        let aside = key(KeyCode::KeyD) - key(KeyCode::KeyA);
+        let up = key(KeyCode::KeyE) - key(KeyCode::KeyQ);
+        let forward = if self.walker.flies {
+            forward
+        } else {
+            DVec3::new(forward.x, 0.0, forward.z).normalize_or_zero()
+        };
+        let speed = if self.keys.contains(&KeyCode::ShiftLeft) {
+            5.0
+        } else {
+            1.8
+        };
+        (forward * ahead + right * aside + DVec3::Y * up).normalize_or_zero() * speed
+    }
+
+    fn style(&self) -> Style {
+        Style {
+            paint: self.shown.paint,
+            dark_corners: !self.shown.plain,
+            shadows: !self.shown.plain,
+            daylight: !self.shown.plain,
+            ..Style::default()
+        }
+    }
+
+    pub(super) fn draw(
+        &mut self,
+        world: &World,
+        camera: &Camera,
+        seconds: f64,
+    ) -> anyhow::Result<()> {
+        use wgpu::CurrentSurfaceTexture as Got;
+        let size = [self.config.width, self.config.height];
+        let target = match self.surface.get_current_texture() {
+            Got::Success(t) | Got::Suboptimal(t) => t,
+            Got::Outdated | Got::Lost => {
+                self.surface
+                    .configure(&self.studio.gpu.device, &self.config);
+                return Ok(());
+            }
+            // Hidden, or late: the next frame will do.
+            _ => return Ok(()),
+        };
+        let aspect = size[0] as f32 / size[1] as f32;
+        let view = camera.view(aspect)?;
+        let mut marks = self.leaves(world);
+        if self.shown.portals {
+            marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
+        }
+        let style = self.style();
+        if style.daylight || style.paint == Paint::Cells {
+            // Once: after that it is there.
+            self.studio.add_light(world)?;
+        }
+        self.shown.queries = None;
+        let list = if self.mode == Mode::Queries {
+            let (list, counts) = self.studio.list_by_queries(world, camera, size)?;
+            self.shown.queries = Some([counts.n_rounds, counts.n_queries]);
+            list
+        } else {
+            let culling = self.mode.culling();
+            self.studio.take_list(&view, camera.eye, culling, size)
+        };
+        let output = target
+            .texture
+            .create_view(&wgpu::TextureViewDescriptor::default());
+        let frame = Frame {
+            projection: camera.projection(aspect)?,
+            list: &list,
+            style,
+            marks: &marks,
+        };
+        self.studio.draw(&frame, &output, size)?;
+        let seen = self
+            .studio
+            .viewer
+            .see(&self.studio.sight, &self.studio.state, &view);
+        self.shown.cells = seen.cells().iter().map(|c| c.0).collect();
+        self.shown.cells.sort_unstable();
+        self.shown.seconds(seconds);
+        self.shown.counts = [
+            list.n_triangles(),
+            self.studio.world.n_triangles(),
+            list.n_draws() as u64,
+        ];
+        self.shown.camera = Some(*camera);
+        self.shown.mode = self.mode;
+        self.shown.closed = self.closed.iter().map(|p| p.0).collect();
+        self.shown.is_recording = self.recorded.is_some();
+        self.shown.flies = self.walker.flies;
+        self.studio.give_list(list);
+        self.panel.draw(
+            &self.studio.gpu,
+            &self.window,
+            &output,
+            size,
+            world,
+            &self.shown,
+        );
+        self.window.pre_present_notify();
+        self.studio.gpu.queue.present(target);
+        Ok(())
+    }
+
+    /// What fills the portals that are closed: else one would see the sky through them.
+    fn leaves(&self, world: &World) -> Vec<Mark> {
+        let portals = &world.graph.portals;
+        let closed = self.closed.iter();
+        closed
+            .map(|p| Mark {
+                shape: Shape::Area(portals[p.0 as usize].outline.clone()),
+                color: [0.23, 0.13, 0.07, 1.0],
+                width: 0.0,
+                on_top: false,
+            })
+            .collect()
+    }
+
+    /// A picture of the world as it is shown now, without the panel.
+    pub(super) fn shot(
+        &mut self,
+        (screenshot, adapter): (&Path, &AdapterChoice),
+        world: &World,
+        outputs: &mut Outputs,
+    ) -> anyhow::Result<()> {
+        self.n_shots += 1;
+        let stem = screenshot.file_stem().unwrap_or_default().to_string_lossy();
+        let to = screenshot.with_file_name(format!("{stem}-{}.png", self.n_shots));
+        let camera = self.camera();
+        // In a studio of its own: a window's pictures do not come back.
+        let mut studio = Studio::new(enfilade_cli::adapter::open(adapter)?, world)?;
+        for &p in &self.closed {
+            studio.state.close(p);
+        }
+        studio.sparing = Sparing {
+            // Its levels would have to be made again.
+            lod: 0.0,
+            ..self.studio.sparing
+        };
+        if self.style().daylight || self.shown.paint == Paint::Cells {
+            studio.add_light(world)?;
+        }
+        let size = [self.config.width, self.config.height];
+        let leaves = self.leaves(world);
+        let picture = studio.picture(&camera, self.mode.culling(), self.style(), &leaves, size)?;
+        let png = picture.to_png()?;
+        outputs.write("--screenshot", Format::Picture, &to)?;
+        write_whole(&to, &png)?;
+        let [drawn, ..] = self.shown.counts;
+        self.say(format!("wrote {}, {drawn} triangles", to.display()));
+        Ok(())
+    }
+}
