@@ -59,6 +59,143 @@ fn render_finds_a_view_and_says_where_it_is() {
 }
 
 #[test]
+fn counts_are_those_of_the_picture() {
+    use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, Sparing, Studio};
+    let path = grid("counts.glb");
+    let world = room_grid(&GridParams::offices(24, 1));
+    let gpu = Gpu::open(&AdapterChoice::Software).unwrap();
+    let mut studio = Studio::new(gpu, &world).unwrap();
+    let (mut tried, mut spared) = (0, 0);
+    for (_, cell) in world.graph.indoor_cells().take(6) {
+        let eye = [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5);
+        let look = [eye[0] + 1.0, eye[1], eye[2] + 0.3];
+        let words = |p: [f32; 3]| p.map(|x| x.to_string()).join(",");
+        let out = place("counts.png");
+        let done = enfilade(&[
+            "render",
+            &path,
+            "-o",
+            out.to_str().unwrap(),
+            "--eye",
+            &words(eye),
+            "--look",
+            &words(look),
+            "--size",
+            "160x90",
+            "--stop",
+            "150",
+            "--objects",
+            "700",
+            "--plain",
+            "--json",
+            "--adapter",
+            "software",
+        ]);
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        let said: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        // Pictures are drawn at twice their size and halved: four pixels for one.
+        let size = [320, 180];
+        let camera = Camera {
+            fov_y: enfilade_cli::cameras::FOV,
+            ..Camera::looking_at(eye, look)
+        };
+        let view = camera.view(size[0] as f32 / size[1] as f32).unwrap();
+        studio.sparing = Sparing::default();
+        let all = studio
+            .list(&view, eye, Culling::Portals, size)
+            .n_triangles();
+        studio.sparing = Sparing {
+            stop_below: 600.0,
+            objects_below: 2800.0,
+            ..Sparing::default()
+        };
+        let list = studio.list(&view, eye, Culling::Portals, size);
+        assert_eq!(said["triangles"], list.n_triangles(), "at {eye:?}");
+        assert_eq!(said["draws"], list.n_draws(), "at {eye:?}");
+        tried += 1;
+        spared += u32::from(list.n_triangles() < all);
+    }
+    assert!(
+        tried == 6 && spared > 0,
+        "{spared} of {tried} are spared something"
+    );
+}
+
+#[test]
+fn overdraw_has_a_scale() {
+    let world = grid("overdraw.glb");
+    let out = place("overdraw.png");
+    let args = [
+        "--size",
+        "320x180",
+        "--paint",
+        "overdraw",
+        "--adapter",
+        "software",
+    ];
+    let done = enfilade(&[&["render", &world, "-o", out.to_str().unwrap()], &args[..]].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    let picture = enfilade_render::Picture::from_png(&fs::read(&out).unwrap()).unwrap();
+    // White stands for 16 and more, which nothing in these rooms is drawn.
+    let white = picture
+        .rgba
+        .chunks_exact(4)
+        .filter(|p| *p == [255; 4])
+        .count();
+    assert!(white > 20, "{white} white pixels");
+}
+
+#[test]
+fn a_photographer_stands_in_a_corner_and_sees_far() {
+    use enfilade_cli::cameras::{EYE_HEIGHT, good_camera};
+    use enfilade_render::{AdapterChoice, Gpu, Studio};
+    let world = room_grid(&GridParams::offices(24, 1));
+    let gpu = || Gpu::open(&AdapterChoice::Software).unwrap();
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let camera = good_camera(&mut studio, &world).unwrap();
+    assert_eq!(
+        camera,
+        good_camera(&mut studio, &world).unwrap(),
+        "the same each time"
+    );
+    let cell = studio.sight.locate(camera.eye).expect("it is in a room");
+    let [low, high] = world.graph[cell].aabb;
+    assert!(!world.graph[cell].outdoor);
+    assert!(
+        (camera.eye[1] - low[1] - EYE_HEIGHT).abs() < 0.05,
+        "{camera:?}"
+    );
+    // Nearer to walls than to the middle, on both axes, and turned towards the middle.
+    let middle = [0, 2].map(|k| (low[k] + high[k]) * 0.5);
+    let from = [camera.eye[0] - middle[0], camera.eye[2] - middle[1]];
+    for (k, axis) in [(0, 0), (1, 2)] {
+        assert!(
+            from[k].abs() > (high[axis] - low[axis]) * 0.2,
+            "{camera:?} in {low:?} {high:?}"
+        );
+    }
+    assert!(camera.toward[0] * from[0] + camera.toward[2] * from[1] < 0.0);
+    // A world without rooms is looked at from outside, all of it.
+    let mut shell = world.clone();
+    for cell in &mut shell.graph.cells {
+        cell.outdoor = true;
+    }
+    let mut studio = Studio::new(gpu(), &shell).unwrap();
+    let camera = good_camera(&mut studio, &shell).unwrap();
+    let [low, high] = studio.world.bounds();
+    assert!((0..3).any(|k| camera.eye[k] < low[k] || camera.eye[k] > high[k]));
+    let projection = camera.projection(16.0 / 9.0).unwrap();
+    for i in 0..8 {
+        let corner = [0, 1, 2].map(|k| [low, high][i >> k & 1][k]);
+        let [x, y] = projection.place(corner).expect("before the eye");
+        assert!(
+            (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y),
+            "{corner:?}"
+        );
+    }
+}
+
+#[test]
 fn a_path_that_was_recorded_gives_the_same_pictures_again() {
     let world = grid("path.glb");
     let (first, again, path) = (place("walk.png"), place("again.png"), place("walk.txt"));

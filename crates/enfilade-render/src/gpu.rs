@@ -49,6 +49,9 @@ pub enum RenderError {
     /// A picture could not be encoded.
     #[error("the picture cannot be encoded: {0}")]
     Encode(String),
+    /// What should be a picture is none.
+    #[error("no PNG picture: {0}")]
+    Decode(String),
     /// A camera without a direction, or with numbers that are not finite.
     #[error(transparent)]
     Camera(#[from] enfilade_runtime::ViewError),

@@ -27,8 +27,25 @@ impl Picture {
         image::DynamicImage::ImageRgba8(image)
             .into_rgb8()
             .write_to(&mut bytes, image::ImageFormat::Png)
-            .map_err(|why| RenderError::Encode(why.to_string()))?;
+            .map_err(|why| RenderError::Decode(why.to_string()))?;
         Ok(bytes.into_inner())
+    }
+
+    /// The picture of a PNG file.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no PNG.
+    pub fn from_png(bytes: &[u8]) -> Result<Self, RenderError> {
+        let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
+            .map_err(|why| RenderError::Encode(why.to_string()))?
+            .into_rgba8();
+        let (width, height) = image.dimensions();
+        Ok(Self {
+            width,
+            height,
+            rgba: image.into_raw(),
+        })
     }
 
     /// The picture at a quarter of its pixels, each the mean of four, averaged as light adds up.
@@ -93,8 +110,7 @@ mod tests {
             rgba,
         };
         let png = picture.to_png().unwrap();
-        let back = image::load_from_memory(&png).unwrap().into_rgba8();
-        assert_eq!((back.dimensions(), back.as_raw()), ((2, 1), &picture.rgba));
+        assert_eq!(Picture::from_png(&png).unwrap(), picture);
         let short = Picture {
             rgba: vec![0; 3],
             ..picture
