@@ -238,3 +238,50 @@ fn light_does_not_depend_on_what_is_culled() {
         assert!((40.0..235.0).contains(&b), "neither night nor glare: {b}");
     }
 }
+
+#[test]
+fn glass_mirrors_the_sky_at_a_grazing_angle_and_is_seen_through_from_before() {
+    use enfilade_geom::scene::{Material, Primitive};
+    let mut world = World::default();
+    world.materials.push(Material {
+        base_color: [0.0, 0.0, 0.0, 0.25],
+        transparent: true,
+        ..Material::default()
+    });
+    // A level pane over a black floor.
+    world.materials.push(Material {
+        base_color: [0.0, 0.0, 0.0, 1.0],
+        ..Material::default()
+    });
+    for (height, material) in [(0.0, 0), (-1.0, 1)] {
+        let corner = |x: f32, z: f32| [x * 200.0, height, z * 200.0];
+        let primitive = Primitive {
+            positions: vec![
+                corner(-1.0, -1.0),
+                corner(-1.0, 1.0),
+                corner(1.0, 1.0),
+                corner(1.0, -1.0),
+            ],
+            indices: vec![0, 1, 2, 0, 2, 3],
+            material: Some(material),
+            ..Primitive::default()
+        };
+        world.batches.push(Batch {
+            primitive,
+            ..Batch::default()
+        });
+    }
+    let mut studio = Studio::new(gpu(), &world).unwrap();
+    let style = Style {
+        dark_corners: false,
+        ..Style::default()
+    };
+    let mut green_at = |look: [f32; 3]| {
+        let camera = Camera::looking_at([0.0, 1.5, 0.0], look);
+        let picture = studio.picture(&camera, Culling::Everything, style, &[], SIZE);
+        picture.unwrap().pixel(SIZE[0] / 2, SIZE[1] / 2)[1]
+    };
+    let (below, far) = (green_at([0.01, 0.0, 0.0]), green_at([40.0, 0.0, 0.0]));
+    assert!(below < 110, "black shows through: {below}");
+    assert!(far > 180, "the sky is mirrored: {far}");
+}
