@@ -22,4 +22,8 @@ inside="--eye 14.71,4.80,7.65 --look 13.79,4.72,8.03"
 draw tower portals $inside --portals --size 1200x675
 # shellcheck disable=SC2086
 draw tower above $inside --above --size 1200x675
+# A storey with its ceiling taken off.
+draw tower cells --paint cells --mode everything --cut 5.4 --eye 5,17,24 --look 11.6,4,8 --size 1200x675
+# Where the command itself would stand.
+draw world room --size 1200x675
 draw world house --eye 19,8.5,17 --look 5.5,2.6,4 --size 1200x675

@@ -62,7 +62,7 @@ pub(crate) struct Render {
     /// walls, orange hidden by a large polygon.
     #[arg(long)]
     above: bool,
-    /// Take off what is higher than this, in meters; with --above, 0.5 above the eye by default.
+    /// Take off what is higher than this, in meters, and light the rest evenly; with --above, 0.5 above the eye by default.
     #[arg(long, value_name = "METERS", allow_hyphen_values = true)]
     cut: Option<f32>,
     /// Portals that are closed, by number.
@@ -203,8 +203,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             Colors::Overdraw => Paint::Overdraw,
         },
         dark_corners: !args.plain,
-        shadows: !args.plain,
-        daylight: !args.plain,
+        // Under a ceiling that was taken off, its shadow would stay.
+        shadows: !args.plain && args.cut.is_none(),
+        daylight: !args.plain && args.cut.is_none(),
         cut_above: args.cut.unwrap_or(f32::INFINITY),
     };
     let mut out = outputs.printed();

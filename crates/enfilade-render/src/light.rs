@@ -23,7 +23,7 @@ pub(crate) use balance::sun_of;
 /// Texels in a row of a table: a shader knows it, too.
 const ROW: u32 = 1024;
 /// How bright a room is in its pictures on average, as a share of what lies under the open sky.
-const MIDDLE: f32 = 0.6;
+const MIDDLE: f32 = 0.7;
 /// The longest exposure, of the shortest.
 const LONGEST: f32 = 4.0;
 /// Texels of a cell in the table.

@@ -28,7 +28,7 @@ const SUN: Vec3 = Vec3::new(3.2, 2.9, 2.4);
 /// Where no daylight comes, somebody has switched on a light: so much falls on the walls at least. Linear, in skies.
 const LAMP: f32 = 0.05;
 /// The light of that lamp.
-const LAMP_COLOR: Vec3 = Vec3::new(1.25, 0.98, 0.70);
+const LAMP_COLOR: Vec3 = Vec3::new(1.12, 0.99, 0.82);
 const ROUNDS: usize = 80;
 
 /// An opening of the graph, as light passes it.

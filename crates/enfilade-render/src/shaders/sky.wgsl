@@ -16,7 +16,7 @@ fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
 // What is seen of the sky, and of the ground far below, along a line.
 fn sky_along(ray: vec3<f32>) -> vec3<f32> {
     let t = clamp(ray.y, -0.15, 1.0);
-    let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.52, 0.52, 0.50), min(-t / 0.12, 1.0));
+    let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.66, 0.70, 0.74), min(-t / 0.12, 1.0));
     let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
     // Too bright for who stands in a room.
     return min(select(above, below, t < 0.0) * (0.7 + 0.3 * globals.field_shift.w), vec3(1.0));

@@ -126,8 +126,9 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
             cell = cell_before(place, normal, toward_eye);
         }
     }
+    var reason = 0u;
     if EXPLAINS {
-        var reason = in.explained.y;
+        reason = in.explained.y;
         if globals.style.y != 0u { reason = reason_of(cell, place); }
         if globals.style.x != 0u || reason != 0u {
             var color = in.explained.x;
@@ -150,7 +151,9 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     if CASTS_SHADOWS {
         sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
-    let light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * globals.field_shift.w;
+    var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * globals.field_shift.w;
+    // What is not seen is told by its color alone: shading would make it look like something.
+    if reason != 0u { light = vec3(1.0 + 0.25 * normal.y); }
     return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
 }
 
