@@ -196,18 +196,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     if !args.plain || args.above || args.paint == Colors::Cells {
         studio.add_light(&world)?;
     }
-    let style = Style {
-        paint: match args.paint {
-            Colors::Lit => Paint::Lit,
-            Colors::Cells => Paint::Cells,
-            Colors::Overdraw => Paint::Overdraw,
-        },
-        dark_corners: !args.plain,
-        // Under a ceiling that was taken off, its shadow would stay.
-        shadows: !args.plain && args.cut.is_none(),
-        daylight: !args.plain && args.cut.is_none(),
-        cut_above: args.cut.unwrap_or(f32::INFINITY),
-    };
+    let style = style_of(args);
     let mut out = outputs.printed();
     let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
@@ -257,6 +246,22 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         _ if !args.json => Ok(()),
         [one] if !is_path => print_json(out, one),
         all => print_json(out, &json!({ "pictures": all })),
+    }
+}
+
+/// How pictures look.
+fn style_of(args: &Render) -> Style {
+    Style {
+        paint: match args.paint {
+            Colors::Lit => Paint::Lit,
+            Colors::Cells => Paint::Cells,
+            Colors::Overdraw => Paint::Overdraw,
+        },
+        dark_corners: !args.plain,
+        // Under a ceiling that was taken off, its shadow would stay.
+        shadows: !args.plain && args.cut.is_none(),
+        daylight: !args.plain && args.cut.is_none(),
+        cut_above: args.cut.unwrap_or(f32::INFINITY),
     }
 }
 

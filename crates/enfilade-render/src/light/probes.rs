@@ -194,10 +194,10 @@ impl Room<'_> {
             self.add(&mut beyond, p, behind, Some((seen, passes)), path);
             path.pop();
         }
-        for k in 0..6 {
-            let walls = (shares[k] - beyond.share[k]).max(0.0);
+        for (k, share) in shares.into_iter().enumerate() {
+            let walls = (share - beyond.share[k]).max(0.0);
             out.light[k] += beyond.light[k] + self.balance.sent[behind.idx()] * walls;
-            out.share[k] += shares[k];
+            out.share[k] += share;
         }
     }
 
