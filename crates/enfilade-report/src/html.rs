@@ -7,9 +7,10 @@ use base64::prelude::BASE64_STANDARD;
 use enfilade_cpg::{PortalKind, Pvs, World};
 use enfilade_geom::DVec2;
 
+use crate::drawing::color;
 use crate::plan::{PlanOptions, plan_svg};
 use crate::storeys::find_storeys;
-use crate::svg::{color, escaped};
+use crate::svg::{escaped, hex};
 
 /// Cells of a visibility matrix at most; larger ones show the largest cells.
 const MAX_MATRIX: usize = 200;
@@ -291,7 +292,7 @@ fn graph_svg(world: &World) -> String {
              <text x=\"{:.2}\" y=\"{:.2}\" font-size=\"{:.2}\" text-anchor=\"middle\" fill=\"#222\">{i}</text>",
             p.x,
             p.y,
-            color(i as u32),
+            hex(color(i as u32)),
             unit * 0.2,
             escaped(&c.name),
             p.x,

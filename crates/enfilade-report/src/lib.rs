@@ -12,12 +12,18 @@
 //! Everything here reads a valid world (`World::validate`) and gives the same bytes every time. A
 //! plan is a drawing: shapes are accurate to about a pixel of its sampling grid, not evidence.
 
+mod drawing;
+mod floors;
 mod html;
+mod label;
+mod marks;
 mod plan;
 mod section;
+mod shafts;
 mod storeys;
 mod svg;
 
+pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
-pub use plan::{PlanOptions, plan_svg};
+pub use plan::{PlanOptions, Plans, plan_svg};
 pub use storeys::{Storey, find_storeys};
