@@ -1,5 +1,5 @@
-//! Reports on enfilade worlds for people: floor plans as SVG, and a page with all there is to
-//! see.
+//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, and a page with all there
+//! is to see.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -14,10 +14,13 @@
 
 mod drawing;
 mod floors;
+mod font;
 mod html;
 mod label;
 mod marks;
+mod pdf;
 mod plan;
+mod raster;
 mod section;
 mod shafts;
 mod storeys;
@@ -25,5 +28,7 @@ mod svg;
 
 pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
+pub use pdf::{PAPERS, Paper, PaperError, to_pdf};
 pub use plan::{PlanOptions, Plans, plan_svg};
+pub use raster::{MAX_PIXELS, RasterError};
 pub use storeys::{Storey, find_storeys};

@@ -236,8 +236,33 @@ impl View<'_> {
         let level: Vec<DVec3> = corners.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect();
         let hull = Winding::hull_in_plane(&plane, &level);
         let flat: Vec<DVec2> = hull.points.iter().map(|p| DVec2::new(p.x, p.z)).collect();
-        (flat.len() >= 3).then(|| path(Class::Detail, vec![flat], true, Some(detail.name.clone())))
+        if flat.len() < 3 || footprint(&flat) > self.room_of(&detail.cells) {
+            return None;
+        }
+        Some(path(
+            Class::Detail,
+            vec![flat],
+            true,
+            Some(detail.name.clone()),
+        ))
     }
+
+    /// Area of the boxes of some cells: no object stands in a room that is smaller than itself, but the box around parts of it that
+    /// lie far apart may be. [Units: wu²]
+    fn room_of(&self, cells: &[CellId]) -> f64 {
+        let side = |c: &CellId, axis: usize| {
+            let [low, high] = self.world.graph[*c].aabb;
+            f64::from(high[axis] - low[axis])
+        };
+        cells.iter().map(|c| side(c, 0) * side(c, 2)).sum()
+    }
+}
+
+/// Area of a convex polygon.
+fn footprint(corners: &[DVec2]) -> f64 {
+    let n = corners.len();
+    let twice = (0..n).map(|i| corners[i].perp_dot(corners[(i + 1) % n]));
+    0.5 * twice.sum::<f64>().abs()
 }
 
 /// Where a convex polygon crosses the height `y`, seen from above.

@@ -144,12 +144,19 @@ impl<'a> Plans<'a> {
             items: Vec::new(),
             zoom,
             numbered: BTreeSet::new(),
+            title: 0.45 * zoom,
             sizes: Sizes {
                 least: LEGIBLE * (size.x * columns as f64).max(size.y * rows as f64),
                 most: NAME * zoom,
             },
         };
         sheet.sizes.most = sheet.sizes.most.max(1.5 * sheet.sizes.least);
+        // No title may reach the next plan, and all are of one size.
+        let room = self.max.x - self.min.x + margin;
+        for &index in which {
+            let title = self.title(&self.pages[index]);
+            sheet.title = sheet.title.min(room / width(&title));
+        }
         for (k, &index) in which.iter().enumerate() {
             let place = DVec2::new((k % columns) as f64, (k / columns) as f64) * size;
             self.draw(index, place + margin - self.min, &mut sheet);
@@ -221,12 +228,8 @@ impl<'a> Plans<'a> {
         for &cell in self.thin.iter().filter(|c| storey.cells.contains(c)) {
             self.draw_thin(cell, sheet);
         }
-        let title = self.title(drawn);
-        // The title must not reach the next plan.
-        let room = self.max.x - self.min.x + MARGIN * sheet.zoom;
-        let size = (room / width(&title)).min(0.45 * sheet.zoom);
         let at = self.min - DVec2::new(0.0, 0.4 * sheet.zoom);
-        sheet.words(at, size, false, title);
+        sheet.words(at, sheet.title, false, self.title(drawn));
     }
 
     fn region(&self, label: Label, region: &Region) -> Item {
@@ -295,8 +298,8 @@ impl<'a> Plans<'a> {
             };
         }
         let name = format!("Storey {} of {n}", storey.name);
-        if drawn.page.cuts.iter().filter(|c| c.at.is_none()).count() > 1 {
-            let [low, high] = storey.range;
+        let [low, high] = storey.range;
+        if high > low {
             return format!(
                 "{name} · floors {low:+.2} to {high:+.2} m, cut {:.2} m above each",
                 self.cut_height
@@ -315,6 +318,8 @@ struct Sheet {
     items: Vec<Item>,
     zoom: f64,
     sizes: Sizes,
+    /// Height of the letters of titles. [Units: wu]
+    title: f64,
     /// Cells that have only a number somewhere on the sheet.
     numbered: BTreeSet<CellId>,
 }
@@ -378,7 +383,18 @@ impl Sheet {
         for (k, (class, words)) in entries.iter().enumerate() {
             let place = DVec2::new((k % 3) as f64 * 2.4, 0.75 + 0.4 * (k / 3) as f64);
             let line = [place - DVec2::Y * 0.07, place + DVec2::new(0.35, -0.07)];
-            self.shape(*class, vec![line.map(|p| p * zoom).to_vec()], false);
+            let line = line.map(|p| p * zoom).to_vec();
+            if *class == Class::Beyond {
+                let up = DVec2::new(0.0, -0.12) * zoom;
+                let [a, b] = [line[0], line[1]];
+                self.shape(*class, vec![vec![a, b, b + up, a + up]], true);
+                // A color, as the cells have.
+                if let Some(Item::Path(path)) = self.items.last_mut() {
+                    path.fill = Some(color(0));
+                }
+            } else {
+                self.shape(*class, vec![line], false);
+            }
             let at = (place + DVec2::X * 0.42) * zoom;
             self.words(at, 0.16 * zoom, false, (*words).into());
         }

@@ -22,6 +22,10 @@ const MOST_HIDDEN: f64 = 0.3;
 const ABOVE: f64 = 1.5;
 /// What has less than this share of the largest storey's area is no storey of its own, if its cells are on another.
 const LEAST_SHARE: f64 = 0.05;
+/// A space without a floor may cover this part of a room on the room's plan, as that under a stair does.
+const INSET: f64 = 0.2;
+/// Where this share of a page's floor is at one height, the page has one height to speak of.
+const NEARLY_ALL: f64 = 0.75;
 /// Floors that differ by less are cut at one height. [Units: wu]
 const SAME_CUT: f64 = 0.5;
 
@@ -32,7 +36,7 @@ pub struct Storey {
     pub name: String,
     /// Height of most of its floor. [Units: wu]
     pub floor: f64,
-    /// Height of its lowest and of its highest floor. [Units: wu]
+    /// Height of its lowest and of its highest floor; both are `floor` where most of the area is at that height. [Units: wu]
     pub range: [f64; 2],
     /// Height of the next storey's floor, or the top of the highest indoor cell. [Units: wu]
     pub top: f64,
@@ -65,6 +69,8 @@ pub(crate) struct Page {
     pub(crate) cuts: Vec<Cut>,
     /// Side of a tile. [Units: wu]
     pub(crate) tile: f64,
+    /// Which cell is shown where.
+    ground: BTreeMap<(i32, i32), CellId>,
 }
 
 /// The storeys, lowest first; one at least where there is an indoor cell. Every indoor cell is in one of them.
@@ -296,14 +302,23 @@ fn page(world: &World, floors: &Floors, group: &Group) -> Page {
         cut.1 += level(k).area;
     }
     cuts.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.floor.total_cmp(&b.0.floor)));
-    let heights = || group.levels.iter().map(|&k| level(k).height);
+    let floor = cuts.first().map_or(0.0, |c| c.0.floor);
+    let is_even = cuts.first().is_none_or(|c| c.1 >= NEARLY_ALL * group.area);
+    let heights = || {
+        let all = group.levels.iter().map(|&k| level(k).height);
+        all.map(move |h| if is_even { floor } else { h })
+    };
+    let mut ground = BTreeMap::new();
+    for level in group.levels.iter().map(|&k| level(k)) {
+        ground.extend(level.tiles.iter().map(|&t| (t, level.cell)));
+    }
     let mut cells: Vec<CellId> = group.levels.iter().map(|&k| level(k).cell).collect();
     cells.sort_unstable();
     cells.dedup();
     Page {
         storey: Storey {
             name: String::new(),
-            floor: cuts.first().map_or(0.0, |c| c.0.floor),
+            floor,
             range: [
                 heights().fold(f64::INFINITY, f64::min),
                 heights().fold(f64::NEG_INFINITY, f64::max),
@@ -315,6 +330,7 @@ fn page(world: &World, floors: &Floors, group: &Group) -> Page {
         },
         cuts: cuts.into_iter().map(|c| c.0).collect(),
         tile: floors.tile,
+        ground,
     }
 }
 
@@ -376,6 +392,7 @@ fn place(shafts: Vec<Shaft>, mut pages: Vec<Page>, tile: f64, highest: f64) -> V
                     },
                     cuts: Vec::new(),
                     tile,
+                    ground: BTreeMap::new(),
                 };
                 page.add(shaft);
                 extras.push(page);
@@ -417,11 +434,19 @@ fn letters(mut index: usize) -> String {
 }
 
 impl Page {
-    /// Whether what is shown here leaves most of the shaft's place free.
+    /// Whether a shaft can be shown here: most of its place is free, or it is a small part of the rooms that it covers.
     fn has_room_for(&self, shaft: &Shaft) -> bool {
-        let is_taken = |t: &&(i32, i32)| self.cuts.iter().any(|c| c.tiles.contains(t));
-        let hidden = shaft.tiles.iter().filter(is_taken).count();
-        hidden as f64 <= MOST_HIDDEN * shaft.tiles.len() as f64
+        let mut covered: BTreeMap<CellId, usize> = BTreeMap::new();
+        for cell in shaft.tiles.iter().filter_map(|t| self.ground.get(t)) {
+            *covered.entry(*cell).or_default() += 1;
+        }
+        let n = shaft.tiles.len() as f64;
+        let is_free = covered.values().sum::<usize>() as f64 <= MOST_HIDDEN * n;
+        is_free
+            || covered.keys().all(|cell| {
+                let whole = self.ground.values().filter(|c| *c == cell).count();
+                n <= INSET * whole as f64
+            })
     }
 
     /// Shows a shaft, at the height of a cut that is there if that serves.
@@ -445,5 +470,7 @@ impl Page {
         };
         self.cuts[k].tops.insert(shaft.cell, shaft.top);
         self.cuts[k].tiles.extend(&shaft.tiles);
+        let place = shaft.tiles.iter().map(|&t| (t, shaft.cell));
+        self.ground.extend(place);
     }
 }
