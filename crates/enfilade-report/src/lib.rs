@@ -15,9 +15,11 @@
 mod drawing;
 mod floors;
 mod font;
+mod graph;
 mod html;
 mod label;
 mod marks;
+mod matrix;
 mod pdf;
 mod plan;
 mod raster;

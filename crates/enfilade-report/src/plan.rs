@@ -42,6 +42,7 @@ pub struct Plans<'a> {
     pages: Vec<Drawn>,
     /// Cells of which no plan shows anything but a box.
     thin: BTreeSet<CellId>,
+    voids: Vec<CellId>,
     min: DVec2,
     max: DVec2,
 }
@@ -73,7 +74,8 @@ impl<'a> Plans<'a> {
     pub fn new(world: &'a World, options: &PlanOptions) -> Self {
         let (min, max) = extent(world);
         let mut shown = BTreeSet::new();
-        let pages: Vec<Drawn> = find_pages(world)
+        let (pages, voids) = find_pages(world);
+        let pages: Vec<Drawn> = pages
             .into_iter()
             .map(|page| {
                 let heights = heights(&page, options.cut_height);
@@ -104,9 +106,15 @@ impl<'a> Plans<'a> {
             cut_height: options.cut_height,
             thin: indoor.filter(|c| !shown.contains(c)).collect(),
             pages,
+            voids,
             min,
             max,
         }
+    }
+
+    /// The cells in which nobody can stand, ascending: shafts, spaces above ceilings, cavities.
+    pub fn voids(&self) -> impl ExactSizeIterator<Item = CellId> {
+        self.voids.iter().copied()
     }
 
     /// The storeys, in the order of the plans.
@@ -279,6 +287,11 @@ impl<'a> Plans<'a> {
     }
 
     fn title(&self, drawn: &Drawn) -> String {
+        // No "-0.00".
+        let height = |h: f64| {
+            let h = (h * 100.0).round() / 100.0;
+            format!("{:+.2}", if h == 0.0 { 0.0 } else { h })
+        };
         let storey = &drawn.page.storey;
         let n = self.storeys().filter(|s| !s.is_between).count();
         let low = drawn.heights.iter().copied().fold(f64::INFINITY, f64::min);
@@ -289,11 +302,17 @@ impl<'a> Plans<'a> {
             .fold(f64::NEG_INFINITY, f64::max);
         if storey.is_between {
             return if high - low < 0.05 {
-                format!("{} · spaces without a floor, cut {low:+.2} m", storey.name)
+                format!(
+                    "{} · spaces without a floor, cut {} m",
+                    storey.name,
+                    height(low)
+                )
             } else {
                 format!(
-                    "{} · spaces without a floor, cut {low:+.2} to {high:+.2} m",
-                    storey.name
+                    "{} · spaces without a floor, cut {} to {} m",
+                    storey.name,
+                    height(low),
+                    height(high)
                 )
             };
         }
@@ -301,14 +320,16 @@ impl<'a> Plans<'a> {
         let [low, high] = storey.range;
         if high > low {
             return format!(
-                "{name} · floors {low:+.2} to {high:+.2} m, cut {:.2} m above each",
+                "{name} · floors {} to {} m, cut {:.2} m above each",
+                height(low),
+                height(high),
                 self.cut_height
             );
         }
         format!(
-            "{name} · floor {:+.2} m, cut {:+.2} m",
-            storey.floor,
-            storey.floor + self.cut_height
+            "{name} · floor {} m, cut {} m",
+            height(storey.floor),
+            height(storey.floor + self.cut_height)
         )
     }
 }

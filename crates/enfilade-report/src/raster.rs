@@ -69,7 +69,8 @@ impl Drawing {
             scale,
             place: DVec2::ZERO,
         };
-        brush.paper(self.size);
+        // The last row of pixels may be only partly of the drawing.
+        brush.paper(self.size + 1.0 / scale);
         for item in &self.items {
             match item {
                 Item::Place { at, .. } => brush.place = *at,

@@ -78,11 +78,11 @@ pub(crate) struct Page {
 /// O(floor area + triangles + levels²) where nothing connects the levels, much less where doorways do.
 #[must_use]
 pub fn find_storeys(world: &World) -> Vec<Storey> {
-    find_pages(world).into_iter().map(|p| p.storey).collect()
+    find_pages(world).0.into_iter().map(|p| p.storey).collect()
 }
 
-/// The same with their cuts.
-pub(crate) fn find_pages(world: &World) -> Vec<Page> {
+/// The same with their cuts; and the cells in which nobody can stand, ascending.
+pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
     let floors = find_floors(world);
     let groups = grouped(world, &floors);
     let mut pages: Vec<Page> = groups.iter().map(|g| page(world, &floors, g)).collect();
@@ -96,7 +96,7 @@ pub(crate) fn find_pages(world: &World) -> Vec<Page> {
         pages[k].storey.top = next.unwrap_or(highest);
     }
     let shafts = find_shafts(world, &floors.unfloored, floors.tile);
-    place(shafts, pages, floors.tile, highest)
+    (place(shafts, pages, floors.tile, highest), floors.unfloored)
 }
 
 /// Levels that are drawn on one plan.
