@@ -18,6 +18,8 @@ use crate::svg::{escaped, hex};
 const DISTANCE: f64 = 70.0;
 /// Middles of disks are no nearer than this: numbers of three digits stay apart. [Units: pixels]
 const LEAST_DISTANCE: f64 = 40.0;
+/// Width of a page without a scroll bar, but for the margins. [Units: pixels]
+const PAGE: f64 = 980.0;
 /// Radius of the smallest and of the largest disk. [Units: pixels]
 const RADII: [f64; 2] = [11.0, 19.0];
 /// Steps of the layout: three times as many as a tower of 100 rooms takes to come to rest.
@@ -36,11 +38,9 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
     if rooms.len() <= MAX_ROOMS {
         lay_out(&rooms, &edges, &mut places);
     }
+    tighten(&mut places);
     spread(&mut places);
-    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    for p in &places {
-        (low, high) = (low.min(*p), high.max(*p));
-    }
+    let (low, high) = bounds(&places);
     let margin = DVec2::splat(1.5 * RADII[1]);
     let size = high - low + 2.0 * margin;
     let at: BTreeMap<CellId, DVec2> = rooms
@@ -231,6 +231,27 @@ fn bonds(joined: &[[usize; 2]], places: &[DVec2]) -> Vec<[usize; 2]> {
     out
 }
 
+fn bounds(places: &[DVec2]) -> (DVec2, DVec2) {
+    let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    places
+        .iter()
+        .fold(start, |(low, high), p| (low.min(*p), high.max(*p)))
+}
+
+/// Makes the whole as small as the number of disks allows, and no wider than the page if it can be.
+fn tighten(places: &mut [DVec2]) {
+    let (low, high) = bounds(places);
+    let size = (high - low).max(DVec2::ONE);
+    let area = places.len() as f64 * DISTANCE * DISTANCE;
+    let scale = (area / (size.x * size.y))
+        .sqrt()
+        .min(PAGE / size.x)
+        .min(1.0);
+    for p in places.iter_mut() {
+        *p = (*p - low) * scale;
+    }
+}
+
 /// Pushes apart what is nearer than a disk is wide.
 fn spread(places: &mut [DVec2]) {
     for _ in 0..200 {
@@ -277,6 +298,7 @@ mod tests {
         let edges = edges.collect();
         let mut places = vec![DVec2::ZERO; 100];
         lay_out(&rooms, &edges, &mut places);
+        tighten(&mut places);
         spread(&mut places);
         for (i, p) in places.iter().enumerate() {
             for q in &places[i + 1..] {
@@ -286,6 +308,7 @@ mod tests {
         }
         let mut again = vec![DVec2::ZERO; 100];
         lay_out(&rooms, &edges, &mut again);
+        tighten(&mut again);
         spread(&mut again);
         assert_eq!(places, again);
     }

@@ -158,7 +158,7 @@ impl<'a> Plans<'a> {
                 most: NAME * zoom,
             },
         };
-        sheet.sizes.most = sheet.sizes.most.max(1.5 * sheet.sizes.least);
+        sheet.sizes.most = sheet.sizes.most.max(2.6 * sheet.sizes.least);
         // No title may reach the next plan, and all are of one size.
         let room = self.max.x - self.min.x + margin;
         for &index in which {
