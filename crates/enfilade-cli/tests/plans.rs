@@ -8,8 +8,8 @@ use enfilade::World;
 use enfilade::import::export_glb;
 use enfilade_report::{PlanOptions, find_storeys, plan_svg};
 use enfilade_testkit::{
-    Generated, TowerParams, Variant, cave, dirkse_maze, furnished_house, gjorup_cavern,
-    gjorup_rooms, mixed, office_tower,
+    Generated, TowerParams, Variant, cave, furnished_house, gjorup_cavern, gjorup_rooms, mixed,
+    office_tower,
 };
 
 fn enfilade(args: &[&str]) -> Output {
@@ -73,7 +73,6 @@ fn every_room_of_generated_scenes_is_on_a_plan() {
         (gjorup_rooms(Variant::Optimised, [0.0; 3]), None),
         (gjorup_cavern([0.0; 3]), None),
         (cave(2), None),
-        (dirkse_maze(1), Some(1)),
     ];
     scenes.extend(mixed::all().into_iter().map(|s| (s, None)));
     for (generated, n_storeys) in scenes {

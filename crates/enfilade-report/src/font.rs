@@ -33,7 +33,7 @@ impl Fonts {
                 continue;
             };
             let location = LocationRef::default();
-            let mut pen = Pen(BezPath::new());
+            let mut pen = Tracer(BezPath::new());
             if let Some(outline) = font.outline_glyphs().get(glyph) {
                 let settings = DrawSettings::unhinted(Size::new(1.0), location);
                 // A glyph that its font describes wrongly stays a gap.
@@ -59,13 +59,13 @@ impl Fonts {
 }
 
 /// Takes an outline with y up.
-struct Pen(BezPath);
+struct Tracer(BezPath);
 
 fn at(x: f32, y: f32) -> (f64, f64) {
     (f64::from(x), -f64::from(y))
 }
 
-impl OutlinePen for Pen {
+impl OutlinePen for Tracer {
     fn move_to(&mut self, x: f32, y: f32) {
         self.0.move_to(at(x, y));
     }

@@ -120,7 +120,7 @@ pub fn to_pdf(
     }
     let fonts = Fonts::new();
     for (k, drawing) in drawings.iter().enumerate() {
-        let sheet = Sheet::new(drawing, paper, scale)?;
+        let sheet = OnPaper::new(drawing, paper, scale)?;
         let stream = Ref::new(page_of(k).get() + 1);
         let mut page = pdf.page(page_of(k));
         let [w, h] = sheet.paper;
@@ -145,14 +145,14 @@ pub fn to_pdf(
 }
 
 /// Where a drawing is on its paper.
-struct Sheet {
+struct OnPaper {
     /// Width and height. [Units: mm]
     paper: [f64; 2],
     scale: f64,
     name: &'static str,
 }
 
-impl Sheet {
+impl OnPaper {
     fn new(drawing: &Drawing, paper: Paper, scale: Option<f64>) -> Result<Self, PaperError> {
         let [short, long] = paper.sides;
         let size = drawing.size * 1e3;

@@ -15,6 +15,8 @@ use crate::storeys::{Page, Storey, find_pages};
 const MARGIN: f64 = 1.2;
 /// Letters of names are no higher than this in a small house. [Units: wu]
 const NAME: f64 = 0.32;
+/// Letters of the legend, in a small house. [Units: wu]
+const SMALL: f64 = 0.16;
 /// The smallest letters, as part of the longer side of a sheet: 1.2 mm on A4, 6.5 pixels of 1600.
 const LEGIBLE: f64 = 0.004;
 
@@ -170,7 +172,7 @@ impl<'a> Plans<'a> {
             self.draw(index, place + margin - self.min, &mut sheet);
         }
         let foot = DVec2::new(margin, size.y * rows as f64 + 0.5 * zoom);
-        let width = (size.x * columns as f64).max(8.5 * zoom);
+        let width = (size.x * columns as f64).max(8.5 * sheet.legend());
         let end = sheet.foot(self.world, foot, width);
         Drawing {
             title: "Floor plans".into(),
@@ -368,9 +370,14 @@ impl Sheet {
         }));
     }
 
+    /// How much larger than usual the legend is: its letters are legible, too.
+    fn legend(&self) -> f64 {
+        self.zoom.max(self.sizes.least / SMALL)
+    }
+
     /// Scale bar, legend, and the names of numbered cells. Returns where they end. [Units: wu]
     fn foot(&mut self, world: &World, at: DVec2, width: f64) -> f64 {
-        let zoom = self.zoom;
+        let (zoom, grown) = (self.zoom, self.legend());
         let is_there = |class: Class| {
             let is = |i: &Item| matches!(i, Item::Path(p) if p.class == class);
             self.items.iter().any(is)
@@ -393,20 +400,21 @@ impl Sheet {
         for k in 0..5 {
             let class = if k % 2 == 0 { Class::Bar } else { Class::Gap };
             let (left, right) = (f64::from(k) * zoom, f64::from(k + 1) * zoom);
-            let bar = [(left, 0.0), (right, 0.0), (right, 0.12), (left, 0.12)];
-            let bar = bar.map(|(x, z)| DVec2::new(x, z * if z > 0.0 { zoom } else { 1.0 }));
-            self.shape(class, vec![bar.to_vec()], true);
+            let high = 0.12 * grown;
+            let bar = [(left, 0.0), (right, 0.0), (right, high), (left, high)];
+            let bar = bar.map(|(x, z)| DVec2::new(x, z)).to_vec();
+            self.shape(class, vec![bar], true);
         }
-        let under = 0.4 * zoom;
-        self.words(DVec2::new(0.0, under), 0.22 * zoom, true, "0".into());
+        let under = 0.4 * grown;
+        self.words(DVec2::new(0.0, under), 0.22 * grown, true, "0".into());
         let words = format!("{} m", 5.0 * zoom);
-        self.words(DVec2::new(5.0 * zoom, under), 0.22 * zoom, true, words);
+        self.words(DVec2::new(5.0 * zoom, under), 0.22 * grown, true, words);
         for (k, (class, words)) in entries.iter().enumerate() {
-            let place = DVec2::new((k % 3) as f64 * 2.4, 0.75 + 0.4 * (k / 3) as f64);
+            let place = DVec2::new((k % 3) as f64 * 2.6, 0.75 + 0.4 * (k / 3) as f64);
             let line = [place - DVec2::Y * 0.07, place + DVec2::new(0.35, -0.07)];
-            let line = line.map(|p| p * zoom).to_vec();
+            let line = line.map(|p| p * grown).to_vec();
             if *class == Class::Beyond {
-                let up = DVec2::new(0.0, -0.12) * zoom;
+                let up = DVec2::new(0.0, -0.12) * grown;
                 let [a, b] = [line[0], line[1]];
                 self.shape(*class, vec![vec![a, b, b + up, a + up]], true);
                 // A color, as the cells have.
@@ -416,17 +424,17 @@ impl Sheet {
             } else {
                 self.shape(*class, vec![line], false);
             }
-            let at = (place + DVec2::X * 0.42) * zoom;
-            self.words(at, 0.16 * zoom, false, (*words).into());
+            let at = (place + DVec2::X * 0.42) * grown;
+            self.words(at, SMALL * grown, false, (*words).into());
         }
-        let mut below = (0.75 + 0.4 * entries.len().div_ceil(3) as f64) * zoom;
+        let mut below = (0.75 + 0.4 * entries.len().div_ceil(3) as f64) * grown;
         below = self.numbers(world, below, width - 2.0 * at.x);
         at.y + below
     }
 
     /// The names that numbers stand for, in columns.
     fn numbers(&mut self, world: &World, below: f64, room: f64) -> f64 {
-        let size = (0.16 * self.zoom).max(self.sizes.least);
+        let size = SMALL * self.legend();
         let mut rows: Vec<String> = Vec::new();
         for &cell in &self.numbered {
             let name = &world.graph[cell].name;

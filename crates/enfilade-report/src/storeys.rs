@@ -96,7 +96,10 @@ pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
         pages[k].storey.top = next.unwrap_or(highest);
     }
     let shafts = find_shafts(world, &floors.unfloored, floors.tile);
-    (place(shafts, pages, floors.tile, highest), floors.unfloored)
+    (
+        place(&shafts, pages, floors.tile, highest),
+        floors.unfloored,
+    )
 }
 
 /// Levels that are drawn on one plan.
@@ -366,18 +369,18 @@ fn drop_landings(pages: &mut Vec<Page>) {
 }
 
 /// Puts the cells without a floor on the storeys that they stand beside, or on pages of their own.
-fn place(shafts: Vec<Shaft>, mut pages: Vec<Page>, tile: f64, highest: f64) -> Vec<Page> {
+fn place(shafts: &[Shaft], mut pages: Vec<Page>, tile: f64, highest: f64) -> Vec<Page> {
     // By the page below: those between, in the order of their making.
     let mut between: BTreeMap<usize, Vec<Page>> = BTreeMap::new();
     for shaft in shafts {
         let below = pages.iter().rposition(|p| p.storey.floor <= shaft.at);
         let host = below.unwrap_or(0);
-        if pages.get(host).is_some_and(|p| p.has_room_for(&shaft)) {
+        if pages.get(host).is_some_and(|p| p.has_room_for(shaft)) {
             pages[host].add(shaft);
             continue;
         }
         let extras = between.entry(host).or_default();
-        match extras.iter().position(|p| p.has_room_for(&shaft)) {
+        match extras.iter().position(|p| p.has_room_for(shaft)) {
             Some(k) => extras[k].add(shaft),
             None => {
                 let mut page = Page {
@@ -450,7 +453,7 @@ impl Page {
     }
 
     /// Shows a shaft, at the height of a cut that is there if that serves.
-    fn add(&mut self, shaft: Shaft) {
+    fn add(&mut self, shaft: &Shaft) {
         let storey = &mut self.storey;
         if let Err(at) = storey.cells.binary_search(&shaft.cell) {
             storey.cells.insert(at, shaft.cell);
