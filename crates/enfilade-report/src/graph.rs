@@ -314,6 +314,16 @@ mod tests {
     }
 
     #[test]
+    fn disks_on_one_spot_are_pushed_apart() {
+        let mut places = vec![DVec2::ONE; 30];
+        spread(&mut places);
+        for (i, p) in places.iter().enumerate() {
+            let near = |q: &DVec2| p.distance(*q) < LEAST_DISTANCE - 0.5;
+            assert!(!places[i + 1..].iter().any(near), "{places:?}");
+        }
+    }
+
+    #[test]
     fn parts_without_a_doorway_between_them_stay_in_sight() {
         let rooms: Vec<CellId> = (0..20).map(CellId).collect();
         let mut places: Vec<DVec2> = (0..20).map(|i| DVec2::X * f64::from(i)).collect();

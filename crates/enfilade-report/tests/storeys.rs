@@ -136,7 +136,7 @@ fn what_lies_above_is_another_storey_whatever_stairs_lead_there() {
     // Back over the first room, from the last one by a door with a drop.
     halls.push(room([0.0, -12.0, 0.0], [30.0, -9.0, 5.0]));
     let mut doors = cascade_doors();
-    doors.push((5, 6, [30.0, -12.0, 2.0]));
+    doors.push((5, 6, [30.0, -11.0, 2.0]));
     let world = world(&halls, &doors);
     assert_eq!(
         storeys(&world),
@@ -303,6 +303,27 @@ fn names_stay_in_their_rooms_shrunk_turned_wrapped_or_numbered() {
     assert_eq!(all(2), ["boiler-", "and-", "water-", "room"]);
     assert_eq!(all(3), ["3"]);
     assert!(svg.contains(&format!(">3  {}<", names[3])), "the legend");
+}
+
+#[test]
+fn a_name_stays_in_the_arms_of_a_room_with_a_corner_in_it() {
+    // Boxes that come first win: the second room is an L around the first, 2 m wide.
+    let halls = [
+        room([2.0, 0.0, 2.0], [12.0, 3.0, 12.0]),
+        room([0.0, 0.0, 0.0], [12.0, 3.0, 12.0]),
+    ];
+    let svg = plan_svg(&world(&halls, &[]), &PlanOptions::default());
+    let words = words_of(&svg, 1);
+    assert_eq!(words.len(), 2, "the name and the area");
+    for (at, size, is_turned, text) in words {
+        let half = 0.5 * 0.62 * size * text.chars().count() as f64;
+        let right = at[0] + if is_turned { 0.3 * size } else { half };
+        let below = at[1] + if is_turned { half } else { 0.3 * size };
+        assert!(
+            right < 202.0 || below < 202.0,
+            "{text} at {at:?}, {size} high, is in the other room"
+        );
+    }
 }
 
 #[test]
