@@ -24,6 +24,14 @@ const PAGE: f64 = 980.0;
 const RADII: [f64; 2] = [11.0, 19.0];
 /// Steps of the layout: three times as many as a tower of 100 rooms takes to come to rest.
 const STEPS: usize = 400;
+/// Directions of length 1 without a pattern.
+const WAYS: [DVec2; 5] = [
+    DVec2::new(1.0, 0.0),
+    DVec2::new(-0.6, 0.8),
+    DVec2::new(0.28, -0.96),
+    DVec2::new(0.8, 0.6),
+    DVec2::new(-0.96, -0.28),
+];
 /// More rooms than this stay where they are: each step takes the square of their number.
 const MAX_ROOMS: usize = 2000;
 
@@ -254,7 +262,7 @@ fn tighten(places: &mut [DVec2]) {
 
 /// Pushes apart what is nearer than a disk is wide.
 fn spread(places: &mut [DVec2]) {
-    for _ in 0..200 {
+    for _ in 0..500 {
         let mut is_moved = false;
         // Neighbors in x only: the list is nearly sorted after the first round.
         let mut order: Vec<usize> = (0..places.len()).collect();
@@ -267,10 +275,11 @@ fn spread(places: &mut [DVec2]) {
                 }
                 let distance = apart.length();
                 if distance < LEAST_DISTANCE {
+                    // Two on one spot part in a direction of their own, or a heap of them would become a row.
                     let way = if distance > 1e-6 {
                         apart / distance
                     } else {
-                        DVec2::X
+                        WAYS[(a + b) % WAYS.len()]
                     };
                     // A little more than needed, so that this comes to an end.
                     let push = way * (0.5 * (LEAST_DISTANCE - distance) + 0.05);
