@@ -75,8 +75,8 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     if !voids.is_empty() {
         let _ = writeln!(
             out,
-            "<p class=\"filter\"><label><input type=\"checkbox\" id=\"voids\" checked> Show the {} spaces in which nobody can \
-             stand: shafts, and the air above ceilings</label></p>",
+            "<p class=\"filter\"><label><input type=\"checkbox\" id=\"voids\" checked> Show spaces in which nobody can stand, such as \
+             shafts and the air above ceilings: {}</label></p>",
             voids.len()
         );
     }

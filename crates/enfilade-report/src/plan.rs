@@ -9,6 +9,7 @@ use crate::drawing::{Class, Drawing, Item, Path, Words, color};
 use crate::label::{Sizes, fit, line_height, line_size, width};
 use crate::marks::View;
 use crate::section::{Label, Region, Section, cell_of, heights};
+use crate::shafts::find_shafts;
 use crate::storeys::{Page, Storey, find_pages};
 
 /// Air around each plan, for its title. [Units: wu]
@@ -59,6 +60,39 @@ struct Drawn {
     marks: Vec<Item>,
 }
 
+impl Drawn {
+    fn new(world: &World, page: Page, cut_height: f64, (min, max): (DVec2, DVec2)) -> Self {
+        let heights = heights(&page, cut_height);
+        let section = Section::sample(world, &page, &heights, min, max);
+        let regions: Vec<(Label, Region)> = section.regions().into_iter().collect();
+        let view = View {
+            world,
+            page: &page,
+            section: &section,
+            heights: &heights,
+        };
+        let mut marks = view.details();
+        marks.push(view.walls());
+        marks.extend(world.graph.portal_ids().filter_map(|id| view.portal(id)));
+        Self {
+            page,
+            heights,
+            section,
+            regions,
+            marks,
+        }
+    }
+}
+
+/// The indoor cells that no plan shows.
+fn hidden_cells(world: &World, pages: &[Drawn]) -> BTreeSet<CellId> {
+    let regions = pages.iter().flat_map(|p| &p.regions);
+    let shown = regions.filter_map(|r| cell_of(r.0)).filter(|c| c.1);
+    let shown: BTreeSet<CellId> = shown.map(|c| c.0).collect();
+    let indoor = world.graph.indoor_cells().map(|c| c.0);
+    indoor.filter(|c| !shown.contains(c)).collect()
+}
+
 /// Draws the floor plans of all storeys as one SVG document; x runs right and z down, as seen from
 /// above. One drawing unit is a centimeter.
 ///
@@ -75,38 +109,26 @@ impl<'a> Plans<'a> {
     #[must_use]
     pub fn new(world: &'a World, options: &PlanOptions) -> Self {
         let (min, max) = extent(world);
-        let mut shown = BTreeSet::new();
         let (pages, voids) = find_pages(world);
-        let pages: Vec<Drawn> = pages
-            .into_iter()
-            .map(|page| {
-                let heights = heights(&page, options.cut_height);
-                let section = Section::sample(world, &page, &heights, min, max);
-                let regions: Vec<(Label, Region)> = section.regions().into_iter().collect();
-                shown.extend(regions.iter().filter_map(|r| cell_of(r.0)).map(|c| c.0));
-                let view = View {
-                    world,
-                    page: &page,
-                    section: &section,
-                    heights: &heights,
-                };
-                let mut marks = view.details();
-                marks.push(view.walls());
-                marks.extend(world.graph.portal_ids().filter_map(|id| view.portal(id)));
-                Drawn {
-                    page,
-                    heights,
-                    section,
-                    regions,
-                    marks,
+        let draw = |page: Page| Drawn::new(world, page, options.cut_height, (min, max));
+        let mut pages: Vec<Drawn> = pages.into_iter().map(draw).collect();
+        // What the cut of its neighbors misses, or what lies under one of them, is cut at a height of its own.
+        let hidden: Vec<CellId> = hidden_cells(world, &pages).into_iter().collect();
+        for drawn in &mut pages {
+            let mut of_page = hidden.clone();
+            of_page.retain(|c| drawn.page.storey.cells.binary_search(c).is_ok());
+            if !of_page.is_empty() {
+                let mut page = drawn.page.clone();
+                for shaft in find_shafts(world, &of_page, page.tile) {
+                    page.show_apart(&shaft);
                 }
-            })
-            .collect();
-        let indoor = world.graph.indoor_cells().map(|c| c.0);
+                *drawn = draw(page);
+            }
+        }
         Self {
             world,
             cut_height: options.cut_height,
-            thin: indoor.filter(|c| !shown.contains(c)).collect(),
+            thin: hidden_cells(world, &pages),
             pages,
             voids,
             min,

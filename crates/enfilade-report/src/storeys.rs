@@ -452,6 +452,17 @@ impl Page {
             })
     }
 
+    /// Shows a cell of the page by a cut of its own, whatever is there.
+    pub(crate) fn show_apart(&mut self, shaft: &Shaft) {
+        for cut in &mut self.cuts {
+            cut.tops.remove(&shaft.cell);
+        }
+        let mut cut = Cut::new(shaft.floor, Some(shaft.at));
+        cut.tops.insert(shaft.cell, shaft.top);
+        cut.tiles.extend(&shaft.tiles);
+        self.cuts.push(cut);
+    }
+
     /// Shows a shaft, at the height of a cut that is there if that serves.
     fn add(&mut self, shaft: &Shaft) {
         let storey = &mut self.storey;

@@ -211,6 +211,21 @@ fn spaces_without_a_floor_stand_beside_rooms_or_on_plans_of_their_own() {
 }
 
 #[test]
+fn a_low_room_is_cut_below_its_ceiling() {
+    // Of two floors that are cut together, the lower room ends below that cut.
+    let halls = [
+        room([0.0, 0.4, 0.0], [20.0, 4.0, 20.0]),
+        room([20.0, 0.0, 0.0], [22.0, 1.3, 20.0]),
+    ];
+    let world = world(&halls, &[]);
+    assert_eq!(storeys(&world), [named("1", &[0, 1])]);
+    let svg = plan_svg(&world, &PlanOptions::default());
+    for id in 0..2 {
+        assert!(svg.contains(&format!("<path class=\"cell\" data-cell=\"{id}\"")));
+    }
+}
+
+#[test]
 fn a_cell_that_is_too_thin_to_draw_is_a_box_with_its_number() {
     let halls = [
         room([0.0, 0.0, 0.0], [40.0, 3.0, 40.0]),
