@@ -18,6 +18,8 @@ const LEAST_LEVEL: f64 = 1.0;
 const SPACING: f64 = 0.5;
 /// Most rows of points on one triangle: with those, a floor 64 m long is still asked every half meter.
 const MAX_ROWS: usize = 128;
+/// Most tiles along a side of the world.
+const MAX_TILES: f64 = 1000.0;
 /// How far above a floor its cell must still be, so that a person can stand on it: the usual height of a cut. [Units: wu]
 const HEADROOM: f64 = 1.2;
 /// How far above a floor the cell that stands on it is looked for. [Units: wu]
@@ -80,14 +82,17 @@ pub(crate) fn tile_at(x: f64, z: f64, tile: f64) -> (i32, i32) {
     ((x / tile).floor() as i32, (z / tile).floor() as i32)
 }
 
-/// A tile as wide as samples are apart on the largest triangle that there can be.
+/// A tile as wide as samples are apart on the largest triangle that there can be, and of a world not more than a million.
 fn tile_of(world: &World) -> f64 {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let mut reach = 0.0_f64;
     for (_, cell) in world.graph.indoor_cells() {
-        let [low, high] = cell.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
-        reach = reach.max((high - low).length());
+        let [a, b] = cell.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
+        reach = reach.max((b - a).length());
+        (low, high) = (low.min(a), high.max(b));
     }
-    SPACING.max(reach / MAX_ROWS as f64)
+    let whole = (high - low).max_element().max(0.0);
+    SPACING.max(reach / MAX_ROWS as f64).max(whole / MAX_TILES)
 }
 
 /// Points of the surfaces that an indoor cell stands on, by cell.
@@ -126,7 +131,9 @@ fn ask(
         .distance(t[1])
         .max(t[1].distance(t[2]))
         .max(t[2].distance(t[0]));
-    let n = ((longest / SPACING).ceil() as usize).clamp(1, MAX_ROWS);
+    // A sliver needs no more points than its area holds.
+    let side = longest.min(4.0 * area.sqrt());
+    let n = ((side / SPACING).ceil() as usize).clamp(1, MAX_ROWS);
     let each = area / (n * n) as f64;
     let locator = &world.graph.locator;
     for i in 0..n {

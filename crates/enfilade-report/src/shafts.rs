@@ -8,7 +8,7 @@ use crate::floors::{Tiles, tile_at};
 /// Heights that are tried, as parts of the cell's own: the middle first.
 const HEIGHTS: [f64; 5] = [0.5, 0.25, 0.75, 0.1, 0.9];
 /// Points asked along each side of a cell's box: few at first, and more where these find nothing.
-const SIDES: [usize; 2] = [48, 256];
+const SIDES: [usize; 2] = [32, 128];
 /// The part of the best cut's points that another height must find to serve as well.
 const AS_GOOD: f64 = 0.5;
 

@@ -226,6 +226,16 @@ fn a_low_room_is_cut_below_its_ceiling() {
 }
 
 #[test]
+fn rooms_a_thousand_kilometers_apart_are_drawn_in_no_more_memory() {
+    let halls = [
+        room([0.0, 0.0, 0.0], [5.0, 3.0, 5.0]),
+        room([1e6, 0.0, 1e6], [1e6 + 5.0, 3.0, 1e6 + 5.0]),
+    ];
+    let svg = plan_svg(&world(&halls, &[]), &PlanOptions::default());
+    assert_eq!(svg.matches("<path class=\"thin\" data-cell=").count(), 2);
+}
+
+#[test]
 fn a_cell_that_is_too_thin_to_draw_is_a_box_with_its_number() {
     let halls = [
         room([0.0, 0.0, 0.0], [40.0, 3.0, 40.0]),
