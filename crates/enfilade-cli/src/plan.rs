@@ -32,7 +32,7 @@ pub(crate) struct Plan {
     /// Height of the cut above each floor, in meters.
     #[arg(long, default_value_t = 1.2, value_name = "METERS", value_parser = height)]
     height: f64,
-    /// Width of a .png in pixels.
+    /// Width of a .png in pixels; 2400 if not given.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(enfilade_report::MAX_PIXELS)))]
     width: Option<u32>,
     /// Paper of a .pdf: A0 to A5, Letter or Tabloid; A4 if not given.
