@@ -1,5 +1,5 @@
 #!/bin/sh
-# Draws the pictures of README and docs from generated scenes; needs a built `enfilade` and no display.
+# Draws the pictures and plans of README and docs from generated scenes; needs a built `enfilade` and no display.
 # Usage: scripts/pictures.sh [PATH/TO/enfilade]
 set -eu
 cd "$(dirname "$0")/.."
@@ -27,3 +27,7 @@ draw tower cells --paint cells --mode everything --cut 5.4 --eye 5,17,24 --look 
 # Where the command itself would stand.
 draw world room --size 1200x675
 draw world house --eye 19,8.5,17 --look 5.5,2.6,4 --size 1200x675
+# Plans; the house as SVG, too.
+"$enfilade" plan "$work/world.glb" -o docs/images/plan.svg
+"$enfilade" plan "$work/world.glb" -o docs/images/plan.png --width 1400
+"$enfilade" plan "$work/tower.glb" -o docs/images/tower.png --width 1600

@@ -43,6 +43,21 @@ pub(crate) const NEEDS: [Need; 4] = [
     },
 ];
 
+/// What tests use if it is there, and pass without: not every system has a package of it.
+pub(crate) const WANTS: [Need; 1] = [Need {
+    what: "Chromium",
+    why: "opens the page that `report` writes, and points at it",
+    packages: &["chromium"],
+    is_there: || has_tool("chromium") || has_tool("chromium-browser"),
+}];
+
+/// Installs what is missing of `wants`, or says that it is not there.
+pub(crate) fn try_install(wants: &[Need], apt: impl FnMut(&[&str]) -> anyhow::Result<()>) {
+    if let Err(why) = install(wants, apt) {
+        println!("{why:#}\nits test says so and passes");
+    }
+}
+
 fn has_driver() -> bool {
     [
         "/usr/share/vulkan/icd.d",
@@ -156,6 +171,16 @@ mod tests {
         assert!(why.contains("apt-get install thing libthing"), "{why}");
         // apt says it is done, and the thing is not there.
         assert!(install(&[need(|| false)], |_| Ok(())).is_err());
+    }
+
+    #[test]
+    fn what_is_only_wanted_stops_nothing() {
+        let mut n_tried = 0;
+        try_install(&[need(|| false)], |_| {
+            n_tried += 1;
+            bail!("no right to")
+        });
+        assert_eq!(n_tried, 1);
     }
 
     #[test]

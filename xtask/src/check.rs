@@ -127,6 +127,7 @@ fn tools() -> anyhow::Result<()> {
     }
     if cfg!(target_os = "linux") {
         apt::install(&apt::NEEDS, apt::apt_get)?;
+        apt::try_install(&apt::WANTS, apt::apt_get);
     }
     if !node_path().join("gltf-validator").is_dir() {
         std::fs::create_dir_all(tools_dir())?;

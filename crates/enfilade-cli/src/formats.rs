@@ -47,7 +47,11 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
 const TABLE: [Row; 14] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
-    row(Format::Plan, "a floor plan as SVG", &["svg"]),
+    row(
+        Format::Plan,
+        "a floor plan as SVG, PNG or PDF",
+        &["svg", "png", "pdf"],
+    ),
     row(Format::Page, "a page of HTML", &["html", "htm"]),
     row(Format::Picture, "a picture as PNG", &["png"]),
     row(Format::Cameras, "cameras as text", &["txt", "path"]),
@@ -70,10 +74,10 @@ const TABLE: [Row; 14] = [
 ];
 
 /// Extensions of what no command writes.
-const FOREIGN: [&str; 38] = [
+const FOREIGN: [&str; 37] = [
     "3ds", "avif", "blend", "bmp", "bsp", "csv", "dae", "dxf", "exr", "fbx", "gif", "gltf", "gz",
-    "ifc", "jpeg", "jpg", "ktx2", "map", "md", "mtl", "obj", "pdf", "ply", "ppm", "stl", "svgz",
-    "tga", "tif", "tiff", "usd", "usda", "usdc", "usdz", "webp", "xml", "yaml", "yml", "zip",
+    "ifc", "jpeg", "jpg", "ktx2", "map", "md", "mtl", "obj", "ply", "ppm", "stl", "svgz", "tga",
+    "tif", "tiff", "usd", "usda", "usdc", "usdz", "webp", "xml", "yaml", "yml", "zip",
 ];
 
 impl Format {
@@ -129,6 +133,8 @@ mod tests {
         };
         for (format, path) in [
             (Format::Plan, "x.SVG"),
+            (Format::Plan, "x.png"),
+            (Format::Plan, "x-{}.pdf"),
             (Format::Plan, "x"),
             (Format::Plan, "/dev/stdout"),
             (Format::Plan, "tmp.Xq3kf"),
@@ -139,7 +145,7 @@ mod tests {
             assert_eq!(refused(format, path), None);
         }
         for (format, path, fits) in [
-            (Format::Plan, "x.png", ".svg fits"),
+            (Format::Plan, "x.jpg", ".svg or .png or .pdf fits"),
             (Format::World, "x.glb.OBJ", ".glb fits"),
             (Format::World, "x.txt", ".glb fits"),
             (Format::Page, "x.svg", ".html or .htm fits"),

@@ -1,34 +1,171 @@
 //! `enfilade plan`: a floor plan per storey.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::bail;
-use enfilade_report::{PlanOptions, plan_svg};
+use anyhow::{Context, bail};
+use enfilade::cpg::World;
+use enfilade_report::{Drawing, PAPERS, Paper, PlanOptions, Plans, Storey, to_pdf};
 
 use crate::formats::Format;
 use crate::output::{Outputs, Written, print_json, write_whole};
-use enfilade_cli::input::name_of;
+use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
-/// Draws the floor plan of every storey as one SVG: rooms colored, doorways at their width.
+/// What stands for a storey's name in the name of an output.
+const PLACE: &str = "{}";
+
+/// Draws floor plans: rooms colored and named, doorways at their width.
+///
+/// A storey is floors that meet and do not lie above each other. Spaces in which nobody can stand have plans of their own, named
+/// 2a, 2b, …, where there is no room for them on that of the storey below. One sheet shows all plans; a PDF has a page for each.
 #[derive(clap::Args)]
 pub(crate) struct Plan {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write the drawing; `-` for standard output.
-    #[arg(short, long, value_name = "SVG")]
+    /// Where to write: a .svg or a .png with all plans on one sheet, or a .pdf with a page for each. With `{}` in the name, as in
+    /// `plan-{}.svg`, a file for each storey, by its name. `-` is SVG to standard output.
+    #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Height of the cut above each storey's floor, in meters.
+    /// Draw this storey only, by the name that its plan has, `1` or `2a`, or by the name of a room on it. May be repeated.
+    #[arg(long, value_name = "N|ROOM")]
+    storey: Vec<String>,
+    /// Height of the cut above each floor, in meters.
     #[arg(long, default_value_t = 1.2, value_name = "METERS", value_parser = height)]
     height: f64,
+    /// Width of a .png in pixels; 2400 if not given.
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(enfilade_report::MAX_PIXELS)))]
+    width: Option<u32>,
+    /// Paper of a .pdf: A0 to A5, Letter or Tabloid; A4 if not given.
+    #[arg(long, value_name = "PAPER", value_parser = paper)]
+    paper: Option<Paper>,
+    /// Scale of a .pdf, as in 1:100; the largest in use that fits the paper if not given.
+    #[arg(long, value_name = "1:N", value_parser = scale)]
+    scale: Option<f64>,
     /// Print what was written as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
 }
 
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+#[serde(untagged)]
+enum PlanReport<'a> {
+    One {
+        #[serde(flatten)]
+        written: Written,
+        storeys: Vec<StoreyReport<'a>>,
+    },
+    Several {
+        plans: Vec<PlanReport<'a>>,
+    },
+}
+
+#[derive(serde::Serialize)]
+struct StoreyReport<'a> {
+    name: &'a str,
+    floor: f64,
+    /// Ids.
+    cells: Vec<u32>,
+}
+
+/// What the file is.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Svg,
+    Png,
+    Pdf,
+}
+
 pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
+    let kind = kind(args)?;
+    let name = args.output.file_name().unwrap_or_default();
+    let is_several = name.to_string_lossy().contains(PLACE);
     let mut outputs = Outputs::reading([&args.world])?;
-    outputs.write("-o", Format::Plan, &args.output)?;
+    if !is_several {
+        outputs.write("-o", Format::Plan, &args.output)?;
+    }
+    let world = read(args)?;
+    let options = PlanOptions {
+        cut_height: args.height,
+    };
+    let plans = Plans::new(&world, &options);
+    let which = chosen(args, &plans)?;
+    let jobs: Vec<(PathBuf, Vec<usize>)> = if is_several {
+        let storeys: Vec<&Storey> = plans.storeys().collect();
+        let path = |k: usize| named(&args.output, &storeys[k].name);
+        which.iter().map(|&k| (path(k), vec![k])).collect()
+    } else {
+        vec![(args.output.clone(), which)]
+    };
+    if is_several {
+        let paths: Vec<PathBuf> = jobs.iter().map(|j| j.0.clone()).collect();
+        outputs.write_all("-o", Format::Plan, &paths)?;
+    }
+    let mut reports = Vec::new();
+    for (path, which) in &jobs {
+        let bytes = drawn(args, kind, &plans, which)?;
+        write_whole(path, &bytes)?;
+        reports.push(PlanReport::One {
+            written: Written::new(path, &bytes),
+            storeys: plans
+                .storeys()
+                .enumerate()
+                .filter(|(k, _)| which.contains(k))
+                .map(|(_, storey)| StoreyReport::new(storey))
+                .collect(),
+        });
+    }
+    if !args.json {
+        return Ok(());
+    }
+    let report = if is_several {
+        PlanReport::Several { plans: reports }
+    } else {
+        reports.remove(0)
+    };
+    print_json(outputs.printed(), &report)
+}
+
+impl<'a> StoreyReport<'a> {
+    fn new(storey: &'a Storey) -> Self {
+        Self {
+            name: &storey.name,
+            floor: storey.floor,
+            cells: storey.cells.iter().map(|c| c.0).collect(),
+        }
+    }
+}
+
+/// What the extension says; refused where an option is for another kind of file.
+fn kind(args: &Plan) -> anyhow::Result<Kind> {
+    let extension = args.output.extension().unwrap_or_default();
+    let extension = extension.to_string_lossy().to_ascii_lowercase();
+    let kind = match extension.as_str() {
+        "png" => Kind::Png,
+        "pdf" => Kind::Pdf,
+        _ => Kind::Svg,
+    };
+    let misplaced = [
+        ("--width", args.width.is_some(), Kind::Png, ".png"),
+        ("--paper", args.paper.is_some(), Kind::Pdf, ".pdf"),
+        ("--scale", args.scale.is_some(), Kind::Pdf, ".pdf"),
+    ];
+    for (option, is_given, of, extension) in misplaced {
+        if is_given && kind != of {
+            bail!(
+                "{option} is of use to a {extension} only, and {} is none; leave {option} out, or give -o a name that ends in {extension}",
+                if is_stream(&args.output) {
+                    "standard output".into()
+                } else {
+                    args.output.display().to_string()
+                }
+            );
+        }
+    }
+    Ok(kind)
+}
+
+fn read(args: &Plan) -> anyhow::Result<World> {
     let world = read_world(&args.world)?;
     if let Err(errors) = world.validate() {
         let first = errors.first().map(ToString::to_string).unwrap_or_default();
@@ -37,25 +174,82 @@ pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
             name_of(&args.world)
         );
     }
-    let svg = plan_svg(
-        &world,
-        &PlanOptions {
-            cut_height: args.height,
-        },
-    );
-    write_whole(&args.output, svg.as_bytes())?;
-    if args.json {
-        print_json(
-            outputs.printed(),
-            &Written::new(&args.output, svg.as_bytes()),
-        )?;
+    Ok(world)
+}
+
+/// The plans to draw, by index.
+fn chosen(args: &Plan, plans: &Plans) -> anyhow::Result<Vec<usize>> {
+    let mut out: Vec<usize> = Vec::new();
+    for name in &args.storey {
+        let found = plans.find(name);
+        if found.is_empty() {
+            let names: Vec<&str> = plans.storeys().map(|s| s.name.as_str()).collect();
+            bail!(
+                "{} has no storey {name}, and no room of that name; its storeys are {}",
+                name_of(&args.world),
+                if names.is_empty() {
+                    "none".into()
+                } else {
+                    names.join(", ")
+                }
+            );
+        }
+        out.extend(found);
     }
-    Ok(())
+    if args.storey.is_empty() {
+        out.extend(0..plans.storeys().len());
+    }
+    out.sort_unstable();
+    out.dedup();
+    Ok(out)
+}
+
+/// The bytes of one file.
+fn drawn(args: &Plan, kind: Kind, plans: &Plans, which: &[usize]) -> anyhow::Result<Vec<u8>> {
+    Ok(match kind {
+        Kind::Svg => plans.sheet(which).to_svg().into_bytes(),
+        Kind::Png => {
+            let width = args.width.unwrap_or(2400);
+            let picture = plans.sheet(which).to_png(width);
+            picture.context("no picture was drawn; --width says how wide it is to be")?
+        }
+        Kind::Pdf => {
+            let pages: Vec<Drawing> = if which.is_empty() {
+                vec![plans.sheet(&[])]
+            } else {
+                which.iter().map(|&k| plans.sheet(&[k])).collect()
+            };
+            let paper = args.paper.unwrap_or(PAPERS[1]);
+            to_pdf(&pages, paper, args.scale).context("change --scale or --paper")?
+        }
+    })
+}
+
+/// The output's name for a storey.
+fn named(path: &Path, storey: &str) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(name.replace(PLACE, storey))
 }
 
 fn height(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x < 100.0 => Ok(x),
         _ => Err("a height in meters between 0 and 100 is needed, e.g. 1.2".into()),
+    }
+}
+
+fn paper(text: &str) -> Result<Paper, String> {
+    let found = PAPERS
+        .into_iter()
+        .find(|p| p.name.eq_ignore_ascii_case(text));
+    let names = PAPERS.map(|p| p.name).join(", ");
+    found.ok_or_else(|| format!("a size of paper is needed: {names}"))
+}
+
+fn scale(text: &str) -> Result<f64, String> {
+    let number = text.strip_prefix("1:").unwrap_or(text);
+    match number.parse::<f64>() {
+        Ok(x) if (1.0..=1e6).contains(&x) => Ok(x),
+        _ => Err("a scale from 1:1 to 1:1000000 is needed, e.g. 1:100".into()),
     }
 }

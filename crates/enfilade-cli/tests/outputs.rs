@@ -174,7 +174,7 @@ fn an_extension_that_contradicts_is_refused_before_the_work() {
         ("edit w.glb --delete-portal 0 -o x.svg", ".glb fits"),
         ("simplify w.glb --max-cells 2 -o x.prt", ".glb fits"),
         ("simplify g.prt --max-cells 1 -o x.glb", ".prt fits"),
-        ("plan w.glb -o x.png", ".svg fits"),
+        ("plan w.glb -o x.jpg", ".svg or .png or .pdf fits"),
         ("report w.glb --no-pictures -o x.pdf", ".html or .htm fits"),
         ("render w.glb -o x.jpg", ".png fits"),
         ("render w.glb --walk 3 -o x.jpg", ".png fits"),

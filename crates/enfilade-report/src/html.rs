@@ -4,17 +4,16 @@ use std::fmt::Write;
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use enfilade_cpg::{PortalKind, Pvs, World};
-use enfilade_geom::DVec2;
+use enfilade_cpg::{CellId, PortalKind, Pvs, World};
 
-use crate::plan::{PlanOptions, plan_svg};
-use crate::storeys::find_storeys;
-use crate::svg::{color, escaped};
+use crate::graph::graph_svg;
+use crate::matrix::{Order, matrix_svg};
+use crate::plan::{PlanOptions, Plans};
+use crate::storeys::Storey;
+use crate::svg::escaped;
 
-/// Cells of a visibility matrix at most; larger ones show the largest cells.
-const MAX_MATRIX: usize = 200;
 /// Rows of the table of rooms at most.
-const MAX_ROWS: usize = 100;
+const MAX_ROWS: usize = 1000;
 
 /// A picture of the page.
 #[derive(Clone, Debug)]
@@ -52,39 +51,61 @@ pub struct ReportParts {
 }
 
 /// Writes the page. The world must be valid; the same parts give the same bytes.
+///
+/// All that shows a cell carries its number as `data-cell`; a script of the page's own marks the others where a pointer rests on one.
 #[must_use]
 pub fn report_html(world: &World, parts: &ReportParts) -> String {
+    let plans = Plans::new(world, &PlanOptions::default());
+    let storeys: Vec<&Storey> = plans.storeys().collect();
     let mut out = String::new();
     let title = escaped(&parts.title);
+    let voids: Vec<String> = plans.voids().map(|c| c.0.to_string()).collect();
     let _ = write!(
         out,
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}: rooms and doorways</title>\n<style>{STYLE}</style></head><body>\n\
+         <title>{title}: rooms and doorways</title>\n<style>{STYLE}</style></head><body data-voids=\"{}\">\n\
          <header><h1>{title}</h1><p>{}</p></header>\n",
-        escaped(&summary(world))
+        voids.join(" "),
+        escaped(&summary(world, &storeys))
     );
     for note in &parts.notes {
         let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(note));
     }
+    if !voids.is_empty() {
+        let _ = writeln!(
+            out,
+            "<p class=\"filter\"><label><input type=\"checkbox\" id=\"voids\" checked> Show spaces in which nobody can stand, such as \
+             shafts and the air above ceilings: {}</label></p>",
+            voids.len()
+        );
+    }
     let (first, rest) = parts.figures.split_at(parts.figures.len().min(1));
     figures(&mut out, first);
-    let plan = plan_svg(world, &PlanOptions::default());
-    let plan = plan.split_once("?>").map_or(plan.as_str(), |(_, svg)| svg);
+    out.push_str(
+        "<section><h2>Plans</h2><p>Point at a room, here or below, to see it everywhere on this page; click to go to it.</p>\n",
+    );
+    for (k, storey) in storeys.iter().enumerate() {
+        let plan = plans.sheet(&[k]).to_svg();
+        let plan = plan.split_once("?>").map_or(plan.as_str(), |(_, svg)| svg);
+        let class = if storey.is_between { " between" } else { "" };
+        let _ = writeln!(out, "<div class=\"drawing{class}\">{plan}</div>");
+    }
     let _ = write!(
         out,
-        "<section><h2>Plans</h2><div class=\"drawing\">{plan}</div></section>\n\
-         <section><h2>Graph</h2><p>A disk for each room, as large as its volume, where its middle is on the \
-         plan, storeys side by side; a line for each doorway.</p><div class=\"drawing\">{}</div></section>\n",
-        graph_svg(world)
+        "</section>\n<section><h2>Graph</h2><p>A disk for each room, with its number and as large as its volume; a line for each \
+         doorway, as on the plan. A thick ring: there is a door, a window or an opening to the outdoors.</p>\
+         <div class=\"wide\">{}</div></section>\n",
+        graph_svg(world, &storeys)
     );
     if parts.visible.n_cells() > 0 {
-        matrix(&mut out, world, &parts.visible);
+        matrix(&mut out, world, &plans, &parts.visible);
     }
     for t in &parts.tables {
-        table(&mut out, t);
+        table(&mut out, t, &[]);
     }
-    table(&mut out, &rooms(world));
+    let (rooms, cells) = rooms(world, &storeys);
+    table(&mut out, &rooms, &cells);
     if !rest.is_empty() {
         out.push_str("<section><h2>Pictures</h2>\n");
         figures(&mut out, rest);
@@ -98,7 +119,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         .collect();
     let _ = write!(
         out,
-        "<footer>Baked by {} ({}), input {}. {}</footer>\n</body></html>\n",
+        "<footer>Baked by {} ({}), input {}. {}</footer>\n<script>{SCRIPT}</script>\n</body></html>\n",
         escaped(&p.generator),
         escaped(&p.method),
         escaped(&p.input_hash),
@@ -106,6 +127,9 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     );
     out
 }
+
+/// Marks what belongs to a cell wherever it is shown, and hides voids. The page is whole without it.
+const SCRIPT: &str = include_str!("report.js");
 
 const STYLE: &str = "\
 :root{color-scheme:light}*{box-sizing:border-box}\
@@ -118,11 +142,16 @@ figcaption{color:#555;font-size:.9rem}.gallery{display:grid;grid-template-column
 .wide{overflow-x:auto}table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-nums;min-width:60%}\
 th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
 th:first-child,td:first-child{text-align:left}th{background:#f4f4f2}\
+.graph line{stroke-width:2;stroke-opacity:.75}.graph text,.matrix text{fill:#222}\
+.band{fill:#e8590c;fill-opacity:0}[data-cell]{cursor:pointer}\
+path.lit{stroke:#000;stroke-width:14}text.lit{font-weight:bold}tr.lit td{background:#ffe8cc}\
+g.lit circle{stroke:#000;stroke-width:5}g.lit .band{fill-opacity:.35}g.lit text{font-weight:bold}line.lit{stroke-width:5;stroke-opacity:1}\
+.no-voids .void,.no-voids .between,.no-voids .twice,.without-voids{display:none}.no-voids .without-voids{display:block}\
 footer{color:#777;font-size:.8rem;margin-top:2rem;overflow-wrap:anywhere}\
 @media print{body{max-width:none;padding:0;font-size:11px}section{break-inside:avoid-page}\
 .wide{overflow:visible}h2{break-after:avoid}tr,figure{break-inside:avoid}th{-webkit-print-color-adjust:exact;print-color-adjust:exact}}";
 
-fn summary(world: &World) -> String {
+fn summary(world: &World, storeys: &[&Storey]) -> String {
     let graph = &world.graph;
     let indoors = graph.indoor_cells().map(|(_, c)| c);
     let n = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
@@ -130,7 +159,7 @@ fn summary(world: &World) -> String {
     format!(
         "{} rooms in {} storeys, {volume:.0} m³ of air; {} doors, {} windows, {} open passages, {} cracks; {} objects",
         indoors.count(),
-        find_storeys(world).len(),
+        storeys.iter().filter(|s| !s.is_between).count(),
         n(PortalKind::Door),
         n(PortalKind::Window),
         n(PortalKind::Open),
@@ -153,7 +182,8 @@ fn figures(out: &mut String, figures: &[Figure]) {
     out.push_str("</div>\n");
 }
 
-fn table(out: &mut String, t: &Table) {
+/// `cells` are those of the rows after the head, where the rows are about cells.
+fn table(out: &mut String, t: &Table, cells: &[CellId]) {
     let _ = write!(
         out,
         "<section><h2>{}</h2><p>{}</p><div class=\"wide\"><table>",
@@ -162,7 +192,12 @@ fn table(out: &mut String, t: &Table) {
     );
     for (i, row) in t.rows.iter().enumerate() {
         let tag = if i == 0 { "th" } else { "td" };
-        out.push_str("<tr>");
+        match i.checked_sub(1).and_then(|k| cells.get(k)) {
+            Some(cell) => {
+                let _ = write!(out, "<tr data-cell=\"{}\">", cell.0);
+            }
+            None => out.push_str("<tr>"),
+        }
         for cell in row {
             let _ = write!(out, "<{tag}>{}</{tag}>", escaped(cell));
         }
@@ -171,15 +206,22 @@ fn table(out: &mut String, t: &Table) {
     out.push_str("</table></div></section>\n");
 }
 
-fn rooms(world: &World) -> Table {
+/// The table of rooms, and the cells of its rows.
+fn rooms(world: &World, storeys: &[&Storey]) -> (Table, Vec<CellId>) {
     let mut cells: Vec<_> = (0..)
         .zip(&world.graph.cells)
         .filter(|c| !c.1.outdoor)
         .collect();
     cells.sort_by(|a: &(u32, _), b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     let n = cells.len();
+    cells.truncate(MAX_ROWS);
+    let of = |cell: u32| {
+        let on = storeys.iter().filter(|s| s.cells.contains(&CellId(cell)));
+        on.map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")
+    };
     let head = [
         "room",
+        "storey",
         "volume m³",
         "size m",
         "doorways",
@@ -187,10 +229,11 @@ fn rooms(world: &World) -> Table {
         "of objects",
     ];
     let mut rows = vec![head.map(String::from).to_vec()];
-    rows.extend(cells.into_iter().take(MAX_ROWS).map(|(_, c)| {
+    rows.extend(cells.iter().map(|&(id, c)| {
         let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
         vec![
             c.name.clone(),
+            of(id),
             format!("{:.1}", c.volume),
             format!("{x:.1} × {y:.1} × {z:.1}"),
             c.portals.len().to_string(),
@@ -198,7 +241,7 @@ fn rooms(world: &World) -> Table {
             c.n_detail_triangles.to_string(),
         ]
     }));
-    Table {
+    let table = Table {
         title: "Rooms".into(),
         note: if n > MAX_ROWS {
             format!("The {MAX_ROWS} largest of {n}.")
@@ -206,152 +249,41 @@ fn rooms(world: &World) -> Table {
             "By volume.".into()
         },
         rows,
-    }
+    };
+    (table, cells.iter().map(|c| CellId(c.0)).collect())
 }
 
-/// The graph as a drawing: rooms where they are, storeys side by side.
-fn graph_svg(world: &World) -> String {
-    let storeys = find_storeys(world);
-    let cells = &world.graph.cells;
-    let mut low = DVec2::INFINITY;
-    let mut high = DVec2::NEG_INFINITY;
-    let middle = |i: usize| {
-        let [a, b] = cells[i].aabb.map(|p| p.map(f64::from));
-        (
-            (a[0] + b[0]) * 0.5,
-            (a[1] + b[1]) * 0.5,
-            (a[2] + b[2]) * 0.5,
-        )
-    };
-    for c in cells.iter().filter(|c| !c.outdoor) {
-        let [a, b] = c.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
-        (low, high) = (low.min(a), high.max(b));
-    }
-    if !low.is_finite() {
-        return "<p>No rooms.</p>".into();
-    }
-    let size = (high - low).max(DVec2::splat(1.0));
-    let step = size.x * 1.12;
-    let place = |i: usize| {
-        let (x, y, z) = middle(i);
-        let storey = storeys.iter().rposition(|s| s.floor <= y).unwrap_or(0);
-        DVec2::new(x - low.x + storey as f64 * step, z - low.y)
-    };
-    let unit = size.max_element() / 100.0;
-    let width = step * storeys.len().max(1) as f64;
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{:.2} {:.2} {:.2} {:.2}\" font-family=\"sans-serif\" role=\"img\" aria-label=\"graph of rooms\">",
-        -4.0 * unit,
-        -4.0 * unit,
-        width + 8.0 * unit,
-        size.y + 8.0 * unit
-    );
-    for p in &world.graph.portals {
-        let [a, b] = p.cells.map(|c| c.0 as usize);
-        let stroke = match p.kind {
-            PortalKind::Open => "#e8590c",
-            PortalKind::Door => "#c92a2a",
-            PortalKind::Window => "#1c7ed6",
-            PortalKind::Crack => "#d6249f",
-        };
-        let ends = match (cells[a].outdoor, cells[b].outdoor) {
-            (true, true) => continue,
-            // To the outdoors: a stub, from the room through its window.
-            (true, _) | (_, true) => {
-                let room = if cells[a].outdoor { b } else { a };
-                let n = p.outline.len().max(1) as f64;
-                let at = |k: usize| p.outline.iter().map(|c| f64::from(c[k])).sum::<f64>() / n;
-                let (x, _, z) = middle(room);
-                let from = place(room);
-                [
-                    from,
-                    from + (DVec2::new(at(0), at(2)) - DVec2::new(x, z)) * 1.08,
-                ]
-            }
-            _ => [place(a), place(b)],
-        };
-        let [u, v] = ends;
-        let _ = write!(
-            out,
-            "<line x1=\"{:.2}\" y1=\"{:.2}\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{stroke}\" stroke-width=\"{:.2}\" stroke-opacity=\".75\"/>",
-            u.x,
-            u.y,
-            v.x,
-            v.y,
-            unit * 0.5
-        );
-    }
-    for (i, c) in cells.iter().enumerate().filter(|(_, c)| !c.outdoor) {
-        let p = place(i);
-        let r = (f64::from(c.volume.max(0.0)).cbrt() * 0.22)
-            .clamp(unit * 1.2, size.max_element() * 0.08);
-        let _ = write!(
-            out,
-            "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\"{r:.2}\" fill=\"{}\" stroke=\"#444\" stroke-width=\"{:.2}\"><title>{}</title></circle>\
-             <text x=\"{:.2}\" y=\"{:.2}\" font-size=\"{:.2}\" text-anchor=\"middle\" fill=\"#222\">{i}</text>",
-            p.x,
-            p.y,
-            color(i as u32),
-            unit * 0.2,
-            escaped(&c.name),
-            p.x,
-            p.y + unit * 0.8,
-            unit * 2.2
-        );
-    }
-    out.push_str("</svg>");
-    out
-}
-
-/// Which room can be seen from which, as a square of dots.
-fn matrix(out: &mut String, world: &World, visible: &Pvs) {
-    let mut cells: Vec<usize> = (0..visible.n_cells().min(world.graph.cells.len())).collect();
-    if cells.len() > MAX_MATRIX {
-        cells.sort_by(|&a, &b| {
-            let volume = |i: usize| world.graph.cells[i].volume;
-            volume(b).total_cmp(&volume(a)).then(a.cmp(&b))
-        });
-        cells.truncate(MAX_MATRIX);
-        cells.sort_unstable();
-    }
-    let n = cells.len();
-    let pairs = visible.n_pairs();
-    let all = visible.n_cells() * visible.n_cells();
+/// Which room can be seen from which; twice where there are voids, with and without them.
+fn matrix(out: &mut String, world: &World, plans: &Plans, visible: &Pvs) {
+    let storeys: Vec<&Storey> = plans.storeys().collect();
+    let all = Order::new(world, &storeys, visible, |_| true);
+    let (n, n_known) = (all.cells.len(), visible.n_cells());
+    let (pairs, of) = (visible.n_pairs(), n_known * n_known);
     let _ = write!(
         out,
         "<section><h2>Visibility</h2><p>A dark square where something of the column's room can be seen from somewhere in \
-         the row's: {pairs} of {all} pairs, {:.1} %{}.</p><div class=\"drawing\"><svg xmlns=\"http://www.w3.org/2000/svg\" \
-         viewBox=\"-1 -1 {} {}\" style=\"max-width:520px\" role=\"img\" aria-label=\"visibility matrix\">\
-         <rect width=\"{n}\" height=\"{n}\" fill=\"#f1f1ee\"/><path fill=\"#1c3d5a\" d=\"",
-        100.0 * pairs as f64 / all.max(1) as f64,
-        if n < visible.n_cells() {
-            format!("; the {n} largest of {} rooms", visible.n_cells())
+         the row's: {pairs} of {of} pairs, {:.1} %{}. Storeys are parted by lines.</p>",
+        100.0 * pairs as f64 / of.max(1) as f64,
+        if n < n_known {
+            format!("; the {n} largest of {n_known} rooms")
         } else {
             String::new()
         },
-        n + 2,
-        n + 2
     );
-    for (y, &from) in cells.iter().enumerate() {
-        let sees = |x: usize| {
-            visible.sees(
-                enfilade_cpg::CellId(from as u32),
-                enfilade_cpg::CellId(cells[x] as u32),
-            )
-        };
-        let mut x = 0;
-        while x < n {
-            let start = x;
-            while x < n && sees(x) {
-                x += 1;
-            }
-            if x > start {
-                let _ = write!(out, "M{start} {y}h{}v1h-{}z", x - start, x - start);
-            }
-            x += 1;
-        }
+    let class = if plans.voids().len() > 0 {
+        " twice"
+    } else {
+        ""
+    };
+    let svg = matrix_svg(world, visible, &all);
+    let _ = writeln!(out, "<div class=\"wide{class}\">{svg}</div>");
+    if plans.voids().len() > 0 {
+        let is_void = |c: CellId| plans.voids().any(|v| v == c);
+        let some = Order::new(world, &storeys, visible, |c| !is_void(c));
+        let svg = matrix_svg(world, visible, &some);
+        let _ = writeln!(out, "<div class=\"wide without-voids\">{svg}</div>");
     }
-    out.push_str("\"/></svg></div></section>\n");
+    out.push_str("</section>\n");
 }
 
 #[cfg(test)]
@@ -380,14 +312,14 @@ mod tests {
             ..ReportParts::default()
         };
         let page = report_html(&world, &parts);
-        assert!(!page.contains("<script"), "{page}");
+        assert!(!page.contains("<script>x"), "{page}");
         // Names of name spaces are no addresses to load from.
         let outside = page.replace("http://www.w3.org/2000/svg", "");
         assert!(
             !outside.contains("http") && !outside.contains("src=\"/"),
             "{outside}"
         );
-        assert!(page.contains("M0 0h1v1h-1z"), "a room sees itself");
+        assert!(page.contains("M0 0h11v11h-11z"), "a room sees itself");
         assert!(page.contains("data:image/png;base64,AQID"));
         assert_eq!(page, report_html(&world, &parts));
     }

@@ -1,5 +1,5 @@
-//! Reports on enfilade worlds for people: floor plans as SVG, and a page with all there is to
-//! see.
+//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, and a page with all there
+//! is to see.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -12,12 +12,25 @@
 //! Everything here reads a valid world (`World::validate`) and gives the same bytes every time. A
 //! plan is a drawing: shapes are accurate to about a pixel of its sampling grid, not evidence.
 
+mod drawing;
+mod floors;
+mod font;
+mod graph;
 mod html;
+mod label;
+mod marks;
+mod matrix;
+mod pdf;
 mod plan;
+mod raster;
 mod section;
+mod shafts;
 mod storeys;
 mod svg;
 
+pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
-pub use plan::{PlanOptions, plan_svg};
+pub use pdf::{PAPERS, Paper, PaperError, to_pdf};
+pub use plan::{PlanOptions, Plans, plan_svg};
+pub use raster::{MAX_PIXELS, RasterError};
 pub use storeys::{Storey, find_storeys};

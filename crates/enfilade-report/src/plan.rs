@@ -1,25 +1,30 @@
-//! Floor plans: one level section a storey.
+//! Floor plans: a section of each storey, with names, and sheets of them.
 
-use std::fmt::Write;
+use std::collections::BTreeSet;
 
-use enfilade_cpg::{PortalId, PortalKind, World};
-use enfilade_geom::{DMat4, DVec2, DVec3, Plane, Winding};
+use enfilade_cpg::{CellId, World};
+use enfilade_geom::DVec2;
 
-use crate::section::{Label, Section};
-use crate::storeys::{Storey, find_storeys};
-use crate::svg::{SCALE, closed, color, escaped, line, number, point};
+use crate::drawing::{Class, Drawing, Item, Path, Words, color};
+use crate::label::{Sizes, fit, line_height, line_size, width};
+use crate::marks::View;
+use crate::section::{Label, Region, Section, cell_of, heights};
+use crate::shafts::find_shafts;
+use crate::storeys::{Page, Storey, find_pages};
 
 /// Air around each plan, for its title. [Units: wu]
 const MARGIN: f64 = 1.2;
-/// Room for the legend below all plans. [Units: wu]
-const FOOT: f64 = 2.0;
-/// Cuts are raised by this, so that a plane of the model at just that height does not matter.
-const OFF_PLANES: f64 = 1.37e-4;
+/// Letters of names are no higher than this in a small house. [Units: wu]
+const NAME: f64 = 0.32;
+/// Letters of the legend, in a small house. [Units: wu]
+const SMALL: f64 = 0.16;
+/// The smallest letters, as part of the longer side of a sheet: 1.2 mm on A4, 6.5 pixels of 1600.
+const LEGIBLE: f64 = 0.004;
 
 /// How to draw plans.
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
-    /// Height of the cut above each storey's floor. [Units: wu] [Limit: above 0]
+    /// Height of the cut above each floor. [Units: wu] [Limit: above 0]
     pub cut_height: f64,
 }
 
@@ -30,87 +35,461 @@ impl Default for PlanOptions {
     }
 }
 
-/// Draws the floor plan of every storey as one SVG document; x runs right and z down, as seen from
+/// The plans of all storeys of a world.
+///
+/// Every indoor cell is drawn and named on one of them at least: where its floor is; a space without a floor beside the rooms that
+/// it lies beside, or on a plan of such spaces; and a cell that is thinner than a drawing shows as the outline of its box.
+pub struct Plans<'a> {
+    world: &'a World,
+    cut_height: f64,
+    pages: Vec<Drawn>,
+    /// Cells of which no plan shows anything but a box.
+    thin: BTreeSet<CellId>,
+    voids: Vec<CellId>,
+    min: DVec2,
+    max: DVec2,
+}
+
+/// A storey, cut.
+struct Drawn {
+    page: Page,
+    heights: Vec<f64>,
+    section: Section,
+    regions: Vec<(Label, Region)>,
+    /// Walls, objects, doorways.
+    marks: Vec<Item>,
+}
+
+impl Drawn {
+    fn new(world: &World, page: Page, cut_height: f64, (min, max): (DVec2, DVec2)) -> Self {
+        let heights = heights(&page, cut_height);
+        let section = Section::sample(world, &page, &heights, min, max);
+        let regions: Vec<(Label, Region)> = section.regions().into_iter().collect();
+        let view = View {
+            world,
+            page: &page,
+            section: &section,
+            heights: &heights,
+        };
+        let mut marks = view.details();
+        marks.push(view.walls());
+        marks.extend(world.graph.portal_ids().filter_map(|id| view.portal(id)));
+        Self {
+            page,
+            heights,
+            section,
+            regions,
+            marks,
+        }
+    }
+}
+
+/// The indoor cells that no plan shows.
+fn hidden_cells(world: &World, pages: &[Drawn]) -> BTreeSet<CellId> {
+    let regions = pages.iter().flat_map(|p| &p.regions);
+    let shown = regions.filter_map(|r| cell_of(r.0)).filter(|c| c.1);
+    let shown: BTreeSet<CellId> = shown.map(|c| c.0).collect();
+    let indoor = world.graph.indoor_cells().map(|c| c.0);
+    indoor.filter(|c| !shown.contains(c)).collect()
+}
+
+/// Draws the floor plans of all storeys as one SVG document; x runs right and z down, as seen from
 /// above. One drawing unit is a centimeter.
 ///
 /// The world must be valid (`World::validate`). Time grows with the area drawn and the triangles.
 #[must_use]
 pub fn plan_svg(world: &World, options: &PlanOptions) -> String {
-    let storeys = find_storeys(world);
-    let (min, max) = extent(world);
-    let zoom = lettering(max - min, storeys.len());
-    let margin = MARGIN * zoom;
-    let size = max - min + 2.0 * margin;
-    // Rows and columns that make the sheet about three wide by two high.
-    let n = storeys.len().max(1);
-    let columns = ((n as f64 * 1.5 * size.y / size.x).sqrt().round() as usize).clamp(1, n);
-    let rows = n.div_ceil(columns);
-    let sheet = DVec2::new(
-        (size.x * columns as f64).max(8.5 * zoom),
-        size.y * rows as f64 + FOOT * zoom,
-    );
-    let mut out = String::new();
-    let (w, h) = (number(sheet.x * SCALE), number(sheet.y * SCALE));
-    // Pixels for viewers that do not fit the drawing to their window.
-    let pixels = (1600.0 / sheet.x.max(sheet.y)).max(1.0);
-    let _ = write!(
-        out,
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {w} {h}\" \
-         font-family=\"sans-serif\">\n<title>Floor plans</title>\n{STYLE}\
-         <rect width=\"{w}\" height=\"{h}\" fill=\"#fff\"/>\n",
-        (sheet.x * pixels).round(),
-        (sheet.y * pixels).round(),
-    );
-    for (k, storey) in storeys.iter().enumerate() {
-        let place = DVec2::new((k % columns) as f64, (k / columns) as f64) * size;
-        let origin = place + margin - min;
-        let _ = writeln!(
-            out,
-            "<g class=\"storey\" transform=\"translate({} {})\">",
-            number(origin.x * SCALE),
-            number(origin.y * SCALE)
-        );
-        draw_storey(&mut out, world, options, storey, (min, max), zoom);
-        let title = format!(
-            "Storey {} of {} · floor {:+.2} m, cut {:+.2} m",
-            k + 1,
-            storeys.len(),
-            storey.floor,
-            storey.floor + options.cut_height
-        );
-        // A letter is about 0.6 of its height wide; the title must not reach the next plan.
-        let room = (max.x - min.x + margin) * SCALE;
-        let height = (room / (0.6 * title.chars().count() as f64)).min(45.0 * zoom);
-        text(
-            &mut out,
-            min - DVec2::new(0.0, 0.4 * zoom),
-            height,
-            "start",
-            &title,
-        );
-        out.push_str("</g>\n");
-    }
-    let foot = DVec2::new(margin, size.y * rows as f64 + 0.5 * zoom);
-    draw_foot(&mut out, foot, zoom);
-    out.push_str("</svg>\n");
-    out
+    let plans = Plans::new(world, options);
+    let all: Vec<usize> = (0..plans.pages.len()).collect();
+    plans.sheet(&all).to_svg()
 }
 
-const STYLE: &str = "<style>\
-.solid{fill:#5a5a5a}.wall{stroke:#000;stroke-width:2;fill:none;stroke-linecap:round}\
-.detail{fill:#000;fill-opacity:.06;stroke:#999;stroke-width:1}\
-.open{stroke:#e8590c;stroke-width:7}.door{stroke:#c92a2a;stroke-width:7}\
-.window{stroke:#1c7ed6;stroke-width:6}.crack{stroke:#d6249f;stroke-width:2}\
-.low{stroke:#e8590c;stroke-width:3;stroke-dasharray:10 8}\
-.stair{stroke:#e8590c;stroke-width:4;stroke-dasharray:16 10;fill:none}\
-text{fill:#222}</style>\n";
+impl<'a> Plans<'a> {
+    /// Cuts all storeys. The world must be valid. Time grows with the area drawn and the triangles.
+    #[must_use]
+    pub fn new(world: &'a World, options: &PlanOptions) -> Self {
+        let (min, max) = extent(world);
+        let (pages, voids) = find_pages(world);
+        let draw = |page: Page| Drawn::new(world, page, options.cut_height, (min, max));
+        let mut pages: Vec<Drawn> = pages.into_iter().map(draw).collect();
+        // What the cut of its neighbors misses, or what lies under one of them, is cut at a height of its own.
+        let hidden: Vec<CellId> = hidden_cells(world, &pages).into_iter().collect();
+        for drawn in &mut pages {
+            let mut of_page = hidden.clone();
+            of_page.retain(|c| drawn.page.storey.cells.binary_search(c).is_ok());
+            if !of_page.is_empty() {
+                let mut page = drawn.page.clone();
+                for shaft in find_shafts(world, &of_page, page.tile) {
+                    page.show_apart(&shaft);
+                }
+                *drawn = draw(page);
+            }
+        }
+        Self {
+            world,
+            cut_height: options.cut_height,
+            thin: hidden_cells(world, &pages),
+            pages,
+            voids,
+            min,
+            max,
+        }
+    }
+
+    /// The cells in which nobody can stand, ascending: shafts, spaces above ceilings, cavities.
+    pub fn voids(&self) -> impl ExactSizeIterator<Item = CellId> {
+        self.voids.iter().copied()
+    }
+
+    /// The storeys, in the order of the plans.
+    pub fn storeys(&self) -> impl ExactSizeIterator<Item = &Storey> {
+        self.pages.iter().map(|p| &p.page.storey)
+    }
+
+    /// The plans that are meant by the name of a storey, `1`, or by that of a cell, `cell-3`. Ascending; empty where there is none.
+    #[must_use]
+    pub fn find(&self, name: &str) -> Vec<usize> {
+        let by_name = self.storeys().position(|s| s.name == name);
+        let cell = self.world.graph.cell_named(name);
+        let has = |k: &usize| {
+            let storey = &self.pages[*k].page.storey;
+            Some(*k) == by_name || cell.is_some_and(|c| storey.cells.contains(&c))
+        };
+        (0..self.pages.len()).filter(has).collect()
+    }
+
+    /// Draws some of the plans, by index, on one sheet.
+    ///
+    /// # Panics
+    ///
+    /// When an index is not less than the number of storeys.
+    #[must_use]
+    pub fn sheet(&self, which: &[usize]) -> Drawing {
+        let zoom = lettering(self.max - self.min, which.len());
+        let margin = MARGIN * zoom;
+        let size = self.max - self.min + 2.0 * margin;
+        // Rows and columns that make the sheet about three wide by two high.
+        let n = which.len().max(1);
+        let columns = ((n as f64 * 1.5 * size.y / size.x).sqrt().round() as usize).clamp(1, n);
+        let rows = n.div_ceil(columns);
+        let mut sheet = Sheet {
+            items: Vec::new(),
+            zoom,
+            numbered: BTreeSet::new(),
+            title: 0.45 * zoom,
+            sizes: Sizes {
+                least: LEGIBLE * (size.x * columns as f64).max(size.y * rows as f64),
+                most: NAME * zoom,
+            },
+        };
+        sheet.sizes.most = sheet.sizes.most.max(2.6 * sheet.sizes.least);
+        // No title may reach the next plan, and all are of one size.
+        let room = self.max.x - self.min.x + margin;
+        for &index in which {
+            let title = self.title(&self.pages[index]);
+            sheet.title = sheet.title.min(room / width(&title));
+        }
+        for (k, &index) in which.iter().enumerate() {
+            let place = DVec2::new((k % columns) as f64, (k / columns) as f64) * size;
+            self.draw(index, place + margin - self.min, &mut sheet);
+        }
+        let foot = DVec2::new(margin, size.y * rows as f64 + 0.5 * zoom);
+        let width = (size.x * columns as f64).max(8.5 * sheet.legend());
+        let end = sheet.foot(self.world, foot, width);
+        Drawing {
+            title: "Floor plans".into(),
+            size: DVec2::new(width, end),
+            zoom,
+            items: sheet.items,
+        }
+    }
+
+    fn draw(&self, index: usize, origin: DVec2, sheet: &mut Sheet) {
+        let drawn = &self.pages[index];
+        let storey = &drawn.page.storey;
+        sheet.items.push(Item::Place {
+            at: origin,
+            storey: Some(storey.name.clone()),
+        });
+        for (label, region) in &drawn.regions {
+            sheet.items.push(self.region(*label, region));
+        }
+        sheet.items.extend_from_slice(&drawn.marks);
+        for (label, region) in &drawn.regions {
+            let Some((cell, is_own)) = cell_of(*label) else {
+                continue;
+            };
+            let name = &self.world.graph[cell].name;
+            let area = if is_own {
+                format!("{:.1} m²", region.area)
+            } else {
+                String::new()
+            };
+            let number = cell.0.to_string();
+            let words = [name.as_str(), area.as_str(), number.as_str()];
+            let fitted = fit(&drawn.section, (*label, region), words, sheet.sizes);
+            if fitted.is_number {
+                sheet.numbered.insert(cell);
+            }
+            let n = fitted.lines.len();
+            let sizes: Vec<f64> = (0..n).map(|i| line_size(&fitted, i)).collect();
+            let height: f64 = sizes.iter().sum::<f64>() * line_height();
+            // Along the lines' own down.
+            let mut down = -0.5 * height;
+            for (line, size) in fitted.lines.iter().zip(sizes) {
+                // The base line is a quarter of the letters' height above the line's end.
+                down += size * line_height();
+                let base = down - 0.28 * size;
+                let offset = if fitted.is_turned {
+                    DVec2::new(base, 0.0)
+                } else {
+                    DVec2::new(0.0, base)
+                };
+                if !line.is_empty() {
+                    sheet.items.push(Item::Words(Words {
+                        at: fitted.at + offset,
+                        size,
+                        is_centered: true,
+                        is_turned: fitted.is_turned,
+                        text: line.clone(),
+                        cell: Some(cell),
+                    }));
+                }
+            }
+        }
+        for &cell in self.thin.iter().filter(|c| storey.cells.contains(c)) {
+            self.draw_thin(cell, sheet);
+        }
+        let at = self.min - DVec2::new(0.0, 0.4 * sheet.zoom);
+        sheet.words(at, sheet.title, false, self.title(drawn));
+    }
+
+    fn region(&self, label: Label, region: &Region) -> Item {
+        let cell = cell_of(label).map(|c| c.0);
+        Item::Path(Path {
+            class: match label {
+                Label::Cell(_) => Class::Cell,
+                Label::Beyond(_) => Class::Beyond,
+                Label::Solid | Label::Outdoor => Class::Solid,
+            },
+            fill: cell.map(|c| color(c.0)),
+            lines: region.borders.clone(),
+            is_closed: true,
+            cell,
+            hint: cell.map(|c| self.world.graph[c].name.clone()),
+        })
+    }
+
+    /// A cell that is thinner than the grid is fine: the box around it, and its number.
+    fn draw_thin(&self, cell: CellId, sheet: &mut Sheet) {
+        let [low, high] = self.world.graph[cell]
+            .aabb
+            .map(|p| DVec2::new(p[0].into(), p[2].into()));
+        let corners = vec![
+            low,
+            DVec2::new(high.x, low.y),
+            high,
+            DVec2::new(low.x, high.y),
+        ];
+        sheet.items.push(Item::Path(Path {
+            class: Class::Thin,
+            fill: None,
+            lines: vec![corners],
+            is_closed: true,
+            cell: Some(cell),
+            hint: Some(self.world.graph[cell].name.clone()),
+        }));
+        sheet.numbered.insert(cell);
+        sheet.items.push(Item::Words(Words {
+            at: (low + high) * 0.5,
+            size: sheet.sizes.least,
+            is_centered: true,
+            is_turned: false,
+            text: cell.0.to_string(),
+            cell: Some(cell),
+        }));
+    }
+
+    fn title(&self, drawn: &Drawn) -> String {
+        // No "-0.00".
+        let height = |h: f64| {
+            let h = (h * 100.0).round() / 100.0;
+            format!("{:+.2}", if h == 0.0 { 0.0 } else { h })
+        };
+        let storey = &drawn.page.storey;
+        let n = self.storeys().filter(|s| !s.is_between).count();
+        let low = drawn.heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = drawn
+            .heights
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        if storey.is_between {
+            return if high - low < 0.05 {
+                format!(
+                    "{} · spaces without a floor, cut {} m",
+                    storey.name,
+                    height(low)
+                )
+            } else {
+                format!(
+                    "{} · spaces without a floor, cut {} to {} m",
+                    storey.name,
+                    height(low),
+                    height(high)
+                )
+            };
+        }
+        let name = format!("Storey {} of {n}", storey.name);
+        let [low, high] = storey.range;
+        if high > low {
+            return format!(
+                "{name} · floors {} to {} m, cut {:.2} m above each",
+                height(low),
+                height(high),
+                self.cut_height
+            );
+        }
+        format!(
+            "{name} · floor {} m, cut {} m",
+            height(storey.floor),
+            height(storey.floor + self.cut_height)
+        )
+    }
+}
+
+/// What is drawn so far.
+struct Sheet {
+    items: Vec<Item>,
+    zoom: f64,
+    sizes: Sizes,
+    /// Height of the letters of titles. [Units: wu]
+    title: f64,
+    /// Cells that have only a number somewhere on the sheet.
+    numbered: BTreeSet<CellId>,
+}
+
+impl Sheet {
+    fn words(&mut self, at: DVec2, size: f64, is_centered: bool, text: String) {
+        self.items.push(Item::Words(Words {
+            at,
+            size,
+            is_centered,
+            is_turned: false,
+            text,
+            cell: None,
+        }));
+    }
+
+    fn shape(&mut self, class: Class, lines: Vec<Vec<DVec2>>, is_closed: bool) {
+        self.items.push(Item::Path(Path {
+            class,
+            fill: None,
+            lines,
+            is_closed,
+            cell: None,
+            hint: None,
+        }));
+    }
+
+    /// How much larger than usual the legend is: its letters are legible, too.
+    fn legend(&self) -> f64 {
+        self.zoom.max(self.sizes.least / SMALL)
+    }
+
+    /// Scale bar, legend, and the names of numbered cells. Returns where they end. [Units: wu]
+    fn foot(&mut self, world: &World, at: DVec2, width: f64) -> f64 {
+        let (zoom, grown) = (self.zoom, self.legend());
+        let is_there = |class: Class| {
+            let is = |i: &Item| matches!(i, Item::Path(p) if p.class == class);
+            self.items.iter().any(is)
+        };
+        let mut entries = vec![
+            (Class::Open, "opening"),
+            (Class::Door, "door"),
+            (Class::Window, "window"),
+            (Class::Crack, "crack"),
+            (Class::Low, "opening not cut"),
+            (Class::Stair, "hole in floor or ceiling"),
+        ];
+        if is_there(Class::Beyond) {
+            entries.push((Class::Beyond, "pale: floor on another plan"));
+        }
+        if is_there(Class::Thin) {
+            entries.push((Class::Thin, "too thin to draw"));
+        }
+        self.items.push(Item::Place { at, storey: None });
+        for k in 0..5 {
+            let class = if k % 2 == 0 { Class::Bar } else { Class::Gap };
+            let (left, right) = (f64::from(k) * zoom, f64::from(k + 1) * zoom);
+            let high = 0.12 * grown;
+            let bar = [(left, 0.0), (right, 0.0), (right, high), (left, high)];
+            let bar = bar.map(|(x, z)| DVec2::new(x, z)).to_vec();
+            self.shape(class, vec![bar], true);
+        }
+        let under = 0.4 * grown;
+        self.words(DVec2::new(0.0, under), 0.22 * grown, true, "0".into());
+        let words = format!("{} m", 5.0 * zoom);
+        self.words(DVec2::new(5.0 * zoom, under), 0.22 * grown, true, words);
+        for (k, (class, words)) in entries.iter().enumerate() {
+            let place = DVec2::new((k % 3) as f64 * 2.6, 0.75 + 0.4 * (k / 3) as f64);
+            let line = [place - DVec2::Y * 0.07, place + DVec2::new(0.35, -0.07)];
+            let line = line.map(|p| p * grown).to_vec();
+            if *class == Class::Beyond {
+                let up = DVec2::new(0.0, -0.12) * grown;
+                let [a, b] = [line[0], line[1]];
+                self.shape(*class, vec![vec![a, b, b + up, a + up]], true);
+                // A color, as the cells have.
+                if let Some(Item::Path(path)) = self.items.last_mut() {
+                    path.fill = Some(color(0));
+                }
+            } else {
+                self.shape(*class, vec![line], false);
+            }
+            let at = (place + DVec2::X * 0.42) * grown;
+            self.words(at, SMALL * grown, false, (*words).into());
+        }
+        let mut below = (0.75 + 0.4 * entries.len().div_ceil(3) as f64) * grown;
+        below = self.numbers(world, below, width - 2.0 * at.x);
+        at.y + below
+    }
+
+    /// The names that numbers stand for, in columns.
+    fn numbers(&mut self, world: &World, below: f64, room: f64) -> f64 {
+        let size = SMALL * self.legend();
+        let mut rows: Vec<String> = Vec::new();
+        for &cell in &self.numbered {
+            let name = &world.graph[cell].name;
+            if *name != format!("cell-{}", cell.0) {
+                rows.push(format!("{}  {name}", cell.0));
+            }
+        }
+        // The usual names hold their numbers.
+        if let Some(cell) = self
+            .numbered
+            .iter()
+            .find(|c| world.graph[**c].name == c.to_string())
+        {
+            let words = format!("A number alone stands for a cell: {} is {cell}.", cell.0);
+            self.words(DVec2::new(0.0, below), size, false, words);
+        }
+        let widest = rows.iter().map(|r| width(r)).fold(1.0, f64::max) * size;
+        let columns = ((room / (widest + size)).floor() as usize).max(1);
+        let start = below + 1.6 * size;
+        for (k, row) in rows.iter().enumerate() {
+            let x = (k % columns) as f64 * (widest + size);
+            let z = start + (k / columns) as f64 * 1.5 * size;
+            self.words(DVec2::new(x, z), size, false, row.clone());
+        }
+        start + 1.5 * size * rows.len().div_ceil(columns) as f64
+    }
+}
 
 /// How much larger than usual letters and margins are: sheets are looked at as a whole, whatever
 /// the size of the building. Whole numbers keep the scale bar round.
 fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
     let side = (plan.x * plan.y * n_storeys.max(1) as f64).sqrt();
-    [4.0, 2.0]
+    [40.0, 20.0, 10.0, 4.0, 2.0]
         .into_iter()
         .find(|zoom| side > 20.0 * zoom)
         .unwrap_or(1.0)
@@ -138,306 +517,4 @@ fn extent(world: &World) -> (DVec2, DVec2) {
     }
     // Room for the thickness of outer walls.
     (bounds.0 - 0.5, bounds.1 + 0.5)
-}
-
-fn draw_storey(
-    out: &mut String,
-    world: &World,
-    options: &PlanOptions,
-    storey: &Storey,
-    (min, max): (DVec2, DVec2),
-    zoom: f64,
-) {
-    let y = storey.floor + options.cut_height + OFF_PLANES;
-    let regions = Section::sample(world, y, min, max).regions();
-    for (label, region) in &regions {
-        let path: String = region.borders.iter().map(|b| closed(b)).collect();
-        let _ = match label {
-            Label::Cell(id) => writeln!(
-                out,
-                "<path class=\"cell\" fill=\"{}\" fill-rule=\"evenodd\" d=\"{path}\"><title>{}</title></path>",
-                color(*id),
-                escaped(&world.graph.cells[*id as usize].name)
-            ),
-            _ => writeln!(
-                out,
-                "<path class=\"solid\" fill-rule=\"evenodd\" d=\"{path}\"/>"
-            ),
-        };
-    }
-    draw_details(out, world, storey, y);
-    draw_walls(out, world, y);
-    for id in world.graph.portal_ids() {
-        draw_portal(out, world, id, storey, y);
-    }
-    for (label, region) in &regions {
-        let Label::Cell(id) = label else { continue };
-        // Legible where there is room; small cells get a name that still fits, a letter being about 0.6 of its
-        // height wide.
-        let name = &world.graph.cells[*id as usize].name;
-        let fitting = 1.9 / (0.6 * name.chars().count().max(1) as f64);
-        let height = (region.radius * fitting.min(0.55)).clamp(0.06, 0.32 * zoom) * SCALE;
-        text(out, region.inner, height, "middle", name);
-        if region.radius > 0.25 {
-            let below = region.inner + DVec2::new(0.0, height / SCALE * 0.9);
-            text(
-                out,
-                below,
-                height * 0.7,
-                "middle",
-                &format!("{:.1} m²", region.area),
-            );
-        }
-    }
-}
-
-/// Structural triangles cut by the plane.
-fn draw_walls(out: &mut String, world: &World, y: f64) {
-    let mut lines: Vec<String> = Vec::new();
-    for batch in &world.batches {
-        let p = &batch.primitive;
-        for t in p.indices.chunks_exact(3) {
-            let corners: Vec<DVec3> = t
-                .iter()
-                .map(|&i| DVec3::from_array(p.positions[i as usize].map(f64::from)))
-                .collect();
-            if let Some((a, b)) = cut(&corners, y) {
-                // One way round, so that the two sides of a sheet are drawn once.
-                let (a, b) = if (a.x, a.y) <= (b.x, b.y) {
-                    (a, b)
-                } else {
-                    (b, a)
-                };
-                if point(a) != point(b) {
-                    lines.push(line(a, b));
-                }
-            }
-        }
-    }
-    lines.sort_unstable();
-    lines.dedup();
-    let _ = writeln!(out, "<path class=\"wall\" d=\"{}\"/>", lines.concat());
-}
-
-/// Where a convex polygon crosses the height `y`, seen from above.
-fn cut(corners: &[DVec3], y: f64) -> Option<(DVec2, DVec2)> {
-    let mut ends = Vec::with_capacity(2);
-    for (i, &p) in corners.iter().enumerate() {
-        let q = corners[(i + 1) % corners.len()];
-        if (p.y < y) != (q.y < y) {
-            let at = p + (q - p) * ((y - p.y) / (q.y - p.y));
-            ends.push(DVec2::new(at.x, at.z));
-        }
-    }
-    match ends[..] {
-        [a, b] => Some((a, b)),
-        _ => None,
-    }
-}
-
-/// A line for upright portals, at their true width; an outline for level ones.
-fn draw_portal(out: &mut String, world: &World, id: PortalId, storey: &Storey, y: f64) {
-    let portal = &world.graph[id];
-    let outline: Vec<DVec3> = portal
-        .outline
-        .iter()
-        .map(|p| DVec3::from_array(p.map(f64::from)))
-        .collect();
-    let low = outline.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-    let high = outline
-        .iter()
-        .map(|p| p.y)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let kind = match portal.kind {
-        PortalKind::Open => "open",
-        PortalKind::Door => "door",
-        PortalKind::Window => "window",
-        PortalKind::Crack => "crack",
-    };
-    let [one, other] = portal.cells.map(|c| escaped(&world.graph[c].name));
-    let title = format!("{id}, {one} and {other}");
-    // Half a meter: a hole in a floor belongs to the storeys on both sides of that floor.
-    let is_near = high > storey.floor - 0.5 && low < storey.top + 0.5;
-    let is_level = portal.normal[1].abs() > 0.7;
-    if is_level {
-        if is_near {
-            let flat: Vec<DVec2> = outline.iter().map(|p| DVec2::new(p.x, p.z)).collect();
-            let class = if kind == "crack" { "crack" } else { "stair" };
-            let _ = writeln!(
-                out,
-                "<path class=\"{class}\" fill=\"none\" d=\"{}\"><title>{title}</title></path>",
-                closed(&flat)
-            );
-        }
-        return;
-    }
-    let pieces = portal.pieces.iter().filter_map(|piece| {
-        let corners: Vec<DVec3> = piece
-            .iter()
-            .map(|p| DVec3::from_array(p.map(f64::from)))
-            .collect();
-        cut(&corners, y)
-    });
-    let mut segments: Vec<(DVec2, DVec2)> = pieces.collect();
-    let mut class = kind;
-    if segments.is_empty() {
-        // Not cut: what is in the storey all the same, by half of its height at least (a lintel
-        // may hang through a ceiling, and a sill stand in the floor), is drawn as wide as it is.
-        let is_inside = high.min(storey.top) - low.max(storey.floor) > 0.5 * (high - low);
-        if !is_inside {
-            return;
-        }
-        if matches!(portal.kind, PortalKind::Open | PortalKind::Door) {
-            class = "low";
-        }
-        let across = DVec2::new(-f64::from(portal.normal[2]), f64::from(portal.normal[0]));
-        let flat = outline.iter().map(|p| DVec2::new(p.x, p.z));
-        let first = flat
-            .clone()
-            .min_by(|a, b| across.dot(*a).total_cmp(&across.dot(*b)));
-        let last = flat.max_by(|a, b| across.dot(*a).total_cmp(&across.dot(*b)));
-        segments.extend(first.zip(last));
-    }
-    let path: String = joined(&segments).iter().map(|s| line(s.0, s.1)).collect();
-    let _ = writeln!(
-        out,
-        "<path class=\"{class}\" d=\"{path}\"><title>{title}</title></path>"
-    );
-}
-
-/// Joins touching segments of one line.
-fn joined(segments: &[(DVec2, DVec2)]) -> Vec<(DVec2, DVec2)> {
-    let Some(longest) = segments.iter().max_by(|a, b| {
-        a.0.distance_squared(a.1)
-            .total_cmp(&b.0.distance_squared(b.1))
-    }) else {
-        return Vec::new();
-    };
-    let along = (longest.1 - longest.0).normalize_or(DVec2::X);
-    let mut sorted: Vec<(DVec2, DVec2)> = segments
-        .iter()
-        .map(|&(a, b)| {
-            if along.dot(a) <= along.dot(b) {
-                (a, b)
-            } else {
-                (b, a)
-            }
-        })
-        .collect();
-    sorted.sort_by(|a, b| along.dot(a.0).total_cmp(&along.dot(b.0)));
-    let mut out: Vec<(DVec2, DVec2)> = Vec::new();
-    for (a, b) in sorted {
-        match out.last_mut() {
-            // A millimeter: as far as is drawn.
-            Some(last) if along.dot(a) <= along.dot(last.1) + 1e-3 => {
-                if along.dot(b) > along.dot(last.1) {
-                    last.1 = b;
-                }
-            }
-            _ => out.push((a, b)),
-        }
-    }
-    out
-}
-
-/// Footprints of the detail objects that stand in the storey.
-fn draw_details(out: &mut String, world: &World, storey: &Storey, y: f64) {
-    let plane = Plane {
-        normal: DVec3::Y,
-        d: 0.0,
-    };
-    for detail in &world.details {
-        let place = DMat4::from_cols_array(&detail.transform.map(f64::from));
-        let mesh = &world.detail_meshes[detail.mesh as usize];
-        let mut bounds = enfilade_geom::Aabb::EMPTY;
-        for p in mesh.primitives.iter().flat_map(|p| &p.positions) {
-            bounds = bounds.including(DVec3::from_array(p.map(f64::from)));
-        }
-        if bounds.is_empty() {
-            continue;
-        }
-        let corners: Vec<DVec3> = (0..8)
-            .map(|k| {
-                let pick = |axis: usize| {
-                    if k >> axis & 1 == 0 {
-                        bounds.min[axis]
-                    } else {
-                        bounds.max[axis]
-                    }
-                };
-                place.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-            })
-            .collect();
-        let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let high = corners
-            .iter()
-            .map(|p| p.y)
-            .fold(f64::NEG_INFINITY, f64::max);
-        // What hangs above the cut is not seen from it.
-        if low >= y || high <= storey.floor {
-            continue;
-        }
-        let level: Vec<DVec3> = corners.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect();
-        let hull = Winding::hull_in_plane(&plane, &level);
-        let flat: Vec<DVec2> = hull.points.iter().map(|p| DVec2::new(p.x, p.z)).collect();
-        if flat.len() >= 3 {
-            let _ = writeln!(
-                out,
-                "<path class=\"detail\" d=\"{}\"><title>{}</title></path>",
-                closed(&flat),
-                escaped(&detail.name)
-            );
-        }
-    }
-}
-
-/// Scale bar and legend.
-fn draw_foot(out: &mut String, at: DVec2, zoom: f64) {
-    let _ = writeln!(
-        out,
-        "<g transform=\"translate({}) scale({zoom})\">",
-        point(at)
-    );
-    for k in 0..5 {
-        let fill = if k % 2 == 0 { "#000" } else { "#fff" };
-        let _ = writeln!(
-            out,
-            "<rect x=\"{}\" y=\"0\" width=\"100\" height=\"12\" fill=\"{fill}\" stroke=\"#000\" stroke-width=\"1\"/>",
-            k * 100
-        );
-    }
-    text(out, DVec2::new(0.0, 0.4), 22.0, "middle", "0");
-    text(
-        out,
-        DVec2::new(5.0, 0.4),
-        22.0,
-        "middle",
-        &format!("{} m", 5.0 * zoom),
-    );
-    let entries = [
-        ("open", "opening"),
-        ("door", "door"),
-        ("window", "window"),
-        ("crack", "crack"),
-        ("low", "opening not cut"),
-        ("stair", "hole in floor or ceiling"),
-    ];
-    for (k, (class, words)) in entries.iter().enumerate() {
-        let (x, z) = ((k % 3) as f64 * 2.2, 0.75 + 0.4 * (k / 3) as f64);
-        let path = line(DVec2::new(x, z - 0.07), DVec2::new(x + 0.35, z - 0.07));
-        let _ = writeln!(out, "<path class=\"{class}\" d=\"{path}\"/>");
-        text(out, DVec2::new(x + 0.42, z), 16.0, "start", words);
-    }
-    out.push_str("</g>\n");
-}
-
-fn text(out: &mut String, at: DVec2, size: f64, anchor: &str, words: &str) {
-    let _ = writeln!(
-        out,
-        "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\">{}</text>",
-        number(at.x * SCALE),
-        number(at.y * SCALE),
-        number(size),
-        escaped(words)
-    );
 }

@@ -1,25 +1,114 @@
-//! A level section of a world: which cell is where, as outlines.
+//! A section of a world: which cell is where, as outlines.
 //!
-//! The locator is asked on a grid, and the borders between answers are traced and simplified.
+//! The locator is asked on a grid, each point at the height of the cut that belongs there, and the borders between answers are
+//! traced and simplified.
 //! Borders are cut at the points where three answers meet and simplified piece by piece, each the
 //! same way from both sides, so that neighbors still share them.
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::World;
+use enfilade_cpg::{CellId, World};
 use enfilade_geom::{DVec2, DVec3};
 
+use crate::storeys::Page;
+
+/// Cuts are raised by this, so that a plane of the model at just that height does not matter. [Units: wu]
+const OFF_PLANES: f64 = 1.37e-4;
+/// Matter is drawn as far as this from a room: walls and floors, but not the rock that a level of a game is dug into. [Units: wu]
+const WALL: f64 = 1.0;
 /// Most grid points along the longer side.
 const MAX_SIDE: f64 = 1200.0;
 /// Finest grid. [Units: wu]
 const FINEST: f64 = 0.02;
+
+/// The cut of a point at which nothing is drawn.
+const NO_CUT: u16 = u16::MAX;
 
 /// What a grid point is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Label {
     Outdoor,
     Solid,
+    /// A cell that is on another storey, seen from this one: the upper part of a hall.
+    Beyond(u32),
     Cell(u32),
+}
+
+/// Which cuts may show something where, the likeliest first.
+struct Candidates {
+    min: DVec2,
+    tile: f64,
+    width: usize,
+    by_tile: Vec<Vec<u16>>,
+}
+
+impl Candidates {
+    fn new(world: &World, page: &Page, min: DVec2, max: DVec2) -> Self {
+        let tile = page.tile;
+        let min = (min / tile).floor();
+        let size = (max / tile).floor() - min + 1.0;
+        let (width, height) = (size.x as usize, size.y as usize);
+        let mut by_tile = vec![Vec::new(); width * height];
+        let place = |(x, z): (i32, i32)| {
+            let (x, z) = (f64::from(x) - min.x, f64::from(z) - min.y);
+            let is_inside = x >= 0.0 && z >= 0.0 && x < size.x && z < size.y;
+            is_inside.then(|| z as usize * width + x as usize)
+        };
+        // What is small comes first: it would be lost under what is large.
+        let mut order: Vec<u16> = (0..page.cuts.len().min(usize::from(NO_CUT)) as u16).collect();
+        let cut = |k: u16| &page.cuts[usize::from(k)];
+        order.sort_by_key(|&k| (cut(k).tiles.len(), k));
+        for &k in &order {
+            for at in cut(k).tiles.iter().filter_map(|&t| place(t)) {
+                by_tile[at].push(k);
+            }
+        }
+        // A cell reaches farther than its floor: over furniture, under a stair, into a window.
+        for &k in &order {
+            for cell in cut(k).tops.keys() {
+                let corner = |p: [f32; 3]| {
+                    let at = DVec2::new(p[0].into(), p[2].into()) / tile;
+                    (at.floor() - min).clamp(DVec2::ZERO, size - 1.0)
+                };
+                let [low, high] = world.graph[*cell].aabb.map(corner);
+                for z in low.y as usize..=high.y as usize {
+                    for x in low.x as usize..=high.x as usize {
+                        let list: &mut Vec<u16> = &mut by_tile[z * width + x];
+                        if !list.contains(&k) {
+                            list.push(k);
+                        }
+                    }
+                }
+            }
+        }
+        Self {
+            min,
+            tile,
+            width,
+            by_tile,
+        }
+    }
+
+    fn of(&self, x: f64, z: f64) -> &[u16] {
+        let at = (DVec2::new(x, z) / self.tile).floor() - self.min;
+        let i = at.y.max(0.0) as usize * self.width + at.x.max(0.0) as usize;
+        self.by_tile.get(i).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// The heights of a page's cuts. [Units: wu]
+pub(crate) fn heights(page: &Page, cut_height: f64) -> Vec<f64> {
+    let height = |at: Option<f64>, floor: f64| at.unwrap_or(floor + cut_height) + OFF_PLANES;
+    page.cuts.iter().map(|c| height(c.at, c.floor)).collect()
+}
+
+/// The cell of a label, and whether it belongs to the storey.
+pub(crate) fn cell_of(label: Label) -> Option<(CellId, bool)> {
+    match label {
+        Label::Cell(id) => Some((CellId(id), true)),
+        Label::Beyond(id) => Some((CellId(id), false)),
+        Label::Outdoor | Label::Solid => None,
+    }
 }
 
 /// Border edges by the corner that they start from.
@@ -32,6 +121,8 @@ pub(crate) struct Section {
     width: usize,
     height: usize,
     labels: Vec<Label>,
+    /// By which cut each point was decided.
+    cuts: Vec<u16>,
 }
 
 /// Where a cell is on the section.
@@ -42,38 +133,138 @@ pub(crate) struct Region {
     pub(crate) area: f64,
     /// A point well inside.
     pub(crate) inner: DVec2,
-    /// About how far it is to the border from there. [Units: wu]
-    pub(crate) radius: f64,
+    /// The first column and row of the grid that it reaches, and how many of them.
+    pub(crate) first: [usize; 2],
+    pub(crate) size: [usize; 2],
 }
 
 impl Section {
-    /// Samples the height `y` over the rectangle `min` to `max` (x and z).
-    pub(crate) fn sample(world: &World, y: f64, min: DVec2, max: DVec2) -> Self {
+    /// Samples a page over the rectangle `min` to `max` (x and z), `heights` being those of its cuts.
+    pub(crate) fn sample(
+        world: &World,
+        page: &Page,
+        heights: &[f64],
+        min: DVec2,
+        max: DVec2,
+    ) -> Self {
         let size = max - min;
         let step = (size.max_element() / MAX_SIDE).max(FINEST);
         let (width, height) = (
             (size.x / step).ceil() as usize,
             (size.y / step).ceil() as usize,
         );
-        let mut labels = Vec::with_capacity(width * height);
-        for row in 0..height {
-            for column in 0..width {
-                let x = min.x + (column as f64 + 0.5) * step;
-                let z = min.y + (row as f64 + 0.5) * step;
-                labels.push(match world.graph.locator.locate(DVec3::new(x, y, z)) {
-                    None => Label::Solid,
-                    Some(c) if world.graph[c].outdoor => Label::Outdoor,
-                    Some(c) => Label::Cell(c.0),
-                });
-            }
-        }
-        Self {
+        let candidates = Candidates::new(world, page, min, max);
+        let mut out = Self {
             origin: min,
             step,
             width,
             height,
-            labels,
+            labels: Vec::with_capacity(width * height),
+            cuts: Vec::with_capacity(width * height),
+        };
+        for row in 0..height {
+            for column in 0..width {
+                let x = min.x + (column as f64 + 0.5) * step;
+                let z = min.y + (row as f64 + 0.5) * step;
+                let at = |k: u16| {
+                    let p = DVec3::new(x, heights[usize::from(k)], z);
+                    world.graph.locator.locate(p)
+                };
+                let shown = candidates.of(x, z).iter().find_map(|&k| {
+                    let cell = at(k)?;
+                    let tops = &page.cuts[usize::from(k)].tops;
+                    tops.contains_key(&cell).then_some((Label::Cell(cell.0), k))
+                });
+                let (label, cut) = shown.unwrap_or_else(|| {
+                    let label = match at(0) {
+                        None => Label::Solid,
+                        Some(c) if world.graph[c].outdoor => Label::Outdoor,
+                        Some(c) => Label::Beyond(c.0),
+                    };
+                    (label, 0)
+                });
+                out.labels.push(label);
+                out.cuts.push(cut);
+            }
         }
+        out.drop_rock();
+        out
+    }
+
+    /// Turns matter that is far from every room to paper.
+    fn drop_rock(&mut self) {
+        let is_room = |l: &Label| matches!(l, Label::Cell(_) | Label::Beyond(_));
+        let mut is_near: Vec<bool> = self.labels.iter().map(is_room).collect();
+        let mut round: Vec<usize> = (0..is_near.len()).filter(|&i| is_near[i]).collect();
+        for _ in 0..(WALL / self.step).ceil() as usize {
+            let mut next = Vec::new();
+            for i in round {
+                let (row, column) = (i / self.width, i % self.width);
+                let sides = [
+                    (column > 0).then(|| i - 1),
+                    (column + 1 < self.width).then_some(i + 1),
+                    (row > 0).then(|| i - self.width),
+                    (row + 1 < self.height).then_some(i + self.width),
+                ];
+                for side in sides.into_iter().flatten() {
+                    if !is_near[side] && self.labels[side] == Label::Solid {
+                        is_near[side] = true;
+                        next.push(side);
+                    }
+                }
+            }
+            round = next;
+        }
+        for (i, is_near) in is_near.into_iter().enumerate() {
+            if self.labels[i] == Label::Solid && !is_near {
+                (self.labels[i], self.cuts[i]) = (Label::Outdoor, NO_CUT);
+            }
+        }
+    }
+
+    /// Spacing of the grid. [Units: wu]
+    pub(crate) fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Whether a point of the grid has this label.
+    pub(crate) fn is(&self, label: Label, column: usize, row: usize) -> bool {
+        self.labels[row * self.width + column] == label
+    }
+
+    /// Where a column and a row begin. [Units: wu]
+    pub(crate) fn corner(&self, column: usize, row: usize) -> DVec2 {
+        self.origin + DVec2::new(column as f64, row as f64) * self.step
+    }
+
+    /// The grid point that `p` is in, if it is in the rectangle.
+    fn index(&self, p: DVec2) -> Option<usize> {
+        let at = ((p - self.origin) / self.step).floor();
+        let is_inside =
+            at.x >= 0.0 && at.y >= 0.0 && at.x < self.width as f64 && at.y < self.height as f64;
+        is_inside.then(|| at.y as usize * self.width + at.x as usize)
+    }
+
+    /// What is at `p`.
+    pub(crate) fn label_at(&self, p: DVec2) -> Label {
+        self.index(p).map_or(Label::Outdoor, |i| self.labels[i])
+    }
+
+    /// Whether something near `p` is cut by cut `k`: `p` is a border point of its part of the page.
+    pub(crate) fn is_cut_by(&self, k: usize, p: DVec2) -> bool {
+        // A wall that is thinner than the grid is seen from its sides only.
+        let reach = 1.5 * self.step;
+        let around = [
+            DVec2::ZERO,
+            DVec2::X * reach,
+            DVec2::NEG_X * reach,
+            DVec2::Y * reach,
+            DVec2::NEG_Y * reach,
+        ];
+        around.into_iter().any(|d| {
+            let at = self.index(p + d);
+            at.is_some_and(|i| usize::from(self.cuts[i]) == k)
+        })
     }
 
     fn label(&self, column: i64, row: i64) -> Label {
@@ -97,8 +288,15 @@ impl Section {
         let mut regions: BTreeMap<Label, Region> = BTreeMap::new();
         let mut deepest: BTreeMap<Label, (u32, usize)> = BTreeMap::new();
         let mut counts: BTreeMap<Label, usize> = BTreeMap::new();
+        let mut boxes: BTreeMap<Label, [[usize; 2]; 2]> = BTreeMap::new();
         for (i, &label) in self.labels.iter().enumerate() {
             *counts.entry(label).or_default() += 1;
+            let at = [i % self.width, i / self.width];
+            let [low, high] = boxes.entry(label).or_insert([at, at]);
+            for k in 0..2 {
+                low[k] = low[k].min(at[k]);
+                high[k] = high[k].max(at[k]);
+            }
             let best = deepest.entry(label).or_insert((0, i));
             if depth[i] > best.0 {
                 *best = (depth[i], i);
@@ -108,7 +306,8 @@ impl Section {
             if label == Label::Outdoor {
                 continue;
             }
-            let (depth, i) = deepest[&label];
+            let (_, i) = deepest[&label];
+            let [first, last] = boxes[&label];
             let (row, column) = ((i / self.width) as f64 + 0.5, (i % self.width) as f64 + 0.5);
             let borders = edges
                 .remove(&label)
@@ -119,7 +318,8 @@ impl Section {
                     borders,
                     area: count as f64 * self.step * self.step,
                     inner: self.origin + DVec2::new(column, row) * self.step,
-                    radius: f64::from(depth) * self.step,
+                    first,
+                    size: [last[0] + 1 - first[0], last[1] + 1 - first[1]],
                 },
             );
         }
@@ -336,6 +536,7 @@ mod tests {
             width,
             height,
             labels: (0..width * height).map(label).collect(),
+            cuts: vec![0; width * height],
         };
         let regions = section.regions();
         let inner = |cell: u32| -> Vec<DVec2> {

@@ -1,0 +1,171 @@
+//! What is drawn, whatever it is written as: paths of a class, words, and where they stand.
+
+use enfilade_cpg::CellId;
+use enfilade_geom::DVec2;
+
+/// Red, green, blue.
+pub(crate) type Rgb = [u8; 3];
+
+const BLACK: Rgb = [0, 0, 0];
+/// Color of words.
+pub(crate) const INK: Rgb = [0x22, 0x22, 0x22];
+
+/// A drawing, ready to be written as SVG, PNG or PDF: one plan or several on a sheet.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    pub(crate) title: String,
+    /// [Units: wu]
+    pub(crate) size: DVec2,
+    /// How much wider than usual lines are, for drawings of large buildings.
+    pub(crate) zoom: f64,
+    pub(crate) items: Vec<Item>,
+}
+
+impl Drawing {
+    /// Width and height. [Units: wu]
+    #[must_use]
+    pub fn size(&self) -> [f64; 2] {
+        self.size.to_array()
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum Item {
+    /// What follows until the next stands at `at`, and is a storey of that name or no storey.
+    Place {
+        at: DVec2,
+        storey: Option<String>,
+    },
+    Path(Path),
+    Words(Words),
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Path {
+    pub(crate) class: Class,
+    /// Instead of the color of the class.
+    pub(crate) fill: Option<Rgb>,
+    /// Lines; closed ones end where they begin without saying so. [Units: wu]
+    pub(crate) lines: Vec<Vec<DVec2>>,
+    pub(crate) is_closed: bool,
+    pub(crate) cell: Option<CellId>,
+    /// What is shown where a pointer rests on it.
+    pub(crate) hint: Option<String>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Words {
+    /// Where the base line starts, or has its middle. [Units: wu]
+    pub(crate) at: DVec2,
+    /// Height of the letters, from base line to base line where there are several. [Units: wu]
+    pub(crate) size: f64,
+    pub(crate) is_centered: bool,
+    /// Read from below upwards.
+    pub(crate) is_turned: bool,
+    pub(crate) text: String,
+    pub(crate) cell: Option<CellId>,
+}
+
+/// What a path stands for, which decides how it looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    Cell,
+    Beyond,
+    Thin,
+    Solid,
+    Wall,
+    Detail,
+    Open,
+    Door,
+    Window,
+    Crack,
+    Low,
+    Stair,
+    Bar,
+    Gap,
+}
+
+pub(crate) const CLASSES: [Class; 14] = [
+    Class::Cell,
+    Class::Beyond,
+    Class::Thin,
+    Class::Solid,
+    Class::Wall,
+    Class::Detail,
+    Class::Open,
+    Class::Door,
+    Class::Window,
+    Class::Crack,
+    Class::Low,
+    Class::Stair,
+    Class::Bar,
+    Class::Gap,
+];
+
+/// How a class looks.
+pub(crate) struct Look {
+    pub(crate) name: &'static str,
+    /// Color and opacity.
+    pub(crate) fill: Option<(Rgb, f32)>,
+    /// Color and width. [Units: cm]
+    pub(crate) stroke: Option<(Rgb, f64)>,
+    /// Lengths of dashes and gaps in turn. [Units: cm]
+    pub(crate) dashes: &'static [f64],
+}
+
+impl Class {
+    pub(crate) fn look(self) -> Look {
+        let orange = [0xe8, 0x59, 0x0c];
+        let filled = |name, color, opacity| Look {
+            name,
+            fill: Some((color, opacity)),
+            stroke: None,
+            dashes: &[],
+        };
+        let line = |name, color, width, dashes| Look {
+            name,
+            fill: None,
+            stroke: Some((color, width)),
+            dashes,
+        };
+        match self {
+            // Each cell has a color of its own.
+            Self::Cell => filled("cell", [0xff; 3], 1.0),
+            Self::Beyond => filled("beyond", [0xff; 3], 0.35),
+            Self::Thin => line("thin", [0x66; 3], 3.0, &[6.0, 6.0]),
+            Self::Solid => filled("solid", [0x5a; 3], 1.0),
+            Self::Wall => line("wall", BLACK, 2.0, &[]),
+            Self::Detail => Look {
+                stroke: Some(([0x99; 3], 1.0)),
+                ..filled("detail", BLACK, 0.06)
+            },
+            Self::Open => line("open", orange, 7.0, &[]),
+            Self::Door => line("door", [0xc9, 0x2a, 0x2a], 7.0, &[]),
+            Self::Window => line("window", [0x1c, 0x7e, 0xd6], 6.0, &[]),
+            Self::Crack => line("crack", [0xd6, 0x24, 0x9f], 2.0, &[]),
+            Self::Low => line("low", orange, 3.0, &[10.0, 8.0]),
+            Self::Stair => line("stair", orange, 4.0, &[16.0, 10.0]),
+            Self::Bar => filled("bar", BLACK, 1.0),
+            Self::Gap => Look {
+                stroke: Some((BLACK, 1.0)),
+                ..filled("gap", [0xff; 3], 1.0)
+            },
+        }
+    }
+}
+
+/// A light color of its own for each number; neighbors in number are far apart in hue.
+pub(crate) fn color(id: u32) -> Rgb {
+    // The golden angle spreads any run of hues evenly; lightness alternates over three steps so
+    // that hues that come round again still differ.
+    let hue = (f64::from(id) * 137.507_764 + 40.0) % 360.0;
+    let lightness = [0.82, 0.75, 0.87][(id % 3) as usize];
+    let saturation = 0.62;
+    let reach = saturation * f64::min(lightness, 1.0 - lightness);
+    let channel = |n: f64| {
+        let k = (n + hue / 30.0) % 12.0;
+        let value = lightness - reach * f64::min(k - 3.0, 9.0 - k).clamp(-1.0, 1.0);
+        (value * 255.0).round() as u8
+    };
+    [channel(0.0), channel(8.0), channel(4.0)]
+}

@@ -1,0 +1,228 @@
+//! Finds the heights at which the cells have floors.
+//!
+//! Points spread over the level triangles ask which cell stands on them. The heights of a cell's points, weighted by area, are a
+//! histogram; its heaviest windows are the cell's levels. A cell on sloping ground has several, and so has one that holds a stair.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use enfilade_cpg::{CellId, World};
+use enfilade_geom::{DVec2, DVec3, Triangle};
+
+/// Half the height of the window in which floor areas add up to one level. [Units: wu]
+const WINDOW: f64 = 0.1;
+/// Floors of one cell nearer than this in height are one level: a cut at the usual height still passes above all of them. [Units: wu]
+const APART: f64 = 1.0;
+/// The least area of a second level in a cell: a landing, but no tread and no sill. [Units: wu²]
+const LEAST_LEVEL: f64 = 1.0;
+/// Spacing of the points at which a floor is asked whether a room stands on it. [Units: wu]
+const SPACING: f64 = 0.5;
+/// Most rows of points on one triangle: with those, a floor 64 m long is still asked every half meter.
+const MAX_ROWS: usize = 128;
+/// Most tiles along a side of the world.
+const MAX_TILES: f64 = 1000.0;
+/// How far above a floor its cell must still be, so that a person can stand on it: the usual height of a cut. [Units: wu]
+const HEADROOM: f64 = 1.2;
+/// How far above a floor the cell that stands on it is looked for. [Units: wu]
+const JUST_ABOVE: f64 = 0.1;
+/// A cell stands on slopes where less than this share of its ground is level: terrain.
+const LEAST_LEVEL_SHARE: f64 = 0.25;
+
+/// Squares of the plane (x, z), by whole numbers.
+pub(crate) type Tiles = BTreeSet<(i32, i32)>;
+
+/// A floor of a cell, near one height.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Level {
+    pub(crate) cell: CellId,
+    /// [Units: wu]
+    pub(crate) height: f64,
+    /// [Units: wu²]
+    pub(crate) area: f64,
+    /// Where it is.
+    pub(crate) tiles: Tiles,
+}
+
+/// All floors of a world.
+pub(crate) struct Floors {
+    /// Floors to stand on, cells ascending, the largest of a cell first.
+    pub(crate) levels: Vec<Level>,
+    /// Cells that nobody can stand in, ascending: shafts, spaces above ceilings, cavities.
+    pub(crate) unfloored: Vec<CellId>,
+    /// Side of a tile. [Units: wu]
+    pub(crate) tile: f64,
+}
+
+/// A point of a floor.
+struct Sample {
+    p: DVec3,
+    area: f64,
+    is_level: bool,
+}
+
+/// Finds them. O(floor area + triangles).
+pub(crate) fn find_floors(world: &World) -> Floors {
+    let tile = tile_of(world);
+    let samples = floor_samples(world);
+    let mut out = Floors {
+        levels: Vec::new(),
+        unfloored: Vec::new(),
+        tile,
+    };
+    for (cell, _) in world.graph.indoor_cells() {
+        match samples.get(&cell) {
+            Some(samples) => levels_of(cell, samples, tile, &mut out.levels),
+            None => out.unfloored.push(cell),
+        }
+    }
+    out
+}
+
+/// Which tile a point is in.
+pub(crate) fn tile_at(x: f64, z: f64, tile: f64) -> (i32, i32) {
+    ((x / tile).floor() as i32, (z / tile).floor() as i32)
+}
+
+/// A tile as wide as samples are apart on the largest triangle that there can be, and of a world not more than a million.
+fn tile_of(world: &World) -> f64 {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let mut reach = 0.0_f64;
+    for (_, cell) in world.graph.indoor_cells() {
+        let [a, b] = cell.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
+        reach = reach.max((b - a).length());
+        (low, high) = (low.min(a), high.max(b));
+    }
+    let whole = (high - low).max_element().max(0.0);
+    SPACING.max(reach / MAX_ROWS as f64).max(whole / MAX_TILES)
+}
+
+/// Points of the surfaces that an indoor cell stands on, by cell.
+fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
+    let mut out = BTreeMap::new();
+    for batch in &world.batches {
+        let is_indoor = |c: &CellId| !world.graph[*c].outdoor;
+        if !batch.cells.iter().any(is_indoor) {
+            continue;
+        }
+        let p = &batch.primitive;
+        for t in p.indices.chunks_exact(3) {
+            let t: Triangle =
+                [0, 1, 2].map(|k| DVec3::from_array(p.positions[t[k] as usize].map(f64::from)));
+            let n = (t[1] - t[0]).cross(t[2] - t[0]);
+            // Within 45° of level one can walk, whichever way it faces: models turn floors upside down.
+            if n.y.abs() > 0.7 * n.length() && n.y != 0.0 {
+                // Within 8° it is level.
+                let is_level = n.y.abs() > 0.99 * n.length();
+                ask(world, &t, 0.5 * n.length(), is_level, &mut out);
+            }
+        }
+    }
+    out
+}
+
+/// Asks points spread over the triangle; those with headroom are a sample of the cell above them.
+fn ask(
+    world: &World,
+    t: &Triangle,
+    area: f64,
+    is_level: bool,
+    out: &mut BTreeMap<CellId, Vec<Sample>>,
+) {
+    let longest = t[0]
+        .distance(t[1])
+        .max(t[1].distance(t[2]))
+        .max(t[2].distance(t[0]));
+    // A sliver needs no more points than its area holds.
+    let side = longest.min(4.0 * area.sqrt());
+    let n = ((side / SPACING).ceil() as usize).clamp(1, MAX_ROWS);
+    let each = area / (n * n) as f64;
+    let locator = &world.graph.locator;
+    for i in 0..n {
+        for j in 0..2 * (n - i) - 1 {
+            // Centroids of the n² small triangles, upright and inverted in turn.
+            let (row, column, third) =
+                (i as f64, (j / 2) as f64, if j % 2 == 0 { 1.0 } else { 2.0 });
+            let (u, v) = (
+                (row + third / 3.0) / n as f64,
+                (column + third / 3.0) / n as f64,
+            );
+            let p = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
+            let above = |up: f64| locator.locate(p + DVec3::Y * up);
+            let Some(cell) = above(JUST_ABOVE).filter(|&c| !world.graph[c].outdoor) else {
+                continue;
+            };
+            // The top of a suspended ceiling, or of a wall under the roof, is no floor; neither is it one of the room above.
+            if above(HEADROOM) == Some(cell) && above(0.5 * HEADROOM).is_some() {
+                out.entry(cell).or_default().push(Sample {
+                    p,
+                    area: each,
+                    is_level,
+                });
+            }
+        }
+    }
+}
+
+/// Adds the levels of one cell.
+fn levels_of(cell: CellId, samples: &[Sample], tile: f64, out: &mut Vec<Level>) {
+    let sum = |only_level: bool| -> f64 {
+        let counted = samples.iter().filter(|s| s.is_level || !only_level);
+        counted.map(|s| s.area).sum()
+    };
+    let is_terrain = sum(true) < LEAST_LEVEL_SHARE * sum(false);
+    let mut votes: Vec<&Sample> = samples
+        .iter()
+        .filter(|s| s.is_level || is_terrain)
+        .collect();
+    votes.sort_by(|a, b| {
+        let by = |f: fn(&DVec3) -> f64| f(&a.p).total_cmp(&f(&b.p));
+        by(|p| p.y).then(by(|p| p.x)).then(by(|p| p.z))
+    });
+    let mut is_taken = vec![false; votes.len()];
+    let first_of_cell = out.len();
+    while let Some((first, last)) = heaviest_window(&votes, &is_taken) {
+        let weight: f64 = votes[first..last].iter().map(|v| v.area).sum();
+        if out.len() > first_of_cell && weight < LEAST_LEVEL {
+            break;
+        }
+        let height = votes[first..last]
+            .iter()
+            .map(|v| v.p.y * v.area)
+            .sum::<f64>()
+            / weight;
+        let mut level = Level {
+            cell,
+            height,
+            area: 0.0,
+            tiles: Tiles::new(),
+        };
+        for (taken, vote) in is_taken.iter_mut().zip(&votes) {
+            if !*taken && (vote.p.y - height).abs() < APART {
+                *taken = true;
+                level.area += vote.area;
+                level.tiles.insert(tile_at(vote.p.x, vote.p.z, tile));
+            }
+        }
+        out.push(level);
+    }
+}
+
+/// The run of votes (sorted by height, none taken) within one window with the greatest sum.
+fn heaviest_window(votes: &[&Sample], is_taken: &[bool]) -> Option<(usize, usize)> {
+    let mut best: Option<(f64, usize, usize)> = None;
+    let (mut first, mut sum) = (0, 0.0);
+    for last in 0..votes.len() {
+        if is_taken[last] {
+            (first, sum) = (last + 1, 0.0);
+            continue;
+        }
+        sum += votes[last].area;
+        while votes[last].p.y - votes[first].p.y > 2.0 * WINDOW {
+            sum -= votes[first].area;
+            first += 1;
+        }
+        if best.is_none_or(|b| sum > b.0) {
+            best = Some((sum, first, last + 1));
+        }
+    }
+    best.map(|(_, first, last)| (first, last))
+}

@@ -1,0 +1,237 @@
+//! Finds a place and a size for the name of a cell, inside the cell.
+
+use enfilade_geom::DVec2;
+
+use crate::section::{Label, Region, Section};
+
+/// The width of a letter, as part of its height: an upper estimate over the usual fonts, since every viewer has its own.
+const LETTER: f64 = 0.62;
+/// The height of a line, as part of the letters' height.
+const LINE: f64 = 1.15;
+/// What a size is multiplied by until the words fit.
+const SMALLER: f64 = 0.88;
+/// Height of the area below a name, as part of the name's.
+const AREA: f64 = 0.7;
+/// A number may be this much smaller than what is readable without a magnifying glass, rather than not be there.
+const TINY: f64 = 0.5;
+
+/// The sizes that letters may have. [Units: wu]
+#[derive(Clone, Copy)]
+pub(crate) struct Sizes {
+    pub(crate) least: f64,
+    pub(crate) most: f64,
+}
+
+/// Lines of words and where they stand.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fitted {
+    /// Top line first.
+    pub(crate) lines: Vec<String>,
+    /// The last line is the area, and smaller.
+    pub(crate) has_area: bool,
+    /// The middle of all. [Units: wu]
+    pub(crate) at: DVec2,
+    /// [Units: wu]
+    pub(crate) size: f64,
+    pub(crate) is_turned: bool,
+    /// The name did not fit; its number stands for it.
+    pub(crate) is_number: bool,
+}
+
+/// Fits the name, and the area if there is room: in one line, else turned, else in several lines, else the number alone.
+pub(crate) fn fit(
+    section: &Section,
+    (label, region): (Label, &Region),
+    [name, area, number]: [&str; 3],
+    sizes: Sizes,
+) -> Fitted {
+    let mask = Mask::new(section, label, region);
+    let mut tries = vec![
+        Try::new(&[name, area], true, false),
+        Try::new(&[name], false, false),
+        Try::new(&[name], false, true),
+    ];
+    let parts = wrapped(name);
+    if parts.len() > 1 {
+        let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+        tries.push(Try::new(&parts, false, false));
+    }
+    let found = tries.iter().find_map(|t| t.largest(&mask, sizes));
+    found.unwrap_or_else(|| {
+        let one = Try::new(&[number], false, false);
+        let tiny = Sizes {
+            least: TINY * sizes.least,
+            most: sizes.least,
+        };
+        let mut out = one.largest(&mask, tiny).unwrap_or_else(|| Fitted {
+            at: mask.middle(),
+            size: tiny.least,
+            ..one.fitted()
+        });
+        out.is_number = number != name;
+        out
+    })
+}
+
+/// About how wide words are, in heights of their letters.
+pub(crate) fn width(words: &str) -> f64 {
+    // Letters of East Asian scripts are as wide as high.
+    let letter = |c: char| if c < '\u{1100}' { LETTER } else { 1.0 };
+    words.chars().map(letter).sum()
+}
+
+/// The parts of a name that may stand below each other: broken after spaces, hyphens, underscores and dots.
+fn wrapped(name: &str) -> Vec<String> {
+    let parts = name.split_inclusive([' ', '-', '_', '.', ':', '/']);
+    parts
+        .map(|p| p.trim().to_owned())
+        .filter(|p| !p.is_empty())
+        .collect()
+}
+
+/// One way to write a label.
+struct Try {
+    lines: Vec<String>,
+    has_area: bool,
+    is_turned: bool,
+}
+
+impl Try {
+    fn new(lines: &[&str], has_area: bool, is_turned: bool) -> Self {
+        Self {
+            lines: lines.iter().map(ToString::to_string).collect(),
+            has_area,
+            is_turned,
+        }
+    }
+
+    /// Width and height of all lines, in heights of their letters.
+    fn extent(&self) -> DVec2 {
+        let last = self.lines.len() - 1;
+        let mut out = DVec2::ZERO;
+        for (i, line) in self.lines.iter().enumerate() {
+            let size = if self.has_area && i == last {
+                AREA
+            } else {
+                1.0
+            };
+            out = DVec2::new(out.x.max(width(line) * size), out.y + LINE * size);
+        }
+        if self.is_turned {
+            DVec2::new(out.y, out.x)
+        } else {
+            out
+        }
+    }
+
+    fn fitted(&self) -> Fitted {
+        Fitted {
+            lines: self.lines.clone(),
+            has_area: self.has_area,
+            at: DVec2::ZERO,
+            size: 0.0,
+            is_turned: self.is_turned,
+            is_number: false,
+        }
+    }
+
+    /// The largest size, and a place for it.
+    fn largest(&self, mask: &Mask, sizes: Sizes) -> Option<Fitted> {
+        let extent = self.extent();
+        let mut size = sizes.most;
+        loop {
+            if let Some(at) = mask.place(extent * size) {
+                return Some(Fitted {
+                    at,
+                    size,
+                    ..self.fitted()
+                });
+            }
+            if size <= sizes.least {
+                return None;
+            }
+            size = (size * SMALLER).max(sizes.least);
+        }
+    }
+}
+
+/// Where one label is, with sums over rectangles: whether words fit somewhere is four look-ups.
+struct Mask {
+    origin: DVec2,
+    step: f64,
+    width: usize,
+    height: usize,
+    /// Points of the label above and left of each corner; rows of `width + 1`.
+    sums: Vec<u32>,
+    /// A point well inside.
+    inner: DVec2,
+}
+
+impl Mask {
+    fn new(section: &Section, label: Label, region: &Region) -> Self {
+        let (first, [width, height]) = (region.first, region.size);
+        let mut sums = vec![0_u32; (width + 1) * (height + 1)];
+        for row in 0..height {
+            let mut in_row = 0;
+            for column in 0..width {
+                in_row += u32::from(section.is(label, first[0] + column, first[1] + row));
+                sums[(row + 1) * (width + 1) + column + 1] =
+                    sums[row * (width + 1) + column + 1] + in_row;
+            }
+        }
+        Self {
+            origin: section.corner(first[0], first[1]),
+            step: section.step(),
+            width,
+            height,
+            sums,
+            inner: region.inner,
+        }
+    }
+
+    fn middle(&self) -> DVec2 {
+        self.inner
+    }
+
+    /// The middle of a rectangle of this size in the label, the nearest to its inner point.
+    fn place(&self, size: DVec2) -> Option<DVec2> {
+        let points = (size / self.step).ceil();
+        if points.x > self.width as f64 || points.y > self.height as f64 {
+            return None;
+        }
+        let (w, h) = (points.x as usize, points.y as usize);
+        let row = self.width + 1;
+        let is_free = |x: usize, y: usize| {
+            let at = |x: usize, y: usize| self.sums[y * row + x];
+            at(x + w, y + h) + at(x, y) - at(x + w, y) - at(x, y + h) == (w * h) as u32
+        };
+        let middle = |x: usize, y: usize| {
+            self.origin + (DVec2::new(x as f64, y as f64) + 0.5 * points) * self.step
+        };
+        let mut best: Option<(f64, DVec2)> = None;
+        // An eighth of a letter more or less is not seen.
+        let stride = (h.min(w) / 8).max(1);
+        for y in (0..=self.height - h).step_by(stride) {
+            for x in (0..=self.width - w).step_by(stride) {
+                if is_free(x, y) {
+                    let distance = middle(x, y).distance_squared(self.inner);
+                    if best.is_none_or(|b| distance < b.0) {
+                        best = Some((distance, middle(x, y)));
+                    }
+                }
+            }
+        }
+        best.map(|b| b.1)
+    }
+}
+
+/// Height of the area's letters, as part of the name's.
+pub(crate) fn line_size(fitted: &Fitted, line: usize) -> f64 {
+    let is_area = fitted.has_area && line + 1 == fitted.lines.len();
+    fitted.size * if is_area { AREA } else { 1.0 }
+}
+
+/// Height from one line's top to the next one's, as part of the letters' height.
+pub(crate) const fn line_height() -> f64 {
+    LINE
+}

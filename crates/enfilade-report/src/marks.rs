@@ -1,0 +1,318 @@
+//! What a plan shows beside the cells: walls, doorways, and the objects that stand there.
+
+use enfilade_cpg::{CellId, Portal, PortalId, PortalKind, World};
+use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
+
+use crate::drawing::{Class, Item, Path};
+use crate::section::{Section, cell_of};
+use crate::storeys::Page;
+
+/// A hole in a floor belongs to the storeys on both sides of that floor, if it is no farther from them. [Units: wu]
+const FLOOR: f64 = 0.5;
+
+/// A page with its section.
+pub(crate) struct View<'a> {
+    pub(crate) world: &'a World,
+    pub(crate) page: &'a Page,
+    pub(crate) section: &'a Section,
+    /// By cut.
+    pub(crate) heights: &'a [f64],
+}
+
+fn path(class: Class, lines: Vec<Vec<DVec2>>, is_closed: bool, hint: Option<String>) -> Item {
+    Item::Path(Path {
+        class,
+        fill: None,
+        lines,
+        is_closed,
+        cell: None,
+        hint,
+    })
+}
+
+fn point(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
+
+impl View<'_> {
+    /// Structural triangles cut by the plane of the place, as one path.
+    pub(crate) fn walls(&self) -> Item {
+        // In tenths of millimeters, so that the two sides of a sheet are one line.
+        let mut lines: Vec<[[i64; 2]; 2]> = Vec::new();
+        let rounded = |p: DVec2| [p.x, p.y].map(|x| (x * 1e3).round() as i64);
+        for batch in &self.world.batches {
+            let p = &batch.primitive;
+            for t in p.indices.chunks_exact(3) {
+                let corners = [0, 1, 2].map(|k| point(p.positions[t[k] as usize]));
+                for (k, &y) in self.heights.iter().enumerate() {
+                    let Some((a, b)) = cut(&corners, y) else {
+                        continue;
+                    };
+                    for (a, b) in self.shown_parts(k, a, b) {
+                        let (a, b) = (rounded(a), rounded(b));
+                        if a != b {
+                            lines.push([a.min(b), a.max(b)]);
+                        }
+                    }
+                }
+            }
+        }
+        lines.sort_unstable();
+        lines.dedup();
+        let back = |[x, z]: [i64; 2]| DVec2::new(x as f64, z as f64) / 1e3;
+        let lines = lines.into_iter().map(|l| l.map(back).to_vec()).collect();
+        path(Class::Wall, lines, false, None)
+    }
+
+    /// The parts of a line of cut `k` that lie where that cut is shown.
+    fn shown_parts(&self, k: usize, a: DVec2, b: DVec2) -> Vec<(DVec2, DVec2)> {
+        let n = (a.distance(b) / self.section.step()).ceil().max(1.0) as usize;
+        let at = |i: usize| a + (b - a) * (i as f64 / n as f64);
+        let mut out = Vec::new();
+        let mut start = None;
+        for i in 0..n {
+            let is_shown = self.section.is_cut_by(k, (at(i) + at(i + 1)) * 0.5);
+            match (start, is_shown) {
+                (None, true) => start = Some(i),
+                (Some(s), false) => {
+                    out.push((at(s), at(i)));
+                    start = None;
+                }
+                _ => {}
+            }
+        }
+        if let Some(s) = start {
+            out.push((at(s), b));
+        }
+        out
+    }
+
+    /// A line for an upright portal, at its true width; an outline for a level one; nothing for one of another storey.
+    pub(crate) fn portal(&self, id: PortalId) -> Option<Item> {
+        let portal = &self.world.graph[id];
+        let outline: Vec<DVec3> = portal.outline.iter().map(|&p| point(p)).collect();
+        let low = outline.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        let high = outline
+            .iter()
+            .map(|p| p.y)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let class = match portal.kind {
+            PortalKind::Open => Class::Open,
+            PortalKind::Door => Class::Door,
+            PortalKind::Window => Class::Window,
+            PortalKind::Crack => Class::Crack,
+        };
+        let [one, other] = portal.cells.map(|c| &self.world.graph[c].name);
+        let hint = Some(format!("{id}, {one} and {other}"));
+        let flat: Vec<DVec2> = outline.iter().map(|p| DVec2::new(p.x, p.z)).collect();
+        if portal.normal[1].abs() > 0.7 {
+            let is_near = |(floor, top): (f64, f64)| high > floor - FLOOR && low < top + FLOOR;
+            let class = if class == Class::Crack {
+                class
+            } else {
+                Class::Stair
+            };
+            return self
+                .spans(portal)
+                .any(is_near)
+                .then(|| path(class, vec![flat], true, hint));
+        }
+        let mut segments = self.segments(portal, &flat);
+        let mut class = class;
+        if segments.is_empty() {
+            // Not cut: what is in the storey all the same, by half of its height at least (a lintel
+            // may hang through a ceiling, and a sill stand in the floor), is drawn as wide as it is.
+            let is_inside =
+                |(floor, top): (f64, f64)| high.min(top) - low.max(floor) > 0.5 * (high - low);
+            if !self.spans(portal).any(is_inside) {
+                return None;
+            }
+            if matches!(portal.kind, PortalKind::Open | PortalKind::Door) {
+                class = Class::Low;
+            }
+            let across = DVec2::new(-f64::from(portal.normal[2]), f64::from(portal.normal[0]));
+            let by = |a: &&DVec2, b: &&DVec2| across.dot(**a).total_cmp(&across.dot(**b));
+            let ends = (flat.iter().min_by(by), flat.iter().max_by(by));
+            segments.extend(ends.0.copied().zip(ends.1.copied()));
+        }
+        let lines = joined(&segments).iter().map(|s| vec![s.0, s.1]).collect();
+        Some(path(class, lines, false, hint))
+    }
+
+    /// From which to which height the portal's cells are on this page.
+    fn spans(&self, portal: &Portal) -> impl Iterator<Item = (f64, f64)> {
+        let cuts = self.page.cuts.iter();
+        let cells = portal.cells;
+        cuts.flat_map(move |cut| {
+            let top = move |c: CellId| Some((cut.floor, *cut.tops.get(&c)?));
+            cells.into_iter().filter_map(top)
+        })
+    }
+
+    /// Where the cuts that show one of its cells cross the portal; or the main cut, where it shows one of another storey.
+    fn segments(&self, portal: &Portal, flat: &[DVec2]) -> Vec<(DVec2, DVec2)> {
+        let pieces = |y: f64| -> Vec<(DVec2, DVec2)> {
+            let cut = |piece: &Vec<[f32; 3]>| {
+                let corners: Vec<DVec3> = piece.iter().map(|&p| point(p)).collect();
+                cut(&corners, y)
+            };
+            portal.pieces.iter().filter_map(cut).collect()
+        };
+        for (cut, &y) in self.page.cuts.iter().zip(self.heights) {
+            if portal.cells.iter().any(|c| cut.tops.contains_key(c)) {
+                let found = pieces(y);
+                if !found.is_empty() {
+                    return found;
+                }
+            }
+        }
+        // Beside it one sees the cell of another storey.
+        let middle = flat.iter().sum::<DVec2>() / flat.len().max(1) as f64;
+        let normal = DVec2::new(portal.normal[0].into(), portal.normal[2].into());
+        let is_seen = [-2.0, 2.0].into_iter().any(|side| {
+            let beside = middle + normal.normalize_or_zero() * side * self.section.step();
+            let seen = cell_of(self.section.label_at(beside));
+            seen.is_some_and(|(cell, is_own)| !is_own && portal.cells.contains(&cell))
+        });
+        match self.heights.first() {
+            Some(&y) if is_seen => pieces(y),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Footprints of the objects that stand in the storey.
+    pub(crate) fn details(&self) -> Vec<Item> {
+        let details = &self.world.details;
+        (0..details.len()).filter_map(|k| self.detail(k)).collect()
+    }
+
+    fn detail(&self, index: usize) -> Option<Item> {
+        let detail = &self.world.details[index];
+        let place = DMat4::from_cols_array(&detail.transform.map(f64::from));
+        let mesh = &self.world.detail_meshes[detail.mesh as usize];
+        let mut bounds = Aabb::EMPTY;
+        for p in mesh.primitives.iter().flat_map(|p| &p.positions) {
+            bounds = bounds.including(point(*p));
+        }
+        if bounds.is_empty() {
+            return None;
+        }
+        let corners: Vec<DVec3> = (0..8)
+            .map(|k| {
+                let pick = |axis: usize| {
+                    if k >> axis & 1 == 0 {
+                        bounds.min[axis]
+                    } else {
+                        bounds.max[axis]
+                    }
+                };
+                place.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+            })
+            .collect();
+        let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        let high = corners
+            .iter()
+            .map(|p| p.y)
+            .fold(f64::NEG_INFINITY, f64::max);
+        // What hangs above the cut is not seen from it. What touches outdoors only stands on the ground around the storey.
+        let is_indoor = |c: &CellId| !self.world.graph[*c].outdoor;
+        let cuts = || self.page.cuts.iter().zip(self.heights).enumerate();
+        let is_here = cuts().any(|(k, (cut, &y))| {
+            let stands = low < y && high > cut.floor;
+            let has = if detail.cells.iter().any(is_indoor) {
+                detail.cells.iter().any(|c| cut.tops.contains_key(c))
+            } else {
+                k == 0 && !self.page.storey.is_between
+            };
+            stands && has
+        });
+        if !is_here {
+            return None;
+        }
+        let plane = Plane {
+            normal: DVec3::Y,
+            d: 0.0,
+        };
+        let level: Vec<DVec3> = corners.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect();
+        let hull = Winding::hull_in_plane(&plane, &level);
+        let flat: Vec<DVec2> = hull.points.iter().map(|p| DVec2::new(p.x, p.z)).collect();
+        if flat.len() < 3 || footprint(&flat) > self.room_of(&detail.cells) {
+            return None;
+        }
+        Some(path(
+            Class::Detail,
+            vec![flat],
+            true,
+            Some(detail.name.clone()),
+        ))
+    }
+
+    /// Area of the boxes of some cells: no object stands in a room that is smaller than itself, but the box around parts of it that
+    /// lie far apart may be. [Units: wu²]
+    fn room_of(&self, cells: &[CellId]) -> f64 {
+        let side = |c: &CellId, axis: usize| {
+            let [low, high] = self.world.graph[*c].aabb;
+            f64::from(high[axis] - low[axis])
+        };
+        cells.iter().map(|c| side(c, 0) * side(c, 2)).sum()
+    }
+}
+
+/// Area of a convex polygon.
+fn footprint(corners: &[DVec2]) -> f64 {
+    let n = corners.len();
+    let twice = (0..n).map(|i| corners[i].perp_dot(corners[(i + 1) % n]));
+    0.5 * twice.sum::<f64>().abs()
+}
+
+/// Where a convex polygon crosses the height `y`, seen from above.
+fn cut(corners: &[DVec3], y: f64) -> Option<(DVec2, DVec2)> {
+    let mut ends = [DVec2::ZERO; 2];
+    let mut n = 0;
+    for (i, &p) in corners.iter().enumerate() {
+        let q = corners[(i + 1) % corners.len()];
+        if (p.y < y) != (q.y < y) {
+            let at = p + (q - p) * ((y - p.y) / (q.y - p.y));
+            if let Some(end) = ends.get_mut(n) {
+                *end = DVec2::new(at.x, at.z);
+            }
+            n += 1;
+        }
+    }
+    (n == 2).then(|| (ends[0], ends[1]))
+}
+
+/// Joins touching segments of one line.
+fn joined(segments: &[(DVec2, DVec2)]) -> Vec<(DVec2, DVec2)> {
+    let Some(longest) = segments.iter().max_by(|a, b| {
+        a.0.distance_squared(a.1)
+            .total_cmp(&b.0.distance_squared(b.1))
+    }) else {
+        return Vec::new();
+    };
+    let along = (longest.1 - longest.0).normalize_or(DVec2::X);
+    let mut sorted: Vec<(DVec2, DVec2)> = segments
+        .iter()
+        .map(|&(a, b)| {
+            if along.dot(a) <= along.dot(b) {
+                (a, b)
+            } else {
+                (b, a)
+            }
+        })
+        .collect();
+    sorted.sort_by(|a, b| along.dot(a.0).total_cmp(&along.dot(b.0)));
+    let mut out: Vec<(DVec2, DVec2)> = Vec::new();
+    for (a, b) in sorted {
+        match out.last_mut() {
+            // A millimeter: as far as is drawn.
+            Some(last) if along.dot(a) <= along.dot(last.1) + 1e-3 => {
+                if along.dot(b) > along.dot(last.1) {
+                    last.1 = b;
+                }
+            }
+            _ => out.push((a, b)),
+        }
+    }
+    out
+}
