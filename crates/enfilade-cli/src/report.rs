@@ -244,6 +244,7 @@ fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
 
 fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figure>> {
     let mut studio = Studio::new(gpu, world)?;
+    studio.add_light(world)?;
     let mut out = Vec::new();
     let style = Style::default();
     let camera = good_camera(&mut studio, world)?;
