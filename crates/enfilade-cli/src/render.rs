@@ -139,6 +139,14 @@ pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(Worl
     Ok((world, studio))
 }
 
+/// Computes the light of each place; where the adapter cannot hold it, says so, and all places are lit alike.
+pub(crate) fn light(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
+    if let Err(error) = studio.add_light(world) {
+        writeln!(Warned, "enfilade: all rooms are lit alike: {error}")?;
+    }
+    Ok(())
+}
+
 /// A picture at twice the size, halved: smooth edges.
 pub(crate) fn smooth(
     size: [u32; 2],
@@ -194,7 +202,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         studio.add_levels(&world)?;
     }
     if !args.plain || args.above || args.paint == Colors::Cells {
-        studio.add_light(&world)?;
+        light(&mut studio, &world)?;
     }
     let style = style_of(args);
     let mut out = outputs.printed();
@@ -404,7 +412,7 @@ pub(crate) fn above(
 ) -> anyhow::Result<Picture> {
     let aspect = size[0] as f32 / size[1] as f32;
     let view = camera.view(aspect.max(1.0))?;
-    studio.add_light(world)?;
+    light(studio, world)?;
     let list = studio.everything();
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let cut = cut.unwrap_or(camera.eye[1] + 0.5);

@@ -15,7 +15,7 @@ use enfilade_verify::structural_triangles;
 
 use crate::formats::Format;
 use crate::output::{Outputs, Warned, Written, print_json, write_whole};
-use crate::render::{above, portal_marks, smooth};
+use crate::render::{above, light, portal_marks, smooth};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
@@ -244,7 +244,7 @@ fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
 
 fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figure>> {
     let mut studio = Studio::new(gpu, world)?;
-    studio.add_light(world)?;
+    light(&mut studio, world)?;
     let mut out = Vec::new();
     let style = Style::default();
     let camera = good_camera(&mut studio, world)?;

@@ -55,11 +55,16 @@ pub(crate) struct Light {
 
 fn volume(
     gpu: &Gpu,
-    label: &str,
+    label: &'static str,
     size: UVec3,
     format: wgpu::TextureFormat,
     bytes: &[u8],
-) -> wgpu::TextureView {
+) -> Result<wgpu::TextureView, RenderError> {
+    Gpu::check(
+        label,
+        size.max_element().into(),
+        gpu.device.limits().max_texture_dimension_3d,
+    )?;
     let texture = gpu.device.create_texture_with_data(
         &gpu.queue,
         &wgpu::TextureDescriptor {
@@ -79,7 +84,7 @@ fn volume(
         wgpu::util::TextureDataOrder::LayerMajor,
         bytes,
     );
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
 }
 
 /// Words that a shader looks up by number, four to a texel.
@@ -146,14 +151,14 @@ impl Light {
                 field.n,
                 wgpu::TextureFormat::R32Sint,
                 bytemuck::cast_slice(&field.starts),
-            ),
+            )?,
             probes: volume(
                 gpu,
                 "light",
                 probes.size,
                 wgpu::TextureFormat::Rgb9e5Ufloat,
                 bytemuck::cast_slice(&probes.texels),
-            ),
+            )?,
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 mag_filter: linear,
                 min_filter: linear,

@@ -100,11 +100,8 @@ impl Studio {
     /// As [`Studio::new`].
     pub fn add_levels(&mut self, world: &World) -> Result<(), RenderError> {
         self.world = GpuWorld::load_with_levels(&self.gpu, world, &self.sight)?;
-        let light = if self.stage.light.is_known() {
-            self.light_of(world)?
-        } else {
-            Light::uniform(&self.gpu)?
-        };
+        // Light has nothing to do with levels.
+        let light = std::mem::replace(&mut self.stage.light, Light::uniform(&self.gpu)?);
         let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
         self.stage = self.renderer.set_stage(&self.gpu, &self.world, light, all);
         Ok(())
@@ -116,19 +113,15 @@ impl Studio {
     ///
     /// # Errors
     ///
-    /// As [`Studio::new`].
+    /// A world whose locator or cells are more than the adapter's textures hold. It is drawn without this light, as before.
     pub fn add_light(&mut self, world: &World) -> Result<(), RenderError> {
         if self.stage.light.is_known() {
             return Ok(());
         }
-        let light = self.light_of(world)?;
+        let light = Light::of_world(&self.gpu, world, &self.sight, self.renderer.sun)?;
         let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
         self.stage = (self.renderer).set_stage(&self.gpu, &self.world, light, all);
         Ok(())
-    }
-
-    fn light_of(&self, world: &World) -> Result<Light, RenderError> {
-        Light::of_world(&self.gpu, world, &self.sight, self.renderer.sun)
     }
 
     /// What is drawn of a view.

@@ -269,6 +269,7 @@ impl App<'_> {
             mode: Mode::default(),
             is_captured: false,
             wants_mouse: false,
+            has_asked_for_light: false,
             closed: BTreeSet::new(),
             recorded: None,
             n_shots: 0,

@@ -19,7 +19,7 @@ use super::panel::{Panel, Shown};
 use super::walker::Walker;
 use crate::formats::Format;
 use crate::output::{Outputs, write_whole};
-use crate::render::portal_marks;
+use crate::render::{light, portal_marks};
 use enfilade_cli::cameras::FOV;
 
 /// What there is once the window is.
@@ -42,6 +42,8 @@ pub(super) struct Open {
     pub(super) is_captured: bool,
     /// Whether it is meant to be, while the window has the keyboard.
     pub(super) wants_mouse: bool,
+    /// Whether the light of each place was computed, or cannot be.
+    pub(super) has_asked_for_light: bool,
     pub(super) closed: BTreeSet<PortalId>,
     pub(super) recorded: Option<Vec<Camera>>,
     pub(super) n_shots: u32,
@@ -182,9 +184,9 @@ impl Open {
             marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
         }
         let style = self.style();
-        if style.daylight || style.paint == Paint::Cells {
-            // Once: after that it is there.
-            self.studio.add_light(world)?;
+        if !self.has_asked_for_light && (style.daylight || style.paint == Paint::Cells) {
+            self.has_asked_for_light = true;
+            light(&mut self.studio, world)?;
         }
         self.shown.queries = None;
         let list = if self.mode == Mode::Queries {
@@ -272,7 +274,7 @@ impl Open {
             ..self.studio.sparing
         };
         if self.style().daylight || self.shown.paint == Paint::Cells {
-            studio.add_light(world)?;
+            light(&mut studio, world)?;
         }
         let size = [self.config.width, self.config.height];
         let leaves = self.leaves(world);
