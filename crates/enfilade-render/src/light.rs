@@ -22,9 +22,9 @@ pub(crate) use balance::sun_of;
 
 /// Texels in a row of a table: a shader knows it, too.
 const ROW: u32 = 1024;
-/// How bright a room is in its pictures on average, as a share of what lies under the open sky.
+/// Mean brightness of a room in its pictures, as a share of the brightness outdoors.
 const MIDDLE: f32 = 0.7;
-/// The longest exposure, of the shortest.
+/// The longest exposure, as a multiple of the shortest.
 const LONGEST: f32 = 4.0;
 /// Texels of a cell in the table.
 const CELL_TEXELS: usize = 4;
@@ -215,8 +215,8 @@ impl Light {
         Self::new(gpu, field, (&texels, first, n_cells), probes, true)
     }
 
-    /// How much more light a camera takes in at a place: rooms are photographed for longer than gardens, so that what is
-    /// outdoors, seen from in there, is too bright.
+    /// The exposure for an eye at a place, as a multiple of that outdoors: longer in dim rooms, from which the outdoors then
+    /// looks overexposed.
     fn exposure(&self, eye: Vec3) -> f32 {
         let cell = self.field.locate(eye.to_array());
         let brightness = usize::try_from(cell)
