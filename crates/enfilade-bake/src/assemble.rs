@@ -4,6 +4,7 @@
 //! each is stored, and drawn, once. Detail objects keep their identity and list the cells they touch.
 
 mod bays;
+mod fittings;
 mod seals;
 
 use std::collections::{BTreeMap, HashMap};
@@ -85,7 +86,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     let mut batches = batches(cut, &mut cells);
     batches.extend(seals::batches(cut));
     let (details, detail_meshes) = details(scene, &partition.locator, &mut cells);
-    World {
+    let mut world = World {
         graph: CellPortalGraph {
             cells,
             portals,
@@ -104,7 +105,9 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         fixtures: scene.fixtures.clone(),
         about: scene.about.clone(),
         pvs: None,
-    }
+    };
+    fittings::fit(&mut world, cut.bvh);
+    world
 }
 
 /// Pieces narrower than this are lost when their corners are rounded to `f32`. [Units: wu]
@@ -165,6 +168,7 @@ pub(crate) fn rounded_portal(
             .map(|piece| rounded(piece).area())
             .sum::<f64>() as f32,
         pieces,
+        fittings: Vec::new(),
     })
 }
 
@@ -401,6 +405,7 @@ fn details(scene: &Scene, locator: &Locator, cells: &mut [Cell]) -> (Vec<DetailO
             transform: object.transform.to_cols_array().map(|v| v as f32),
             cells: touched,
             source: object.node,
+            part_of: None,
         });
     }
     (out, meshes)

@@ -33,6 +33,7 @@ mod realize;
 pub mod simplify;
 mod stage;
 mod structure;
+mod subset;
 mod vessel;
 pub use enfilade_voxel as voxel;
 pub mod watershed;

@@ -67,6 +67,7 @@ fn read_portal_file(path: &Path) -> anyhow::Result<Subject> {
             pieces: vec![outline.clone()],
             outline,
             area: winding.area() as f32,
+            fittings: Vec::new(),
         });
     }
     for (i, cell) in cells.iter_mut().enumerate() {

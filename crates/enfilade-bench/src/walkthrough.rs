@@ -426,6 +426,7 @@ impl Rings {
                 transform,
                 cells,
                 source: None,
+                part_of: None,
             });
         }
     }

@@ -184,6 +184,8 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
                 walls.push(chunk.and_then(|c| studio.world.batch_of_chunk(c)));
             }
             Shown::Detail { detail, .. } => objects.push(detail),
+            // A shut door is as dull as a wall.
+            Shown::Plug { .. } => walls.push(None),
         }
         if *depth > 0.0 {
             let distance = Camera::distance_of(*depth);

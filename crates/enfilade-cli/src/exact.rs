@@ -3,7 +3,8 @@
 use std::fmt;
 use std::path::Path;
 
-use enfilade::cpg::{CellId, World};
+use enfilade::cpg::{CellId, PortalId, World};
+use enfilade::runtime::SightState;
 use enfilade_render::{
     AdapterChoice, Camera, Culling, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio, Style,
 };
@@ -29,6 +30,8 @@ pub(crate) struct Asked<'a> {
     /// What the command reads.
     pub(crate) outputs: Outputs,
     pub(crate) max_listed: usize,
+    /// Whether doors are open and shut by chance, anew for each view.
+    pub(crate) has_doors: bool,
 }
 
 /// What was found.
@@ -127,6 +130,10 @@ fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) 
             let batch = batch.map_or("?".to_owned(), |b| b.to_string());
             (format!("triangle {triangle} of batch {batch}"), cells)
         }
+        Shown::Plug { portal } => (
+            format!("what fills {portal}"),
+            world.graph[portal].cells.to_vec(),
+        ),
         Shown::Detail { detail, .. } => {
             let d = &world.details[detail as usize];
             (format!("detail {detail} ({})", d.name), d.cells.clone())
@@ -145,12 +152,16 @@ pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::R
         adapter: studio.gpu.name(),
         ..Exactness::default()
     };
-    let oracle = Oracle::new(world, &studio.sight);
+    let mut oracle = Oracle::new(world, &studio.sight);
     let bar = StageBar::new();
     bar.start("comparing pictures", asked.views);
     let aspect = asked.size[0] as f32 / asked.size[1] as f32;
     for view in 0..asked.views {
         // What the near plane cuts is lost to any renderer: such an eye is drawn anew.
+        if asked.has_doors {
+            studio.state = random_doors(&mut rng, &studio);
+            oracle.follow(&studio.sight, &studio.state);
+        }
         let mut camera = random_camera(&mut rng, world, &studio.sight, bounds);
         for _ in 0..MAX_DRAWS {
             if !oracle.is_at_surface(camera.eye) {
@@ -213,6 +224,25 @@ pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::R
     }
     bar.finish();
     Ok(out)
+}
+
+/// A third of all portals with leaves shut, a third some way open, the others as the model has them; and a tenth of those
+/// without leaves closed.
+fn random_doors(rng: &mut Rng, studio: &Studio) -> SightState {
+    let mut state = SightState::new(&studio.sight);
+    for p in (0..studio.sight.n_portals() as u32).map(PortalId) {
+        let chance = rng.range(0.0, 1.0);
+        if studio.sight.leaves(p).is_empty() {
+            if chance < 0.1 {
+                state.close(p);
+            }
+        } else if chance < 1.0 / 3.0 {
+            state.set_leaves(p, 0.0);
+        } else if chance < 2.0 / 3.0 {
+            state.set_leaves(p, rng.range(0.0, 1.0) as f32);
+        }
+    }
+    state
 }
 
 fn describe(

@@ -1,5 +1,6 @@
 //! `enfilade inspect`: what a world holds.
 
+mod doors;
 mod objects;
 
 use std::collections::BTreeMap;
@@ -7,6 +8,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
+use doors::FittingReport;
 use enfilade::bake::simplify::{CostModel, portal_scores};
 use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
 use serde::Serialize;
@@ -75,6 +77,7 @@ struct PortalReport<'a> {
     score: f64,
     normal: [f32; 3],
     outline: &'a [[f32; 3]],
+    fittings: Vec<FittingReport>,
 }
 
 /// An opening to outdoors that may be a hole of the model.
@@ -140,6 +143,7 @@ fn report(world: &World) -> Inspection<'_> {
                 score: s.score(),
                 normal: p.normal,
                 outline: &p.outline,
+                fittings: p.fittings.iter().map(FittingReport::of).collect(),
             }
         });
     let holes = graph.suspected_holes().into_iter().map(|h| HoleReport {
@@ -331,6 +335,9 @@ fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
         format!(" ({})", kinds.join(", "))
     };
     row("portals", format!("{}{kinds}", graph.portals.len()))?;
+    if let Some(doors) = doors::summary(world) {
+        row("doors", doors)?;
+    }
     let most = graph
         .cells
         .iter()

@@ -17,7 +17,7 @@ use crate::formats::Format;
 use crate::output::{Outputs, Warned, print_json, refuse_stream, write_whole};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::input::name_of;
-use enfilade_cli::values::{point, size};
+use enfilade_cli::values::{door, point, size};
 use enfilade_cli::world::read_world;
 
 /// Draws a picture of a world, or one for each camera of a path, to PNG files; needs no display.
@@ -65,9 +65,12 @@ pub(crate) struct Render {
     /// Take off what is higher than this, in meters, and light the rest evenly; with --above, 0.5 above the eye by default.
     #[arg(long, value_name = "METERS", allow_hyphen_values = true)]
     cut: Option<f32>,
-    /// Portals that are closed, by number.
+    /// Portals that are closed, by number: their leaves are shut; where there are none, a panel fills them.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     close: Vec<u32>,
+    /// Leaves of a portal stand so far on their way from shut (0) to open (1); as the model has them, where nothing is said.
+    #[arg(long, value_name = "ID=SHARE", value_delimiter = ',', value_parser = door)]
+    door: Vec<(u32, f32)>,
     /// Portals that cover fewer pixels are not looked through: the mean color of the cell behind stands
     /// in for it.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
@@ -179,12 +182,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         .map(|p| read_path(p, fov))
         .transpose()?;
     let (world, mut studio) = open(&args.world, &args.adapter)?;
-    for &p in &args.close {
-        if p as usize >= world.graph.portals.len() {
-            bail!("there is no portal {p}; `enfilade inspect` lists them");
-        }
-        studio.state.close(PortalId(p));
-    }
+    set_doors(args, &mut studio)?;
     let cameras = match given {
         Some(path) => path,
         None => cameras(args, &mut studio, &world)?,
@@ -255,6 +253,27 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         [one] if !is_path => print_json(out, one),
         all => print_json(out, &json!({ "pictures": all })),
     }
+}
+
+/// Closes portals and moves leaves.
+fn set_doors(args: &Render, studio: &mut Studio) -> anyhow::Result<()> {
+    let n = studio.sight.n_portals();
+    let asked = args.door.iter().map(|(p, _)| p).chain(&args.close);
+    if let Some(p) = asked.into_iter().find(|p| **p as usize >= n) {
+        bail!("there is no portal {p}; `enfilade inspect` lists them");
+    }
+    for &(p, share) in &args.door {
+        if studio.sight.leaves(PortalId(p)).is_empty() {
+            bail!(
+                "--door: portal {p} has no leaf that moves; `enfilade inspect` lists those that have, --close fills any"
+            );
+        }
+        studio.state.set_leaves(PortalId(p), share);
+    }
+    for &p in &args.close {
+        studio.state.close(PortalId(p));
+    }
+    Ok(())
 }
 
 /// How pictures look.

@@ -41,6 +41,22 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "a number of seconds of at least 0 is needed".into())
 }
 
+/// Reads `ID=SHARE`: a portal, and how far its leaves are open, 0 to 1.
+///
+/// # Errors
+///
+/// Anything else; the text says what is needed.
+pub fn door(text: &str) -> Result<(u32, f32), String> {
+    let parse = || {
+        let (id, share) = text.split_once('=')?;
+        let (id, share) = (id.trim().parse().ok()?, share.trim().parse::<f32>().ok()?);
+        (0.0..=1.0).contains(&share).then_some((id, share))
+    };
+    parse().ok_or_else(|| {
+        "a portal and a share from 0 (shut) to 1 (open) are needed, e.g. 12=0.5".into()
+    })
+}
+
 /// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. [Units: bytes]
 ///
 /// # Errors
@@ -62,6 +78,15 @@ pub fn bytes(text: &str) -> Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_door_is_open_by_a_share() {
+        assert_eq!(door("12=0.5"), Ok((12, 0.5)));
+        assert_eq!(door("0=1"), Ok((0, 1.0)));
+        for bad in ["", "12", "12=", "=1", "12=1.5", "12=-0.1", "12=nan", "a=1"] {
+            assert!(door(bad).is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn an_amount_of_memory_has_a_unit() {

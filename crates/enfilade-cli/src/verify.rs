@@ -53,6 +53,9 @@ pub(crate) struct Verify {
     /// Views drawn with and without culling by portals, and compared pixel by pixel.
     #[arg(long, default_value_t = 0, value_name = "N")]
     views: u64,
+    /// Doors are shut and open by chance, anew for each of these views.
+    #[arg(long, requires = "views")]
+    doors: bool,
     /// Size of these pictures.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
     view_size: [u32; 2],
@@ -124,6 +127,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
                 pictures,
                 outputs,
                 max_listed: args.list,
+                has_doors: args.doors,
             };
             verify_pictures(&world, &mut asked).with_context(|| name_of(&args.world))
         })

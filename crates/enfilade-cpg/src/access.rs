@@ -163,6 +163,7 @@ mod tests {
             ],
             pieces: Vec::new(),
             area: 4.0,
+            fittings: Vec::new(),
         };
         CellPortalGraph {
             cells: vec![

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
-use crate::{CellId, Locator, PortalId, Pvs, SourceRuns};
+use crate::{CellId, Fitting, Locator, PortalId, Pvs, SourceRuns};
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,6 +40,8 @@ pub struct Portal {
     pub pieces: Vec<Vec<[f32; 3]>>,
     /// Area of the true opening, the sum over the pieces. [Units: wu²]
     pub area: f32,
+    /// The objects that stand in it: leaves of a door, frames, panes. Ascending by object, none twice.
+    pub fittings: Vec<Fitting>,
 }
 
 /// What kind of opening a portal is.
@@ -146,4 +148,7 @@ pub struct DetailObject {
     pub cells: Vec<CellId>,
     /// What it comes from. Index into [`World::sources`].
     pub source: Option<u32>,
+    /// The object that it was taken out of, as a leaf is out of a door modeled in one piece with its frame. Index into
+    /// [`World::details`].
+    pub part_of: Option<u32>,
 }

@@ -163,6 +163,7 @@ mod tests {
                     area: area(&outline),
                     pieces: vec![outline.clone()],
                     outline,
+                    fittings: Vec::new(),
                 })
                 .collect(),
             ..CellPortalGraph::default()

@@ -7,9 +7,11 @@
 
 mod access;
 mod cell_set;
+mod fitting;
 mod graph;
 mod holes;
 mod ids;
+mod leaf;
 mod locator;
 mod look;
 mod named;
@@ -22,6 +24,7 @@ pub mod wire;
 
 pub use access::Exit;
 pub use cell_set::CellSet;
+pub use fitting::{Fitting, FittingPart, Motion, MotionKind};
 pub use graph::{
     Batch, Cell, CellPortalGraph, DetailObject, Portal, PortalKind, Provenance, Statistics, World,
 };

@@ -118,6 +118,48 @@ impl Locator {
         }
     }
 
+    /// Adds the cells that the convex hull of `points` may touch, grown by `margin`, to `cells`, which stays ascending and
+    /// without repeats. [Units: wu]
+    ///
+    /// No cell that it touches is missing; a few may be in it that only come near. Points that are not finite touch nothing.
+    /// `O(points)` for each node that the hull reaches.
+    pub fn cells_near(&self, points: &[DVec3], margin: f64, cells: &mut Vec<CellId>) {
+        if points.is_empty() || points.iter().any(|p| !p.is_finite()) {
+            return;
+        }
+        let mut add = |cell: Option<CellId>| {
+            if let Some(cell) = cell
+                && let Err(at) = cells.binary_search(&cell)
+            {
+                cells.insert(at, cell);
+            }
+        };
+        let margin = margin.max(0.0) + TOUCH;
+        let reach = Aabb::of_points(points).expanded(margin);
+        if !(self.bounds.contains(reach.min) && self.bounds.contains(reach.max)) {
+            add(self.outside);
+        }
+        let mut stack = vec![self.root];
+        while let Some(at) = stack.pop() {
+            if at < 0 {
+                add((at <= -2).then(|| CellId((-2 - at) as u32)));
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            let [x, y, z, d] = self.planes[node.plane as usize];
+            let normal = DVec3::new(x, y, z);
+            let far = margin * normal.length();
+            let sides = points.iter().map(|p| normal.dot(*p) + d);
+            let (low, high) = sides.fold((f64::MAX, f64::MIN), |(l, h), s| (l.min(s), h.max(s)));
+            if high >= -far {
+                stack.push(node.children[0]);
+            }
+            if low <= far {
+                stack.push(node.children[1]);
+            }
+        }
+    }
+
     /// The cell that `p` lies in; `None` inside solid matter and for points that are not finite.
     #[must_use]
     pub fn locate(&self, p: DVec3) -> Option<CellId> {

@@ -6,6 +6,7 @@
 
 mod error;
 mod extent;
+mod fitting;
 mod geometry;
 mod locator;
 mod origin;
@@ -83,6 +84,9 @@ impl World {
         for (i, detail) in self.details.iter().enumerate() {
             check_detail(i, detail, n_cells, self.detail_meshes.len(), &mut found);
         }
+        fitting::check(self, &mut |owner, problem| {
+            found.push(GraphError::Fitting { owner, problem });
+        });
         origin::check(self, &mut |owner, problem| {
             found.push(GraphError::Source { owner, problem });
         });

@@ -126,6 +126,18 @@ breaks! {
         => GraphError::CellList { cell: 0, .. },
     a_details_cells_exist: |w| w.details[1].cells[1] = CellId(3)
         => GraphError::CellList { cell: 3, .. },
+    what_fills_an_opening_exists: |w| w.graph.portals[0].fittings[0].detail = 2
+        => GraphError::Fitting { .. },
+    what_fills_an_opening_is_named_once: |w| w.graph.portals[1].fittings[1].detail = 0
+        => GraphError::Fitting { .. },
+    a_leaf_moves_by_a_number: |w| {
+        let motion = w.graph.portals[0].fittings[0].motion.as_mut();
+        motion.unwrap().open = f32::NAN;
+    } => GraphError::Fitting { .. },
+    a_part_is_of_another: |w| w.details[1].part_of = Some(1)
+        => GraphError::Fitting { .. },
+    a_part_is_of_a_whole: |w| w.details[0].part_of = Some(1)
+        => GraphError::Fitting { .. },
     a_details_mesh_exists: |w| w.details[1].mesh = 1
         => GraphError::Detail { detail: 1, .. },
     a_details_transform_is_affine: |w| w.details[1].transform[3] = 0.5

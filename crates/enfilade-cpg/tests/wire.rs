@@ -32,7 +32,10 @@ fn a_world_comes_back_as_it_was() {
             .collect::<Vec<_>>()
     };
     assert_eq!(runs(&back), runs(&world));
-    let of_details = |w: &World| w.details.iter().map(|d| d.source).collect::<Vec<_>>();
+    let of_details = |w: &World| {
+        let details = w.details.iter();
+        details.map(|d| (d.source, d.part_of)).collect::<Vec<_>>()
+    };
     assert_eq!(of_details(&back), of_details(&world));
     assert_eq!(back.sources, world.sources);
     assert_eq!(back.fixtures, world.fixtures);

@@ -3,6 +3,8 @@
 //! Drawn through the same lists as pictures are, scissors included, so that what is tried is what is
 //! drawn. Two layers: surfaces that hide what is behind them, and the nearest that is seen through.
 
+use enfilade_cpg::PortalId;
+
 use crate::camera::Projection;
 use crate::formats::ID;
 use crate::frame::Style;
@@ -28,6 +30,11 @@ pub enum Shown {
         detail: u32,
         /// The triangle, by its number among all.
         triangle: u32,
+    },
+    /// What fills a portal that is shut.
+    Plug {
+        /// The portal.
+        portal: PortalId,
     },
 }
 
@@ -167,11 +174,19 @@ impl Renderer {
         }
         gpu.queue.submit([encoder.finish()]);
         let [a, b] = &layers;
-        Ok([read_ids(gpu, a, size)?, read_ids(gpu, b, size)?])
+        Ok([
+            read_ids(gpu, world, a, size)?,
+            read_ids(gpu, world, b, size)?,
+        ])
     }
 }
 
-fn read_ids(gpu: &Gpu, texture: &wgpu::Texture, size: [u32; 2]) -> Result<IdPicture, RenderError> {
+fn read_ids(
+    gpu: &Gpu,
+    world: &GpuWorld,
+    texture: &wgpu::Texture,
+    size: [u32; 2],
+) -> Result<IdPicture, RenderError> {
     let bytes = read_texture(gpu, texture, size, 16)?;
     let pixels = bytes
         .chunks_exact(16)
@@ -180,7 +195,10 @@ fn read_ids(gpu: &Gpu, texture: &wgpu::Texture, size: [u32; 2]) -> Result<IdPict
             let triangle = word(4);
             let shown = match word(0) {
                 0 => Shown::Sky,
-                1 => Shown::Structure { triangle },
+                1 => match world.portal_of_plug(triangle) {
+                    Some(portal) => Shown::Plug { portal },
+                    None => Shown::Structure { triangle },
+                },
                 n => Shown::Detail {
                     detail: n - 2,
                     triangle,

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use enfilade_cpg::{CellId, PortalId};
-use enfilade_runtime::{ChunkId, DetailId, Seen, Sight, View};
+use enfilade_runtime::{ChunkId, DetailId, Seen, Sight, SightState, View};
 use glam::Vec3;
 
 use crate::scene::{Finish, GpuWorld};
@@ -68,6 +68,8 @@ pub struct Sparing {
 pub struct Shot<'a> {
     /// What was asked about.
     pub view: &'a View,
+    /// Which portals are shut.
+    pub state: &'a SightState,
     /// Of the picture. [Units: px]
     pub size: [u32; 2],
     /// Whether batches are drawn only where their cells are seen.
@@ -155,6 +157,7 @@ pub struct Lister {
     chunks: Vec<(u32, u32)>,
     /// Mesh, level, object.
     details: Vec<(u32, u32, u32)>,
+    plugs: Vec<PortalId>,
     far: Vec<(f32, Run)>,
 }
 
@@ -190,14 +193,21 @@ impl Lister {
         self.list = list;
     }
 
-    /// All that there is, whatever the view.
-    pub fn everything(&mut self, world: &GpuWorld, sight: &Sight, eye: [f32; 3]) -> &DrawList {
+    /// All that there is, whatever the view; and what fills portals that `state` shuts.
+    pub fn everything(
+        &mut self,
+        world: &GpuWorld,
+        sight: &Sight,
+        state: &SightState,
+        eye: [f32; 3],
+    ) -> &DrawList {
         let chunks = 0..world.chunks.len() as u32;
         let details = 0..world.details.len() as u32;
         self.begin(Reason::Seen);
         self.chunks.extend(chunks.map(|c| (0, c)));
         self.details
             .extend(details.map(|d| (world.details[d as usize].mesh, 0, d)));
+        self.plugs.extend(state.shut_portals());
         self.finish(world, sight, eye, None)
     }
 
@@ -257,14 +267,24 @@ impl Lister {
         if !sparing.stop_at_nothing {
             self.list.stand_ins.extend_from_slice(seen.stopped());
         }
+        self.plug(world, shot.state, |c| is_whole || seen.cells().contains(&c));
         self.finish(world, sight, shot.view.eye(), size)
     }
 
-    /// Chunks and details of one's own choice, colored by why they are drawn.
+    /// Adds what fills the portals that are shut of cells that are seen.
+    fn plug(&mut self, world: &GpuWorld, state: &SightState, is_seen: impl Fn(CellId) -> bool) {
+        let cells = |p: PortalId| world.portal_cells[p.0 as usize];
+        let shut = state.shut_portals();
+        self.plugs
+            .extend(shut.filter(|p| cells(*p).into_iter().any(&is_seen)));
+    }
+
+    /// Chunks and details of one's own choice, colored by why they are drawn, and what fills all portals that `state` shuts.
     pub fn chosen(
         &mut self,
         world: &GpuWorld,
         sight: &Sight,
+        state: &SightState,
         chunks: impl Iterator<Item = ChunkId>,
         details: impl Iterator<Item = DetailId>,
         reason: Reason,
@@ -273,6 +293,7 @@ impl Lister {
         self.chunks.extend(chunks.map(|c| (0, c.0)));
         self.details
             .extend(details.map(|d| (world.details[d.0 as usize].mesh, 0, d.0)));
+        self.plugs.extend(state.shut_portals());
         self.finish(world, sight, [0.0; 3], None)
     }
 
@@ -287,6 +308,7 @@ impl Lister {
         self.list.instances.push((reason as u32) << 28);
         self.chunks.clear();
         self.details.clear();
+        self.plugs.clear();
         self.far.clear();
     }
 
@@ -354,6 +376,20 @@ impl Lister {
             } else {
                 push_run(&mut self.list.opaque, run);
             }
+        }
+        for &portal in &self.plugs {
+            let span = world.plugs[portal.0 as usize];
+            self.list.n_triangles += u64::from(span.n / 3);
+            let run = Run {
+                first: span.first,
+                n: span.n,
+                texture: span.texture,
+                finish: span.finish,
+                is_smooth: span.is_smooth,
+                instances: 0..1,
+                scissor: None,
+            };
+            push_run(&mut self.list.opaque, run);
         }
         self.details.sort_unstable();
         for group in (self.details).chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {

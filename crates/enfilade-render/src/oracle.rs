@@ -9,24 +9,72 @@
 use enfilade_cpg::World;
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Bvh, DMat4, DVec3, Ray, Triangle};
-use enfilade_runtime::Sight;
+use enfilade_runtime::{DetailId, Sight, SightState};
 
 use crate::camera::Camera;
 use crate::ids::Shown;
-use crate::materials::looks_of;
+use crate::materials::{Look, looks_of};
+use crate::scene::plug;
 
 /// How far a sight line is moved, in pixels: a little over what adapters round by.
 const NUDGE: f64 = 1.0 / 64.0;
 
-/// The triangles of a world, those that hide and those that do not.
+/// Triangles, those that hide and those that do not, and what a picture calls each.
+struct Layers {
+    bvhs: [Bvh; 2],
+    keys: [Vec<Shown>; 2],
+}
+
+/// Layers under way.
+struct LayersBuilder<'w> {
+    looks: &'w [Look],
+    triangles: [Vec<Triangle>; 2],
+    keys: [Vec<Shown>; 2],
+}
+
+impl<'w> LayersBuilder<'w> {
+    fn new(looks: &'w [Look]) -> Self {
+        Self {
+            looks,
+            triangles: Default::default(),
+            keys: Default::default(),
+        }
+    }
+
+    fn add(
+        &mut self,
+        primitive: &Primitive,
+        indices: &[u32],
+        place: &dyn Fn(DVec3) -> DVec3,
+        key: &dyn Fn(u32) -> Shown,
+    ) {
+        let look = (primitive.material).and_then(|m| self.looks.get(m as usize));
+        let to = usize::from(look.is_some_and(|l| l.is_transparent));
+        for (i, t) in (0..).zip(indices.chunks_exact(3)) {
+            let corners = [0, 1, 2].map(|k| place(dvec(primitive.positions[t[k] as usize])));
+            self.triangles[to].push(corners);
+            self.keys[to].push(key(i));
+        }
+    }
+
+    fn finish(self) -> Layers {
+        Layers {
+            bvhs: self.triangles.map(|t| Bvh::build(&t)),
+            keys: self.keys,
+        }
+    }
+}
+
+/// The triangles of a world.
 ///
 /// Memory: some 200 bytes a triangle. A question takes microseconds.
-pub struct Oracle {
-    solid: Bvh,
-    transparent: Bvh,
-    /// By triangle of each: what a picture calls it.
-    solid_keys: Vec<Shown>,
-    transparent_keys: Vec<Shown>,
+pub struct Oracle<'w> {
+    world: &'w World,
+    looks: Vec<Look>,
+    /// By detail mesh: the number of its first triangle.
+    first_of_mesh: Vec<u32>,
+    /// What stays, and what a state has moved or put in.
+    layers: [Layers; 2],
     tolerance: f64,
 }
 
@@ -34,75 +82,58 @@ fn dvec(p: [f32; 3]) -> DVec3 {
     DVec3::new(p[0].into(), p[1].into(), p[2].into())
 }
 
-impl Oracle {
-    /// Of a world; `sight`, which was made of the same, numbers the triangles as pictures do.
+impl<'w> Oracle<'w> {
+    /// Of a world as the model has it; `sight`, which was made of the same, numbers the triangles as pictures do.
     #[must_use]
-    pub fn new(world: &World, sight: &Sight) -> Self {
+    pub fn new(world: &'w World, sight: &Sight) -> Self {
         let looks = looks_of(world);
-        let mut triangles: [Vec<Triangle>; 2] = [Vec::new(), Vec::new()];
-        let mut keys: [Vec<Shown>; 2] = [Vec::new(), Vec::new()];
-        let mut add = |primitive: &Primitive,
-                       indices: &[u32],
-                       place: &dyn Fn(DVec3) -> DVec3,
-                       key: &dyn Fn(u32) -> Shown| {
-            let look = (primitive.material).and_then(|m| looks.get(m as usize));
-            let to = usize::from(look.is_some_and(|l| l.is_transparent));
-            for (i, t) in (0..).zip(indices.chunks_exact(3)) {
-                let corners = [0, 1, 2].map(|k| place(dvec(primitive.positions[t[k] as usize])));
-                triangles[to].push(corners);
-                keys[to].push(key(i));
-            }
-        };
+        let mut filling = LayersBuilder::new(&looks);
         let mut n = 0;
         for (i, batch) in (0..).zip(&world.batches) {
             let indices = sight.indices(i);
-            add(&batch.primitive, indices, &|p| p, &|t| Shown::Structure {
-                triangle: n + t,
-            });
+            let key = |t| Shown::Structure { triangle: n + t };
+            filling.add(&batch.primitive, indices, &|p| p, &key);
             n += indices.len() as u32 / 3;
         }
         let mut first_of_mesh = Vec::new();
         for mesh in &world.detail_meshes {
             first_of_mesh.push(n);
-            n += mesh
-                .primitives
-                .iter()
-                .map(|p| p.indices.len() as u32 / 3)
-                .sum::<u32>();
+            let primitives = mesh.primitives.iter();
+            n += primitives.map(|p| p.indices.len() as u32 / 3).sum::<u32>();
         }
-        for (detail, object) in (0..).zip(&world.details) {
-            let m = DMat4::from_cols_array(&object.transform.map(f64::from));
-            let mut n = first_of_mesh[object.mesh as usize];
-            for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-                add(
-                    primitive,
-                    &primitive.indices,
-                    &|p| m.transform_point3(p),
-                    &|t| Shown::Detail {
-                        detail,
-                        triangle: n + t,
-                    },
-                );
-                n += primitive.indices.len() as u32 / 3;
+        for detail in (0..).map(DetailId).take(world.details.len()) {
+            if sight.portals_of(detail).next().is_none() {
+                add_detail(&mut filling, world, &first_of_mesh, detail, None);
             }
         }
-        let [solid_keys, transparent_keys] = keys;
+        let stays = filling.finish();
+        let moves = moving(
+            world,
+            &looks,
+            &first_of_mesh,
+            sight,
+            &SightState::new(sight),
+        );
         Self {
-            solid: Bvh::build(&triangles[0]),
-            transparent: Bvh::build(&triangles[1]),
-            solid_keys,
-            transparent_keys,
+            world,
+            looks,
+            first_of_mesh,
+            layers: [stays, moves],
             tolerance: sight.tolerance(),
         }
+    }
+
+    /// Moves leaves to where `state` has them, and fills the portals that it shuts. Linear in the triangles of these.
+    pub fn follow(&mut self, sight: &Sight, state: &SightState) {
+        let (world, looks) = (self.world, &self.looks);
+        self.layers[1] = moving(world, looks, &self.first_of_mesh, sight, state);
     }
 
     /// Whether an eye is so near to a surface that the near plane cuts it.
     #[must_use]
     pub fn is_at_surface(&self, eye: [f32; 3]) -> bool {
         let near = f64::from(Camera::NEAR) * 8.0;
-        [&self.solid, &self.transparent]
-            .iter()
-            .any(|b| b.nearest(dvec(eye), near).is_some())
+        (self.layers.iter().flat_map(|l| &l.bvhs)).any(|b| b.nearest(dvec(eye), near).is_some())
     }
 
     /// Whether what is drawn at a pixel, `found` meters away along the view direction (infinity for
@@ -169,19 +200,17 @@ impl Oracle {
         if first.is_infinite() {
             return shown == Shown::Sky;
         }
-        let (bvh, keys) = if is_transparent {
-            (&self.transparent, &self.transparent_keys)
-        } else {
-            (&self.solid, &self.solid_keys)
-        };
         let ray = Ray {
             t_max: first - f64::from(Camera::NEAR) + 1e-6 * first,
             ..ray_through(camera, at, nudge, size)
         };
         let mut is_met = false;
-        bvh.for_each_hit(&ray, |hit| {
-            is_met |= keys[hit.triangle as usize] == shown;
-        });
+        for Layers { bvhs, keys } in &self.layers {
+            let layer = usize::from(is_transparent);
+            bvhs[layer].for_each_hit(&ray, |hit| {
+                is_met |= keys[layer][hit.triangle as usize] == shown;
+            });
+        }
         is_met
     }
 
@@ -195,18 +224,69 @@ impl Oracle {
         is_transparent: bool,
     ) -> f64 {
         let ray = ray_through(camera, at, nudge, size);
-        let first = |bvh: &Bvh| {
-            bvh.closest_hit(&ray, |_| false)
-                .map_or(f64::INFINITY, |h| h.t)
+        let first = |layer: usize| {
+            let hits = self.layers.iter().map(|l| &l.bvhs[layer]);
+            let hits = hits.filter_map(|b| b.closest_hit(&ray, |_| false));
+            hits.map(|h| h.t).fold(f64::INFINITY, f64::min)
         };
-        let solid = first(&self.solid);
+        let solid = first(0);
         let t = if is_transparent {
-            let t = first(&self.transparent);
+            let t = first(1);
             if t < solid { t } else { f64::INFINITY }
         } else {
             solid
         };
         t + f64::from(Camera::NEAR)
+    }
+}
+
+/// Leaves, and what fills portals.
+fn moving(
+    world: &World,
+    looks: &[Look],
+    first_of_mesh: &[u32],
+    sight: &Sight,
+    state: &SightState,
+) -> Layers {
+    let mut filling = LayersBuilder::new(looks);
+    for detail in (0..).map(DetailId).take(world.details.len()) {
+        if sight.portals_of(detail).next().is_some() {
+            let pose = state.pose(detail);
+            add_detail(&mut filling, world, first_of_mesh, detail, pose);
+        }
+    }
+    for portal in state.shut_portals() {
+        let plug = plug(world, sight, portal);
+        let key = |_| Shown::Plug { portal };
+        filling.add(&plug, &plug.indices, &|p| p, &key);
+    }
+    filling.finish()
+}
+
+/// Adds a detail object, moved by `pose`.
+fn add_detail(
+    filling: &mut LayersBuilder<'_>,
+    world: &World,
+    first_of_mesh: &[u32],
+    id: DetailId,
+    pose: Option<DMat4>,
+) {
+    let object = &world[id];
+    let own = DMat4::from_cols_array(&object.transform.map(f64::from));
+    let m = pose.map_or(own, |pose| pose * own);
+    let mut n = first_of_mesh[object.mesh as usize];
+    for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+        let key = |t| Shown::Detail {
+            detail: id.0,
+            triangle: n + t,
+        };
+        filling.add(
+            primitive,
+            &primitive.indices,
+            &|p| m.transform_point3(p),
+            &key,
+        );
+        n += primitive.indices.len() as u32 / 3;
     }
 }
 
@@ -259,14 +339,14 @@ mod tests {
         }
     }
 
-    fn oracle() -> Oracle {
-        let world = wall();
-        Oracle::new(&world, &Sight::build(&world).unwrap())
+    fn oracle(world: &World) -> Oracle<'_> {
+        Oracle::new(world, &Sight::build(world).unwrap())
     }
 
     #[test]
     fn only_what_an_exact_ray_shows_is_right() {
-        let oracle = oracle();
+        let world = wall();
+        let oracle = oracle(&world);
         // 4 pixels wide: the wall's edge is between the second and the third.
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
         let right = |x, d| oracle.is_right(&camera, [x, 2], [4, 4], d, false);
@@ -276,7 +356,8 @@ mod tests {
 
     #[test]
     fn on_an_edge_both_sides_are_right() {
-        let oracle = oracle();
+        let world = wall();
+        let oracle = oracle(&world);
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
         // 5 pixels: the middle of the third is on the edge.
         for d in [5.0, f64::INFINITY] {
@@ -287,7 +368,8 @@ mod tests {
 
     #[test]
     fn what_is_behind_a_wall_is_not_met() {
-        let oracle = oracle();
+        let world = wall();
+        let oracle = oracle(&world);
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
         let met = |x, shown| oracle.is_met(&camera, [x, 2], [4, 4], shown, false);
         // Chunks put the two triangles in an order of their own.
@@ -299,7 +381,8 @@ mod tests {
 
     #[test]
     fn an_eye_at_a_wall_is_known() {
-        let oracle = oracle();
+        let world = wall();
+        let oracle = oracle(&world);
         assert!(oracle.is_at_surface([1.0, 0.0, -4.99999]));
         assert!(!oracle.is_at_surface([1.0, 0.0, -4.9]));
     }

@@ -66,6 +66,7 @@ impl Studio {
     ) -> Result<(DrawList, QueryCounts), RenderError> {
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
+        self.follow_state();
         let mut counts = QueryCounts::default();
         let cells = match self.sight.locate(camera.eye) {
             None => None,
@@ -91,7 +92,14 @@ impl Studio {
             .filter(|d| is_in(&gpu_world.details[d.0 as usize].cells));
         let list = self
             .lister
-            .chosen(gpu_world, &self.sight, chunks, details, Reason::Seen)
+            .chosen(
+                gpu_world,
+                &self.sight,
+                &self.state,
+                chunks,
+                details,
+                Reason::Seen,
+            )
             .clone();
         Ok((list, counts))
     }

@@ -190,7 +190,14 @@ impl Renderer {
         (flat * back, 2.0 * radius / SHADOW_SIDE as f32)
     }
 
-    fn draw_shadows(&mut self, gpu: &Gpu, world: &GpuWorld, stage: &Stage, all: &DrawList) {
+    /// What the sun sees.
+    pub(crate) fn draw_shadows(
+        &mut self,
+        gpu: &Gpu,
+        world: &GpuWorld,
+        stage: &Stage,
+        all: &DrawList,
+    ) {
         let projection = Projection::parallel([0.0; 3], [0.0, -1.0, 0.0], 1.0, 1.0, 1.0);
         self.write_globals(gpu, stage, &projection, &Style::default(), [1, 1]);
         self.write_instances(gpu, world, all);

@@ -7,10 +7,11 @@
 mod color;
 mod filling;
 mod placed;
+mod plug;
 mod textures;
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_runtime::Sight;
+use enfilade_runtime::{Sight, SightState};
 use glam::Vec3;
 use wgpu::util::DeviceExt;
 
@@ -18,13 +19,14 @@ use crate::gpu::{Gpu, RenderError};
 use crate::marks::{Mark, Shape};
 use crate::materials::{Look, looks_of};
 use filling::{Filling, Level, Span};
-use placed::{Placed, bounds_of, placed};
+use placed::{Moving, Placed, bounds_of, placed};
 use textures::load_textures;
 
 pub use color::cell_color;
 pub(crate) use color::packed_cell_color;
 pub(crate) use filling::{CORNER_LAYOUT, Finish};
 pub(crate) use placed::{INSTANCE_LAYOUT, Instance};
+pub(crate) use plug::plug;
 pub(crate) use textures::texture_layout;
 
 /// A world on the adapter, ready to be drawn.
@@ -46,6 +48,11 @@ pub struct GpuWorld {
     /// By detail mesh: its levels, the finest first.
     pub(crate) meshes: Vec<Vec<Level>>,
     pub(crate) details: Vec<Placed>,
+    moving: Vec<Moving>,
+    /// By portal: what fills it when it is shut.
+    pub(crate) plugs: Vec<Span>,
+    /// By portal.
+    pub(crate) portal_cells: Vec<[CellId; 2]>,
     /// Least and greatest corner of all that is drawn. [Units: wu]
     pub(crate) bounds: [Vec3; 2],
     /// By portal: its outline. [Units: wu]
@@ -96,7 +103,8 @@ impl GpuWorld {
         };
         let batches = filling.add_batches(sight);
         let meshes = filling.add_meshes(has_levels);
-        let (instances, details) = placed(world);
+        let (instances, details, moving) = placed(world, sight);
+        let plugs = filling.add_plugs(sight);
         let chunks: Vec<Span> = sight
             .chunks()
             .iter()
@@ -145,6 +153,9 @@ impl GpuWorld {
             batch_cells: world.batches.iter().map(|b| b.cells.clone()).collect(),
             meshes,
             details,
+            moving,
+            plugs,
+            portal_cells: world.graph.portals.iter().map(|p| p.cells).collect(),
             bounds,
             outlines: world
                 .graph
@@ -156,6 +167,14 @@ impl GpuWorld {
             n_triangles: sight.n_triangles(),
             n_missing_pictures,
         })
+    }
+
+    /// Moves leaves to where `state` has them.
+    pub(crate) fn place(&mut self, state: &SightState) {
+        for leaf in &self.moving {
+            let at = leaf.detail.0 as usize;
+            leaf.place(state, &mut self.instances[at + 1], &mut self.details[at]);
+        }
     }
 
     /// The level that an object is drawn at, to be off by `lod` pixels at most. `pixels` tells how many a meter has.
@@ -218,6 +237,15 @@ impl GpuWorld {
             .partition_point(|c| c.first + c.n <= triangle * 3);
         let chunk = self.chunks.get(at)?;
         (chunk.first <= triangle * 3).then_some(at as u32)
+    }
+
+    /// The portal that a triangle fills when it is shut.
+    pub(crate) fn portal_of_plug(&self, triangle: u32) -> Option<PortalId> {
+        let at = self
+            .plugs
+            .partition_point(|s| s.first + s.n <= triangle * 3);
+        let plug = self.plugs.get(at)?;
+        (plug.first <= triangle * 3).then_some(PortalId(at as u32))
     }
 
     /// The batch of a chunk, and the triangle's place in it as [`Sight::indices`] orders them.

@@ -50,6 +50,8 @@ pub struct Studio {
     pub(crate) renderer: Renderer,
     pub(crate) stage: Stage,
     pub(crate) lister: Lister,
+    /// How leaves are drawn: [`SightState::shares`].
+    placed: Vec<Option<f32>>,
 }
 
 impl Studio {
@@ -77,11 +79,13 @@ impl Studio {
         let mut renderer = Renderer::with_format(&gpu, format);
         renderer.sun = sun_of(world);
         let mut lister = Lister::new();
-        let all = lister.everything(&on_gpu, &sight, [0.0; 3]);
+        let state = SightState::new(&sight);
+        let all = lister.everything(&on_gpu, &sight, &state, [0.0; 3]);
         let light = Light::uniform(&gpu)?;
         let stage = renderer.set_stage(&gpu, &on_gpu, light, all);
         Ok(Self {
-            state: SightState::new(&sight),
+            placed: state.shares().to_vec(),
+            state,
             viewer: Viewer::new(&sight),
             sparing: Sparing::default(),
             gpu,
@@ -100,9 +104,10 @@ impl Studio {
     /// As [`Studio::new`].
     pub fn add_levels(&mut self, world: &World) -> Result<(), RenderError> {
         self.world = GpuWorld::load_with_levels(&self.gpu, world, &self.sight)?;
+        self.world.place(&self.state);
         // Light has nothing to do with levels.
         let light = std::mem::replace(&mut self.stage.light, Light::uniform(&self.gpu)?);
-        let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
+        let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
         self.stage = self.renderer.set_stage(&self.gpu, &self.world, light, all);
         Ok(())
     }
@@ -119,12 +124,25 @@ impl Studio {
             return Ok(());
         }
         let light = Light::of_world(&self.gpu, world, &self.sight, self.renderer.sun)?;
-        let all = (self.lister).everything(&self.world, &self.sight, [0.0; 3]);
+        let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
         self.stage = (self.renderer).set_stage(&self.gpu, &self.world, light, all);
         Ok(())
     }
 
-    /// What is drawn of a view.
+    /// Moves leaves to where the state has them, and what the sun sees with them.
+    pub(crate) fn follow_state(&mut self) {
+        if self.placed == self.state.shares() {
+            return;
+        }
+        self.placed.clear();
+        self.placed.extend_from_slice(self.state.shares());
+        self.world.place(&self.state);
+        let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
+        self.renderer
+            .draw_shadows(&self.gpu, &self.world, &self.stage, all);
+    }
+
+    /// What is drawn of a view: leaves of doors as [`Studio::state`] has them, and what fills portals that it shuts.
     pub fn list(
         &mut self,
         view: &View,
@@ -132,14 +150,16 @@ impl Studio {
         culling: Culling,
         size: [u32; 2],
     ) -> &DrawList {
+        self.follow_state();
         let (world, sight) = (&self.world, &self.sight);
         let shot = Shot {
             view,
+            state: &self.state,
             size,
             has_scissors: culling == Culling::Portals,
         };
         match culling {
-            Culling::Everything => self.lister.everything(world, sight, eye),
+            Culling::Everything => self.lister.everything(world, sight, &self.state, eye),
             Culling::Frustum => {
                 let seen = self.viewer.see_through_walls(sight, view);
                 let sparing = Sparing {
@@ -354,8 +374,9 @@ impl Studio {
 
     /// The list of all that there is.
     pub fn everything(&mut self) -> DrawList {
+        self.follow_state();
         (self.lister)
-            .everything(&self.world, &self.sight, [0.0; 3])
+            .everything(&self.world, &self.sight, &self.state, [0.0; 3])
             .clone()
     }
 }

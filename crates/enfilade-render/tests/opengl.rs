@@ -69,6 +69,7 @@ fn grid() -> World {
             transform,
             cells: vec![enfilade_cpg::CellId(i as u32)],
             source: None,
+            part_of: None,
         });
     }
     world
@@ -234,6 +235,7 @@ fn by_opengl_too_surfaces_stay_apart_far_away() {
             transform: glam::Mat4::IDENTITY.to_cols_array(),
             cells: Vec::new(),
             source: None,
+            part_of: None,
         });
     }
     // A little aslant, so that depths are not the same all over.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::f32::consts::{PI, TAU};
 
-use enfilade_cpg::{DetailObject, PortalId, World};
+use enfilade_cpg::{CellId, DetailObject, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive, Texture};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, Frame, Gpu, GpuWorld, Mark, Oracle, Paint, RenderError, Shape,
@@ -79,8 +79,8 @@ fn culling_by_portals_changes_no_pixel() {
 fn a_traversal_that_loses_a_room_is_noticed() {
     let world = grid();
     let mut studio = Studio::new(gpu(), &world).unwrap();
-    for p in 0..world.graph.portals.len() as u32 {
-        studio.state.close(PortalId(p));
+    for c in 0..world.graph.cells.len() as u32 {
+        studio.state.lock(CellId(c), true);
     }
     let [lost, differing] = n_lost(&mut studio, &world, 20, 1);
     assert!(
@@ -231,6 +231,7 @@ fn objects_far_away_have_fewer_triangles_and_look_the_same() {
             transform,
             cells: Vec::new(),
             source: None,
+            part_of: None,
         });
     }
     let mut studio = Studio::new(gpu(), &world).unwrap();

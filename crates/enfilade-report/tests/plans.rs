@@ -257,6 +257,7 @@ fn hostile_names_and_empty_worlds_are_valid_xml() {
             .to_cols_array(),
         cells: vec![CellId(0)],
         source: None,
+        part_of: None,
     });
     let svg = plan(&world);
     assert_eq!(paths(&svg, "detail").len(), 1);

@@ -7,8 +7,10 @@ use enfilade_cpg::World;
 use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Ray, Triangle};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
+use crate::doors::Doors;
 use crate::point::point;
 use crate::seen::DetailId;
+use crate::state::SightState;
 
 /// The triangles of a mesh, in its own space or, for an object that is flattened, in the world's.
 #[derive(Clone, Debug)]
@@ -50,6 +52,8 @@ pub(crate) struct DetailHit {
 impl Details {
     /// O(n log n) in the triangles of the meshes and in the objects.
     pub(crate) fn build(world: &World) -> Self {
+        // A world whose fittings are none has no answers about doors; all else is as it is.
+        let doors = Doors::of(world).unwrap_or_default();
         let mut shapes: Vec<Shape> = (0..world.detail_meshes.len())
             .map(|mesh| Shape::of_mesh(world, mesh as u32, &DMat4::IDENTITY))
             .collect();
@@ -59,7 +63,10 @@ impl Details {
             let to_world = DMat4::from_cols_array(&object.transform.map(f64::from));
             let inverse = to_world.inverse();
             let shape = &shapes[object.mesh as usize];
-            let bounds = shape.bounds_under(&to_world);
+            let mut bounds = shape.bounds_under(&to_world);
+            if let Some((swept, _)) = doors.way(i as u32) {
+                bounds = bounds.union(swept);
+            }
             if !bounds.is_empty() {
                 let item = i as u32;
                 boxes.push(Boxed { bounds, item });
@@ -102,9 +109,11 @@ impl Details {
         }
     }
 
-    /// The first hit on the segment `origin + t · direction`, `t` from 0 to `t_max`, of objects for which `counts`.
+    /// The first hit on the segment `origin + t · direction`, `t` from 0 to `t_max`, of objects for which `counts`; leaves of
+    /// doors as `state` has them.
     pub(crate) fn first_hit(
         &self,
+        state: &SightState,
         ray: &Ray,
         mut counts: impl FnMut(DetailId) -> bool,
     ) -> Option<DetailHit> {
@@ -119,9 +128,11 @@ impl Details {
                 let id = DetailId(item);
                 let placed = &self.placed[item as usize];
                 let shape = &self.shapes[placed.shape as usize];
+                let moved = state.pose(id);
+                let to_shape = moved.map_or(placed.to_shape, |m| placed.to_shape * m.inverse());
                 let local = Ray {
-                    origin: placed.to_shape.transform_point3(ray.origin),
-                    direction: placed.to_shape.transform_vector3(ray.direction),
+                    origin: to_shape.transform_point3(ray.origin),
+                    direction: to_shape.transform_vector3(ray.direction),
                     t_max,
                 };
                 let hit = shape.bvh.closest_hit(&local, |_| false);
@@ -132,7 +143,8 @@ impl Details {
                 });
                 if let Some(hit) = nearer {
                     t_max = hit.t;
-                    best = Some(shape.named(id, &hit, &placed.to_world));
+                    let to_world = moved.map_or(placed.to_world, |m| m * placed.to_world);
+                    best = Some(shape.named(id, &hit, &to_world));
                 }
                 limit(t_max)
             });

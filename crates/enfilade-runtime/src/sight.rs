@@ -1,22 +1,25 @@
 //! What is made once from a world, to be asked many times.
 
 mod drawn;
-mod error;
 mod portals;
+
+use std::sync::Arc;
 
 use enfilade_cpg::{CellId, Locator, PortalId, World};
 use enfilade_geom::{DVec3, world_tolerance};
 
 use crate::boxes::{BoxTrees, Root};
 use crate::chunks::Chunk;
+use crate::doors::{Doors, Leaf};
 use crate::exits::{Exit, Group, Runs, group};
 use crate::occluder::{Occluders, occluders_of};
 use crate::options::SightOptions;
 use crate::point::point;
+use crate::seen::DetailId;
 use drawn::{Boxes, Detail, Drawn};
 use portals::Portals;
 
-pub use error::SightError;
+use crate::sight_error::SightError;
 
 /// A world made ready for questions: portals side by side, exits by cell, boxes in trees.
 ///
@@ -43,6 +46,7 @@ pub struct Sight {
     pub(crate) occluders: Occluders,
     /// By batch: its triangles as index triples, sorted so that chunks are ranges.
     indices: Vec<Vec<u32>>,
+    pub(crate) doors: Arc<Doors>,
     pub(crate) n_portals: usize,
     pub(crate) n_triangles: u64,
     /// How far a stored outline may be off. [Units: wu]
@@ -68,7 +72,8 @@ impl Sight {
     /// As [`Sight::build`].
     pub fn build_with(world: &World, options: &SightOptions) -> Result<Self, SightError> {
         let n_cells = world.graph.cells.len();
-        let drawn = Drawn::of(world, options)?;
+        let doors = Doors::of(world)?;
+        let drawn = Drawn::of(world, options, &doors)?;
         let mut portals = Portals::default();
         for (i, portal) in world.graph.portals.iter().enumerate() {
             portals.add(PortalId(i as u32), portal, n_cells)?;
@@ -85,7 +90,7 @@ impl Sight {
             group(own, &portals.corners, size, tolerance, &mut groups);
             first_group.push(groups.len() as u32);
         }
-        let boxes = Boxes::of(world, &drawn, tolerance);
+        let boxes = Boxes::of(world, &drawn, &doors, tolerance);
         let occluders = occluders_of(world, options, tolerance);
         let n_triangles = drawn.n_triangles();
         Ok(Self {
@@ -103,6 +108,7 @@ impl Sight {
             details: drawn.details,
             occluders,
             indices: drawn.indices,
+            doors: Arc::new(doors),
             n_portals: world.graph.portals.len(),
             n_triangles,
             tolerance,
@@ -154,6 +160,42 @@ impl Sight {
         self.details
             .get(detail as usize)
             .map_or(0, |d| d.n_triangles)
+    }
+
+    /// The leaves of a portal: which objects shut it, and how they move. Empty where the world knows none.
+    #[must_use]
+    pub fn leaves(&self, portal: PortalId) -> &[Leaf] {
+        self.doors.leaves(portal)
+    }
+
+    /// The portals that an object is a leaf of, in ascending order; empty for all other objects.
+    pub fn portals_of(&self, detail: DetailId) -> impl Iterator<Item = PortalId> {
+        let slot = self.doors.slot(detail);
+        let portals = slot.map_or(&[][..], |s| self.doors.portals(s));
+        portals.iter().map(|&p| PortalId(p))
+    }
+
+    /// The cells that an object is in, ascending: of a leaf, all on its way.
+    ///
+    /// # Panics
+    ///
+    /// When `world` is not the one that this was built from.
+    #[must_use]
+    pub fn cells_of_detail(&self, world: &World, detail: DetailId) -> Vec<CellId> {
+        let mut cells = world[detail].cells.clone();
+        if let Some((_, way)) = self.doors.way(detail.0) {
+            cells.extend_from_slice(way);
+            cells.sort_unstable();
+            cells.dedup();
+        }
+        cells
+    }
+
+    /// Where in its opening a portal is shut, along its normal from its plane: in the middle of its leaves, so that what
+    /// fills it there is hidden by them; 0 without leaves. [Units: wu]
+    #[must_use]
+    pub fn depth_of_leaves(&self, portal: PortalId) -> f32 {
+        self.doors.depth(portal)
     }
 
     /// The cell of a point; `None` in solid matter. About 100 ns.

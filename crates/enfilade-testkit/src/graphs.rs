@@ -3,6 +3,7 @@
 //! Walls have no thickness and are seen from both sides; each opening is a rectangle in one wall. The
 //! graph is exact, so whatever a run-time loses in such a world, it lost itself.
 
+mod doors;
 mod grid;
 mod world;
 
@@ -12,6 +13,7 @@ use enfilade_cpg::{PortalKind, World};
 use enfilade_geom::{Aabb, DMat3, DVec3};
 
 use crate::rng::Rng;
+pub use doors::with_doors;
 use grid::{Face, Grid};
 use world::{FaceHole, world_of};
 

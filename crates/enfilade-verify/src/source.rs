@@ -109,7 +109,7 @@ const NAMED: usize = 10;
 /// below `n`, and may be asked for it several times.
 ///
 /// A detail that was moved, changed, added or taken away is found, whatever the world's counts say. Triangles are compared in
-/// their order, which no writer of ours changes; objects in any. Linear in triangles and `O(n log n)` in objects, as long as few
+/// their order, which no writer of ours changes, also where parts were taken out of an object; objects in any. Linear in triangles and `O(n log n)` in objects, as long as few
 /// that differ lie in one place.
 #[must_use]
 pub fn compare_details(
@@ -117,10 +117,19 @@ pub fn compare_details(
     n: usize,
     source: impl Fn(usize) -> SourceDetail,
 ) -> Vec<String> {
-    let of_world = |i: usize| details::triangles_of(world, &world.details[i]);
-    let numbered = world.details.iter().enumerate();
-    let mut own: Vec<Shape> = numbered
-        .filter_map(|(i, d)| Shape::of(i, &d.name, &of_world(i)))
+    let mut parts: Vec<Vec<usize>> = vec![Vec::new(); world.details.len()];
+    for (i, d) in world.details.iter().enumerate() {
+        let whole = d.part_of.map_or(i, |w| w as usize);
+        parts[whole].push(i);
+    }
+    // A whole with what was taken out of it, one after the other.
+    let of_world = |i: usize| -> Vec<Vec<Triangle>> {
+        let own = parts[i].iter().map(|&p| &world.details[p]);
+        own.map(|d| details::triangles_of(world, d)).collect()
+    };
+    let wholes = (0..world.details.len()).filter(|&i| world.details[i].part_of.is_none());
+    let mut own: Vec<Shape> = wholes
+        .filter_map(|i| Shape::of(i, &world.details[i].name, &of_world(i).concat()))
         .collect();
     let mut theirs: Vec<Shape> = (0..n)
         .filter_map(|i| {
@@ -164,11 +173,22 @@ pub fn compare_details(
     unmet(&theirs, &own)
 }
 
-fn is_same(a: &[Triangle], b: &[Triangle], slack: f64) -> bool {
-    let corners = a.iter().flatten().zip(b.iter().flatten());
-    corners
-        .into_iter()
-        .all(|(p, q)| (*p - *q).abs().max_element() <= slack)
+/// Whether triangles are those of parts that were taken out of them, each part in their order.
+fn is_same(parts: &[Vec<Triangle>], of: &[Triangle], slack: f64) -> bool {
+    let is_near = |a: &Triangle, b: &Triangle| {
+        let mut corners = a.iter().zip(b);
+        corners.all(|(p, q)| (*p - *q).abs().max_element() <= slack)
+    };
+    let mut rest: Vec<&[Triangle]> = parts.iter().map(Vec::as_slice).collect();
+    of.iter().all(|t| {
+        let next = rest
+            .iter_mut()
+            .find(|r| r.first().is_some_and(|f| is_near(f, t)));
+        next.is_some_and(|r| {
+            *r = &r[1..];
+            true
+        })
+    })
 }
 
 /// Those that lack a partner, a line each.

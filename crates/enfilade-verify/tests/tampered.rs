@@ -567,6 +567,43 @@ fn details_are_where_the_source_has_them() {
     assert!(said.len() == 1 && said[0].contains("other settings"));
 }
 
+/// The world with every third triangle of a detail taken out as a part.
+fn divided(whole: usize) -> World {
+    let mut world = HOUSE.clone();
+    let mesh = world.detail_meshes[world.details[whole].mesh as usize].clone();
+    for is_part in [false, true] {
+        let mut part = mesh.clone();
+        for p in &mut part.primitives {
+            let triangles = p.indices.chunks_exact(3).enumerate();
+            let own = triangles.filter(|(t, _)| (t % 3 == 0) == is_part);
+            p.indices = own.flat_map(|(_, t)| t.to_vec()).collect();
+        }
+        world.detail_meshes.push(part);
+        let mesh = world.detail_meshes.len() as u32 - 1;
+        if is_part {
+            let mut detail = world.details[whole].clone();
+            (detail.mesh, detail.part_of) = (mesh, Some(whole as u32));
+            world.details.push(detail);
+        } else {
+            world.details[whole].mesh = mesh;
+        }
+    }
+    world
+}
+
+#[test]
+fn a_part_is_where_the_source_has_its_whole() {
+    let n = HOUSE.details.len();
+    let problems = |w: &World| compare_details(w, n, |i| detail_of(&HOUSE, i));
+    let mut world = divided(n / 2);
+    assert_eq!(problems(&world), [""; 0]);
+    let part = world.details.len() - 1;
+    world.details[part].transform[13] += 0.01;
+    assert!(!problems(&world).is_empty());
+    world.details.pop();
+    assert!(!problems(&world).is_empty());
+}
+
 #[test]
 fn kinds_of_portals_are_those_of_the_rule_as_far_as_a_file_tells() {
     let is_found = |change: &dyn Fn(&mut World)| {

@@ -1,11 +1,11 @@
-//! Doors that close, slide and are picked: `cargo run --release -p enfilade --example doors`.
+//! Doors that close, slide, turn and are picked: `cargo run --release -p enfilade --example doors`.
 
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
 
-use enfilade::{PortalId, Sight, SightState, Sightlines, Target, View, Viewer};
-use enfilade_testkit::{GridParams, room_grid};
+use enfilade::{PortalId, Sight, SightState, Sightlines, Target, View, Viewer, World};
+use enfilade_testkit::{GridParams, room_grid, with_doors};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // Two rooms in a row, with one doorway.
@@ -76,5 +76,27 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         "beside it: a wall of {}, at {:?}",
         world.graph[here].name, hit.position
     );
+    turn(&with_doors(world, |_| false), door)
+}
+
+/// The same doorway with a leaf in it, as a bake finds them.
+fn turn(world: &World, door: PortalId) -> Result<(), Box<dyn Error>> {
+    let sight = Sight::build(world)?;
+    let lines = Sightlines::build(world);
+    let mut state = SightState::new(&sight);
+    let portal = &world.graph[door];
+    let middle = portal.center();
+    let at = |along: f32| [0, 1, 2].map(|k| middle[k] + along * portal.normal[k]);
+    let leaf = sight.leaves(door)[0].detail;
+    state.set_leaves(door, 0.0);
+    let hit = lines.pick(&state, at(-1.0), at(1.0))?;
+    let met = hit.ok_or("nothing was hit")?.target;
+    assert!(matches!(met, Target::Detail { detail, .. } if detail == leaf));
+    println!("shut: the click meets {}", world[leaf].name);
+    // A game does this frame by frame, and draws the leaf by its own transform, and this one after it.
+    state.set_leaves(door, 1.0);
+    let moved = state.pose(leaf).ok_or("it has not moved")?;
+    assert_eq!(lines.pick(&state, at(-1.0), at(1.0))?, None);
+    println!("open: {} is turned by {moved}", world[leaf].name);
     Ok(())
 }

@@ -76,6 +76,7 @@ fn doorway(i: u32) -> Portal {
         pieces: vec![outline.clone()],
         outline,
         area: 2.1,
+        fittings: Vec::new(),
     }
 }
 

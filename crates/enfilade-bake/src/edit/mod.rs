@@ -13,13 +13,13 @@ mod splice;
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{Cell, CellId, Portal, PortalId, SourceRuns, World};
-use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DMat4, DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::rounded_portal;
 use crate::complex::divide::{BACK, Cutter, FRONT, Undivided};
 use crate::complex::{ComplexInput, Partition, build_complex};
 use crate::simplify::Batches;
+use crate::subset::subset_of;
 
 use splice::{SideTree, spliced};
 
@@ -402,6 +402,7 @@ impl Parts {
                 portal.cells[end] = self.id(side);
                 portal.kind = base.kind;
                 portal.normal = base.normal;
+                portal.fittings.clone_from(&base.fittings);
                 portal
             };
             match &halves[..] {
@@ -467,7 +468,7 @@ impl Parts {
                 }
             }
             for (list, (indices, sources)) in by_list {
-                batches.add(list, &part_of(p, &indices), &sources, batch.is_seal);
+                batches.add(list, &subset_of(p, &indices), &sources, batch.is_seal);
             }
         }
         out.batches = batches.finish();
@@ -541,36 +542,5 @@ impl Parts {
                 cell.aabb = [b.min.as_vec3().to_array(), b.max.as_vec3().to_array()];
             }
         }
-    }
-}
-
-/// The triangles of a primitive that `indices` list, with the vertices that they use.
-fn part_of(p: &Primitive, indices: &[u32]) -> Primitive {
-    let mut number: BTreeMap<u32, u32> = BTreeMap::new();
-    let mut used: Vec<usize> = Vec::new();
-    let indices = indices
-        .iter()
-        .map(|&i| {
-            *number.entry(i).or_insert_with(|| {
-                used.push(i as usize);
-                used.len() as u32 - 1
-            })
-        })
-        .collect();
-    fn pick<T: Copy>(used: &[usize], from: &[T]) -> Vec<T> {
-        if from.is_empty() {
-            Vec::new()
-        } else {
-            used.iter().map(|&i| from[i]).collect()
-        }
-    }
-    Primitive {
-        positions: pick(&used, &p.positions),
-        normals: pick(&used, &p.normals),
-        tangents: pick(&used, &p.tangents),
-        uvs: p.uvs.iter().map(|set| pick(&used, set)).collect(),
-        colors: pick(&used, &p.colors),
-        indices,
-        ..p.clone()
     }
 }

@@ -11,7 +11,7 @@ use enfilade_geom::scene::{Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Triangle, triangle_area_normal};
 
 /// Flat means thinner than this. [Units: wu] A door with its frame and handles is about 0.3.
-const MAX_THICKNESS: f64 = 0.4;
+pub(crate) const MAX_THICKNESS: f64 = 0.4;
 /// A closure is at least this long and this wide. [Units: wu]
 const MIN_EXTENT: f64 = 0.35;
 /// … and at least this many times wider than thick.
@@ -165,7 +165,7 @@ const MAX_DIRECTIONS: usize = 64;
 ///
 /// The largest triangles say which directions there are: the many small ones of moldings, handles and scanned edges may
 /// face anywhere.
-fn thin_direction(triangles: &[Triangle]) -> DVec3 {
+pub(crate) fn thin_direction(triangles: &[Triangle]) -> DVec3 {
     let mut normals: Vec<DVec3> = triangles.iter().map(triangle_area_normal).collect();
     normals.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
     let mut clusters: Vec<(DVec3, f64)> = Vec::new();

@@ -25,7 +25,7 @@ mod slabs;
 mod stairs;
 
 pub(crate) use backs::{BACKS, count_backs, is_crevice, is_inside, rays_from};
-pub(crate) use blockers::plates;
+pub(crate) use blockers::{MAX_THICKNESS, plates, thin_direction};
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
 pub(crate) use lattice::{connected_count, rim_share};

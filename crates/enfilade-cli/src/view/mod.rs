@@ -14,7 +14,7 @@ use std::time::Instant;
 use anyhow::{Context, anyhow};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
-use enfilade::runtime::Sightlines;
+use enfilade::runtime::{Sightlines, Target};
 use enfilade_render::{AdapterChoice, Camera, Paint, Sparing, Studio};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
@@ -107,6 +107,9 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         None => Ok(()),
     }
 }
+
+/// How far a click reaches, in lengths of the view direction.
+const CLICK: f32 = 30.0;
 
 struct App<'a> {
     args: &'a View,
@@ -254,7 +257,7 @@ impl App<'_> {
             ..Shown::default()
         };
         Ok(Open {
-            walker: Walker::new(&self.world, start.eye),
+            walker: Walker::new(&self.world, &studio.sight, start.eye),
             window,
             surface,
             config,
@@ -270,7 +273,7 @@ impl App<'_> {
             is_captured: false,
             wants_mouse: false,
             has_asked_for_light: false,
-            closed: BTreeSet::new(),
+            turning: Vec::new(),
             recorded: None,
             n_shots: 0,
             last: Instant::now(),
@@ -371,17 +374,17 @@ impl App<'_> {
             toward: (forward + right * x + up * y).to_array(),
             ..camera
         };
-        let Some((portal, _)) = portal_looked_at(&self.world, &self.lines, &ray) else {
-            open.say("no portal there".into());
-            return;
+        // The leaf that is there, or else the opening.
+        let end = [0, 1, 2].map(|k| ray.eye[k] + ray.toward[k] * CLICK);
+        let hit = self.lines.pick(&open.studio.state, ray.eye, end);
+        let leaf_of = match hit.ok().flatten().map(|h| h.target) {
+            Some(Target::Detail { detail, .. }) => open.studio.sight.portals_of(detail).next(),
+            _ => None,
         };
-        if open.closed.remove(&portal) {
-            open.studio.state.open(portal);
-            open.say(format!("{portal} is open"));
-        } else {
-            open.closed.insert(portal);
-            open.studio.state.close(portal);
-            open.say(format!("{portal} is closed"));
+        let portal = leaf_of.or_else(|| Some(portal_looked_at(&self.world, &self.lines, &ray)?.0));
+        match portal {
+            Some(portal) => open.toggle(portal),
+            None => open.say("no portal there".into()),
         }
     }
 
@@ -401,7 +404,9 @@ impl App<'_> {
             open.walker.eye = DVec3::from(camera.eye.map(f64::from));
             (open.yaw, open.pitch) = (z.atan2(x), y.atan2(x.hypot(z)));
         } else {
-            open.walker.step(open.wish(), seconds);
+            open.turn_leaves(seconds);
+            let wish = open.wish();
+            open.walker.step(wish, seconds, &open.studio.state);
         }
         let camera = open.camera();
         if let Some(recorded) = &mut open.recorded {

@@ -9,7 +9,7 @@ use std::time::Instant;
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
-use enfilade_render::{AdapterChoice, Camera, Frame, Mark, Paint, Shape, Sparing, Studio, Style};
+use enfilade_render::{AdapterChoice, Camera, Frame, Paint, Sparing, Studio, Style};
 use winit::dpi::PhysicalSize;
 use winit::keyboard::KeyCode;
 use winit::window::{CursorGrabMode, Window};
@@ -44,7 +44,8 @@ pub(super) struct Open {
     pub(super) wants_mouse: bool,
     /// Whether the light of each place was computed, or cannot be.
     pub(super) has_asked_for_light: bool,
-    pub(super) closed: BTreeSet<PortalId>,
+    /// Doors that turn: how far their leaves are open, and shall be.
+    pub(super) turning: Vec<(PortalId, [f32; 2])>,
     pub(super) recorded: Option<Vec<Camera>>,
     pub(super) n_shots: u32,
     pub(super) last: Instant,
@@ -179,7 +180,7 @@ impl Open {
         };
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
-        let mut marks = self.leaves(world);
+        let mut marks = Vec::new();
         if self.shown.portals {
             marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
         }
@@ -221,7 +222,7 @@ impl Open {
         ];
         self.shown.camera = Some(*camera);
         self.shown.mode = self.mode;
-        self.shown.closed = self.closed.iter().map(|p| p.0).collect();
+        self.shown.closed = self.studio.state.shut_portals().map(|p| p.0).collect();
         self.shown.is_recording = self.recorded.is_some();
         self.shown.flies = self.walker.flies;
         self.studio.give_list(list);
@@ -238,18 +239,46 @@ impl Open {
         Ok(())
     }
 
-    /// What fills the portals that are closed: else one would see the sky through them.
-    fn leaves(&self, world: &World) -> Vec<Mark> {
-        let portals = &world.graph.portals;
-        let closed = self.closed.iter();
-        closed
-            .map(|p| Mark {
-                shape: Shape::Area(portals[p.0 as usize].outline.clone()),
-                color: [0.23, 0.13, 0.07, 1.0],
-                width: 0.0,
-                on_top: false,
-            })
-            .collect()
+    /// Opens or closes a portal: its leaves begin to turn; one without them is closed or opened at once.
+    pub(super) fn toggle(&mut self, portal: PortalId) {
+        let state = &mut self.studio.state;
+        let before = self.turning.iter().position(|(p, _)| *p == portal);
+        let before = before.map(|i| self.turning.swap_remove(i).1);
+        let share = before.map(|b| b[0]).or_else(|| state.leaves(portal));
+        let Some(share) = share else {
+            let is_open = state.is_open(portal);
+            if is_open {
+                state.close(portal);
+            } else {
+                state.open(portal);
+            }
+            let now = if is_open { "closed" } else { "open" };
+            self.say(format!("{portal} is {now}"));
+            return;
+        };
+        let is_open = before.map_or(share, |b| b[1]) >= 0.5;
+        self.turning
+            .push((portal, [share, if is_open { 0.0 } else { 1.0 }]));
+        self.say(format!(
+            "{portal} {}",
+            if is_open { "closes" } else { "opens" }
+        ));
+    }
+
+    /// Turns leaves for a time.
+    pub(super) fn turn_leaves(&mut self, seconds: f64) {
+        /// From shut to open. [Units: s]
+        const TIME: f32 = 0.7;
+        let by = seconds as f32 / TIME;
+        for (portal, [share, to]) in &mut self.turning {
+            *share = if *to > *share {
+                (*share + by).min(*to)
+            } else {
+                (*share - by).max(*to)
+            };
+            self.studio.state.set_leaves(*portal, *share);
+        }
+        self.turning.retain(|(_, [share, to])| share != to);
     }
 
     /// A picture of the world as it is shown now, without the panel.
@@ -265,9 +294,7 @@ impl Open {
         let camera = self.camera();
         // In a studio of its own: a window's pictures do not come back.
         let mut studio = Studio::new(enfilade_cli::adapter::open(adapter)?, world)?;
-        for &p in &self.closed {
-            studio.state.close(p);
-        }
+        studio.state = self.studio.state.clone();
         studio.sparing = Sparing {
             // Its levels would have to be made again.
             lod: 0.0,
@@ -277,8 +304,7 @@ impl Open {
             light(&mut studio, world)?;
         }
         let size = [self.config.width, self.config.height];
-        let leaves = self.leaves(world);
-        let picture = studio.picture(&camera, self.mode.culling(), self.style(), &leaves, size)?;
+        let picture = studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?;
         let png = picture.to_png()?;
         outputs.write("--screenshot", Format::Picture, &to)?;
         write_whole(&to, &png)?;

@@ -59,7 +59,7 @@ pub(super) struct Panel {
 const HELP: &str = "\
 W A S D        walk; Shift: run
 mouse          look around; Tab: let go of it, then drag
-click          open or close the doorway there
+click          open or close the door or doorway there
 wheel, + -     zoom of the map
 F              fly; Q and E: down and up
 M              drawn: portals, portals asked of the adapter,

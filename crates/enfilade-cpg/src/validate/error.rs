@@ -58,6 +58,14 @@ pub enum GraphError {
         /// What is wrong with it.
         problem: String,
     },
+    /// What fills an opening is not there or moves by no number.
+    #[error("{owner}: {problem}")]
+    Fitting {
+        /// The portal or detail.
+        owner: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A row of the potentially visible set does not fit the graph.
     #[error("potentially visible set, cell {cell}: {problem}")]
     Pvs {

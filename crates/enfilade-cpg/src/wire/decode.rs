@@ -12,6 +12,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use super::boxes;
+use super::fitting;
 use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
 use super::origin;
 use super::rows::{Row, eight, four, pairs};
@@ -19,7 +20,7 @@ use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, W
 use crate::look::material_of_text;
 use crate::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
-    PortalKind, Provenance, Pvs, SourceRuns, Statistics, World,
+    Provenance, Pvs, SourceRuns, Statistics, World,
 };
 
 /// Decodes a world from one GLB.
@@ -313,16 +314,13 @@ impl<'a> Reader<'a> {
                 .collect::<Result<_, _>>()?;
             portals.push(Portal {
                 cells: p.cells.map(CellId),
-                kind: match p.kind {
-                    json::Kind::Open => PortalKind::Open,
-                    json::Kind::Door => PortalKind::Door,
-                    json::Kind::Window => PortalKind::Window,
-                    json::Kind::Crack => PortalKind::Crack,
-                },
+                kind: p.kind.into(),
                 normal: p.normal.map(|v| v as f32),
                 outline,
                 pieces,
                 area: p.area as f32,
+                fittings: (p.fittings.iter().map(|f| fitting::read(i, f)))
+                    .collect::<Result<_, _>>()?,
             });
         }
         if !corners.is_empty() {
@@ -443,6 +441,7 @@ impl<'a> Reader<'a> {
             transform,
             cells: detail.cells.iter().copied().map(CellId).collect(),
             source: detail.source,
+            part_of: detail.part_of,
         })
     }
 

@@ -12,13 +12,14 @@ use serde_json::value::RawValue;
 
 use super::boxes;
 use super::buffer::{Layout, image_bytes, mime};
+use super::fitting;
 use super::json::{self, TEXTURE_EXTENSIONS};
 use super::transform::{IDENTITY, is_trs, transformed};
 use super::{
     CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, LEAK_PATH, LIGHTS, VERSION, WireError,
 };
 use crate::look::{add_extensions, material_text, n_texcoord_sets, sampler_text};
-use crate::{CellId, PortalKind, World};
+use crate::{CellId, World};
 
 /// Encodes a world as one GLB.
 ///
@@ -283,6 +284,7 @@ fn lay_out_details<'a>(
             mesh,
             cells: ids(&detail.cells),
             source: detail.source,
+            part_of: detail.part_of,
             aabb: boxes::placed(&local, &transform),
         });
     }
@@ -504,12 +506,7 @@ fn cells(world: &World) -> Vec<json::CellJson> {
 fn portals(world: &World) -> Vec<json::PortalJson> {
     let portal = |portal: &crate::Portal| json::PortalJson {
         cells: portal.cells.map(|c| c.0),
-        kind: match portal.kind {
-            PortalKind::Open => json::Kind::Open,
-            PortalKind::Door => json::Kind::Door,
-            PortalKind::Window => json::Kind::Window,
-            PortalKind::Crack => json::Kind::Crack,
-        },
+        kind: portal.kind.into(),
         normal: portal.normal.map(f64::from),
         area: portal.area.into(),
         outline: portal.outline.len() as u32,
@@ -518,6 +515,7 @@ fn portals(world: &World) -> Vec<json::PortalJson> {
             .iter()
             .map(|piece| piece.len() as u32)
             .collect(),
+        fittings: portal.fittings.iter().map(fitting::written).collect(),
     };
     world.graph.portals.iter().map(portal).collect()
 }

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use crate::PortalKind;
+
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Root {
@@ -258,6 +260,41 @@ pub(super) struct PortalJson {
     pub(super) outline: u32,
     /// Corners of each piece.
     pub(super) pieces: Vec<u32>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) fittings: Vec<FittingJson>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct FittingJson {
+    pub(super) detail: u32,
+    pub(super) part: PartJson,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) turn: Option<TurnJson>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) slide: Option<SlideJson>,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum PartJson {
+    Leaf,
+    Frame,
+    Pane,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct TurnJson {
+    pub(super) through: [f64; 3],
+    pub(super) axis: [f64; 3],
+    pub(super) shut: f64,
+    pub(super) open: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct SlideJson {
+    pub(super) along: [f64; 3],
+    pub(super) shut: f64,
+    pub(super) open: f64,
 }
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -267,6 +304,28 @@ pub(super) enum Kind {
     Door,
     Window,
     Crack,
+}
+
+impl From<Kind> for PortalKind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Open => Self::Open,
+            Kind::Door => Self::Door,
+            Kind::Window => Self::Window,
+            Kind::Crack => Self::Crack,
+        }
+    }
+}
+
+impl From<PortalKind> for Kind {
+    fn from(kind: PortalKind) -> Self {
+        match kind {
+            PortalKind::Open => Self::Open,
+            PortalKind::Door => Self::Door,
+            PortalKind::Window => Self::Window,
+            PortalKind::Crack => Self::Crack,
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -294,6 +353,7 @@ pub(super) struct SourceJson {
 }
 
 #[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct Detail {
     pub(super) node: u32,
     /// Index into `detailMeshes`.
@@ -301,6 +361,9 @@ pub(super) struct Detail {
     pub(super) cells: Vec<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) source: Option<u32>,
+    /// The detail that it was taken out of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) part_of: Option<u32>,
     /// Absent for a mesh without vertices, and in files of before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) aabb: Option<[[f64; 3]; 2]>,

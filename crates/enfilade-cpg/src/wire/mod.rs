@@ -34,6 +34,7 @@ mod boxes;
 mod buffer;
 mod decode;
 mod encode;
+mod fitting;
 mod json;
 mod origin;
 mod rows;

@@ -2,8 +2,9 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use enfilade_cpg::{
-    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Locator, LocatorNode, Portal,
-    PortalId, PortalKind, Provenance, Pvs, SourceRuns, Statistics, World,
+    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Fitting, FittingPart, Locator,
+    LocatorNode, Motion, MotionKind, Portal, PortalId, PortalKind, Provenance, Pvs, SourceRuns,
+    Statistics, World,
 };
 use enfilade_geom::scene::{
     About, Fixture, FixtureKind, Image, Material, Mesh, Primitive, SourceNode, Texture,
@@ -59,6 +60,7 @@ pub(crate) fn doorway(x: f32, z0: f32, z1: f32, height: f32, cells: [u32; 2]) ->
         pieces: vec![outline.clone()],
         outline,
         area: height * (z1 - z0),
+        fittings: Vec::new(),
     }
 }
 
@@ -82,6 +84,24 @@ pub(crate) fn two_rooms() -> World {
         ],
     ];
     window.area = 3.8;
+    let fitting = |detail, part, kind, [shut, open]: [f32; 2]| Fitting {
+        detail,
+        part,
+        motion: (part == FittingPart::Leaf).then_some(Motion { kind, shut, open }),
+    };
+    let turn = MotionKind::Turn {
+        through: [4.0, 0.0, 1.0],
+        axis: [0.0, 1.0, 0.0],
+    };
+    let slide = MotionKind::Slide {
+        along: [0.0, 0.0, -1.0],
+    };
+    let mut door = doorway(4.0, 2.0, 3.0, 2.1, [0, 1]);
+    door.fittings = vec![fitting(0, FittingPart::Leaf, turn, [-0.25, 1.25])];
+    window.fittings = vec![
+        fitting(0, FittingPart::Pane, turn, [0.0; 2]),
+        fitting(1, FittingPart::Leaf, slide, [0.0, 1.5]),
+    ];
     let locator = Locator {
         bounds: Aabb::new(DVec3::new(0.0, 0.0, 0.0), DVec3::new(8.0, 3.0, 5.0)),
         outside: Some(CellId(2)),
@@ -107,7 +127,7 @@ pub(crate) fn two_rooms() -> World {
             cell("cell-1", [[4.0, 0.0, 0.0], [8.0, 3.0, 5.0]], &[0, 1]),
             cell("outdoors", [[-1.0, -1.0, -1.0], [9.0, 4.0, 6.0]], &[1]),
         ],
-        portals: vec![doorway(4.0, 2.0, 3.0, 2.1, [0, 1]), window],
+        portals: vec![door, window],
         locator,
         provenance: Provenance {
             generator: "enfilade 0.1.0".into(),
@@ -148,6 +168,7 @@ pub(crate) fn two_rooms() -> World {
         transform,
         cells: cells.iter().copied().map(CellId).collect(),
         source: None,
+        part_of: None,
     };
     let mut identity = [0.0; 16];
     [0, 5, 10, 15].into_iter().for_each(|i| identity[i] = 1.0);
@@ -182,6 +203,7 @@ pub(crate) fn two_rooms() -> World {
             chair("chair", identity, &[0]),
             DetailObject {
                 source: Some(3),
+                part_of: Some(0),
                 ..chair("chair", turned, &[0, 1])
             },
         ],
@@ -308,6 +330,7 @@ pub(crate) fn nasty_rooms() -> World {
         transform,
         cells: vec![CellId(0)],
         source: None,
+        part_of: None,
     };
     let mut identity = [0.0; 16];
     [0, 5, 10, 15].into_iter().for_each(|i| identity[i] = 1.0);

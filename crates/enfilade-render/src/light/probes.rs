@@ -361,6 +361,7 @@ mod tests {
             normal: [1.0, 0.0, 0.0],
             outline: vec![[x, from, 1.5], [x, to, 1.5], [x, to, 2.5], [x, from, 2.5]],
             pieces: Vec::new(),
+            fittings: Vec::new(),
             area: to - from,
         };
         let mut world = World::default();

@@ -1,11 +1,12 @@
 //! Triangles of all batches and meshes, side by side in one buffer.
 
-use enfilade_cpg::World;
+use enfilade_cpg::{PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
 use glam::Vec3;
 
 use super::color::color_of;
+use super::plug::plug;
 use crate::levels::coarser;
 use crate::materials::Look;
 
@@ -149,6 +150,26 @@ impl Filling<'_> {
                 self.add(&batch.primitive, order, color_of(&batch.cells))
             })
             .collect()
+    }
+
+    /// By portal: what fills it when it is shut.
+    pub(super) fn add_plugs(&mut self, sight: &Sight) -> Vec<Span> {
+        let look = Look {
+            base_color: super::plug::COLOR,
+            ..Look::default()
+        };
+        let own = self.looks.len() - 1;
+        // Plugs have no material: the look of none is theirs for now.
+        let none = std::mem::replace(&mut self.looks[own], look);
+        let world = self.world;
+        let plugs = (0..world.graph.portals.len() as u32)
+            .map(|p| {
+                let plug = plug(world, sight, PortalId(p));
+                self.add(&plug, &plug.indices, color_of(&[]))
+            })
+            .collect();
+        self.looks[own] = none;
+        plugs
     }
 
     /// The mean color of what is seen of each cell's surfaces, by area, in the light of the sky.

@@ -1,7 +1,8 @@
 //! Where structure and detail objects stand.
 
 use enfilade_cpg::{CellId, World};
-use glam::{Mat4, Vec3, Vec4};
+use enfilade_runtime::{DetailId, Sight, SightState};
+use glam::{DMat4, Mat4, Vec3, Vec4};
 
 use super::color::{color_of, packed};
 
@@ -44,7 +45,30 @@ pub(crate) struct Placed {
     pub(crate) stretch: f32,
 }
 
-pub(super) fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
+/// The leaf of a door.
+pub(super) struct Moving {
+    pub(super) detail: DetailId,
+    /// As the model has it.
+    transform: DMat4,
+    center: Vec3,
+}
+
+impl Moving {
+    /// Moves it to where `state` has it.
+    pub(super) fn place(&self, state: &SightState, instance: &mut Instance, placed: &mut Placed) {
+        let pose = state.pose(self.detail);
+        let m = pose.map_or(self.transform, |p| p * self.transform);
+        instance.rows = rows(&m.as_mat4());
+        let center = pose.map(|p| p.transform_point3(self.center.as_dvec3()).as_vec3());
+        placed.center = center.unwrap_or(self.center);
+    }
+}
+
+fn rows(m: &Mat4) -> [[f32; 4]; 3] {
+    [m.row(0), m.row(1), m.row(2)].map(|r| r.to_array())
+}
+
+pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed>, Vec<Moving>) {
     // The first is where structure stands: where it is.
     let mut instances = vec![Instance {
         rows: [
@@ -55,11 +79,12 @@ pub(super) fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
         key: 0,
         color: packed([0.35; 3]),
     }];
-    let mut details = Vec::new();
-    for detail in &world.details {
+    let mut details: Vec<Placed> = Vec::new();
+    let mut moving = Vec::new();
+    for (id, detail) in (0..).map(DetailId).zip(&world.details) {
         let m = Mat4::from_cols_array(&detail.transform);
         instances.push(Instance {
-            rows: [m.row(0), m.row(1), m.row(2)].map(|r| r.to_array()),
+            rows: rows(&m),
             key: 0,
             color: color_of(&detail.cells),
         });
@@ -75,7 +100,7 @@ pub(super) fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
         let is_empty = low.x > high.x;
         details.push(Placed {
             mesh: detail.mesh,
-            cells: detail.cells.clone(),
+            cells: sight.cells_of_detail(world, id),
             center: if is_empty {
                 m.w_axis.truncate()
             } else {
@@ -88,8 +113,15 @@ pub(super) fn placed(world: &World) -> (Vec<Instance>, Vec<Placed>) {
             },
             stretch: stretch(&m),
         });
+        if sight.portals_of(id).next().is_some() {
+            moving.push(Moving {
+                detail: id,
+                transform: DMat4::from_cols_array(&detail.transform.map(f64::from)),
+                center: details[details.len() - 1].center,
+            });
+        }
     }
-    (instances, details)
+    (instances, details, moving)
 }
 
 /// How much longer a map can make a length, at most; exact where its axes stay at right angles.

@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 
+use enfilade_cpg::{CellId, PortalId};
 use glam::DVec3;
 
 use super::viewer::{NONE, Pending, Stage, Viewer};
@@ -54,13 +55,13 @@ impl Traversal<'_, '_> {
             let cell = self.viewer.pending[i].cell;
             i += 1;
             let sight = self.sight;
-            let near = 4.0 * sight.tolerance;
+            // Or between the plane of a portal and the leaves that shut it.
+            let near = 4.0 * sight.tolerance + sight.doors.most_depth();
             let (low, high) = (self.view.eye - near, self.view.eye + near);
             let mut runs = sight.runs_of(cell);
             while let Some(run) = runs.next(|group| group.is_apart_from(low, high)) {
                 for exit in run {
-                    if self.state.lets_through(exit.portal, exit.to)
-                        && self.is_at_portal(exit)
+                    if self.may_be_beyond(exit)
                         && !self.viewer.pending.iter().any(|p| p.cell == exit.to)
                     {
                         self.add_portal(exit.portal);
@@ -75,17 +76,30 @@ impl Traversal<'_, '_> {
         self.push(cell, NONE, Region::screen(), None, 0.0);
     }
 
-    /// Whether the eye is within a few tolerances of the portal's outline.
-    fn is_at_portal(&self, exit: &Exit) -> bool {
+    /// Whether the eye may be said to be in the cell behind an exit: it is within a few tolerances of an open portal's
+    /// outline, or between a shut one and its leaves.
+    fn may_be_beyond(&self, exit: &Exit) -> bool {
         let near = 4.0 * self.sight.tolerance;
-        let normal = point(exit.normal);
+        let depth = if self.state.is_open(PortalId(exit.portal)) {
+            0.0
+        } else {
+            let along_portal = self.state.depth(exit.portal);
+            if exit.is_turned {
+                along_portal
+            } else {
+                -along_portal
+            }
+        };
+        let is_way = self.state.lets_through(exit.portal, exit.to)
+            || depth != 0.0 && !self.state.is_locked(CellId(exit.to));
         let from_center = self.view.eye - point(exit.center);
-        if normal.dot(from_center).abs() > near
-            || from_center.length_squared() > (f64::from(exit.radius) + near).powi(2)
-        {
-            return false;
-        }
-        self.sight.is_in_outline(exit, self.view.eye, near)
+        let off = point(exit.normal).dot(from_center);
+        let reach = f64::from(exit.radius) + near;
+        is_way
+            && off >= depth.min(0.0) - near
+            && off <= depth.max(0.0) + near
+            && from_center.length_squared() <= reach.powi(2) + depth * depth
+            && self.sight.is_in_outline(exit, self.view.eye, near)
     }
 
     pub(super) fn run(&mut self) {

@@ -3,11 +3,12 @@
 use enfilade_cpg::{Batch, CellId, DetailObject, World};
 use enfilade_geom::{Aabb, DMat4};
 
-use super::error::SightError;
 use crate::boxes::{BoxTrees, Boxed, Root};
 use crate::chunks::{Chunk, chunks_of};
+use crate::doors::Doors;
 use crate::options::SightOptions;
 use crate::point::point;
+use crate::sight_error::SightError;
 
 /// A detail object, placed.
 #[derive(Clone, Debug)]
@@ -27,7 +28,11 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    pub(super) fn of(world: &World, options: &SightOptions) -> Result<Self, SightError> {
+    pub(super) fn of(
+        world: &World,
+        options: &SightOptions,
+        doors: &Doors,
+    ) -> Result<Self, SightError> {
         let mut drawn = Self {
             chunks: Vec::new(),
             details: Vec::new(),
@@ -51,6 +56,11 @@ impl Drawn {
                     what: "detail",
                     index,
                 })?;
+        }
+        for (i, detail) in (0..).zip(&mut drawn.details) {
+            if let Some((swept, _)) = doors.way(i) {
+                detail.bounds = detail.bounds.union(swept);
+            }
         }
         Ok(drawn)
     }
@@ -128,8 +138,8 @@ pub(super) struct Boxes {
 }
 
 impl Boxes {
-    pub(super) fn of(world: &World, drawn: &Drawn, tolerance: f64) -> Self {
-        let (mut listed, mut unlisted) = listed(world, drawn);
+    pub(super) fn of(world: &World, drawn: &Drawn, doors: &Doors, tolerance: f64) -> Self {
+        let (mut listed, mut unlisted) = listed(world, drawn, doors);
         let mut trees = BoxTrees::default();
         let mut boxes = Vec::new();
         let mut cell_roots = Vec::new();
@@ -163,7 +173,7 @@ impl Boxes {
 }
 
 /// By cell the chunks and details that it sees, and those that no cell sees.
-fn listed(world: &World, drawn: &Drawn) -> (Vec<Vec<Boxed>>, Vec<Boxed>) {
+fn listed(world: &World, drawn: &Drawn, doors: &Doors) -> (Vec<Vec<Boxed>>, Vec<Boxed>) {
     let mut listed: Vec<Vec<Boxed>> = world.graph.cells.iter().map(|_| Vec::new()).collect();
     let mut unlisted = Vec::new();
     let mut list = |cells: &[CellId], bounds: Aabb, item: u32| {
@@ -180,7 +190,15 @@ fn listed(world: &World, drawn: &Drawn) -> (Vec<Vec<Boxed>>, Vec<Boxed>) {
         list(&batch.cells, chunk.bounds(), item);
     }
     for (item, (placed, detail)) in (n_chunks..).zip(world.details.iter().zip(&drawn.details)) {
-        list(&placed.cells, detail.bounds, item);
+        match doors.way(item - n_chunks) {
+            None => list(&placed.cells, detail.bounds, item),
+            Some((_, way)) => {
+                let mut cells = [&placed.cells, way].concat();
+                cells.sort_unstable();
+                cells.dedup();
+                list(&cells, detail.bounds, item);
+            }
+        }
     }
     (listed, unlisted)
 }

@@ -3,10 +3,10 @@
 use enfilade_cpg::{Portal, PortalId};
 use enfilade_geom::{DVec2, DVec3, Plane, Winding};
 
-use super::error::SightError;
 use crate::exits::Exit;
 use crate::point::point;
 use crate::region::{MAX_CORNERS, reduced_around};
+use crate::sight_error::SightError;
 
 /// Pieces are used instead of the outline where there are at most so many.
 const MAX_PIECES: usize = 4;

@@ -119,6 +119,7 @@ fn portal_of(grid: &Grid, face: &Face, (low, high, kind): FaceHole) -> Portal {
         pieces: vec![outline.clone()],
         outline,
         area: area as f32,
+        fittings: Vec::new(),
     }
 }
 
@@ -187,6 +188,7 @@ fn details_of(grid: &Grid, furniture: &[(u32, Aabb)]) -> Vec<DetailObject> {
             transform: std::array::from_fn(|k| transform[k / 4][k % 4]),
             cells: vec![CellId(*label)],
             source: None,
+            part_of: None,
         }
     };
     furniture.iter().enumerate().map(placed).collect()

@@ -118,6 +118,7 @@ pub(crate) fn portal(cells: [CellId; 2], kind: PortalKind, quad: Quad) -> Portal
         pieces: vec![outline.clone()],
         outline,
         area: n.length() as f32,
+        fittings: Vec::new(),
     }
 }
 

@@ -26,7 +26,7 @@ pub enum SightError {
     /// finite.
     #[error("{what} {index} names a cell, mesh or corner that does not exist or is not finite")]
     Geometry {
-        /// `batch` or `detail`.
+        /// `batch`, `detail`, or `portal` for what fills it.
         what: &'static str,
         /// Which one.
         index: u32,

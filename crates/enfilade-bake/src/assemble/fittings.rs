@@ -1,0 +1,350 @@
+//! What fills openings: which objects are leaves, frames and panes of which portal, and how leaves move.
+//!
+//! By shape and place alone, names are not asked. An object that is a leaf together with its frame is taken apart: the
+//! leaf becomes an object of its own, so that an engine can turn it.
+//!
+//! Pairs of portals and objects near them are looked at side by side; what several portals claim goes to the one that it
+//! fits best. `O(portals · objects)` comparisons of boxes, and `O(n log n)` in the triangles of objects near openings.
+
+mod opening;
+mod parts;
+mod shells;
+mod split;
+mod swing;
+
+use std::collections::HashMap;
+
+use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, PortalKind, World};
+use enfilade_geom::scene::Mesh;
+use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, NearSeries, Triangle};
+use rayon::prelude::*;
+
+use opening::Rectangle;
+use parts::{Aperture, Leaf, Pose, Roles, roles};
+use swing::Around;
+
+/// An open leaf has no room where something else is nearer to it. [Units: wu]
+const ROOM: f64 = 0.06;
+
+/// A detail object near an opening.
+struct Object {
+    detail: u32,
+    triangles: Vec<Triangle>,
+    /// By triangle, and how many there are.
+    shells: Vec<u32>,
+    n_shells: usize,
+}
+
+/// What an object is to a portal.
+struct Role {
+    portal: u32,
+    object: u32,
+    roles: Roles,
+}
+
+/// A leaf that was given to a portal.
+struct Hung {
+    portal: u32,
+    object: u32,
+    leaf: Leaf,
+    /// All portals that it shuts, `portal` among them.
+    portals: Vec<u32>,
+}
+
+/// Finds what fills each opening, and gives leaves that are one with their frames objects of their own.
+pub(super) fn fit(world: &mut World, walls: &Bvh) {
+    let openings: Vec<Option<Aperture>> =
+        (world.graph.portals.par_iter()).map(Aperture::of).collect();
+    let bounds: Vec<Aabb> = (world.details.par_iter())
+        .map(|d| Aabb::of_points(&corners_of(world, d)))
+        .collect();
+    let near: Vec<Vec<u32>> = (openings.par_iter())
+        .map(|o| {
+            o.as_ref()
+                .map_or_else(Vec::new, |o| touching(&o.reach(), &bounds))
+        })
+        .collect();
+    let mut asked: Vec<u32> = near.iter().flatten().copied().collect();
+    asked.sort_unstable();
+    asked.dedup();
+    let objects: Vec<Object> = (asked.par_iter()).map(|&d| Object::of(world, d)).collect();
+    let found: Vec<Vec<Role>> = (openings.par_iter().zip(&near).enumerate())
+        .filter_map(|(p, (opening, near))| Some((p as u32, opening.as_ref()?, near)))
+        .map(|(portal, opening, near)| {
+            let near = near.iter().filter_map(|d| asked.binary_search(d).ok());
+            near.map(|o| Role {
+                portal,
+                object: o as u32,
+                roles: roles(opening, &objects[o].triangles, &objects[o].shells),
+            })
+            .collect()
+        })
+        .collect();
+    let found: Vec<Role> = found.into_iter().flatten().collect();
+    let hung = hang(&found);
+    let fitted = Fitted {
+        world,
+        walls,
+        openings: &openings,
+        near: &near,
+        objects: &objects,
+        found: &found,
+        hung: &hung,
+    };
+    let motions: Vec<Motion> = (0..hung.len())
+        .into_par_iter()
+        .map(|h| fitted.motion(h))
+        .collect();
+    let still = fitted.still();
+    let carried = fitted.carried();
+    let numbers = split::take_out(world, &objects, &hung);
+    for ((leaf, number), motion) in hung.iter().zip(numbers).zip(&motions) {
+        for &p in &leaf.portals {
+            let portal = &mut world.graph.portals[p as usize];
+            // An opening with a leaf is a door, also where the leaf stands open.
+            portal.kind = PortalKind::Door;
+            portal.fittings.push(Fitting {
+                detail: number,
+                part: FittingPart::Leaf,
+                motion: Some(*motion),
+            });
+        }
+    }
+    for (detail, h) in carried {
+        for &p in &hung[h].portals {
+            world.graph.portals[p as usize].fittings.push(Fitting {
+                detail,
+                part: FittingPart::Leaf,
+                motion: Some(motions[h]),
+            });
+        }
+    }
+    for (portal, detail, part) in still {
+        let fittings = &mut world.graph.portals[portal as usize].fittings;
+        // What was its only leaf has nothing left to be a frame.
+        if fittings.iter().all(|f| f.detail != detail) {
+            fittings.push(Fitting {
+                detail,
+                part,
+                motion: None,
+            });
+        }
+    }
+    for portal in &mut world.graph.portals {
+        portal.fittings.sort_by_key(|f| f.detail);
+    }
+}
+
+impl Object {
+    fn of(world: &World, detail: u32) -> Self {
+        let triangles = triangles_of(world, &world.details[detail as usize]);
+        let (shells, n_shells) = shells::shells(&triangles);
+        Self {
+            detail,
+            triangles,
+            shells,
+            n_shells,
+        }
+    }
+}
+
+/// Gives each leaf to the portal that it fits best, and to others that it shuts as well.
+fn hang(found: &[Role]) -> Vec<Hung> {
+    let mut claims: Vec<(&Role, &Leaf)> = (found.iter())
+        .flat_map(|r| r.roles.leaves.iter().map(move |l| (r, l)))
+        .collect();
+    claims.sort_by(|(a, x), (b, y)| {
+        let by_fit = y.fit.total_cmp(&x.fit);
+        by_fit.then_with(|| (a.portal, a.object, &x.shells).cmp(&(b.portal, b.object, &y.shells)))
+    });
+    let mut owner: HashMap<(u32, u32), usize> = HashMap::new();
+    let mut hung: Vec<Hung> = Vec::new();
+    for (role, leaf) in claims {
+        let known = leaf
+            .shells
+            .iter()
+            .find_map(|s| owner.get(&(role.object, *s)));
+        let Some(&h) = known else {
+            owner.extend(leaf.shells.iter().map(|&s| ((role.object, s), hung.len())));
+            hung.push(Hung {
+                portal: role.portal,
+                object: role.object,
+                leaf: leaf.clone(),
+                portals: vec![role.portal],
+            });
+            continue;
+        };
+        let other = &mut hung[h];
+        let is_shut = leaf.pose == Pose::Shut && other.leaf.pose == Pose::Shut;
+        let n_shared = leaf
+            .shells
+            .iter()
+            .filter(|s| other.leaf.shells.contains(s))
+            .count();
+        if is_shut && 2 * n_shared >= leaf.shells.len() && !other.portals.contains(&role.portal) {
+            other.portals.push(role.portal);
+        }
+    }
+    hung
+}
+
+/// All that was found, before it is written down.
+struct Fitted<'a> {
+    world: &'a World,
+    walls: &'a Bvh,
+    openings: &'a [Option<Aperture>],
+    /// By portal: details about its opening.
+    near: &'a [Vec<u32>],
+    objects: &'a [Object],
+    found: &'a [Role],
+    hung: &'a [Hung],
+}
+
+impl Fitted<'_> {
+    fn leaves_of(&self, portal: u32) -> impl Iterator<Item = &Hung> {
+        self.hung
+            .iter()
+            .filter(move |h| h.portals.contains(&portal))
+    }
+
+    /// How a leaf moves.
+    fn motion(&self, h: usize) -> Motion {
+        let Hung { portal, leaf, .. } = &self.hung[h];
+        let graph = &self.world.graph;
+        let opening = self.openings[*portal as usize].as_ref();
+        let around = opening.map_or(&leaf.around, |o| &o.around);
+        let cells = graph.portals[*portal as usize].cells;
+        let volume = |c: CellId| {
+            let cell = &graph[c];
+            if cell.outdoor {
+                f64::INFINITY
+            } else {
+                f64::from(cell.volume)
+            }
+        };
+        let frame = self.frame(*portal, around);
+        let own: Vec<u32> = (self.found.iter())
+            .filter(|r| r.portal == *portal && is_part(&r.roles))
+            .map(|r| self.objects[r.object as usize].detail)
+            .collect();
+        let reach = opening.map_or(Aabb::EMPTY, Aperture::reach);
+        let others: Vec<Triangle> = (self.near[*portal as usize].iter())
+            .filter(|d| !own.contains(d))
+            .filter_map(|d| self.objects.binary_search_by_key(d, |o| o.detail).ok())
+            .flat_map(|o| &self.objects[o].triangles)
+            .filter(|t| Aabb::of_points(*t).overlaps(&reach))
+            .copied()
+            .collect();
+        let others = Bvh::build(&others);
+        Around {
+            locator: &graph.locator,
+            walls: self.walls,
+            opening: around,
+            cells,
+            volumes: cells.map(volume),
+            frame,
+            n_leaves: self.leaves_of(*portal).count(),
+            is_furnished: &|p| {
+                let near = others.any_within(p, ROOM, &mut NearSeries::default());
+                near.is_some()
+            },
+        }
+        .motion(leaf)
+    }
+
+    /// The middle, along the opening's normal, of what runs around it.
+    fn frame(&self, portal: u32, around: &Rectangle) -> Option<f64> {
+        let mut bounds = Aabb::EMPTY;
+        for role in self
+            .found
+            .iter()
+            .filter(|r| r.portal == portal && is_part(&r.roles))
+        {
+            let object = &self.objects[role.object as usize];
+            let is_leaf = |shell: u32| {
+                let mut own = self.hung.iter().filter(|h| h.object == role.object);
+                own.any(|h| h.leaf.shells.contains(&shell))
+            };
+            for (t, &shell) in object.triangles.iter().zip(&object.shells) {
+                if !is_leaf(shell) {
+                    bounds = t.iter().fold(bounds, |b, p| b.including(around.place(*p)));
+                }
+            }
+        }
+        (!bounds.is_empty()).then_some((bounds.min.z + bounds.max.z) * 0.5)
+    }
+
+    /// Frames and panes: portal, detail, which.
+    fn still(&self) -> Vec<(u32, u32, FittingPart)> {
+        let part = |r: &Role| {
+            let claimed = !r.roles.leaves.is_empty();
+            let hung = self.leaves_of(r.portal).any(|h| h.object == r.object);
+            if r.roles.is_pane {
+                Some(FittingPart::Pane)
+            } else {
+                (r.roles.is_frame && (hung || !claimed)).then_some(FittingPart::Frame)
+            }
+        };
+        (self.found.iter())
+            .filter_map(|r| Some((r.portal, self.objects[r.object as usize].detail, part(r)?)))
+            .collect()
+    }
+
+    /// Objects that lie on a leaf and move with it, handles and the glass in it: detail, and which leaf.
+    fn carried(&self) -> Vec<(u32, usize)> {
+        let mut out: Vec<(u32, usize)> = Vec::new();
+        for role in self.found.iter().filter(|r| !is_part(&r.roles)) {
+            let object = &self.objects[role.object as usize];
+            let is_hung = self.hung.iter().any(|h| h.object == role.object);
+            if is_hung || out.iter().any(|(d, _)| *d == object.detail) {
+                continue;
+            }
+            let on = (self.hung.iter().enumerate())
+                .find(|(_, h)| h.portal == role.portal && h.leaf.carries(&object.triangles));
+            out.extend(on.map(|(h, _)| (object.detail, h)));
+        }
+        out
+    }
+}
+
+/// Whether an object belongs to the opening.
+fn is_part(roles: &Roles) -> bool {
+    !roles.leaves.is_empty() || roles.is_frame || roles.is_pane
+}
+
+fn touching(reach: &Aabb, bounds: &[Aabb]) -> Vec<u32> {
+    let touches = |(_, b): &(usize, &Aabb)| !b.is_empty() && b.overlaps(reach);
+    (bounds.iter().enumerate().filter(touches))
+        .map(|(i, _)| i as u32)
+        .collect()
+}
+
+fn placed<'a>(world: &'a World, detail: &DetailObject) -> (&'a Mesh, DMat4) {
+    let mesh = &world.detail_meshes[detail.mesh as usize];
+    (
+        mesh,
+        DMat4::from_cols_array(&detail.transform.map(f64::from)),
+    )
+}
+
+fn corners_of(world: &World, detail: &DetailObject) -> Vec<DVec3> {
+    let (mesh, transform) = placed(world, detail);
+    let corners = mesh.primitives.iter().flat_map(|p| &p.positions);
+    corners
+        .map(|p| transform.transform_point3(DVec3::from(p.map(f64::from))))
+        .collect()
+}
+
+/// In world space, primitive after primitive.
+fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
+    let (mesh, transform) = placed(world, detail);
+    let of = |p: &enfilade_geom::scene::Primitive| -> Vec<Triangle> {
+        let corner = |i: u32| {
+            let p = p.positions[i as usize].map(f64::from);
+            transform.transform_point3(DVec3::from(p))
+        };
+        let triangles = p.indices.chunks_exact(3);
+        triangles.map(|t| [t[0], t[1], t[2]].map(corner)).collect()
+    };
+    mesh.primitives.iter().flat_map(of).collect()
+}

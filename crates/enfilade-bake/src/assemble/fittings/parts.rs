@@ -1,0 +1,397 @@
+//! Which shells of an object are the leaf of a door, and how it stands: shut, or turned by how much.
+//!
+//! A *body* is a shell that is a plate about as high as the opening: a leaf, one of its two skins, or the glass within its
+//! rails. A *ring* runs around something: a frame, or the rails of a leaf. All else is small, a handle or a hinge, and goes
+//! with the leaf whose middle it lies on.
+
+use enfilade_cpg::{Portal, PortalKind};
+use enfilade_geom::{Aabb, DVec3, Triangle};
+
+use super::opening::{Mask, Rectangle};
+use crate::structure::{MAX_THICKNESS, thin_direction};
+
+/// A leaf's height over that of its opening; less where a light is above the door, more where it overlaps the frame.
+const HEIGHT: [f64; 2] = [0.7, 1.1];
+/// A body's width over that of its opening: of the glass in one of two leaves, and of a leaf that overlaps the frame.
+const WIDTH: [f64; 2] = [0.2, 1.1];
+/// The width of a leaf that stands open, one of one or one of two, over that of its opening.
+const OPEN_WIDTHS: [[f64; 2]; 2] = [[0.8, 1.1], [0.4, 0.55]];
+/// Least share of its own rectangle that a body covers; a ring covers less.
+const FULL: f64 = 0.6;
+/// A leaf off the opening's plane by less is shut: the sine of 3 degrees.
+const SHUT: f64 = 0.05;
+/// What stands open is turned by no more: beyond, it would lie beside the wall as a cupboard does. [Units: degrees]
+const MOST_TURNED: f64 = 130.0;
+/// A leaf that stands open is no thicker: beyond, it is a cupboard. [Units: wu]
+const THICK: f64 = 0.1;
+/// How far a leaf or frame may end off the jamb, sill or head. [Units: wu]
+const OFF: f64 = 0.15;
+/// What lies on a leaf may reach over its edges by less. [Units: wu]
+const HAIR: f64 = 0.01;
+/// How far from the portal's plane a leaf or frame may stand, within a wall. [Units: wu]
+pub(super) const DEEP: f64 = 0.4;
+/// Openings of these widths and heights have doors. [Units: wu]
+const DOOR_WIDTH: [f64; 2] = [0.5, 6.0];
+const LEAST_DOOR_HEIGHT: f64 = 1.5;
+/// Least share of a door that all of an object covers to be its leaf though no shell of it is a plate.
+const WHOLE: f64 = 0.5;
+/// Least share of a window that a pane covers.
+const PANE: f64 = 0.3;
+
+/// A leaf in an object.
+#[derive(Clone, Debug)]
+pub(super) struct Leaf {
+    /// Ascending.
+    pub(super) shells: Vec<u32>,
+    /// Around its bodies.
+    pub(super) around: Rectangle,
+    pub(super) pose: Pose,
+    /// Where its handles are, along `around.across` from its middle, in halves of its width; 0 where it has none.
+    pub(super) handle: f64,
+    /// Share of the opening that it covers, or how well it fits where it stands open: 1 at best.
+    pub(super) fit: f64,
+}
+
+impl Leaf {
+    /// Whether triangles lie on it, as those of a handle or of the glass in it.
+    pub(super) fn carries(&self, triangles: &[Triangle]) -> bool {
+        let r = &self.around;
+        let b = r.bounds(triangles);
+        let grow = DVec3::new(HAIR, HAIR, OFF);
+        b.min.cmpge(r.low - grow).all() && b.max.cmple(r.high + grow).all()
+    }
+}
+
+/// How the model has a leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Pose {
+    Shut,
+    /// Turned around its hinge by an angle, counter-clockwise seen from above. [Units: rad]
+    Open {
+        hinge: DVec3,
+        angle: f64,
+    },
+}
+
+/// What an object is to an opening.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Roles {
+    pub(super) leaves: Vec<Leaf>,
+    /// What is no leaf of it runs around the opening.
+    pub(super) is_frame: bool,
+    pub(super) is_pane: bool,
+}
+
+/// An opening of a portal.
+pub(super) struct Aperture {
+    pub(super) kind: PortalKind,
+    pub(super) around: Rectangle,
+    pub(super) open: Mask,
+}
+
+impl Aperture {
+    /// `None` for what is no opening to be filled.
+    pub(super) fn of(portal: &Portal) -> Option<Self> {
+        let around = Rectangle::of_portal(portal).filter(|_| portal.kind != PortalKind::Crack)?;
+        Some(Self {
+            kind: portal.kind,
+            open: around.open(portal),
+            around,
+        })
+    }
+
+    /// Whether a door fits into it.
+    fn takes_door(&self) -> bool {
+        let size = self.around.size();
+        size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR_HEIGHT
+    }
+
+    /// The box in which its leaves, frames and panes lie.
+    pub(super) fn reach(&self) -> Aabb {
+        let r = &self.around;
+        // A leaf that stands open reaches as far as it is wide.
+        let out = if self.takes_door() {
+            r.size().x + OFF
+        } else {
+            DEEP
+        };
+        let grow = DVec3::new(out.min(DOOR_WIDTH[1]), OFF, out.max(DEEP));
+        let (low, high) = (r.low - grow, r.high + grow);
+        Aabb::new(low, high)
+            .corners()
+            .iter()
+            .fold(Aabb::EMPTY, |b, p| b.including(r.point(*p)))
+    }
+}
+
+/// A shell and what it looks like.
+struct Shell<'t> {
+    number: u32,
+    triangles: Vec<&'t Triangle>,
+    around: Rectangle,
+    /// Of its own rectangle.
+    share: f64,
+    foot: f64,
+}
+
+impl<'t> Shell<'t> {
+    fn of(number: u32, triangles: Vec<&'t Triangle>) -> Self {
+        let owned: Vec<Triangle> = triangles.iter().map(|t| **t).collect();
+        let normal = thin_direction(&owned);
+        let corners: Vec<DVec3> = owned.iter().flatten().copied().collect();
+        let flat = DVec3::new(normal.x, 0.0, normal.z);
+        // What lies flat is no plate of a door, whatever it is seen along.
+        let normal = if normal.y.abs() < 0.5 { flat } else { DVec3::Z };
+        let seen_along = |n: DVec3| Rectangle::around(n.normalize(), &corners);
+        let (facing, aside) = (seen_along(normal), seen_along(DVec3::Y.cross(normal)));
+        // Most of a frame's surface is that of its jambs; what it looks like shows from where it is widest.
+        let is_deep = aside.size().z < facing.size().z;
+        let around = if is_deep { aside } else { facing };
+        let mask = around.mask(owned.iter().copied());
+        Self {
+            number,
+            triangles,
+            share: mask.share(),
+            foot: mask.share_at_foot(),
+            around,
+        }
+    }
+
+    fn is_body(&self, opening: &Rectangle) -> bool {
+        let (own, size) = (self.around.size(), opening.size());
+        let fits = |x: f64, [least, most]: [f64; 2]| x >= least && x <= most;
+        own.z <= MAX_THICKNESS
+            && fits(own.y / size.y, HEIGHT)
+            && fits(own.x / size.x, WIDTH)
+            && self.share >= FULL
+    }
+
+    /// Whether it runs around something that is as high as the opening.
+    fn is_ring(&self, opening: &Rectangle) -> bool {
+        let (own, size) = (self.around.size(), opening.size());
+        own.y >= HEIGHT[0] * size.y && own.x >= WIDTH[0] * size.x && self.share < FULL
+    }
+}
+
+/// What an object is to an opening. `shells` numbers its triangles' shells.
+pub(super) fn roles(opening: &Aperture, triangles: &[Triangle], shells: &[u32]) -> Roles {
+    let near = near_shells(opening, triangles, shells);
+    let mut roles = Roles::default();
+    if near.is_empty() {
+        return roles;
+    }
+    let around = &opening.around;
+    let all = || near.iter().flat_map(|s| s.triangles.iter().map(|t| **t));
+    let bounds = all()
+        .flatten()
+        .fold(Aabb::EMPTY, |b, p| b.including(around.place(p)));
+    let is_within_wall = bounds.min.z >= around.low.z - DEEP
+        && bounds.max.z <= around.high.z + DEEP
+        && bounds.size().z <= MAX_THICKNESS + DEEP;
+    let covered = opening.open.share_in(&around.mask(all()));
+    if opening.takes_door() && opening.kind != PortalKind::Window {
+        roles.leaves = leaves(opening, &near);
+        if roles.leaves.is_empty()
+            && opening.kind == PortalKind::Door
+            && is_within_wall
+            && covered >= WHOLE
+        {
+            roles.leaves = vec![whole(opening, &near, covered)];
+        }
+    }
+    let n_taken: usize = roles.leaves.iter().map(|l| l.shells.len()).sum();
+    if n_taken == near.len() || !is_within_wall {
+        return roles;
+    }
+    roles.is_pane = opening.kind == PortalKind::Window && covered >= PANE;
+    let reaches = |own: f64, rim: f64| (own - rim).abs() <= OFF;
+    roles.is_frame = !roles.is_pane
+        && (!roles.leaves.is_empty()
+            || reaches(bounds.min.x, around.low.x)
+                && reaches(bounds.max.x, around.high.x)
+                && reaches(bounds.max.y, around.high.y));
+    roles
+}
+
+/// The shells of an object that lie about an opening.
+fn near_shells<'t>(
+    opening: &Aperture,
+    triangles: &'t [Triangle],
+    shells: &[u32],
+) -> Vec<Shell<'t>> {
+    let reach = opening.reach();
+    let n = shells.iter().max().map_or(0, |m| *m as usize + 1);
+    let mut of_shell: Vec<(Aabb, Vec<&Triangle>)> = vec![(Aabb::EMPTY, Vec::new()); n];
+    for (t, s) in triangles.iter().zip(shells) {
+        let (bounds, list) = &mut of_shell[*s as usize];
+        *bounds = bounds.union(Aabb::of_points(t));
+        list.push(t);
+    }
+    let is_near = |bounds: &Aabb| {
+        let inside = reach.expanded(OFF);
+        inside.contains(bounds.min) && inside.contains(bounds.max)
+    };
+    (of_shell.into_iter().enumerate())
+        .filter(|(_, (bounds, _))| is_near(bounds))
+        .map(|(i, (_, triangles))| Shell::of(i as u32, triangles))
+        .collect()
+}
+
+/// All of an object as one leaf that is shut.
+fn whole(opening: &Aperture, near: &[Shell], covered: f64) -> Leaf {
+    let corners = near
+        .iter()
+        .flat_map(|s| s.triangles.iter().copied().flatten());
+    let corners: Vec<DVec3> = corners.copied().collect();
+    Leaf {
+        shells: near.iter().map(|s| s.number).collect(),
+        around: Rectangle::around(opening.around.normal, &corners),
+        pose: Pose::Shut,
+        handle: 0.0,
+        fit: covered,
+    }
+}
+
+fn leaves(opening: &Aperture, near: &[Shell]) -> Vec<Leaf> {
+    let mut leaves: Vec<Leaf> = Vec::new();
+    for shell in near.iter().filter(|s| s.is_body(&opening.around)) {
+        let Some((pose, fit)) = pose(opening, shell) else {
+            continue;
+        };
+        // Two skins of one leaf, or its glass and its panel.
+        let same = leaves.iter_mut().find(|l| is_one(l, shell));
+        if let Some(leaf) = same {
+            leaf.shells.push(shell.number);
+            let size = [leaf.around.size().x, shell.around.size().x];
+            if size[1] > size[0] {
+                (leaf.around, leaf.pose) = (shell.around.clone(), pose);
+            }
+            leaf.fit = leaf.fit.max(fit);
+        } else {
+            leaves.push(Leaf {
+                shells: vec![shell.number],
+                around: shell.around.clone(),
+                pose,
+                handle: 0.0,
+                fit,
+            });
+        }
+    }
+    let rings: Vec<&Shell> = near.iter().filter(|s| s.is_ring(&opening.around)).collect();
+    for shell in near {
+        if leaves.iter().any(|l| l.shells.contains(&shell.number)) {
+            continue;
+        }
+        let is_ring = rings.iter().any(|r| r.number == shell.number);
+        if is_ring && is_frame(shell, &rings) {
+            continue;
+        }
+        attach(shell, is_ring, &mut leaves);
+    }
+    for leaf in &mut leaves {
+        leaf.shells.sort_unstable();
+    }
+    leaves
+}
+
+/// How a body stands in an opening, and how well it fits; `None` if it is no leaf of it.
+fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
+    let (r, own) = (&opening.around, &body.around);
+    let center = own.point((own.low + own.high) * 0.5);
+    let at = r.place(center);
+    let z = (r.low.z + r.high.z) * 0.5;
+    let is_flat = own.across.dot(r.normal).abs() < SHUT;
+    if is_flat && at.x > r.low.x && at.x < r.high.x && (at.z - z).abs() <= DEEP {
+        let covered = opening
+            .open
+            .share_in(&r.mask(body.triangles.iter().map(|t| **t)));
+        // An opening without a door is not shut by what stands before it.
+        let is_shut = opening.kind == PortalKind::Door && covered >= WIDTH[0];
+        return is_shut.then_some((Pose::Shut, covered));
+    }
+    let width = own.size().x;
+    let fits = |[least, most]: [f64; 2]| {
+        let share = width / r.size().x;
+        share >= least && share <= most
+    };
+    let is_on_sill = (own.low.y - r.low.y).abs() <= OFF;
+    if own.size().z > THICK || !OPEN_WIDTHS.into_iter().any(fits) || !is_on_sill {
+        return None;
+    }
+    let ends = [-0.5, 0.5].map(|k| center + own.across * (k * width));
+    let mut best: Option<(f64, Pose)> = None;
+    for (end, far) in [(ends[0], ends[1]), (ends[1], ends[0])] {
+        for (jamb, sign) in [(r.low.x, 1.0), (r.high.x, -1.0)] {
+            let p = r.place(end);
+            let off = (p.x - jamb).abs();
+            let is_at_jamb = off <= OFF + own.size().z && (p.z - z).abs() <= DEEP;
+            let angle = turn(r.across * sign, far - end);
+            let turned = angle.abs().to_degrees();
+            if is_at_jamb && turned <= MOST_TURNED && best.is_none_or(|(o, _)| off < o) {
+                let pose = Pose::Open { hinge: end, angle };
+                best = Some((off, pose));
+            }
+        }
+    }
+    best.map(|(off, pose)| (pose, 1.0 - off))
+}
+
+/// The angle by which one horizontal direction turns to another, counter-clockwise seen from above. [Units: rad]
+fn turn(from: DVec3, to: DVec3) -> f64 {
+    // Seen from above with x to the right, z points down.
+    let cross = from.z * to.x - from.x * to.z;
+    let dot = from.x * to.x + from.z * to.z;
+    cross.atan2(dot)
+}
+
+/// Whether a body lies on a leaf: another skin, or a panel of it.
+fn is_one(leaf: &Leaf, body: &Shell) -> bool {
+    let (a, b) = (&leaf.around, &body.around);
+    let center = a.place(b.point((b.low + b.high) * 0.5));
+    let is_flat = a.across.dot(b.normal).abs() < 3.0 * SHUT;
+    let is_inside = center.cmpge(a.low - OFF).all() && center.cmple(a.high + OFF).all();
+    let back = b.place(a.point((a.low + a.high) * 0.5));
+    let is_around = back.x >= b.low.x && back.x <= b.high.x;
+    is_flat && is_inside && (is_around || center.x >= a.low.x && center.x <= a.high.x)
+}
+
+/// Whether a ring is a frame rather than the rails of a leaf: it stands on the floor without a rail at its foot, or another
+/// ring lies in it; and it lies in none.
+fn is_frame(ring: &Shell, rings: &[&Shell]) -> bool {
+    let lies_in = |inner: &Shell, outer: &Shell| {
+        let b = outer.around.bounds(&[[
+            inner.around.point(inner.around.low),
+            inner.around.point(inner.around.high),
+            inner
+                .around
+                .point((inner.around.low + inner.around.high) * 0.5),
+        ]]);
+        let (low, high) = (outer.around.low, outer.around.high);
+        inner.number != outer.number && b.min.x > low.x && b.max.x < high.x && b.max.y < high.y
+    };
+    let is_inner = rings.iter().any(|r| lies_in(ring, r));
+    let is_outer = rings.iter().any(|r| lies_in(r, ring));
+    !is_inner && (is_outer || ring.foot < FULL)
+}
+
+/// Gives a shell that is no body to the leaf that it lies on, if any.
+fn attach(shell: &Shell, is_ring: bool, leaves: &mut [Leaf]) {
+    let own = &shell.around;
+    let center = own.point((own.low + own.high) * 0.5);
+    for leaf in leaves {
+        let r = &leaf.around;
+        let at = r.place(center);
+        let is_on = at.x > r.low.x && at.x < r.high.x && at.y > r.low.y && at.y < r.high.y;
+        let is_near = at.z > r.low.z - OFF && at.z < r.high.z + OFF;
+        if is_on && is_near {
+            leaf.shells.push(shell.number);
+            let half = r.size().x * 0.5;
+            let off = (at.x - (r.low.x + r.high.x) * 0.5) / half;
+            // Of several handles that farthest out.
+            if !is_ring && off.abs() > leaf.handle.abs() {
+                leaf.handle = off;
+            }
+            return;
+        }
+    }
+}

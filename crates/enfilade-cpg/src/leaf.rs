@@ -1,0 +1,52 @@
+//! Where a leaf stands, and whether one sees through it.
+
+use enfilade_geom::DMat4;
+
+use crate::fitting::vector;
+use crate::{DetailObject, Motion, World};
+
+impl DetailObject {
+    /// Its transform once `motion` has moved it to a share of the way from shut (0) to open (1); column-major, as
+    /// [`DetailObject::transform`], and the same where the model has it there.
+    #[must_use]
+    pub fn transform_at(&self, motion: &Motion, share: f32) -> [f32; 16] {
+        if share == motion.share_of_model() {
+            return self.transform;
+        }
+        let own = DMat4::from_cols_array(&self.transform.map(f64::from));
+        (motion.at(share) * own).to_cols_array().map(|x| x as f32)
+    }
+}
+
+/// Surfaces of this share of a leaf or more let one see through it as a whole.
+const SEE_THROUGH: f64 = 0.25;
+
+impl World {
+    /// Whether one sees through an object, by its materials' `alphaMode`: at least a quarter of its surface. A door of
+    /// glass shuts the way, not the sight. O(triangles of the object).
+    ///
+    /// # Panics
+    ///
+    /// When there is no such detail object.
+    #[must_use]
+    pub fn is_see_through(&self, detail: u32) -> bool {
+        let mesh = &self.detail_meshes[self.details[detail as usize].mesh as usize];
+        let (mut clear, mut all) = (0.0, 0.0);
+        for p in &mesh.primitives {
+            let corner = |i: u32| vector(p.positions[i as usize]);
+            let triangles = p.indices.chunks_exact(3);
+            let area: f64 = triangles
+                .map(|t| {
+                    let [a, b, c] = [t[0], t[1], t[2]].map(corner);
+                    (b - a).cross(c - a).length()
+                })
+                .sum();
+            all += area;
+            let material = p.material.and_then(|m| self.materials.get(m as usize));
+            if material.is_some_and(|m| m.transparent) {
+                clear += area;
+            }
+        }
+        all > 0.0 && clear >= SEE_THROUGH * all
+    }
+}
