@@ -286,6 +286,9 @@ fn leaves(opening: &Aperture, near: &[Shell]) -> Vec<Leaf> {
         if is_ring && is_frame(shell, &rings) {
             continue;
         }
+        if is_ring {
+            join_within(shell, &mut leaves);
+        }
         attach(shell, is_ring, &mut leaves);
     }
     for leaf in &mut leaves {
@@ -374,6 +377,34 @@ fn is_frame(ring: &Shell, rings: &[&Shell]) -> bool {
     !is_inner && (is_outer || ring.foot < FULL)
 }
 
+/// Makes one leaf of those that have their rails in common: what is one piece cannot part in the middle.
+fn join_within(rails: &Shell, leaves: &mut Vec<Leaf>) {
+    let r = &rails.around;
+    let is_within = |l: &Leaf| {
+        let p = r.place(l.around.point((l.around.low + l.around.high) * 0.5));
+        l.pose == Pose::Shut && p.cmpgt(r.low - OFF).all() && p.cmplt(r.high + OFF).all()
+    };
+    if leaves.iter().filter(|l| is_within(l)).count() < 2 {
+        return;
+    }
+    let mut whole = Leaf {
+        shells: Vec::new(),
+        around: r.clone(),
+        pose: Pose::Shut,
+        handle: 0.0,
+        fit: 0.0,
+    };
+    leaves.retain(|leaf| {
+        if !is_within(leaf) {
+            return true;
+        }
+        whole.shells.extend(&leaf.shells);
+        whole.fit += leaf.fit;
+        false
+    });
+    leaves.push(whole);
+}
+
 /// Gives a shell that is no body to the leaf that it lies on, if any.
 fn attach(shell: &Shell, is_ring: bool, leaves: &mut [Leaf]) {
     let own = &shell.around;
@@ -393,5 +424,75 @@ fn attach(shell: &Shell, is_ring: bool, leaves: &mut [Leaf]) {
             }
             return;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_cpg::CellId;
+
+    /// A door of 1.8 × 2.1 m across z.
+    fn doorway() -> Aperture {
+        let outline = [[0.0, 0.0], [1.8, 0.0], [1.8, 2.1], [0.0, 2.1]];
+        let outline: Vec<[f32; 3]> = outline.iter().map(|&[x, y]| [x, y, 0.0]).collect();
+        let portal = Portal {
+            cells: [CellId(0), CellId(1)],
+            kind: PortalKind::Door,
+            normal: [0.0, 0.0, 1.0],
+            pieces: vec![outline.clone()],
+            outline,
+            area: 3.78,
+            fittings: Vec::new(),
+        };
+        Aperture::of(&portal).unwrap()
+    }
+
+    /// Boxes across the opening, 4 cm thick, by the shell that each belongs to: left, foot, right, head.
+    fn object(boxes: &[(u32, [f64; 4])]) -> (Vec<Triangle>, Vec<u32>) {
+        let mut out = (Vec::new(), Vec::new());
+        for &(shell, [x0, y0, x1, y1]) in boxes {
+            let b = Aabb::new(DVec3::new(x0, y0, -0.02), DVec3::new(x1, y1, 0.02));
+            out.0.extend(b.triangles());
+            out.1.extend([shell; 12]);
+        }
+        out
+    }
+
+    const FRAME: [(u32, [f64; 4]); 3] = [
+        (0, [0.0, 0.0, 0.04, 2.1]),
+        (0, [1.76, 0.0, 1.8, 2.1]),
+        (0, [0.04, 2.06, 1.76, 2.1]),
+    ];
+
+    /// Stiles and rails around a pane, from `x` to `x + 0.86`.
+    fn glazed(x: f64, rails: u32, pane: u32) -> [(u32, [f64; 4]); 5] {
+        [
+            (rails, [x, 0.0, x + 0.1, 2.06]),
+            (rails, [x + 0.76, 0.0, x + 0.86, 2.06]),
+            (rails, [x + 0.1, 0.0, x + 0.76, 0.1]),
+            (rails, [x + 0.1, 1.96, x + 0.76, 2.06]),
+            (pane, [x + 0.1, 0.1, x + 0.76, 1.96]),
+        ]
+    }
+
+    #[test]
+    fn rails_go_with_their_pane_and_the_frame_stays() {
+        let boxes = [&FRAME[..], &glazed(0.04, 1, 2), &glazed(0.9, 3, 4)].concat();
+        let (triangles, shells) = object(&boxes);
+        let roles = roles(&doorway(), &triangles, &shells);
+        let leaves: Vec<&[u32]> = roles.leaves.iter().map(|l| &l.shells[..]).collect();
+        assert_eq!(leaves, [&[1, 2][..], &[3, 4]]);
+        assert!(roles.is_frame);
+    }
+
+    #[test]
+    fn panes_in_rails_of_one_piece_are_one_leaf() {
+        let boxes = [&FRAME[..], &glazed(0.04, 1, 2), &glazed(0.9, 1, 3)].concat();
+        let (triangles, shells) = object(&boxes);
+        let roles = roles(&doorway(), &triangles, &shells);
+        let leaves: Vec<&[u32]> = roles.leaves.iter().map(|l| &l.shells[..]).collect();
+        assert_eq!(leaves, [&[1, 2, 3][..]]);
+        assert!((roles.leaves[0].around.size().x - 1.72).abs() < 1e-9);
     }
 }
