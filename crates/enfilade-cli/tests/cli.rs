@@ -65,7 +65,14 @@ fn inspect_prints_the_agreed_json() {
         report["portals"][0],
         json!({"id": 0, "cells": [0, 1], "kind": "open", "area": 2.1, "width": 1.0, "height": 2.1,
             "pieces": 1, "visible_volume": seen, "balance": 4.0, "score": 4.0 * seen, "normal": [1.0, 0.0, 0.0],
-            "outline": [[4.0, 0.0, 2.0], [4.0, 2.1, 2.0], [4.0, 2.1, 3.0], [4.0, 0.0, 3.0]]})
+            "outline": [[4.0, 0.0, 2.0], [4.0, 2.1, 2.0], [4.0, 2.1, 3.0], [4.0, 0.0, 3.0]],
+            "fittings": [{"detail": 0, "part": "leaf", "turns": {"through": [4.0, 0.0, 1.0], "axis": [0.0, 1.0, 0.0],
+                "shut_degrees": (-0.25_f32).to_degrees(), "open_degrees": 1.25_f32.to_degrees()}}]})
+    );
+    assert_eq!(
+        report["portals"][1]["fittings"],
+        json!([{"detail": 0, "part": "pane"},
+            {"detail": 1, "part": "leaf", "slides": {"along": [0.0, 0.0, -1.0], "shut": 0.0, "open": 1.5}}])
     );
     assert_eq!(report["portals"][1]["kind"], json!("window"));
     assert_eq!(report["stats"]["input_triangles"], json!(8));

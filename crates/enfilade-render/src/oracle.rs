@@ -172,8 +172,10 @@ impl<'w> Oracle<'w> {
     }
 
     /// Whether `shown` is what an exact ray through the middle of the pixel meets first, or among several
-    /// in one place; and so at two or more places a 64th of a pixel away. What is seen at the middle
-    /// alone is seen through a gap that comes of rounding corners to 32 bits.
+    /// in one place; and so a 64th of a pixel away in three directions or more, of eight that do not tell there from back.
+    ///
+    /// What is seen at the middle alone, or along a line through it, is seen through a slit narrower than adapters round:
+    /// between triangles whose corners were rounded to 32 bits, or moved by less than a world's tolerance.
     #[must_use]
     pub fn is_met(
         &self,
@@ -184,7 +186,10 @@ impl<'w> Oracle<'w> {
         is_transparent: bool,
     ) -> bool {
         let met = |nudge| self.is_met_there(camera, at, nudge, size, shown, is_transparent);
-        met([0.0; 2]) && around().filter(|&nudge| met(nudge)).count() >= 2
+        let nudges: Vec<[f64; 2]> = around().collect();
+        let half = nudges.len() / 2;
+        let is_way = |i: &usize| met(nudges[*i]) || met(nudges[i + half]);
+        met([0.0; 2]) && (0..half).filter(is_way).nth(2).is_some()
     }
 
     fn is_met_there(
@@ -377,6 +382,45 @@ mod tests {
         assert!(wall.iter().any(|&t| met(2, t)) && !met(2, Shown::Sky));
         assert!(met(1, Shown::Sky) && !wall.iter().any(|&t| met(1, t)));
         assert!(!met(2, Shown::Structure { triangle: 9 }));
+    }
+
+    #[test]
+    fn what_is_seen_through_a_slit_is_not_met() {
+        // Two walls 5 m ahead, a slit between them that leans, and a third behind it.
+        let slit = |width: f32| {
+            let wall = |edge: [f32; 2], x: f32, z: f32| Batch {
+                primitive: Primitive {
+                    positions: vec![
+                        [x, -9.0, z],
+                        [edge[0], -9.0, z],
+                        [edge[1], 9.0, z],
+                        [x, 9.0, z],
+                    ],
+                    indices: vec![0, 1, 2, 0, 2, 3],
+                    ..Primitive::default()
+                },
+                ..Batch::default()
+            };
+            // Along one of the directions that are tried.
+            let (a, b) = (2.5 - width * 0.5, -2.5 - width * 0.5);
+            World {
+                batches: vec![
+                    wall([a, b], -9.0, -5.0),
+                    wall([a + width, b + width], 9.0, -5.0),
+                    wall([30.0; 2], -30.0, -6.0),
+                ],
+                ..World::default()
+            }
+        };
+        let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
+        // The middle of the third of 5 pixels, each 2 m wide there; a 64th of one is 3 cm.
+        for (width, is_there) in [(0.004, false), (0.06, true)] {
+            let world = slit(width);
+            let oracle = oracle(&world);
+            let behind = [4, 5].map(|triangle| Shown::Structure { triangle });
+            let met = |t: &Shown| oracle.is_met(&camera, [2, 2], [5, 5], *t, false);
+            assert_eq!(behind.iter().any(met), is_there, "{width}");
+        }
     }
 
     #[test]

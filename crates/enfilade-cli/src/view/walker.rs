@@ -288,6 +288,32 @@ mod tests {
     }
 
     #[test]
+    fn a_stair_is_climbed() {
+        let mut world = rooms(1);
+        let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
+        let x = (low[0] + high[0]) * 0.5 + 0.5;
+        // Steep: 19 cm up on 23 cm.
+        for i in 1..=4 {
+            let n = f64::from(i);
+            let from = [x + 0.23 * n, low[1], low[2]];
+            add_block(
+                &mut world,
+                from,
+                [x + 0.23 * 5.0, low[1] + 0.19 * n, high[2]],
+            );
+        }
+        let (mut walker, state) = walker(&world);
+        walk(&mut walker, &state, DVec3::ZERO);
+        let floor = walker.eye.y;
+        let mut highest = floor;
+        for _ in 0..200 {
+            walker.step(DVec3::X, 0.01, &state);
+            highest = highest.max(walker.eye.y);
+        }
+        assert!((highest - floor - 0.76).abs() < 0.03, "{}", highest - floor);
+    }
+
+    #[test]
     fn a_shut_door_stops_and_an_open_one_lets_through() {
         let mut world = rooms(2);
         let between = |p: &enfilade::cpg::Portal| p.cells.map(|c| c.0) == [0, 1];
