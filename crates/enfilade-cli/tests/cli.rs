@@ -67,7 +67,7 @@ fn inspect_prints_the_agreed_json() {
             "pieces": 1, "visible_volume": seen, "balance": 4.0, "score": 4.0 * seen, "normal": [1.0, 0.0, 0.0],
             "outline": [[4.0, 0.0, 2.0], [4.0, 2.1, 2.0], [4.0, 2.1, 3.0], [4.0, 0.0, 3.0]],
             "fittings": [{"detail": 0, "part": "leaf", "turns": {"through": [4.0, 0.0, 1.0], "axis": [0.0, 1.0, 0.0],
-                "shut_degrees": (-0.25_f32).to_degrees(), "open_degrees": 1.25_f32.to_degrees()}}]})
+                "shut_degrees": -14.323_945, "open_degrees": 71.619_73}}]})
     );
     assert_eq!(
         report["portals"][1]["fittings"],
