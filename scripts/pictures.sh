@@ -27,6 +27,7 @@ draw tower cells --paint cells --mode everything --cut 5.4 --eye 5,17,24 --look 
 # Where the command itself would stand.
 draw world room --size 1200x675
 draw world house --eye 19,8.5,17 --look 5.5,2.6,4 --size 1200x675
+draw world doors --eye 1.4,1.6,2.6 --look 4.35,1.1,4.2 --door 19=0.5 --size 1200x675
 # Plans; the house as SVG, too.
 "$enfilade" plan "$work/world.glb" -o docs/images/plan.svg
 "$enfilade" plan "$work/world.glb" -o docs/images/plan.png --width 1400
