@@ -1,13 +1,19 @@
 //! The separate surfaces of an object: leaf, frame, handles of a door that is modeled in one piece.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 
 use enfilade_geom::{DVec3, Sets, Triangle};
 
-/// Corners nearer than this are one, by rounding. [Units: wu]
-const WELD: f64 = 1e-4;
-/// Faces at an edge whose angles differ by less coincide. [Units: rad]
-const COINCIDE: f64 = 1e-4;
+/// Corners nearer than this are one: the first distance by which nearly all edges find another triangle. Models whose
+/// corners were moved need more; where none does, the last is taken. [Units: wu]
+const WELDS: [f64; 3] = [1e-4, 1e-3, 5e-3];
+/// Nearly all: this share of edges.
+const PAIRED: f64 = 0.9;
+/// Faces at an edge coincide if their angles differ by no more than corners moved by the weld turn a face of 5 cm.
+/// [Units: rad/wu]
+const COINCIDE: f64 = 20.0;
 /// An object of more triangles is not taken apart: doors have fewer. [Units: triangles]
 const MAX_TRIANGLES: usize = 50_000;
 
@@ -15,48 +21,27 @@ const MAX_TRIANGLES: usize = 50_000;
 ///
 /// Two triangles are of one shell if one can walk from one to the other across edges. Where solids touch along an edge,
 /// more than two triangles meet; there the walk goes around the solid whose inside lies between, so that a leaf that
-/// touches its frame stays one of its own. `O(n log n)`.
+/// touches its frame stays one of its own. `O(n log n)`, as long as few corners lie in one place.
 pub(super) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
     if triangles.len() > MAX_TRIANGLES {
         return (vec![0; triangles.len()], 1);
     }
-    let mut number: HashMap<[i64; 3], u32> = HashMap::new();
-    let mut points: Vec<DVec3> = Vec::new();
-    let corners: Vec<[u32; 3]> = triangles
-        .iter()
-        .map(|t| {
-            t.map(|p| {
-                let key = (p / WELD).round().to_array().map(|x| x as i64);
-                *number.entry(key).or_insert_with(|| {
-                    points.push(p);
-                    points.len() as u32 - 1
-                })
-            })
-        })
-        .collect();
-    let mut sides: Vec<HalfEdge> = Vec::with_capacity(3 * triangles.len());
-    for (t, c) in corners.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b, apex) = (c[k], c[(k + 1) % 3], c[(k + 2) % 3]);
-            if a != b {
-                sides.push(HalfEdge {
-                    edge: [a.min(b), a.max(b)],
-                    is_forward: a < b,
-                    apex,
-                    triangle: t as u32,
-                });
-            }
-        }
-    }
-    sides.sort_by_key(|s| (s.edge, s.triangle));
+    let tries = WELDS.map(|weld| (weld, OnceCell::new()));
+    let sides_of = |k: usize| {
+        tries[k]
+            .1
+            .get_or_init(|| Welded::new(triangles, tries[k].0))
+    };
+    let fits = (0..WELDS.len() - 1).find(|&k| sides_of(k).paired_share() >= PAIRED);
+    let welded = sides_of(fits.unwrap_or(WELDS.len() - 1));
     let mut sets = Sets::new(triangles.len());
-    for at_edge in sides.chunk_by(|a, b| a.edge == b.edge) {
+    for at_edge in welded.sides.chunk_by(|a, b| a.edge == b.edge) {
         match at_edge {
             [_] => {}
             [a, b] => {
                 sets.join(a.triangle, b.triangle);
             }
-            many => join_around(many, &points, &mut sets),
+            many => welded.join_around(many, &mut sets),
         }
     }
     let least = sets.into_least();
@@ -80,34 +65,120 @@ struct HalfEdge {
     triangle: u32,
 }
 
-/// Joins triangles that bound the same solid at an edge where more than two meet.
-fn join_around(sides: &[HalfEdge], points: &[DVec3], sets: &mut Sets) {
-    let [a, b] = sides[0].edge.map(|i| points[i as usize]);
-    let along = (b - a).normalize_or_zero();
-    let x = along.any_orthonormal_vector();
-    let y = along.cross(x);
-    let angle = |s: &HalfEdge| {
-        let d = points[s.apex as usize] - a;
-        d.dot(y)
-            .atan2(d.dot(x))
-            .rem_euclid(std::f64::consts::TAU - COINCIDE)
-    };
-    // A triangle that runs forward has its solid before it, turning around the edge; one that runs back, behind it. Of
-    // two in one place, what ends comes before what begins.
-    let mut around: Vec<(i64, bool, u32)> = sides
-        .iter()
-        .map(|s| {
-            let at = (angle(s) / COINCIDE).round() as i64;
-            (at, !s.is_forward, s.triangle)
-        })
-        .collect();
-    around.sort_unstable();
-    for (i, &(_, begins, triangle)) in around.iter().enumerate() {
-        let (_, next_begins, next) = around[(i + 1) % around.len()];
-        if begins && !next_begins {
-            sets.join(triangle, next);
+/// Triangles whose corners are one where they are near each other.
+struct Welded {
+    points: Vec<DVec3>,
+    /// Sorted by edge.
+    sides: Vec<HalfEdge>,
+    weld: f64,
+}
+
+impl Welded {
+    fn new(triangles: &[Triangle], weld: f64) -> Self {
+        let (corners, points) = welded_corners(triangles, weld);
+        let mut sides: Vec<HalfEdge> = Vec::with_capacity(3 * triangles.len());
+        for (t, c) in corners.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b, apex) = (c[k], c[(k + 1) % 3], c[(k + 2) % 3]);
+                if a != b && apex != a && apex != b {
+                    sides.push(HalfEdge {
+                        edge: [a.min(b), a.max(b)],
+                        is_forward: a < b,
+                        apex,
+                        triangle: t as u32,
+                    });
+                }
+            }
+        }
+        sides.sort_by_key(|s| (s.edge, s.triangle));
+        Self {
+            points,
+            sides,
+            weld,
         }
     }
+
+    /// The share of sides whose edge is another triangle's, too.
+    fn paired_share(&self) -> f64 {
+        let edges = self.sides.chunk_by(|a, b| a.edge == b.edge);
+        let n_alone = edges.filter(|e| e.len() == 1).count();
+        1.0 - n_alone as f64 / self.sides.len().max(1) as f64
+    }
+
+    /// Joins triangles that bound the same solid at an edge where more than two meet.
+    fn join_around(&self, sides: &[HalfEdge], sets: &mut Sets) {
+        let [a, b] = sides[0].edge.map(|i| self.points[i as usize]);
+        let along = (b - a).normalize_or_zero();
+        let x = along.any_orthonormal_vector();
+        let y = along.cross(x);
+        let angle = |s: &HalfEdge| {
+            let d = self.points[s.apex as usize] - a;
+            d.dot(y).atan2(d.dot(x))
+        };
+        let mut around: Vec<(f64, &HalfEdge)> = sides.iter().map(|s| (angle(s), s)).collect();
+        around.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.triangle.cmp(&q.1.triangle)));
+        // From the widest gap on, so that no place is at both ends.
+        let n = around.len();
+        let gap = |i: usize| (around[i].0 - around[(i + n - 1) % n].0).rem_euclid(TAU);
+        let begin = (0..n).max_by(|&i, &k| gap(i).total_cmp(&gap(k)));
+        let begin = begin.unwrap_or_default();
+        // A triangle that runs forward has its solid before it, turning around the edge; one that runs back, behind it.
+        // Of those in one place, what ends comes before what begins.
+        let mut place = 0;
+        let mut ordered: Vec<(u32, bool, u32)> = Vec::with_capacity(n);
+        for i in (begin..n).chain(0..begin) {
+            if !ordered.is_empty() && gap(i) > COINCIDE * self.weld {
+                place += 1;
+            }
+            let side = around[i].1;
+            ordered.push((place, !side.is_forward, side.triangle));
+        }
+        ordered.sort_unstable();
+        for (i, &(_, begins, triangle)) in ordered.iter().enumerate() {
+            let (_, next_begins, next) = ordered[(i + 1) % n];
+            if begins && !next_begins {
+                sets.join(triangle, next);
+            }
+        }
+    }
+}
+
+/// By triangle the numbers of its corners, and by number where they are. Corners within `weld` of each other are one, and
+/// so are those that a chain of such joins.
+fn welded_corners(triangles: &[Triangle], weld: f64) -> (Vec<[u32; 3]>, Vec<DVec3>) {
+    let mut number: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut points: Vec<DVec3> = Vec::new();
+    let corners: Vec<[u32; 3]> = (triangles.iter())
+        .map(|t| {
+            t.map(|p| {
+                // Adding zero makes one of the two zeros.
+                let key = (p + 0.0).to_array().map(f64::to_bits);
+                *number.entry(key).or_insert_with(|| {
+                    points.push(p);
+                    points.len() as u32 - 1
+                })
+            })
+        })
+        .collect();
+    let cell = |p: DVec3| (p / weld).floor().to_array().map(|x| x as i64);
+    let mut in_cell: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut sets = Sets::new(points.len());
+    for (i, p) in (0..).zip(&points) {
+        let own = cell(*p);
+        for k in 0..27 {
+            let by = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+            let beside = [0, 1, 2].map(|axis| own[axis].saturating_add(by[axis]));
+            for &other in in_cell.get(&beside).into_iter().flatten() {
+                if points[other as usize].distance(*p) <= weld {
+                    sets.join(i, other);
+                }
+            }
+        }
+        in_cell.entry(own).or_default().push(i);
+    }
+    let least = sets.into_least();
+    let welded = corners.iter().map(|c| c.map(|i| least[i as usize]));
+    (welded.collect(), points)
 }
 
 #[cfg(test)]
@@ -180,6 +251,24 @@ mod tests {
                 shells[28..].iter().all(|&s| s == 1),
                 "{degrees}: {shells:?}"
             );
+        }
+    }
+
+    #[test]
+    fn corners_that_were_moved_make_no_difference() {
+        let all = framed_leaf();
+        let turn = enfilade_geom::DMat4::from_rotation_y(0.7);
+        let mut rng = enfilade_testkit::Rng::new(8);
+        for by in [1e-6, 1e-5, 1e-4, 1e-3] {
+            for _ in 0..20 {
+                let mut moved = |p: DVec3| p + DVec3::from([0, 1, 2].map(|_| rng.range(-by, by)));
+                let spoilt: Vec<Triangle> = (all.iter())
+                    .map(|t| t.map(|p| moved(turn.transform_point3(p))))
+                    .collect();
+                let (shells, n) = shells(&spoilt);
+                assert_eq!(n, 2, "{by}: {shells:?}");
+                assert!(shells[28..].iter().all(|&s| s == 1), "{by}: {shells:?}");
+            }
         }
     }
 
