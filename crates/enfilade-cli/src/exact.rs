@@ -45,8 +45,8 @@ pub(crate) struct Exactness {
     differing_views: u64,
     /// Pixels whose middle lies on an edge, to a 64th of a pixel: both pictures are right.
     edges: u64,
-    /// Pixels where the picture without culling shows what no exact ray meets first: through a crack
-    /// that the adapter's rounding opens between triangles which touch.
+    /// Pixels where the picture without culling shows what is seen through a crack alone that is no wider than the
+    /// adapter rounds, or than the world's tolerance.
     cracks: u64,
     /// Views passed over: the eye was on a surface.
     on_surface: u64,
@@ -83,8 +83,8 @@ impl fmt::Display for Exactness {
         let share = 100.0 * self.triangles[0] as f64 / self.triangles[1].max(1) as f64;
         writeln!(
             f,
-            "exact      {} views, {} pixels: {} lost in {} views; {} are on an edge, {} look through cracks of the \
-             adapter's rounding\n                 {} views passed over at a surface; {share:.2} % of the triangles drawn; {}",
+            "exact      {} views, {} pixels: {} lost in {} views; {} are on an edge, {} look through cracks no wider \
+             than rounding and tolerance\n                 {} views passed over at a surface; {share:.2} % of the triangles drawn; {}",
             self.views,
             self.pixels,
             self.differing,
