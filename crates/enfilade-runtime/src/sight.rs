@@ -4,7 +4,7 @@ mod drawn;
 mod error;
 mod portals;
 
-use enfilade_cpg::{CellId, Locator, PortalId, World};
+use enfilade_cpg::{CellId, Locator, PortalId, VisibleParts, World};
 use enfilade_geom::{DVec3, world_tolerance};
 
 use crate::boxes::{BoxTrees, Root};
@@ -41,6 +41,8 @@ pub struct Sight {
     pub(crate) chunks: Vec<Chunk>,
     pub(crate) details: Vec<Detail>,
     pub(crate) occluders: Occluders,
+    /// By cell of the eye: the chunks and details that may be seen from it, where the world says so.
+    pub(crate) seen_from: Option<VisibleParts>,
     /// By batch: its triangles as index triples, sorted so that chunks are ranges.
     indices: Vec<Vec<u32>>,
     pub(crate) n_portals: usize,
@@ -88,6 +90,7 @@ impl Sight {
         let boxes = Boxes::of(world, &drawn, tolerance);
         let occluders = occluders_of(world, options, tolerance);
         let n_triangles = drawn.n_triangles();
+        let seen_from = drawn.seen_from(world);
         Ok(Self {
             locator: world.graph.locator.clone(),
             first_exit,
@@ -102,6 +105,7 @@ impl Sight {
             chunks: drawn.chunks,
             details: drawn.details,
             occluders,
+            seen_from,
             indices: drawn.indices,
             n_portals: world.graph.portals.len(),
             n_triangles,
