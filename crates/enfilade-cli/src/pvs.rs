@@ -10,9 +10,7 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{self, CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
-use enfilade::vis::{
-    VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all, visible_parts, visible_volumes,
-};
+use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all, see_parts};
 
 use enfilade_verify::structural_triangles;
 
@@ -336,9 +334,8 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
 
 /// What of each cell can be seen from each other: volumes, and what is in them.
 fn add_parts(args: &Pvs, world: &World, pvs: &mut cpg::Pvs) -> anyhow::Result<()> {
-    let pool = pool(args)?;
-    let volumes = pool.install(|| visible_volumes(world, pvs))?;
-    pvs.parts = Some(pool.install(|| visible_parts(world, pvs, &volumes)));
+    let (volumes, parts) = pool(args)?.install(|| see_parts(world, pvs))?;
+    pvs.parts = Some(parts);
     pvs.volumes = Some(volumes);
     Ok(())
 }

@@ -121,7 +121,10 @@ impl VisibleParts {
             let row = self.runs_of(pair);
             let is_run = |run: &[u32; 2]| run[0] < run[1] && run[1] <= n_parts;
             let is_good = row.iter().all(is_run) && row.windows(2).all(|w| w[0][1] < w[1][0]);
-            (!is_good).then_some((pair, "its runs must be of parts that exist, ascending and apart"))
+            (!is_good).then_some((
+                pair,
+                "its runs must be of parts that exist, ascending and apart",
+            ))
         })
     }
 }
@@ -196,9 +199,8 @@ impl VisibleVolumes {
             if self.pieces_of(pair).count() > Self::MAX_PIECES {
                 return Some((pair, "it has more pieces than there may be"));
             }
-            let is_good = |piece: &[[f64; 4]]| {
-                piece.len() <= Self::MAX_PLANES && piece.iter().all(is_plane)
-            };
+            let is_good =
+                |piece: &[[f64; 4]]| piece.len() <= Self::MAX_PLANES && piece.iter().all(is_plane);
             let is_broken = !self.pieces_of(pair).all(is_good);
             is_broken.then_some((pair, "its planes must be few and have unit normals"))
         })
@@ -211,15 +213,16 @@ fn row<'a, T>(ends: &[u32], items: &'a [T], i: usize) -> &'a [T] {
         return &[];
     };
     let first = i.checked_sub(1).map_or(0, |before| ends[before]);
-    items
-        .get(first as usize..end as usize)
-        .unwrap_or_default()
+    items.get(first as usize..end as usize).unwrap_or_default()
 }
 
 /// The first row that does not lie in the list behind the one before it.
 fn ends_problem(ends: &[u32], n_rows: usize, n_items: usize) -> Option<(usize, &'static str)> {
     if ends.len() != n_rows {
-        return Some((0, "there must be a row for each pair of cells that see each other"));
+        return Some((
+            0,
+            "there must be a row for each pair of cells that see each other",
+        ));
     }
     let mut first = 0;
     for (i, &end) in ends.iter().enumerate() {
@@ -248,7 +251,10 @@ mod tests {
         };
         assert_eq!(numbers.of_batch(1), 3..5);
         assert_eq!((numbers.of_detail(1), numbers.n_parts()), (6, 7));
-        assert_eq!([0, 1, 2].map(|p| parts.count(p, &numbers)), [[3, 1], [0, 0], [2, 1]]);
+        assert_eq!(
+            [0, 1, 2].map(|p| parts.count(p, &numbers)),
+            [[3, 1], [0, 0], [2, 1]]
+        );
     }
 
     #[test]

@@ -117,7 +117,10 @@ impl Pvs {
     /// past the last. Linear. The rows of cells must be right.
     pub(crate) fn pair_problem(&self, n_parts: u32) -> Option<([u32; 2], &'static str)> {
         let n_pairs = self.n_pairs();
-        let parts = self.parts.as_ref().and_then(|p| p.problem(n_pairs, n_parts));
+        let parts = self
+            .parts
+            .as_ref()
+            .and_then(|p| p.problem(n_pairs, n_parts));
         let volumes = self.volumes.as_ref();
         let (pair, problem) = parts.or_else(|| volumes.and_then(|v| v.problem(n_pairs)))?;
         let n_cells = self.ends.len() as u32;

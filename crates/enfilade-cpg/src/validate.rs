@@ -93,8 +93,8 @@ impl World {
         let pvs = self.pvs.as_ref().and_then(|p| p.problem(n_cells));
         if let Some((cell, problem)) = pvs {
             found.push(GraphError::Pvs { cell, problem });
-        } else if let Some((cells, problem)) = (self.pvs.as_ref())
-            .and_then(|p| p.pair_problem(PartNumbers::new(self).n_parts()))
+        } else if let Some((cells, problem)) =
+            (self.pvs.as_ref()).and_then(|p| p.pair_problem(PartNumbers::new(self).n_parts()))
         {
             found.push(GraphError::PvsPair { cells, problem });
         }

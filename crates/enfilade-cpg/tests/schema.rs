@@ -149,7 +149,14 @@ fn encoded_worlds_follow_the_schema() {
     };
     let seen = two_rooms_with_pvs();
     let parts = two_rooms_with_parts();
-    for world in [two_rooms(), nasty_rooms(), World::default(), leaking, seen, parts] {
+    for world in [
+        two_rooms(),
+        nasty_rooms(),
+        World::default(),
+        leaking,
+        seen,
+        parts,
+    ] {
         assert_eq!(check(&schema, &schema, &extension(&world), ""), Ok(()));
     }
 }

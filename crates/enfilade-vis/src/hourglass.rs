@@ -62,7 +62,9 @@ impl Hourglass {
     /// Whether a line through the portals may reach a point behind the last of them, or one so near to it. [Units: wu]
     #[must_use]
     pub fn reaches(&self, p: DVec3, slack: f64) -> bool {
-        self.planes.iter().all(|plane| plane.signed_distance(p) >= -slack)
+        self.planes
+            .iter()
+            .all(|plane| plane.signed_distance(p) >= -slack)
     }
 }
 
@@ -89,6 +91,11 @@ impl Hourglasses {
 
     pub(crate) fn dirs(&self) -> &Dirs {
         &self.dirs
+    }
+
+    /// Where a direction of the graph is among [`Hourglasses::dirs`].
+    pub(crate) fn place(&self, direction: u32) -> usize {
+        self.place[direction as usize] as usize
     }
 
     pub(crate) fn clearance(&self) -> f64 {

@@ -10,8 +10,8 @@
 //!    splitting, and at last by `stabbing`, a linear programme. This is the heart; start reading there.
 //! 5. `occlude`: where walls are known, beams settle what they hide inside cells.
 //!
-//! What is seen of each cell, finer than whole cells, comes after: [`visible_volumes`] and [`visible_parts`], by the hourglasses
-//! of sequences of portals ([`Hourglasses`]).
+//! What is seen of each cell, finer than whole cells, comes after: [`see_parts`], by the hourglasses of sequences of portals
+//! ([`Hourglasses`]), and by what walls hide from the last of them (`shade`).
 //!
 //! `search` puts them together in rounds, so that results do not depend on threads.
 //!
@@ -39,6 +39,7 @@ mod rays;
 mod recheck;
 mod rng;
 mod search;
+mod shade;
 mod sheets;
 mod stabbing;
 mod tolerance;
@@ -58,8 +59,8 @@ use sheets::Sheets;
 pub use config::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
 pub use hourglass::{Hourglass, Hourglasses};
 pub use output::{VisOutput, Witness};
-pub use parts::visible_parts;
-pub use volumes::{piece_faces, visible_volumes};
+pub use parts::see_parts;
+pub use volumes::piece_faces;
 
 /// Lines tried between cells that walls may hide from each other, and how often, before each beam is looked at.
 const INSIST_LINES: usize = 50;

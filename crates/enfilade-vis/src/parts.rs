@@ -3,36 +3,120 @@
 //! After Dirkse 2002, section 7.6.2 (objects by cell), by the triangles themselves rather than by boxes.
 //! Errs to visible: a triangle counts as seen where it touches a piece of the volume; all in a cell counts as seen from the cell itself.
 
-use enfilade_cpg::{PartNumbers, Pvs, VisibleParts, VisibleVolumes, World};
-use enfilade_geom::{Aabb, DMat4, DVec3, Plane, Triangle};
+use enfilade_cpg::{
+    Batch, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes, World,
+};
+use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Plane, Triangle, world_tolerance};
 use rayon::prelude::*;
 
+use crate::hourglass::Hourglasses;
 use crate::polytope::clip;
+use crate::shade::Shade;
+use crate::sheets::Sheets;
+use crate::volumes::{ANY_ENTRY, volumes_of};
 
 /// Rounding of what is computed here. [Units: wu] The volumes hold the world's tolerance themselves.
 const EPS: f64 = 1e-9;
 
-/// What of each cell's triangles and objects its volumes meet, by pair of cells in the order of `pvs`.
+/// What of each cell can be seen from each other, by pair of cells in the order of `pvs`: volumes, and the triangles and objects that they
+/// meet, less what walls inside the cell hide from the portals that lead into it.
 ///
-/// `volumes` are those of [`visible_volumes`](crate::visible_volumes) for the same `pvs`. Time: pairs of cells, times what is in the second; threads come from the
-/// current rayon pool.
-#[must_use]
-pub fn visible_parts(world: &World, pvs: &Pvs, volumes: &VisibleVolumes) -> VisibleParts {
+/// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth. Walls are the world's structural
+/// triangles, but those that light passes; details hide nothing, as they may be moved.
+///
+/// Time grows with the sequences of portals that lines may pass, and with pairs of portals and what is in front of them; a building of 300 portals
+/// takes seconds. Threads come from the current rayon pool; the result does not depend on their number.
+///
+/// # Errors
+///
+/// A graph that is broken.
+pub fn see_parts(
+    world: &World,
+    pvs: &Pvs,
+) -> Result<(VisibleVolumes, VisibleParts), SightGraphError> {
+    let glasses = Hourglasses::new(&SightGraph::of_graph(&world.graph))?;
+    let (volumes, entries) = volumes_of(world, pvs, &glasses);
     let (all, by_cell) = (all_parts(world), by_cell(world));
-    let pairs: Vec<(u32, u32)> = pvs.pairs().map(|(a, b)| (a.0, b.0)).collect();
-    let rows: Vec<Vec<u32>> = (pairs.par_iter().enumerate())
-        .with_min_len(4)
-        .map(|(pair, &(from, to))| {
-            let numbers = by_cell.get(to as usize).map_or(&[][..], |n| n);
-            if from == to {
-                return numbers.to_vec();
-            }
-            let pieces: Vec<Vec<Plane>> = volumes.pieces_of(pair).map(planes).collect();
-            let is_seen = |&&i: &&u32| pieces.iter().any(|piece| all[i as usize].meets(piece));
-            numbers.iter().filter(is_seen).copied().collect()
+    let candidates = candidates(pvs, &volumes, &entries, (&all, &by_cell));
+    let mut asked: Vec<(u32, u32)> = candidates.iter().flatten().copied().collect();
+    asked.par_sort_unstable();
+    asked.dedup();
+    asked.retain(|&(entry, _)| entry != ANY_ENTRY);
+    let walls = walls(world);
+    let bvh = Bvh::build(&walls);
+    let sheets = Sheets::new(&walls, &bvh);
+    let shade = Shade {
+        sheets: &sheets,
+        dirs: glasses.dirs(),
+        inset: glasses.clearance(),
+        rounding: glasses.tolerance().rounding,
+    };
+    let slack = world_tolerance(glasses.dirs().scale);
+    let is_hidden: Vec<bool> = (asked.par_iter())
+        .with_min_len(64)
+        .map(|&(entry, part)| {
+            let bounds = all[part as usize].bounds.expanded(slack);
+            shade.hides(glasses.place(entry), &bounds)
         })
         .collect();
-    VisibleParts::of_ascending(rows)
+    let is_seen = |pair: &&(u32, u32)| match asked.binary_search(pair) {
+        Ok(at) => !is_hidden[at],
+        Err(_) => true,
+    };
+    let rows = candidates.iter().map(|row| {
+        let mut parts: Vec<u32> = row.iter().filter(is_seen).map(|pair| pair.1).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        parts
+    });
+    let parts = VisibleParts::of_ascending(rows);
+    Ok((volumes, parts))
+}
+
+/// By pair of cells, which parts of the second its pieces meet: the portal through which a piece is seen, and the part.
+fn candidates(
+    pvs: &Pvs,
+    volumes: &VisibleVolumes,
+    entries: &[u32],
+    (all, by_cell): (&[Part], &[Vec<u32>]),
+) -> Vec<Vec<(u32, u32)>> {
+    let mut first_piece = 0;
+    let pairs: Vec<(usize, u32)> = (pvs.pairs().enumerate())
+        .map(|(pair, (_, to))| {
+            let first = first_piece;
+            first_piece += volumes.pieces_of(pair).count();
+            (first, to.0)
+        })
+        .collect();
+    (pairs.par_iter().enumerate())
+        .with_min_len(4)
+        .map(|(pair, &(first, to))| {
+            let mut out = Vec::new();
+            for (piece, &entry) in volumes.pieces_of(pair).zip(&entries[first..]) {
+                let planes = planes(piece);
+                let met = by_cell[to as usize].iter().copied();
+                let met = met.filter(|&part| all[part as usize].meets(&planes));
+                out.extend(met.map(|part| (entry, part)));
+            }
+            out
+        })
+        .collect()
+}
+
+/// The structural triangles that block sight.
+fn walls(world: &World) -> Vec<Triangle> {
+    let blocks = |batch: &&Batch| {
+        let material = batch.primitive.material;
+        let material = material.and_then(|m| world.materials.get(m as usize));
+        material.is_none_or(|m| !m.transparent)
+    };
+    let batches = world.batches.iter().filter(blocks);
+    let triangles = batches.flat_map(|batch| {
+        let positions = &batch.primitive.positions;
+        let corners = move |t: &[u32]| [0, 1, 2].map(|k| point(positions[t[k] as usize]));
+        batch.primitive.indices.chunks_exact(3).map(corners)
+    });
+    triangles.collect()
 }
 
 /// A triangle of a batch, or those of a detail object.

@@ -22,7 +22,8 @@ pub(crate) fn faces_in_box(planes: &[Plane], bounds: &Aabb, eps: f64) -> Vec<Vec
         let mut points: Vec<DVec3> = section.iter().copied().collect();
         for (k, other) in planes.iter().enumerate() {
             // The same plane twice makes one face.
-            let is_twin = other.normal.dot(plane.normal) > 1.0 - 1e-15 && (other.d - plane.d).abs() < eps;
+            let is_twin =
+                other.normal.dot(plane.normal) > 1.0 - 1e-15 && (other.d - plane.d).abs() < eps;
             if k < i && is_twin {
                 points.clear();
             } else if k != i && !is_twin {

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Pvs, SightGraph, SightGraphError, VisibleVolumes, World};
+use enfilade_cpg::{Pvs, VisibleVolumes, World};
 use enfilade_geom::{Aabb, DVec3, Plane, world_tolerance};
 use rayon::prelude::*;
 
@@ -29,17 +29,15 @@ const MAX_SEQUENCE: usize = 256;
 /// Corners this near to a plane count as on it. [Units: wu] Far below what any reader allows for.
 const EPS: f64 = 1e-9;
 
-/// The potentially visible volume of each pair of cells in `pvs`, in its order.
-///
-/// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth.
-/// Time grows with the sequences of portals that lines may pass; a building of 300 portals takes seconds. Threads come from the
-/// current rayon pool; the result does not depend on their number.
-///
-/// # Errors
-///
-/// A graph that is broken.
-pub fn visible_volumes(world: &World, pvs: &Pvs) -> Result<VisibleVolumes, SightGraphError> {
-    let glasses = Hourglasses::new(&SightGraph::of_graph(&world.graph))?;
+/// The entry of a piece that is not seen through one portal alone.
+pub(crate) const ANY_ENTRY: u32 = u32::MAX;
+
+/// The volumes of each pair, and by piece the portal through which its cell is seen: a direction of the graph, or [`ANY_ENTRY`].
+pub(crate) fn volumes_of(
+    world: &World,
+    pvs: &Pvs,
+    glasses: &Hourglasses,
+) -> (VisibleVolumes, Vec<u32>) {
     let dirs = glasses.dirs();
     let mut might = dirs.might_see(glasses.clearance(), None);
     let mut settled = BitTable::new(dirs.len(), dirs.len());
@@ -47,16 +45,21 @@ pub fn visible_volumes(world: &World, pvs: &Pvs) -> Result<VisibleVolumes, Sight
     let walk = Walk {
         world,
         pvs,
-        glasses: &glasses,
+        glasses,
         might: &might,
         slack: world_tolerance(dirs.scale),
     };
-    let rows: Vec<Vec<Vec<Vec<[f64; 4]>>>> = (0..pvs.n_cells() as u32)
+    let rows: Vec<Vec<Vec<Piece>>> = (0..pvs.n_cells() as u32)
         .into_par_iter()
         .with_max_len(1)
         .map(|cell| walk.from_cell(cell))
         .collect();
-    Ok(VisibleVolumes::of_pairs(rows.into_iter().flatten()))
+    let pairs = || rows.iter().flatten();
+    let four = |p: &Plane| [p.normal.x, p.normal.y, p.normal.z, p.d];
+    let planes = |piece: &Piece| piece.planes.iter().map(four).collect();
+    let volumes = VisibleVolumes::of_pairs(pairs().map(|pair| pair.iter().map(planes).collect()));
+    let entries = pairs().flatten().map(|piece| piece.ends[1]).collect();
+    (volumes, entries)
 }
 
 /// The faces of a piece of a cell's visible volume, to be drawn: convex polygons around the part of the cell's box that the piece holds.
@@ -95,7 +98,7 @@ type Found = BTreeMap<u32, Vec<Piece>>;
 
 impl Walk<'_> {
     /// The pieces of each cell that `cell` sees, in the order of ids.
-    fn from_cell(&self, cell: u32) -> Vec<Vec<Vec<[f64; 4]>>> {
+    fn from_cell(&self, cell: u32) -> Vec<Vec<Piece>> {
         let dirs = self.dirs();
         let mut found = Found::new();
         let at = dirs.cells.partition_point(|&c| c < cell);
@@ -104,17 +107,25 @@ impl Walk<'_> {
                 self.from_exit(exit, &mut found);
             }
         }
-        let four = |p: &Plane| [p.normal.x, p.normal.y, p.normal.z, p.d];
         let row = self.pvs.visible_from(enfilade_cpg::CellId(cell));
+        let whole = || vec![self.whole(cell)];
         row.map(|to| {
             if to.0 == cell {
-                return vec![Vec::new()];
+                whole()
+            } else {
+                found.remove(&to.0).unwrap_or_default()
             }
-            let pieces = found.remove(&to.0).unwrap_or_default();
-            let planes = pieces.iter().map(|p| p.planes.iter().map(four).collect());
-            planes.collect()
         })
         .collect()
+    }
+
+    /// The piece that is a whole cell.
+    fn whole(&self, cell: u32) -> Piece {
+        Piece {
+            ends: [ANY_ENTRY; 2],
+            planes: Vec::new(),
+            corners: self.bounds(cell).corners().to_vec(),
+        }
     }
 
     fn dirs(&self) -> &Dirs {
@@ -240,7 +251,10 @@ impl Walk<'_> {
         // A plane that cuts nothing off is not kept.
         let cuts = |p: &&Plane| bounds.corners().iter().any(|&c| p.signed_distance(c) < 0.0);
         let most = VisibleVolumes::MAX_PLANES;
-        let ends = [glass.sequence()[0], glass.sequence()[glass.sequence().len() - 1]];
+        let ends = [
+            glass.sequence()[0],
+            glass.sequence()[glass.sequence().len() - 1],
+        ];
         (!corners.is_empty()).then(|| Piece {
             ends,
             planes: wide.iter().filter(cuts).take(most).copied().collect(),
@@ -274,6 +288,9 @@ impl Walk<'_> {
         ends.sort_unstable();
         ends.dedup();
         let whole = |ends: &[u32; 2]| {
+            if ends[0] == ANY_ENTRY {
+                return Some(self.whole(to));
+            }
             let glass = if ends[0] == ends[1] {
                 self.glasses.of_portal(ends[0])
             } else {
@@ -281,9 +298,9 @@ impl Walk<'_> {
             };
             self.piece(&glass?, to)
         };
-        let merged: Option<Vec<Piece>> = ends.iter().map(whole).collect();
+        let merged = ends.iter().filter_map(whole);
         let mut kept: Vec<Piece> = Vec::new();
-        for piece in merged.into_iter().flatten() {
+        for piece in merged {
             if !kept.iter().any(|p| p.holds(&piece)) {
                 kept.retain(|p| !piece.holds(p));
                 kept.push(piece);
@@ -291,11 +308,7 @@ impl Walk<'_> {
         }
         // Half of what is allowed, so that merging is rare.
         if kept.is_empty() || kept.len() > VisibleVolumes::MAX_PIECES / 2 {
-            kept = vec![Piece {
-                ends: pieces[0].ends,
-                planes: Vec::new(),
-                corners: self.bounds(to).corners().to_vec(),
-            }];
+            kept = vec![self.whole(to)];
         }
         *pieces = kept;
     }
@@ -312,8 +325,11 @@ struct State<'o> {
 }
 
 impl Piece {
-    /// Whether another piece of the same cell lies in it.
+    /// Whether another piece of the same cell, seen through the same portal, lies in it.
     fn holds(&self, other: &Self) -> bool {
+        if self.ends[1] != ANY_ENTRY && self.ends[1] != other.ends[1] {
+            return false;
+        }
         let is_in = |plane: &Plane| {
             let mut corners = other.corners.iter();
             corners.all(|&c| plane.signed_distance(c) >= -EPS)

@@ -3,9 +3,7 @@
 use enfilade_cpg::{CellId, PartNumbers, Pvs, SightGraph, World};
 use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Ray, Triangle};
 use enfilade_testkit::{GridParams, Rng, room_grid};
-use enfilade_vis::{
-    Hourglasses, VisConfig, VisContext, piece_faces, see_all, visible_parts, visible_volumes,
-};
+use enfilade_vis::{Hourglasses, VisConfig, VisContext, piece_faces, see_all, see_parts};
 use proptest::prelude::*;
 
 fn point(p: [f32; 3]) -> DVec3 {
@@ -19,10 +17,7 @@ fn triangles(world: &World) -> Vec<(Triangle, u32)> {
     for (i, batch) in world.batches.iter().enumerate() {
         let p = &batch.primitive;
         for (number, t) in numbers.of_batch(i).zip(p.indices.chunks_exact(3)) {
-            out.push((
-                [0, 1, 2].map(|k| point(p.positions[t[k] as usize])),
-                number,
-            ));
+            out.push(([0, 1, 2].map(|k| point(p.positions[t[k] as usize])), number));
         }
     }
     for (i, object) in (0..).zip(&world.details) {
@@ -52,9 +47,11 @@ fn with_sight(mut world: World) -> World {
         checkpoint: None,
     };
     let graph = SightGraph::of_graph(&world.graph);
-    let mut pvs = see_all(&graph, &VisConfig::default(), &mut context).unwrap().cells;
-    let volumes = visible_volumes(&world, &pvs).unwrap();
-    pvs.parts = Some(visible_parts(&world, &pvs, &volumes));
+    let mut pvs = see_all(&graph, &VisConfig::default(), &mut context)
+        .unwrap()
+        .cells;
+    let (volumes, parts) = see_parts(&world, &pvs).unwrap();
+    pvs.parts = Some(parts);
     pvs.volumes = Some(volumes);
     world.pvs = Some(pvs);
     world.validate().unwrap();
@@ -129,7 +126,12 @@ fn counts(world: &World) -> [usize; 2] {
     let of_cell = |cell: CellId| {
         let batches = world.batches.iter().filter(|b| b.cells.contains(&cell));
         let walls: usize = batches.map(|b| b.primitive.indices.len() / 3).sum();
-        walls + world.details.iter().filter(|d| d.cells.contains(&cell)).count()
+        walls
+            + world
+                .details
+                .iter()
+                .filter(|d| d.cells.contains(&cell))
+                .count()
     };
     let numbers = PartNumbers::new(world);
     let mut sums = [0, 0];

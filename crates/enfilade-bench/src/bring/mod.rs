@@ -37,11 +37,7 @@ const ROWS: [Row; 1] = [Row {
 }];
 
 /// Prints the rows; an error where one does not reach its bar.
-pub(crate) fn bench_bring(
-    is_json: bool,
-    rows: &[String],
-    scenes: &[String],
-) -> anyhow::Result<()> {
+pub(crate) fn bench_bring(is_json: bool, rows: &[String], scenes: &[String]) -> anyhow::Result<()> {
     let is_chosen = |names: &[String], name: &str| {
         names.is_empty() || names.iter().any(|n| name.starts_with(n.as_str()))
     };
@@ -74,7 +70,8 @@ fn print(is_json: bool, row: &str, scene: &str, figure: Option<&Figure>) {
     let note = figure.map_or("the scene is not there", |f| &f.note);
     if is_json {
         let value = figure.map(|f| f.value);
-        let line = json!({"row": row, "scene": scene, "value": value, "bar": bar, "ok": ok, "note": note});
+        let line =
+            json!({"row": row, "scene": scene, "value": value, "bar": bar, "ok": ok, "note": note});
         println!("{line}");
     } else {
         let value = figure.map_or_else(|| "–".to_owned(), |f| format!("{:.3}", f.value));

@@ -3,7 +3,7 @@
 use enfilade::cpg::{CellId, PartNumbers, SightGraph, VisibleParts, World};
 use enfilade::geom::{Triangle, scene::Material};
 use enfilade::runtime::{Sight, SightState, Sightlines, Target};
-use enfilade::vis::{VisConfig, VisContext, see_all, visible_parts, visible_volumes};
+use enfilade::vis::{VisConfig, VisContext, see_all, see_parts};
 use enfilade_testkit::Rng;
 use enfilade_verify::structural_triangles;
 
@@ -20,7 +20,10 @@ const BAR: f64 = 2.0;
 
 /// The mean over cells of the triangles that count as seen, over that of those that rays reach.
 pub(super) fn measure(world: &World) -> anyhow::Result<Figure> {
-    let walls: Vec<Triangle> = structural_triangles(world).into_iter().map(|t| t.0).collect();
+    let walls: Vec<Triangle> = structural_triangles(world)
+        .into_iter()
+        .map(|t| t.0)
+        .collect();
     let mut context = VisContext {
         on_round: &mut |_, _| true,
         walls: Some(&walls),
@@ -28,8 +31,7 @@ pub(super) fn measure(world: &World) -> anyhow::Result<Figure> {
     };
     let graph = SightGraph::of_graph(&world.graph);
     let pvs = see_all(&graph, &VisConfig::default(), &mut context)?.cells;
-    let volumes = visible_volumes(world, &pvs)?;
-    let parts = visible_parts(world, &pvs, &volumes);
+    let (_, parts) = see_parts(world, &pvs)?;
     let sums = Sums::new(world);
     let sight = Sight::build(world)?;
     let (mut seen, mut whole, mut reached) = (0.0, 0.0, 0.0);
@@ -141,9 +143,8 @@ impl Rays<'_> {
         let [low, high] = self.world.graph.cells[cell.idx()].aabb;
         let far = 1e4;
         for _ in 0..RAYS {
-            let mut inside = (0..TRIES).map(|_| {
-                [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32)
-            });
+            let mut inside = (0..TRIES)
+                .map(|_| [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32));
             let Some(eye) = inside.find(|&p| self.sight.locate(p) == Some(cell)) else {
                 break;
             };
@@ -159,9 +160,8 @@ impl Rays<'_> {
 
     fn shoot(&self, eye: [f32; 3], end: [f32; 3], sums: &Sums, is_hit: &mut [bool]) {
         for lets_through in [false, true] {
-            let counts = |detail: enfilade::runtime::DetailId| {
-                !(lets_through && self.is_glass(detail.0))
-            };
+            let counts =
+                |detail: enfilade::runtime::DetailId| !(lets_through && self.is_glass(detail.0));
             let Ok(Some(hit)) = self.lines.pick_where(self.state, eye, end, counts) else {
                 return;
             };
@@ -192,10 +192,12 @@ impl Rays<'_> {
 
     fn is_glass(&self, detail: u32) -> bool {
         let mesh = &self.world.detail_meshes[self.world.details[detail as usize].mesh as usize];
-        let material = |p: &enfilade::geom::scene::Primitive| {
-            self.world.materials.get(p.material? as usize)
-        };
+        let material =
+            |p: &enfilade::geom::scene::Primitive| self.world.materials.get(p.material? as usize);
         let lets_through = |m: &Material| m.transparent;
-        mesh.primitives.iter().filter_map(material).any(lets_through)
+        mesh.primitives
+            .iter()
+            .filter_map(material)
+            .any(lets_through)
     }
 }

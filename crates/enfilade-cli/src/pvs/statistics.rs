@@ -174,7 +174,9 @@ impl Contents {
                 None => all.clone(),
             };
             let split = self.numbers.n_triangles();
-            let objects = runs.iter().map(|r| r.end.saturating_sub(r.start.max(split)));
+            let objects = runs
+                .iter()
+                .map(|r| r.end.saturating_sub(r.start.max(split)));
             from.destinations.push(Destination {
                 cell: to.0,
                 objects: objects.sum::<u32>() as usize,

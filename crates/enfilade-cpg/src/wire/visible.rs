@@ -56,4 +56,3 @@ pub(super) fn words(pvs: &Pvs) -> impl Iterator<Item = &[u32]> {
     let rows = [&pvs.ends[..], pvs.runs.as_flattened()].into_iter();
     rows.chain(parts).chain(volumes)
 }
-

@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use enfilade_cpg::{
-    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Locator, LocatorNode, Portal,
-    PartNumbers, PortalId, PortalKind, Provenance, Pvs, SourceRuns, Statistics, VisibleParts,
+    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Locator, LocatorNode, PartNumbers,
+    Portal, PortalId, PortalKind, Provenance, Pvs, SourceRuns, Statistics, VisibleParts,
     VisibleVolumes, World,
 };
 use enfilade_geom::scene::{

@@ -135,7 +135,11 @@ impl Viewer {
 
     /// Takes what may be seen from the eye's cell, where the world says so.
     pub(super) fn bound_by(&mut self, sight: &Sight, cell: u32) {
-        let Some(seen) = sight.seen_from.as_ref().filter(|_| self.options.precomputed) else {
+        let Some(seen) = sight
+            .seen_from
+            .as_ref()
+            .filter(|_| self.options.precomputed)
+        else {
             return;
         };
         self.allowed.clear();
