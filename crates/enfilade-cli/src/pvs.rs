@@ -105,7 +105,7 @@ struct PvsReport {
     steps: u64,
     seconds: f64,
     /// Triangles of walls and objects that can be seen from a cell, on average: of what its visible volumes meet, and of whole cells. Absent
-    /// where neither --parts nor --volumes nor --statistics asks for it.
+    /// where none of --parts, --volumes, --statistics and --mutual asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     mean_triangles: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -136,7 +136,7 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     let mut vis = compute(args, &input)?;
     let mut report = report(&input, &vis, start.elapsed());
     if let Some(world) = &input.world
-        && (args.parts || args.volumes || args.statistics.is_some())
+        && (args.parts || args.volumes || args.statistics.is_some() || args.mutual.is_some())
     {
         add_parts(args, world, &mut vis.cells)?;
         report.seconds = start.elapsed().as_secs_f64();

@@ -186,6 +186,49 @@ fn a_world_keeps_parts_and_volumes_where_asked() {
     assert_eq!(done.status.code(), Some(2));
 }
 
+// Covers Q9.
+#[test]
+fn surfaces_see_each_other_by_what_is_in_sight_of_both() {
+    let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(30, 2));
+    let (glb, pvs, mutual) = (place("pairs.glb"), place("pairs.pvs"), place("pairs.mut"));
+    fs::write(&glb, enfilade::cpg::wire::encode_glb(&world).unwrap()).unwrap();
+    let [o, m] = ["-o", "--mutual"].map(Path::new);
+    let done = enfilade(&[Path::new("pvs"), &glb, o, &pvs, m, &mutual]);
+    assert!(done.status.success(), "{done:?}");
+    let rows = enfilade::import::read_pvs_text(&fs::read_to_string(&pvs).unwrap()).unwrap();
+    let text = fs::read_to_string(&mutual).unwrap();
+    let lines = text
+        .lines()
+        .skip_while(|l| !l.starts_with("surfaces"))
+        .skip(1);
+    let (mut n_listed, mut n_by_cells) = (0, 0);
+    for (i, line) in lines.enumerate() {
+        let listed = line.split_once(':').unwrap().1.split_whitespace();
+        let listed: Vec<usize> = listed
+            .flat_map(|range| {
+                let (a, b) = range.split_once('-').unwrap_or((range, range));
+                a.parse().unwrap()..=b.parse().unwrap()
+            })
+            .collect();
+        let sees = |a: u32, b: u32| {
+            rows.rows[a as usize]
+                .iter()
+                .any(|r| (r.0..r.1).contains(&b))
+        };
+        for j in i + 1..world.batches.len() {
+            let (of_i, of_j) = (&world.batches[i].cells, &world.batches[j].cells);
+            let by_cells = of_i.iter().any(|a| of_j.iter().any(|b| sees(a.0, b.0)));
+            let shares = of_i.iter().any(|a| of_j.contains(a));
+            let is_listed = listed.contains(&j);
+            assert!(by_cells || !is_listed, "{i} {j}");
+            assert!(is_listed || !shares, "{i} {j} share a cell");
+            n_by_cells += usize::from(by_cells);
+            n_listed += usize::from(is_listed);
+        }
+    }
+    assert!(n_listed < n_by_cells, "{n_listed} of {n_by_cells}");
+}
+
 #[test]
 fn evidence_of_real_portal_files_is_accepted() {
     let scenes = std::env::var_os("ENFILADE_SCENES").map_or_else(

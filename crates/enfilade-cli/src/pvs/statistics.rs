@@ -4,6 +4,7 @@
 //! section 3.2.2 (pairs for radiosity).
 
 use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::ops::Range;
 
@@ -125,14 +126,18 @@ struct Contents {
     /// By detail object, the triangles of those before it, and then of all.
     of_details: Vec<usize>,
     by_cell: Vec<Vec<Range<u32>>>,
+    /// By cell, the batches that are seen from it without passing a portal.
+    batches: Vec<Vec<u32>>,
 }
 
 impl Contents {
     fn new(world: &World) -> Self {
         let numbers = PartNumbers::new(world);
         let mut by_cell = vec![Vec::new(); world.graph.cells.len()];
+        let mut batches = vec![Vec::new(); world.graph.cells.len()];
         for (i, batch) in world.batches.iter().enumerate() {
             for cell in &batch.cells {
+                batches[cell.idx()].push(i as u32);
                 by_cell[cell.idx()].push(numbers.of_batch(i));
             }
         }
@@ -150,6 +155,7 @@ impl Contents {
             numbers,
             of_details,
             by_cell,
+            batches,
         }
     }
 
@@ -221,9 +227,10 @@ fn viewpoint(c: usize, world: Option<&World>, graph: &SightGraph) -> DVec3 {
 }
 
 /// Pairs that may see each other, each once, as text: `MUT1`, then a line a cell with the greater numbers that it
-/// sees, as ranges; with a world, the same for its batches of structural triangles.
+/// sees, as ranges; with a world, the same for its surfaces: its batches of structural triangles.
 ///
-/// Two surfaces may see each other where a cell of one sees a cell of the other.
+/// Two surfaces may see each other where there are two cells, one of each, and something of either surface may be seen from the other's cell: by the
+/// parts that `visible` has, or by whole cells where it has none.
 pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
     let mut out = String::from("MUT1\n");
     let _ = writeln!(out, "cells {}", visible.n_cells());
@@ -232,22 +239,39 @@ pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
         put_greater(&mut out, a, set.map(|b| b.0));
     }
     let Some(world) = world else { return out };
-    let n = world.batches.len();
-    let mut by_cell = vec![Vec::new(); visible.n_cells()];
-    for (i, batch) in world.batches.iter().enumerate() {
-        for cell in &batch.cells {
-            by_cell[cell.0 as usize].push(i as u32);
-        }
-    }
-    let _ = writeln!(out, "surfaces {n}");
-    for (i, batch) in world.batches.iter().enumerate() {
-        let cells = batch.cells.iter().flat_map(|&c| visible.visible_from(c));
-        let mut seen: Vec<u32> = cells
-            .flat_map(|c| by_cell[c.0 as usize].iter().copied())
-            .collect();
-        seen.sort_unstable();
-        seen.dedup();
+    let _ = writeln!(out, "surfaces {}", world.batches.len());
+    for (i, seen) in mutual_surfaces(visible, world).into_iter().enumerate() {
         put_greater(&mut out, i, seen.into_iter());
+    }
+    out
+}
+
+/// By surface, those that it may see and that may see it, ascending.
+fn mutual_surfaces(visible: &Pvs, world: &World) -> Vec<BTreeSet<u32>> {
+    let contents = Contents::new(world);
+    // By pair of cells, the surfaces of the second that the first may see.
+    let mut seen: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+    for (pair, (a, b)) in visible.pairs().enumerate() {
+        let in_sight = |batch: u32| {
+            let triangles = contents.numbers.of_batch(batch as usize);
+            let meets = |run: &[u32; 2]| run[0] < triangles.end && triangles.start < run[1];
+            let parts = visible.parts.as_ref();
+            parts.is_none_or(|parts| parts.runs_of(pair).iter().any(meets))
+        };
+        let batches = contents.batches[b.idx()].iter().copied();
+        seen.insert((a.0, b.0), batches.filter(|&i| in_sight(i)).collect());
+    }
+    let mut out = vec![BTreeSet::new(); world.batches.len()];
+    for (&(a, b), of_b) in &seen {
+        let Some(of_a) = seen.get(&(b, a)).filter(|_| a <= b) else {
+            continue;
+        };
+        for &i in of_a {
+            for &j in of_b {
+                out[i as usize].insert(j);
+                out[j as usize].insert(i);
+            }
+        }
     }
     out
 }
