@@ -1,6 +1,6 @@
 //! `bench builders`: the same scenes through each builder, compared.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use enfilade::bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Silent, bake};
 use enfilade::cpg::{CellPortalGraph, PortalKind};
@@ -10,7 +10,7 @@ use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::Rng;
 use enfilade_verify::{VerifyOptions, verify_world};
 
-use crate::measure::{cpu_seconds, name};
+use crate::measure::{cpu_seconds, files_of, name};
 use crate::table::Table;
 
 /// Points that say how far two graphs agree.
@@ -33,20 +33,6 @@ pub(crate) fn bench_builders(
         compare(table, &name(path), &imported.scene, rays)?;
     }
     Ok(())
-}
-
-/// A scene file, or a folder with `scene.glb` and, if there is one, `detail.glb`.
-fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    if !path.is_dir() {
-        return (vec![path.to_owned()], Vec::new());
-    }
-    let detail = path.join("detail.glb");
-    let detail = if detail.exists() {
-        vec![detail]
-    } else {
-        Vec::new()
-    };
-    (vec![path.join("scene.glb")], detail)
 }
 
 fn by(method: Method, scene: &Scene, context: &BakeContext<'_>) -> Result<BakeOutput, BakeError> {

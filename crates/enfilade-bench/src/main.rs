@@ -1,6 +1,7 @@
 //! The experiments behind `docs/benchmarks/`, run by `cargo xtask bench NAME`, printed as Markdown tables or as
 //! lines of JSON.
 
+mod bring;
 mod bsp;
 mod builders;
 mod facade;
@@ -16,6 +17,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use enfilade::runtime::SightOptions;
 
+use bring::bench_bring;
 use bsp::{bench_bsp, bench_simplify};
 use builders::bench_builders;
 use facade::bench_facade;
@@ -36,6 +38,15 @@ struct Cli {
 
 #[derive(clap::Subcommand)]
 enum What {
+    /// What worlds bring to those who use them, a row a figure with the value that it must reach.
+    Bring {
+        /// Only rows whose names begin so.
+        #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
+        rows: Vec<String>,
+        /// Only scenes whose names begin so. Scenes are folders of $ENFILADE_SCENES, or of ../shared/scenes.
+        #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
+        scenes: Vec<String>,
+    },
     /// Binary space partition: tree, portals, separators, cells.
     Bsp {
         /// Scenes: Quake maps and any others.
@@ -130,6 +141,7 @@ enum What {
 fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
+        What::Bring { rows, scenes } => return bench_bring(args.json, rows, scenes),
         What::Bsp {
             scenes,
             heuristics,

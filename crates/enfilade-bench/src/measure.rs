@@ -1,6 +1,6 @@
-//! What all tables share: names, processor time, quantiles.
+//! What all tables share: names, files of a scene, processor time, quantiles.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Processor seconds that this process has used so far, all threads together; 0 where the system does
 /// not say.
@@ -18,6 +18,20 @@ pub(crate) fn name(path: &Path) -> String {
     path.file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default()
+}
+
+/// A scene file, or a folder with `scene.glb` and, if there is one, `detail.glb`.
+pub(crate) fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    if !path.is_dir() {
+        return (vec![path.to_owned()], Vec::new());
+    }
+    let detail = path.join("detail.glb");
+    let detail = if detail.exists() {
+        vec![detail]
+    } else {
+        Vec::new()
+    };
+    (vec![path.join("scene.glb")], detail)
 }
 
 /// The value that so large a share of `values` does not exceed; sorts them. Not a number where there are none.

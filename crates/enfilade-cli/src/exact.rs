@@ -3,8 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use enfilade::cpg::{CellId, PortalId, World};
-use enfilade::runtime::SightState;
+use enfilade::cpg::{CellId, World};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio, Style,
 };
@@ -15,6 +14,7 @@ use crate::formats::Format;
 use crate::output::{Outputs, write_whole};
 use crate::progress::StageBar;
 use enfilade_cli::cameras::random_camera;
+use enfilade_cli::doors::random_doors;
 
 /// Eyes drawn for a view, should they lie on surfaces.
 const MAX_DRAWS: usize = 100;
@@ -159,7 +159,7 @@ pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::R
     for view in 0..asked.views {
         // What the near plane cuts is lost to any renderer: such an eye is drawn anew.
         if asked.has_doors {
-            studio.state = random_doors(&mut rng, &studio);
+            studio.state = random_doors(&mut rng, &studio.sight);
             oracle.follow(&studio.sight, &studio.state);
         }
         let mut camera = random_camera(&mut rng, world, &studio.sight, bounds);
@@ -224,25 +224,6 @@ pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::R
     }
     bar.finish();
     Ok(out)
-}
-
-/// A third of all portals with leaves shut, a third some way open, the others as the model has them; and a tenth of those
-/// without leaves closed.
-fn random_doors(rng: &mut Rng, studio: &Studio) -> SightState {
-    let mut state = SightState::new(&studio.sight);
-    for p in (0..studio.sight.n_portals() as u32).map(PortalId) {
-        let chance = rng.range(0.0, 1.0);
-        if studio.sight.leaves(p).is_empty() {
-            if chance < 0.1 {
-                state.close(p);
-            }
-        } else if chance < 1.0 / 3.0 {
-            state.set_leaves(p, 0.0);
-        } else if chance < 2.0 / 3.0 {
-            state.set_leaves(p, rng.range(0.0, 1.0) as f32);
-        }
-    }
-    state
 }
 
 fn describe(

@@ -5,6 +5,7 @@
 pub mod adapter;
 pub mod answers;
 pub mod cameras;
+pub mod doors;
 pub mod input;
 pub mod values;
 pub mod world;

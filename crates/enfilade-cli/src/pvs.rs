@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
-use enfilade::cpg::{CellId, SightGraph, World};
+use enfilade::cpg::{self, CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
-use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all};
+use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all, see_parts};
 
 use enfilade_verify::structural_triangles;
 
@@ -35,6 +35,13 @@ pub(crate) struct Pvs {
     /// Write the world with the answer in it, for programs to ask; may be the input itself.
     #[arg(long, value_name = "OUT.glb", conflicts_with = "far")]
     into: Option<PathBuf>,
+    /// Keep in that world which triangles and objects can be seen by pair of cells, by which the run-time draws less.
+    #[arg(long, requires = "into")]
+    parts: bool,
+    /// Keep in that world the visible volume of each pair of cells: what of one cell the portals leave to be seen from the other,
+    /// as convex pieces.
+    #[arg(long, requires = "into")]
+    volumes: bool,
     /// How thoroughly to look.
     #[arg(long, value_enum, default_value_t = PvsMode::Exact)]
     mode: PvsMode,
@@ -97,6 +104,15 @@ struct PvsReport {
     lines: usize,
     steps: u64,
     seconds: f64,
+    /// Triangles of walls and objects that can be seen from a cell, on average: of what its visible volumes meet, and of whole cells. Absent
+    /// where none of --parts, --volumes, --statistics and --mutual asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_triangles: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_triangles_of_cells: Option<f64>,
+    /// All triangles, where these are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangles: Option<usize>,
     /// By cell, how many cells can be seen from it.
     visible_cells: Vec<usize>,
     /// The ten cells from which most can be seen, the worst first.
@@ -117,8 +133,21 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         );
     }
     let start = Instant::now();
-    let vis = compute(args, &input)?;
-    let report = report(&input, &vis, start.elapsed());
+    let mut vis = compute(args, &input)?;
+    let mut report = report(&input, &vis, start.elapsed());
+    if let Some(world) = &input.world
+        && (args.parts || args.volumes || args.statistics.is_some() || args.mutual.is_some())
+    {
+        add_parts(args, world, &mut vis.cells)?;
+        report.seconds = start.elapsed().as_secs_f64();
+    }
+    let statistics = Statistics::new(&vis.cells, input.world.as_ref(), graph);
+    if vis.cells.parts.is_some() {
+        let [seen, of_cells] = statistics.mean_triangles();
+        report.mean_triangles = Some(seen);
+        report.mean_triangles_of_cells = Some(of_cells);
+        report.triangles = Some(statistics.n_triangles);
+    }
     let ranges = |c| vis.cells.runs_from(CellId(c)).iter().map(|&[a, b]| (a, b));
     let rows = (0..graph.n_cells).map(|c| ranges(c).collect()).collect();
     let text = write_pvs_text(&PvsText {
@@ -130,7 +159,6 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         write_whole(path, evidence)?;
     }
     if let Some(path) = &args.statistics {
-        let statistics = Statistics::new(&vis.cells, input.world.as_ref(), graph);
         let text = serde_json::to_vec_pretty(&statistics)?;
         write_whole(path, &text)?;
     }
@@ -139,7 +167,10 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         write_whole(path, text.as_bytes())?;
     }
     if let (Some(path), Some(world)) = (&args.into, input.world) {
-        let pvs = Some(vis.cells);
+        let mut pvs = vis.cells;
+        pvs.parts = pvs.parts.filter(|_| args.parts);
+        pvs.volumes = pvs.volumes.filter(|_| args.volumes);
+        let pvs = Some(pvs);
         let bytes = encode_glb(&World { pvs, ..world })?;
         write_whole(path, &bytes)?;
     }
@@ -283,11 +314,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         walls: input.walls.as_deref(),
         checkpoint,
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
-        .build()
-        .context("cannot start threads; try --threads 1")?;
-    let answer = pool.install(|| see_all(&input.graph, &config, &mut context));
+    let answer = pool(args)?.install(|| see_all(&input.graph, &config, &mut context));
     bar.finish();
     let vis = answer.with_context(|| match &args.checkpoint {
         Some(path) => format!("{}, {}", name_of(&args.input), path.display()),
@@ -303,6 +330,21 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         fs::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
     }
     Ok(vis)
+}
+
+/// What of each cell can be seen from each other: volumes, and what is in them.
+fn add_parts(args: &Pvs, world: &World, pvs: &mut cpg::Pvs) -> anyhow::Result<()> {
+    let (volumes, parts) = pool(args)?.install(|| see_parts(world, pvs))?;
+    pvs.parts = Some(parts);
+    pvs.volumes = Some(volumes);
+    Ok(())
+}
+
+fn pool(args: &Pvs) -> anyhow::Result<rayon::ThreadPool> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.unwrap_or(0))
+        .build()
+        .context("cannot start threads; try --threads 1")
 }
 
 /// What was saved before, if anything was.
@@ -338,6 +380,9 @@ fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
         lines: vis.witnesses.len(),
         steps: vis.n_steps,
         seconds: took.as_secs_f64(),
+        mean_triangles: None,
+        mean_triangles_of_cells: None,
+        triangles: None,
         visible_cells,
         worst_names: worst.iter().map(|&c| input.name(c)).collect(),
         worst,
@@ -383,6 +428,15 @@ fn print(to: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::Resul
             r.undecided,
             r.base_pairs
         )?;
+        if let (Some(seen), Some(of_cells), Some(n)) =
+            (r.mean_triangles, r.mean_triangles_of_cells, r.triangles)
+        {
+            let share = 100.0 * seen / n.max(1) as f64;
+            writeln!(
+                out,
+                "a cell sees {seen:.0} of {n} triangles on average, {share:.1} %; the cells that it sees hold {of_cells:.0}"
+            )?;
+        }
         if !r.complete {
             writeln!(
                 out,

@@ -114,6 +114,7 @@ fn a_world_has_statistics_and_mutual_lists() {
     let n = |c: &serde_json::Value, key: &str| c[key].as_u64().unwrap();
     // The sums by hand: the text says which cells see which.
     let rows = enfilade::import::read_pvs_text(&fs::read_to_string(&pvs).unwrap()).unwrap();
+    let mut n_hidden = 0;
     for (c, (row, from)) in rows.rows.iter().zip(cells).enumerate() {
         let sees = |b: u32| row.iter().any(|&(first, end)| (first..end).contains(&b));
         assert_eq!(
@@ -124,14 +125,24 @@ fn a_world_has_statistics_and_mutual_lists() {
             .details
             .iter()
             .filter(|d| d.cells.iter().any(|c| sees(c.0)));
-        assert_eq!(n(from, "objects"), objects.count() as u64, "cell {c}");
+        let n_objects = objects.count() as u64;
+        assert_eq!(n(from, "objects_of_cells"), n_objects, "cell {c}");
+        assert!(n(from, "objects") <= n_objects);
         let batches = world
             .batches
             .iter()
             .filter(|b| b.cells.iter().any(|c| sees(c.0)));
         let walls: usize = batches.map(|b| b.primitive.indices.len() / 3).sum();
-        assert!(n(from, "triangles") >= walls as u64);
+        assert!(n(from, "triangles_of_cells") >= walls as u64);
+        assert!(n(from, "triangles") <= n(from, "triangles_of_cells"));
+        n_hidden += n(from, "triangles_of_cells") - n(from, "triangles");
+        let destinations = from["destinations"].as_array().unwrap();
+        assert_eq!(destinations.len() as u64, n(from, "cells"));
+        // What two cells share counts for both.
+        let sum: u64 = destinations.iter().map(|d| n(d, "triangles")).sum();
+        assert!(sum >= n(from, "triangles"), "cell {c}");
     }
+    assert!(n_hidden > 0);
     let worst = json["worst"].as_array().unwrap();
     assert_eq!(worst.len(), 10.min(cells.len()));
     assert_eq!(
@@ -145,6 +156,77 @@ fn a_world_has_statistics_and_mutual_lists() {
         world.graph.cells.len() + world.batches.len(),
         "{text}"
     );
+}
+
+// Covers Q2 and Q5.
+#[test]
+fn a_world_keeps_parts_and_volumes_where_asked() {
+    let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(12, 1));
+    let (glb, pvs, out) = (
+        place("kept.glb"),
+        place("kept.pvs"),
+        place("kept-parts.glb"),
+    );
+    fs::write(&glb, enfilade::cpg::wire::encode_glb(&world).unwrap()).unwrap();
+    let [o, into, parts, volumes] = ["-o", "--into", "--parts", "--volumes"].map(Path::new);
+    for asked in [&[][..], &[parts], &[volumes], &[parts, volumes]] {
+        let mut args = vec![Path::new("pvs"), &glb, o, &pvs, into, &out];
+        args.extend(asked);
+        let done = enfilade(&args);
+        assert!(done.status.success(), "{done:?}");
+        let said = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert_eq!(said.contains("triangles on average"), !asked.is_empty());
+        let read = enfilade::cpg::wire::decode_glb(&fs::read(&out).unwrap()).unwrap();
+        let kept = read.pvs.unwrap();
+        assert_eq!(kept.parts.is_some(), asked.contains(&parts));
+        assert_eq!(kept.volumes.is_some(), asked.contains(&volumes));
+    }
+    // Only a world holds them.
+    let done = enfilade(&[Path::new("pvs"), &glb, o, &pvs, parts]);
+    assert_eq!(done.status.code(), Some(2));
+}
+
+// Covers Q9.
+#[test]
+fn surfaces_see_each_other_by_what_is_in_sight_of_both() {
+    let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(30, 2));
+    let (glb, pvs, mutual) = (place("pairs.glb"), place("pairs.pvs"), place("pairs.mut"));
+    fs::write(&glb, enfilade::cpg::wire::encode_glb(&world).unwrap()).unwrap();
+    let [o, m] = ["-o", "--mutual"].map(Path::new);
+    let done = enfilade(&[Path::new("pvs"), &glb, o, &pvs, m, &mutual]);
+    assert!(done.status.success(), "{done:?}");
+    let rows = enfilade::import::read_pvs_text(&fs::read_to_string(&pvs).unwrap()).unwrap();
+    let text = fs::read_to_string(&mutual).unwrap();
+    let lines = text
+        .lines()
+        .skip_while(|l| !l.starts_with("surfaces"))
+        .skip(1);
+    let (mut n_listed, mut n_by_cells) = (0, 0);
+    for (i, line) in lines.enumerate() {
+        let listed = line.split_once(':').unwrap().1.split_whitespace();
+        let listed: Vec<usize> = listed
+            .flat_map(|range| {
+                let (a, b) = range.split_once('-').unwrap_or((range, range));
+                a.parse().unwrap()..=b.parse().unwrap()
+            })
+            .collect();
+        let sees = |a: u32, b: u32| {
+            rows.rows[a as usize]
+                .iter()
+                .any(|r| (r.0..r.1).contains(&b))
+        };
+        for j in i + 1..world.batches.len() {
+            let (of_i, of_j) = (&world.batches[i].cells, &world.batches[j].cells);
+            let by_cells = of_i.iter().any(|a| of_j.iter().any(|b| sees(a.0, b.0)));
+            let shares = of_i.iter().any(|a| of_j.contains(a));
+            let is_listed = listed.contains(&j);
+            assert!(by_cells || !is_listed, "{i} {j}");
+            assert!(is_listed || !shares, "{i} {j} share a cell");
+            n_by_cells += usize::from(by_cells);
+            n_listed += usize::from(is_listed);
+        }
+    }
+    assert!(n_listed < n_by_cells, "{n_listed} of {n_by_cells}");
 }
 
 #[test]

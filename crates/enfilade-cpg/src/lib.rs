@@ -15,6 +15,7 @@ mod leaf;
 mod locator;
 mod look;
 mod named;
+mod parts;
 mod pvs;
 mod seals;
 mod sight_graph;
@@ -31,6 +32,7 @@ pub use graph::{
 pub use holes::{Hole, HoleReason};
 pub use ids::{CellId, PortalId};
 pub use locator::{Locator, LocatorNode};
+pub use parts::{PartNumbers, VisibleParts, VisibleVolumes};
 pub use pvs::Pvs;
 pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};

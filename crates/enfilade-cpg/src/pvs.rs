@@ -1,5 +1,6 @@
 //! What can be seen from each cell, as a world may carry it.
 
+use crate::parts::{VisibleParts, VisibleVolumes};
 use crate::{CellId, CellSet};
 
 /// The potentially visible set of a graph: for each cell, the cells of which something may be seen from somewhere in it with
@@ -8,12 +9,16 @@ use crate::{CellId, CellSet};
 /// A superset of the truth: what is not in it is never seen. Kept as runs of neighboring ids, which rooms have because
 /// builders number them by place; a question takes a binary search. Made by `enfilade pvs --into`, or from the answer of
 /// the search in code.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pvs {
     /// By cell: where its runs end in `runs`.
     pub(crate) ends: Vec<u32>,
     /// First cell and the one after the last; in each row ascending, with a gap between any two.
     pub(crate) runs: Vec<[u32; 2]>,
+    /// By pair of cells, which triangles and objects may be seen, if that was computed.
+    pub parts: Option<VisibleParts>,
+    /// By pair of cells, the volume that may be seen, if it is kept.
+    pub volumes: Option<VisibleVolumes>,
 }
 
 impl Pvs {
@@ -92,6 +97,12 @@ impl Pvs {
         self.row(cell)
     }
 
+    /// Ordered pairs of cells, the first seeing the second, ascending: the order of rows in [`Pvs::parts`] and [`Pvs::volumes`].
+    pub fn pairs(&self) -> impl Iterator<Item = (CellId, CellId)> + '_ {
+        let cells = (0..self.ends.len() as u32).map(CellId);
+        cells.flat_map(|from| self.visible_from(from).map(move |to| (from, to)))
+    }
+
     /// The runs of a cell; none for one that is not there.
     fn row(&self, cell: CellId) -> &[[u32; 2]] {
         let Some(&end) = self.ends.get(cell.idx()) else {
@@ -100,6 +111,21 @@ impl Pvs {
         let before = cell.idx().checked_sub(1);
         let first = before.map_or(0, |c| self.ends[c]);
         &self.runs[first as usize..end as usize]
+    }
+
+    /// The first pair of cells whose parts or volumes break an invariant, and how; the cell numbers of a pair that is not there are
+    /// past the last. Linear. The rows of cells must be right.
+    pub(crate) fn pair_problem(&self, n_parts: u32) -> Option<([u32; 2], &'static str)> {
+        let n_pairs = self.n_pairs();
+        let parts = self
+            .parts
+            .as_ref()
+            .and_then(|p| p.problem(n_pairs, n_parts));
+        let volumes = self.volumes.as_ref();
+        let (pair, problem) = parts.or_else(|| volumes.and_then(|v| v.problem(n_pairs)))?;
+        let n_cells = self.ends.len() as u32;
+        let cells = self.pairs().nth(pair).map(|(a, b)| [a.0, b.0]);
+        Some((cells.unwrap_or([n_cells; 2]), problem))
     }
 
     /// The first cell whose row breaks an invariant, and how. Linear.

@@ -14,7 +14,7 @@ mod portal;
 
 use std::collections::HashMap;
 
-use crate::{CellPortalGraph, PortalId, World};
+use crate::{CellPortalGraph, PartNumbers, PortalId, World};
 use error::Findings;
 use extent::{check_boxes_around_geometry, check_cells_in_locator};
 use geometry::{check_cell_list, check_detail, check_mesh, check_primitive};
@@ -97,6 +97,10 @@ impl World {
         let pvs = self.pvs.as_ref().and_then(|p| p.problem(n_cells));
         if let Some((cell, problem)) = pvs {
             found.push(GraphError::Pvs { cell, problem });
+        } else if let Some((cells, problem)) =
+            (self.pvs.as_ref()).and_then(|p| p.pair_problem(PartNumbers::new(self).n_parts()))
+        {
+            found.push(GraphError::PvsPair { cells, problem });
         }
         crate::look::check(self, &mut |owner, problem| {
             found.push(GraphError::Look { owner, problem });

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{two_rooms, two_rooms_with_pvs};
+use common::{two_rooms, two_rooms_with_parts, two_rooms_with_pvs};
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
 use enfilade_cpg::{SourceRuns, World};
 use proptest::prelude::*;
@@ -62,7 +62,7 @@ fn taking_a_file_apart_and_together_changes_nothing() {
 
 #[test]
 fn every_prefix_is_an_error() {
-    let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
+    let bytes = encode_glb(&two_rooms_with_parts()).unwrap();
     for n in 0..bytes.len() {
         assert!(decode_glb(&bytes[..n]).is_err(), "{n} bytes decoded");
         // With the header made to fit, too.
@@ -79,7 +79,7 @@ fn every_prefix_is_an_error() {
 
 #[test]
 fn every_bit_flip_is_an_error_or_a_valid_world() {
-    let bytes = encode_glb(&two_rooms_with_pvs()).unwrap();
+    let bytes = encode_glb(&two_rooms_with_parts()).unwrap();
     let mut n_accepted = 0;
     for i in 0..bytes.len() * 8 {
         let mut flipped = bytes.clone();
@@ -353,6 +353,41 @@ fn sources_that_do_not_hold_together_are_errors() {
         ("\"cameras\":[{", "\"cameras\":[3,{"),
     ] {
         assert!(with(from, to).is_err(), "{from} -> {to}");
+    }
+}
+
+#[test]
+fn broken_parts_and_volumes_are_errors() {
+    let mut world = two_rooms_with_parts();
+    // So that the last five buffer views are theirs.
+    world.batches[0].sources = SourceRuns::default();
+    let bytes = encode_glb(&world).unwrap();
+    assert_eq!(decode_glb(&bytes).unwrap().pvs, world.pvs);
+    let n = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let text = String::from_utf8(bytes[20..20 + n].to_vec()).unwrap();
+    let bin = &bytes[28 + n..];
+    let root: Value = serde_json::from_str(&text).unwrap();
+    let views = root["bufferViews"].as_array().unwrap();
+    let at = |view: usize, field: &str| views[view][field].as_u64().unwrap_or_default() as usize;
+    let first = views.len() - 5;
+    for view in first..views.len() {
+        let size = if view + 1 == views.len() { 8 } else { 4 };
+        for word in 0..at(view, "byteLength") / size {
+            let mut bin = bin.to_vec();
+            let start = at(view, "byteOffset") + size * word;
+            bin[start..start + size].fill(0xff);
+            let result = decode_glb(&glb(&text, &bin));
+            assert!(
+                matches!(result, Err(WireError::Invalid(_))),
+                "{view} {word}"
+            );
+        }
+    }
+    let named = format!("\"parts\":{{\"rows\":{first}");
+    assert!(text.contains(&named), "{text}");
+    for bad in ["\"parts\":{\"rows\":999", "\"parts\":{\"rows\":0"] {
+        let result = decode_glb(&glb(&text.replacen(&named, bad, 1), bin));
+        assert!(result.is_err(), "{bad}");
     }
 }
 

@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{nasty_rooms, two_rooms, two_rooms_with_pvs};
+use common::{nasty_rooms, two_rooms, two_rooms_with_parts, two_rooms_with_pvs};
 use enfilade_cpg::World;
 use enfilade_cpg::wire::{EXTENSION, encode_glb};
 use serde_json::{Value, json};
@@ -148,7 +148,15 @@ fn encoded_worlds_follow_the_schema() {
         ..two_rooms()
     };
     let seen = two_rooms_with_pvs();
-    for world in [two_rooms(), nasty_rooms(), World::default(), leaking, seen] {
+    let parts = two_rooms_with_parts();
+    for world in [
+        two_rooms(),
+        nasty_rooms(),
+        World::default(),
+        leaking,
+        seen,
+        parts,
+    ] {
         assert_eq!(check(&schema, &schema, &extension(&world), ""), Ok(()));
     }
 }
@@ -159,7 +167,7 @@ fn the_schema_names_every_field_that_is_written() {
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
     let good = extension(&World {
         leak_path: vec![[0.0; 3], [1.0; 3]],
-        ..two_rooms_with_pvs()
+        ..two_rooms_with_parts()
     });
     for (pointer, optional) in [
         (
@@ -183,7 +191,9 @@ fn the_schema_names_every_field_that_is_written() {
         ("/details/1", &["aabb", "source", "partOf"]),
         ("/locator", &["bounds", "outside", "planes", "nodes"]),
         ("/provenance", &[]),
-        ("/pvs", &[]),
+        ("/pvs", &["parts", "volumes"]),
+        ("/pvs/parts", &["runs"]),
+        ("/pvs/volumes", &["planes"]),
     ] {
         let keys: Vec<String> = good
             .pointer(pointer)

@@ -33,12 +33,23 @@ impl Chunk {
 /// A triangle to be grouped.
 struct Entry {
     corners: [u32; 3],
+    /// Its number in the batch.
+    number: u32,
     center: DVec3,
     /// Which way it faces, in eighths of the sphere and by its main axis.
     facing: u8,
 }
 
-/// Adds the chunks of one batch to `chunks`; returns its indices in their order.
+/// A batch's triangles, sorted so that chunks are ranges.
+#[derive(Default)]
+pub(crate) struct Sorted {
+    /// Index triples.
+    pub(crate) indices: Vec<u32>,
+    /// By place, the triangle's number in the batch.
+    pub(crate) numbers: Vec<u32>,
+}
+
+/// Adds the chunks of one batch to `chunks`; returns its triangles in their order.
 ///
 /// Splits at the median of the longest axis until groups are small. Same input, same chunks.
 pub(crate) fn chunks_of(
@@ -46,11 +57,12 @@ pub(crate) fn chunks_of(
     primitive: &Primitive,
     size: usize,
     chunks: &mut Vec<Chunk>,
-) -> Vec<u32> {
+) -> Sorted {
     let mut entries: Vec<Entry> = primitive
         .indices
         .chunks_exact(3)
-        .map(|t| {
+        .zip(0..)
+        .map(|(t, number)| {
             let p = [0, 1, 2].map(|k| point(primitive.positions[t[k] as usize]));
             let normal = (p[1] - p[0]).cross(p[2] - p[0]);
             let a = normal.abs();
@@ -63,12 +75,16 @@ pub(crate) fn chunks_of(
             };
             Entry {
                 corners: [t[0], t[1], t[2]],
+                number,
                 center: Aabb::of_points(&p).center(),
                 facing: axis * 2 + u8::from(normal[usize::from(axis)] < 0.0),
             }
         })
         .collect();
-    let mut out = Vec::with_capacity(primitive.indices.len());
+    let mut out = Sorted {
+        indices: Vec::with_capacity(primitive.indices.len()),
+        numbers: Vec::with_capacity(entries.len()),
+    };
     split(batch, primitive, size, &mut entries, chunks, &mut out);
     out
 }
@@ -79,7 +95,7 @@ fn split(
     size: usize,
     entries: &mut [Entry],
     chunks: &mut Vec<Chunk>,
-    out: &mut Vec<u32>,
+    out: &mut Sorted,
 ) {
     if entries.is_empty() {
         return;
@@ -122,10 +138,11 @@ fn split(
         split(batch, primitive, size, high, chunks, out);
         return;
     }
-    let first_index = out.len() as u32;
+    let first_index = out.indices.len() as u32;
     let mut aabb = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
     for e in entries.iter() {
-        out.extend(e.corners);
+        out.indices.extend(e.corners);
+        out.numbers.push(e.number);
         for i in e.corners {
             let p = primitive.positions[i as usize];
             for axis in 0..3 {
@@ -137,7 +154,7 @@ fn split(
     chunks.push(Chunk {
         batch,
         first_index,
-        n_indices: out.len() as u32 - first_index,
+        n_indices: out.indices.len() as u32 - first_index,
         aabb,
     });
 }

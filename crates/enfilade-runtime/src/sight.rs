@@ -5,7 +5,7 @@ mod portals;
 
 use std::sync::Arc;
 
-use enfilade_cpg::{CellId, Locator, PortalId, World};
+use enfilade_cpg::{CellId, Locator, PortalId, VisibleParts, World};
 use enfilade_geom::{DVec3, world_tolerance};
 
 use crate::boxes::{BoxTrees, Root};
@@ -44,6 +44,8 @@ pub struct Sight {
     pub(crate) chunks: Vec<Chunk>,
     pub(crate) details: Vec<Detail>,
     pub(crate) occluders: Occluders,
+    /// By cell of the eye: the chunks and details that may be seen from it, where the world says so.
+    pub(crate) seen_from: Option<VisibleParts>,
     /// By batch: its triangles as index triples, sorted so that chunks are ranges.
     indices: Vec<Vec<u32>>,
     pub(crate) doors: Arc<Doors>,
@@ -93,6 +95,7 @@ impl Sight {
         let boxes = Boxes::of(world, &drawn, &doors, tolerance);
         let occluders = occluders_of(world, options, tolerance);
         let n_triangles = drawn.n_triangles();
+        let seen_from = drawn.seen_from(world, &doors);
         Ok(Self {
             locator: world.graph.locator.clone(),
             first_exit,
@@ -107,6 +110,7 @@ impl Sight {
             chunks: drawn.chunks,
             details: drawn.details,
             occluders,
+            seen_from,
             indices: drawn.indices,
             doors: Arc::new(doors),
             n_portals: world.graph.portals.len(),

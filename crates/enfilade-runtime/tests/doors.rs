@@ -1,6 +1,6 @@
 //! Leaves of doors: what they shut, where they stand, what is seen and picked of them. FEATURES: W5.
 
-use enfilade_cpg::{CellId, Locator, PortalId, World};
+use enfilade_cpg::{CellId, Locator, PortalId, Pvs, VisibleParts, World};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_runtime::{DetailId, Sight, SightState, Sightlines, Target, View, Viewer};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
@@ -186,6 +186,26 @@ fn a_leaf_is_seen_wherever_it_stands() {
         }
     }
     assert!(n_seen > 300, "{n_seen}");
+}
+
+/// What a world says of what is seen from a cell is of leaves where the model has them: none is left out for it.
+#[test]
+fn a_leaf_is_seen_whatever_was_computed_before() {
+    let mut world = two_rooms(false);
+    let n = world.graph.cells.len() as u32;
+    let mut pvs = Pvs::of_ascending((0..n).map(|_| 0..n));
+    let nothing: Vec<[u32; 0]> = vec![[]; pvs.n_pairs()];
+    pvs.parts = Some(VisibleParts::of_ascending(nothing));
+    world.pvs = Some(pvs);
+    let sight = Sight::build(&world).unwrap();
+    let mut state = SightState::new(&sight);
+    state.set_leaves(DOOR, 0.7);
+    let eye = (middle(&world) - DVec3::X * 1.5).as_vec3().to_array();
+    let view = View::around(eye).unwrap();
+    let mut viewer = Viewer::new(&sight);
+    let seen = viewer.see(&sight, &state, &view);
+    assert!(seen.chunks().is_empty());
+    assert_eq!(seen.details(), [sight.leaves(DOOR)[0].detail]);
 }
 
 #[test]

@@ -96,6 +96,7 @@ proptest! {
             narrowing: [Narrowing::Rectangle, Narrowing::Polygon, Narrowing::PolygonOf(4)][size % 3],
             occlusion,
             min_share,
+            precomputed: true,
             // Fewer clips would be capped later: the answer would be smaller.
             max_clips: u32::MAX,
         };

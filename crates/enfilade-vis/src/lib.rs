@@ -10,6 +10,9 @@
 //!    splitting, and at last by `stabbing`, a linear programme. This is the heart; start reading there.
 //! 5. `occlude`: where walls are known, beams settle what they hide inside cells.
 //!
+//! What is seen of each cell, finer than whole cells, comes after: [`see_parts`], by the hourglasses of sequences of portals
+//! ([`Hourglasses`]), and by what walls hide from the last of them (`shade`).
+//!
 //! `search` puts them together in rounds, so that results do not depend on threads.
 //!
 //! **The answer is a superset of the truth.** Sight is symmetric and so is the answer. A line that passes
@@ -24,18 +27,23 @@ mod dirs;
 mod evidence;
 mod flow;
 mod grow;
+mod hourglass;
 mod narrow;
 mod occlude;
 mod output;
+mod parts;
 mod planes;
+mod polytope;
 mod prove;
 mod rays;
 mod recheck;
 mod rng;
 mod search;
+mod shade;
 mod sheets;
 mod stabbing;
 mod tolerance;
+mod volumes;
 
 use std::time::Instant;
 
@@ -49,7 +57,10 @@ use search::{Rest, Search};
 use sheets::Sheets;
 
 pub use config::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
+pub use hourglass::{Hourglass, Hourglasses};
 pub use output::{VisOutput, Witness};
+pub use parts::see_parts;
+pub use volumes::piece_faces;
 
 /// Lines tried between cells that walls may hide from each other, and how often, before each beam is looked at.
 const INSIST_LINES: usize = 50;

@@ -27,7 +27,7 @@ const MAX_BEAMS: usize = 20_000;
 /// Places along a line from which a sheet is grown.
 const MAX_SEEDS: usize = 6;
 /// Distances that count as apart, in roundings; a checker asks for half of it.
-const APART: f64 = 16.0;
+pub(crate) const APART: f64 = 16.0;
 
 /// What the lines from one opening to another meet.
 enum Verdict {
@@ -46,7 +46,7 @@ struct Settled {
 
 impl Dirs {
     /// Where lines may cross the pieces of an opening: on its plane, so far inside their edges.
-    fn open_parts(&self, d: usize, inset: f64) -> Vec<Vec<DVec3>> {
+    pub(crate) fn open_parts(&self, d: usize, inset: f64) -> Vec<Vec<DVec3>> {
         let dir = &self.all[d];
         let height = (dir.low + dir.high) * 0.5;
         let pieces = &self.pieces[dir.pieces.start as usize..dir.pieces.end as usize];
@@ -308,7 +308,7 @@ impl Search<'_> {
 }
 
 /// Some of so many places, the ends first.
-fn spread(n: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn spread(n: usize) -> impl Iterator<Item = usize> {
     let front = 0..n.min(MAX_SEEDS);
     front.map(move |i| if i % 2 == 0 { i / 2 } else { n - 1 - i / 2 })
 }

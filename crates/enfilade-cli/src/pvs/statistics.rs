@@ -4,9 +4,11 @@
 //! section 3.2.2 (pairs for radiosity).
 
 use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use std::ops::Range;
 
-use enfilade::cpg::{CellId, Pvs, SightGraph, World};
+use enfilade::cpg::{CellId, PartNumbers, Pvs, SightGraph, World};
 use enfilade::geom::DVec3;
 
 /// What can be seen from each cell.
@@ -16,6 +18,9 @@ pub(super) struct Statistics {
     cells: Vec<FromCell>,
     /// The ten viewpoints from which most can be seen, the worst first: by triangles, then by cells.
     worst: Vec<Viewpoint>,
+    /// Triangles of walls and objects in the world.
+    #[serde(rename = "triangles")]
+    pub(super) n_triangles: usize,
 }
 
 #[derive(serde::Serialize)]
@@ -27,6 +32,19 @@ struct FromCell {
     objects: usize,
     visible_objects: Vec<u32>,
     /// Triangles of walls and objects that can be seen.
+    triangles: usize,
+    /// Detail objects and triangles of the cells that can be seen, whether or not they can be seen themselves.
+    objects_of_cells: usize,
+    triangles_of_cells: usize,
+    /// What of each cell can be seen, by cell; of these numbers the sum may be more than the whole, as what two cells share counts
+    /// for both.
+    destinations: Vec<Destination>,
+}
+
+#[derive(serde::Serialize)]
+struct Destination {
+    cell: u32,
+    objects: usize,
     triangles: usize,
 }
 
@@ -41,10 +59,20 @@ struct Viewpoint {
 }
 
 impl Statistics {
-    /// Time: cells times batches and objects.
+    /// By the parts that `visible` has, or by whole cells where it has none. Time: pairs of cells times what is in the second.
     pub(super) fn new(visible: &Pvs, world: Option<&World>, graph: &SightGraph) -> Self {
-        let cells: Vec<FromCell> = (0..visible.n_cells())
-            .map(|c| from_cell(c, visible, world))
+        let contents = world.map(Contents::new);
+        let mut first_pair = 0;
+        let cells: Vec<FromCell> = (0..visible.n_cells() as u32)
+            .map(|c| {
+                let mut from = FromCell::new(visible, CellId(c));
+                if let (Some(world), Some(contents)) = (world, &contents) {
+                    from.name.clone_from(&world.graph.cells[c as usize].name);
+                    contents.count(visible, CellId(c), first_pair, &mut from);
+                }
+                first_pair += from.cells;
+                from
+            })
             .collect();
         let mut order: Vec<usize> = (0..cells.len()).collect();
         order.sort_by_key(|&c| (Reverse((cells[c].triangles, cells[c].cells)), c));
@@ -59,37 +87,126 @@ impl Statistics {
                 triangles: cells[c].triangles,
             })
             .collect();
-        Self { cells, worst }
+        let n_triangles = contents.map_or(0, |c| c.triangles_of(0..c.numbers.n_parts()));
+        Self {
+            cells,
+            worst,
+            n_triangles,
+        }
+    }
+
+    /// Triangles that a cell sees, and those of the cells that it sees, on average.
+    pub(super) fn mean_triangles(&self) -> [f64; 2] {
+        let n = self.cells.len().max(1) as f64;
+        let sums = self.cells.iter().fold([0, 0], |[a, b], cell| {
+            [a + cell.triangles, b + cell.triangles_of_cells]
+        });
+        sums.map(|sum| sum as f64 / n)
     }
 }
 
-fn from_cell(c: usize, visible: &Pvs, world: Option<&World>) -> FromCell {
-    let mut from = FromCell {
-        name: String::new(),
-        cells: visible.n_visible_from(CellId(c as u32)),
-        objects: 0,
-        visible_objects: Vec::new(),
-        triangles: 0,
-    };
-    let Some(world) = world else { return from };
-    let is_seen = |cells: &[CellId]| {
-        cells
-            .iter()
-            .any(|&cell| visible.sees(CellId(c as u32), cell))
-    };
-    from.name.clone_from(&world.graph.cells[c].name);
-    let batches = world.batches.iter().filter(|batch| is_seen(&batch.cells));
-    from.triangles = batches.map(|batch| batch.primitive.indices.len() / 3).sum();
-    for (i, object) in world.details.iter().enumerate() {
-        if is_seen(&object.cells) {
-            from.visible_objects.push(i as u32);
-            let mesh = &world.detail_meshes[object.mesh as usize];
-            let indices = mesh.primitives.iter().map(|p| p.indices.len());
-            from.triangles += indices.sum::<usize>() / 3;
+impl FromCell {
+    fn new(visible: &Pvs, cell: CellId) -> Self {
+        Self {
+            name: String::new(),
+            cells: visible.n_visible_from(cell),
+            objects: 0,
+            visible_objects: Vec::new(),
+            triangles: 0,
+            objects_of_cells: 0,
+            triangles_of_cells: 0,
+            destinations: Vec::new(),
         }
     }
-    from.objects = from.visible_objects.len();
-    from
+}
+
+/// What is in each cell, by [`PartNumbers`].
+struct Contents {
+    numbers: PartNumbers,
+    /// By detail object, the triangles of those before it, and then of all.
+    of_details: Vec<usize>,
+    by_cell: Vec<Vec<Range<u32>>>,
+    /// By cell, the batches that are seen from it without passing a portal.
+    batches: Vec<Vec<u32>>,
+}
+
+impl Contents {
+    fn new(world: &World) -> Self {
+        let numbers = PartNumbers::new(world);
+        let mut by_cell = vec![Vec::new(); world.graph.cells.len()];
+        let mut batches = vec![Vec::new(); world.graph.cells.len()];
+        for (i, batch) in world.batches.iter().enumerate() {
+            for cell in &batch.cells {
+                batches[cell.idx()].push(i as u32);
+                by_cell[cell.idx()].push(numbers.of_batch(i));
+            }
+        }
+        let mut of_details = vec![0];
+        for (i, object) in (0..).zip(&world.details) {
+            for cell in &object.cells {
+                let part = numbers.of_detail(i);
+                by_cell[cell.idx()].push(part..part + 1);
+            }
+            let mesh = &world.detail_meshes[object.mesh as usize];
+            let n: usize = mesh.primitives.iter().map(|p| p.indices.len() / 3).sum();
+            of_details.push(of_details[i as usize] + n);
+        }
+        Self {
+            numbers,
+            of_details,
+            by_cell,
+            batches,
+        }
+    }
+
+    /// The triangles of walls and objects in a range of parts.
+    fn triangles_of(&self, parts: Range<u32>) -> usize {
+        let split = self.numbers.n_triangles();
+        let walls = parts.end.min(split).saturating_sub(parts.start) as usize;
+        let detail = |part: u32| self.of_details[part.saturating_sub(split) as usize];
+        walls + detail(parts.end) - detail(parts.start)
+    }
+
+    fn count(&self, visible: &Pvs, cell: CellId, first_pair: usize, from: &mut FromCell) {
+        let n_parts = self.numbers.n_parts() as usize;
+        let (mut seen, mut held) = (vec![false; n_parts], vec![false; n_parts]);
+        for (pair, to) in (first_pair..).zip(visible.visible_from(cell)) {
+            let all = &self.by_cell[to.idx()];
+            for parts in all {
+                held[parts.start as usize..parts.end as usize].fill(true);
+            }
+            let runs: Vec<Range<u32>> = match &visible.parts {
+                Some(parts) => parts.runs_of(pair).iter().map(|&[a, b]| a..b).collect(),
+                None => all.clone(),
+            };
+            let split = self.numbers.n_triangles();
+            let objects = runs
+                .iter()
+                .map(|r| r.end.saturating_sub(r.start.max(split)));
+            from.destinations.push(Destination {
+                cell: to.0,
+                objects: objects.sum::<u32>() as usize,
+                triangles: runs.iter().map(|r| self.triangles_of(r.clone())).sum(),
+            });
+            for parts in runs {
+                seen[parts.start as usize..parts.end as usize].fill(true);
+            }
+        }
+        let ones = |bits: &[bool]| {
+            let numbers = (0..).zip(bits.to_vec());
+            numbers.filter(|b| b.1).map(|b| b.0).collect::<Vec<u32>>()
+        };
+        let split = self.numbers.n_triangles();
+        let is_object = |&part: &u32| part >= split;
+        let sum = |parts: &[u32]| parts.iter().map(|&p| self.triangles_of(p..p + 1)).sum();
+        let (seen, held) = (ones(&seen), ones(&held));
+        from.triangles = sum(&seen);
+        from.triangles_of_cells = sum(&held);
+        let objects = seen.iter().copied().filter(is_object);
+        from.visible_objects = objects.map(|part| part - split).collect();
+        from.objects = from.visible_objects.len();
+        from.objects_of_cells = held.iter().copied().filter(is_object).count();
+    }
 }
 
 fn viewpoint(c: usize, world: Option<&World>, graph: &SightGraph) -> DVec3 {
@@ -110,9 +227,10 @@ fn viewpoint(c: usize, world: Option<&World>, graph: &SightGraph) -> DVec3 {
 }
 
 /// Pairs that may see each other, each once, as text: `MUT1`, then a line a cell with the greater numbers that it
-/// sees, as ranges; with a world, the same for its batches of structural triangles.
+/// sees, as ranges; with a world, the same for its surfaces: its batches of structural triangles.
 ///
-/// Two surfaces may see each other where a cell of one sees a cell of the other.
+/// Two surfaces may see each other where there are two cells, one of each, and something of either surface may be seen from the other's cell: by the
+/// parts that `visible` has, or by whole cells where it has none.
 pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
     let mut out = String::from("MUT1\n");
     let _ = writeln!(out, "cells {}", visible.n_cells());
@@ -121,22 +239,39 @@ pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
         put_greater(&mut out, a, set.map(|b| b.0));
     }
     let Some(world) = world else { return out };
-    let n = world.batches.len();
-    let mut by_cell = vec![Vec::new(); visible.n_cells()];
-    for (i, batch) in world.batches.iter().enumerate() {
-        for cell in &batch.cells {
-            by_cell[cell.0 as usize].push(i as u32);
-        }
-    }
-    let _ = writeln!(out, "surfaces {n}");
-    for (i, batch) in world.batches.iter().enumerate() {
-        let cells = batch.cells.iter().flat_map(|&c| visible.visible_from(c));
-        let mut seen: Vec<u32> = cells
-            .flat_map(|c| by_cell[c.0 as usize].iter().copied())
-            .collect();
-        seen.sort_unstable();
-        seen.dedup();
+    let _ = writeln!(out, "surfaces {}", world.batches.len());
+    for (i, seen) in mutual_surfaces(visible, world).into_iter().enumerate() {
         put_greater(&mut out, i, seen.into_iter());
+    }
+    out
+}
+
+/// By surface, those that it may see and that may see it, ascending.
+fn mutual_surfaces(visible: &Pvs, world: &World) -> Vec<BTreeSet<u32>> {
+    let contents = Contents::new(world);
+    // By pair of cells, the surfaces of the second that the first may see.
+    let mut seen: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+    for (pair, (a, b)) in visible.pairs().enumerate() {
+        let in_sight = |batch: u32| {
+            let triangles = contents.numbers.of_batch(batch as usize);
+            let meets = |run: &[u32; 2]| run[0] < triangles.end && triangles.start < run[1];
+            let parts = visible.parts.as_ref();
+            parts.is_none_or(|parts| parts.runs_of(pair).iter().any(meets))
+        };
+        let batches = contents.batches[b.idx()].iter().copied();
+        seen.insert((a.0, b.0), batches.filter(|&i| in_sight(i)).collect());
+    }
+    let mut out = vec![BTreeSet::new(); world.batches.len()];
+    for (&(a, b), of_b) in &seen {
+        let Some(of_a) = seen.get(&(b, a)).filter(|_| a <= b) else {
+            continue;
+        };
+        for &i in of_a {
+            for &j in of_b {
+                out[i as usize].insert(j);
+                out[j as usize].insert(i);
+            }
+        }
     }
     out
 }

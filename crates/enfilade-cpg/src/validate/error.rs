@@ -74,6 +74,14 @@ pub enum GraphError {
         /// What is wrong with its row.
         problem: &'static str,
     },
+    /// What may be seen of one cell from another does not fit the world.
+    #[error("potentially visible set, what cell {} sees of cell {}: {problem}; compute it again", .cells[0], .cells[1])]
+    PvsPair {
+        /// The cells; past the last one where no pair is to blame.
+        cells: [u32; 2],
+        /// What is wrong.
+        problem: &'static str,
+    },
     /// A portal joins a cell to itself or to a cell that does not exist.
     #[error("portal {portal} joins cells {cells:?}; they must differ and lie below {n_cells}")]
     PortalCells {

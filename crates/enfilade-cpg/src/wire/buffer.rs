@@ -7,6 +7,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Image, Primitive};
 
 use super::json::{self, FLOAT, LINE_STRIP, TRIANGLES, U16, U32, VERTICES};
+use super::visible::words;
 use crate::World;
 
 /// A stretch of the buffer that holds one kind of vertex data or indices for all primitives.
@@ -282,10 +283,16 @@ impl<'a> Layout<'a> {
             }
         }
         if let Some(pvs) = &world.pvs {
-            for words in [&pvs.ends[..], pvs.runs.as_flattened()] {
+            for words in words(pvs).filter(|w| !w.is_empty()) {
                 bulk.align(ALIGNMENT);
                 for word in words {
                     bulk.out.extend_from_slice(&word.to_le_bytes());
+                }
+            }
+            if let Some(volumes) = pvs.volumes.as_ref().filter(|v| !v.planes.is_empty()) {
+                bulk.align(ALIGNMENT);
+                for v in volumes.planes.as_flattened() {
+                    bulk.out.extend_from_slice(&v.to_le_bytes());
                 }
             }
         }

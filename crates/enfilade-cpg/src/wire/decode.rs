@@ -16,6 +16,7 @@ use super::fitting;
 use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
 use super::origin;
 use super::rows::{Row, eight, four, pairs};
+use super::visible::read_pvs;
 use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError, broken};
 use crate::look::material_of_text;
 use crate::{
@@ -224,18 +225,12 @@ impl<'a> Reader<'a> {
             return Ok(None);
         };
         let of = "the potentially visible set";
-        let (rows, runs) = (
-            self.optional_view(pvs.rows, of)?,
-            self.optional_view(pvs.runs, of)?,
-        );
-        self.spend(rows.len() as u64 + runs.len() as u64)?;
-        let (rows, rows_rest) = rows.as_chunks::<4>();
-        let runs = pairs(runs).filter(|_| rows_rest.is_empty());
-        let runs = runs.ok_or_else(|| broken(of, "a buffer view is cut off"))?;
-        Ok(Some(Pvs {
-            ends: rows.iter().map(|&r| u32::from_le_bytes(r)).collect(),
-            runs,
-        }))
+        let view = |view| {
+            let bytes = self.optional_view(view, of)?;
+            self.spend(bytes.len() as u64)?;
+            Ok(bytes)
+        };
+        read_pvs(pvs, view, &|| broken(of, "a buffer view is cut off")).map(Some)
     }
 
     fn graph(&mut self) -> Result<CellPortalGraph, WireError> {

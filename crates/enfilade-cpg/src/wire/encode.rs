@@ -109,6 +109,15 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
     let pvs = world.pvs.as_ref().map(|pvs| json::PvsJson {
         rows: layout.view(pvs.ends.len() as u64 * 4),
         runs: layout.view(pvs.runs.len() as u64 * 8),
+        parts: pvs.parts.as_ref().map(|parts| json::PartsJson {
+            rows: layout.view(parts.ends.len() as u64 * 4),
+            runs: layout.view(parts.runs.len() as u64 * 8),
+        }),
+        volumes: pvs.volumes.as_ref().map(|volumes| json::VolumesJson {
+            rows: layout.view(volumes.ends.len() as u64 * 4),
+            pieces: layout.view(volumes.piece_ends.len() as u64 * 4),
+            planes: layout.view(volumes.planes.len() as u64 * 32),
+        }),
     });
     let n_runs: usize = world.batches.iter().map(|b| b.sources.runs().len()).sum();
     let source_runs = layout.view(n_runs as u64 * 8);

@@ -386,6 +386,7 @@ pub(super) struct LocatorJson {
 }
 
 #[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct PvsJson {
     /// Buffer view: by cell, where its runs end. Absent where there is no cell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -393,6 +394,35 @@ pub(super) struct PvsJson {
     /// Buffer view of runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) runs: Option<u32>,
+    /// What is seen by pair of cells. Absent where it was not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) parts: Option<PartsJson>,
+    /// By pair of cells. Absent where they were not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) volumes: Option<VolumesJson>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct PartsJson {
+    /// Buffer view: by pair, where its runs end. Absent where there is no cell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) rows: Option<u32>,
+    /// Buffer view of runs. Absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) runs: Option<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct VolumesJson {
+    /// Buffer view: by pair, where its pieces end. Absent where there is no cell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) rows: Option<u32>,
+    /// Buffer view: by piece, where its planes end. Absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) pieces: Option<u32>,
+    /// Buffer view of planes. Absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) planes: Option<u32>,
 }
 
 #[derive(Serialize, Deserialize)]

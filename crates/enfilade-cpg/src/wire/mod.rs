@@ -39,6 +39,7 @@ mod json;
 mod origin;
 mod rows;
 mod transform;
+mod visible;
 
 pub use decode::decode_glb;
 pub use encode::encode_glb;

@@ -3,8 +3,8 @@
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Fitting, FittingPart, Locator,
-    LocatorNode, Motion, MotionKind, Portal, PortalId, PortalKind, Provenance, Pvs, SourceRuns,
-    Statistics, World,
+    LocatorNode, Motion, MotionKind, PartNumbers, Portal, PortalId, PortalKind, Provenance, Pvs,
+    SourceRuns, Statistics, VisibleParts, VisibleVolumes, World,
 };
 use enfilade_geom::scene::{
     About, Fixture, FixtureKind, Image, Material, Mesh, Primitive, SourceNode, Texture,
@@ -281,6 +281,21 @@ pub(crate) fn two_rooms_with_pvs() -> World {
     let mut rows = vec![CellSet::all(n); n];
     rows[n - 1].remove(CellId(1));
     world.pvs = Some(Pvs::of_rows(&rows));
+    world
+}
+
+/// The same with what is seen by pair of cells.
+#[allow(dead_code)] // Not all tests that share this file use it.
+pub(crate) fn two_rooms_with_parts() -> World {
+    let mut world = two_rooms_with_pvs();
+    let n_parts = PartNumbers::new(&world).n_parts();
+    let pvs = world.pvs.as_mut().unwrap();
+    let n_pairs = pvs.n_pairs() as u32;
+    let row = |pair: u32| (0..n_parts).filter(move |part| (part + pair) % 3 != 0);
+    pvs.parts = Some(VisibleParts::of_ascending((0..n_pairs).map(row)));
+    let plane = |pair: u32| [0.0, 1.0, 0.0, f64::from(pair)];
+    let pieces = |pair: u32| vec![vec![plane(pair); pair as usize % 3]; pair as usize % 2 + 1];
+    pvs.volumes = Some(VisibleVolumes::of_pairs((0..n_pairs).map(pieces)));
     world
 }
 

@@ -83,11 +83,13 @@ impl Traversal<'_, '_> {
         let viewer = &mut *self.viewer;
         let (out, stamps, shadows) = (&mut viewer.out, &mut viewer.item_stamps, &viewer.shadows);
         let frame = viewer.frame_stamp;
+        let (is_bounded, allowed) = (viewer.is_bounded, &viewer.allowed);
         sight
             .trees
             .for_each_inside(root, &self.planes, |item, [min, max]| {
                 let stamp = &mut stamps[item as usize];
-                if *stamp == frame {
+                let is_out = is_bounded && allowed[item as usize / 64] >> (item % 64) & 1 == 0;
+                if *stamp == frame || is_out {
                     return;
                 }
                 let (min, max): (Vec3, Vec3) = (min.truncate(), max.truncate());

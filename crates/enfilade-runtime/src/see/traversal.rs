@@ -70,6 +70,10 @@ impl Traversal<'_, '_> {
                 }
             }
         }
+        // An eye in two cells sees what either does; that is rare, and costs no more than without.
+        if self.viewer.pending.len() == 1 {
+            self.viewer.bound_by(self.sight, cell);
+        }
     }
 
     fn push_start(&mut self, cell: u32) {

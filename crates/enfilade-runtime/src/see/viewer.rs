@@ -19,6 +19,8 @@ pub struct SeeOptions {
     pub narrowing: Narrowing,
     /// Whether large polygons inside cells hide what is behind them.
     pub occlusion: bool,
+    /// Whether what the world says can be seen from the eye's cell (`enfilade pvs --parts`) bounds the answer.
+    pub precomputed: bool,
     /// Portals clipped at most; after that, all cells within reach count as visible.
     pub max_clips: u32,
     /// A portal whose rectangle is less than this share of the screen is not followed but listed in
@@ -32,6 +34,7 @@ impl Default for SeeOptions {
         Self {
             narrowing: Narrowing::PolygonOf(8),
             occlusion: true,
+            precomputed: true,
             max_clips: 20_000,
             min_share: 0.0,
         }
@@ -78,6 +81,9 @@ pub struct Viewer {
     pub(super) portal_stamps: Vec<u32>,
     pub(super) stop_stamps: Vec<u32>,
     pub(super) item_stamps: Vec<u32>,
+    /// By chunk and detail, a bit: whether it may be seen from the eye's cell. Counts where `is_bounded`.
+    pub(super) allowed: Vec<u64>,
+    pub(super) is_bounded: bool,
     pub(super) face_stamp: u32,
     pub(super) frame_stamp: u32,
     pub(super) pending: Vec<Pending>,
@@ -110,6 +116,8 @@ impl Viewer {
             portal_stamps: vec![0; sight.n_portals()],
             stop_stamps: vec![0; sight.n_portals()],
             item_stamps: vec![0; sight.chunks.len() + sight.details.len()],
+            allowed: Vec::new(),
+            is_bounded: false,
             face_stamp: 0,
             frame_stamp: 0,
             pending: Vec::new(),
@@ -125,7 +133,27 @@ impl Viewer {
         &mut self.options
     }
 
+    /// Takes what may be seen from the eye's cell, where the world says so.
+    pub(super) fn bound_by(&mut self, sight: &Sight, cell: u32) {
+        let Some(seen) = sight
+            .seen_from
+            .as_ref()
+            .filter(|_| self.options.precomputed)
+        else {
+            return;
+        };
+        self.allowed.clear();
+        self.allowed.resize(self.item_stamps.len().div_ceil(64), 0);
+        for &[first, end] in seen.runs_of(cell as usize) {
+            for item in first..end {
+                self.allowed[item as usize / 64] |= 1 << (item % 64);
+            }
+        }
+        self.is_bounded = true;
+    }
+
     pub(super) fn begin(&mut self) {
+        self.is_bounded = false;
         let out = &mut self.out;
         out.visits.clear();
         out.planes.clear();

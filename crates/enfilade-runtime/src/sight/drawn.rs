@@ -1,6 +1,6 @@
 //! What of a world is drawn, in pieces small enough to be left out one by one, and the trees over their boxes.
 
-use enfilade_cpg::{Batch, CellId, DetailObject, World};
+use enfilade_cpg::{Batch, CellId, DetailObject, VisibleParts, World};
 use enfilade_geom::{Aabb, DMat4};
 
 use crate::boxes::{BoxTrees, Boxed, Root};
@@ -23,6 +23,8 @@ pub(super) struct Drawn {
     pub(super) details: Vec<Detail>,
     /// By batch: its triangles as index triples, sorted so that chunks are ranges.
     pub(super) indices: Vec<Vec<u32>>,
+    /// By triangle of all batches in order, its chunk.
+    chunk_of: Vec<u32>,
     /// Largest absolute coordinate, or 1. [Units: wu]
     pub(super) extent: f64,
 }
@@ -37,6 +39,7 @@ impl Drawn {
             chunks: Vec::new(),
             details: Vec::new(),
             indices: Vec::new(),
+            chunk_of: Vec::new(),
             extent: 1.0,
         };
         for (index, batch) in world.batches.iter().enumerate() {
@@ -85,8 +88,17 @@ impl Drawn {
             self.extent = self.extent.max(point(*p).abs().max_element());
         }
         let size = options.chunk_triangles.max(1);
-        let indices = chunks_of(index, &batch.primitive, size, &mut self.chunks);
-        self.indices.push(indices);
+        let first = self.chunks.len();
+        let sorted = chunks_of(index, &batch.primitive, size, &mut self.chunks);
+        let base = self.chunk_of.len();
+        self.chunk_of.resize(base + sorted.numbers.len(), 0);
+        for (chunk, item) in self.chunks[first..].iter().zip(first as u32..) {
+            let place = chunk.first_index as usize / 3;
+            for &number in &sorted.numbers[place..place + chunk.n_triangles() as usize] {
+                self.chunk_of[base + number as usize] = item;
+            }
+        }
+        self.indices.push(sorted.indices);
         Some(())
     }
 
@@ -113,6 +125,42 @@ impl Drawn {
             n_triangles,
         });
         Some(())
+    }
+
+    /// By cell, the chunks and details (from `chunks.len()` on) that may be seen from it, where the world says so. Time: pairs of
+    /// cells that see each other, and what the second ones hold.
+    pub(super) fn seen_from(&self, world: &World, doors: &Doors) -> Option<VisibleParts> {
+        let pvs = world.pvs.as_ref()?;
+        let is_whole = pvs.n_cells() == world.graph.cells.len();
+        let parts = (pvs.parts.as_ref()).filter(|p| is_whole && p.n_pairs() == pvs.n_pairs())?;
+        let n_chunks = self.chunks.len();
+        let item_of = |part: u32| {
+            let detail = || n_chunks + (part as usize - self.chunk_of.len());
+            let chunk = self.chunk_of.get(part as usize);
+            chunk.map_or_else(detail, |&chunk| chunk as usize)
+        };
+        // Cell by cell; an item is seen if any part of it is, of whatever cell.
+        let mut last_seen_by = vec![u32::MAX; n_chunks + self.details.len()];
+        let mut rows = vec![Vec::new(); pvs.n_cells()];
+        for (pair, (from, _)) in pvs.pairs().enumerate() {
+            for part in parts.runs_of(pair).iter().flat_map(|&[a, b]| a..b) {
+                let item = item_of(part);
+                let by = last_seen_by.get_mut(item)?;
+                if *by != from.0 {
+                    *by = from.0;
+                    rows[from.idx()].push(item as u32);
+                }
+            }
+        }
+        // What is known of leaves is known of where the model has them: they move, and are never left out.
+        let leaves = (0..self.details.len()).filter(|&d| doors.way(d as u32).is_some());
+        let leaves: Vec<u32> = leaves.map(|d| (n_chunks + d) as u32).collect();
+        for row in &mut rows {
+            row.extend_from_slice(&leaves);
+            row.sort_unstable();
+            row.dedup();
+        }
+        Some(VisibleParts::of_ascending(rows))
     }
 
     pub(super) fn n_triangles(&self) -> u64 {

@@ -1,0 +1,110 @@
+//! Whether doors know their leaves: each has one, shut it hides what is behind, and no picture shows less for it.
+
+use enfilade::cpg::{PortalId, PortalKind, World};
+use enfilade::runtime::{Sight, SightState, View, Viewer};
+use enfilade_cli::cameras::random_camera;
+use enfilade_render::{AdapterChoice, Camera, Gpu, Oracle, Studio};
+use enfilade_testkit::Rng;
+
+use super::Figure;
+
+/// Views in random states of doors, and the size of their pictures.
+const VIEWS: usize = 1000;
+const SIZE: [u32; 2] = [320, 240];
+/// How far before a shut door one stands. [Units: wu]
+const BEFORE: f32 = 0.6;
+
+fn doors(world: &World) -> Vec<PortalId> {
+    let all = (0..).map(PortalId).zip(&world.graph.portals);
+    let doors = all.filter(|(_, p)| p.kind == PortalKind::Door);
+    doors.map(|(id, _)| id).collect()
+}
+
+/// Doors that know no leaf.
+pub(super) fn without_leaf(world: &World) -> anyhow::Result<Figure> {
+    let sight = Sight::build(world)?;
+    let doors = doors(world);
+    let without = doors.iter().filter(|d| sight.leaves(**d).is_empty());
+    Ok(Figure {
+        value: without.count() as f64,
+        most: 0.0,
+        note: format!("of {} doors have no leaf", doors.len()),
+    })
+}
+
+/// Sides of doors from which, all doors being shut, another cell is seen through one, or its leaf is not.
+pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
+    let sight = Sight::build(world)?;
+    let mut state = SightState::new(&sight);
+    let mut viewer = Viewer::new(&sight);
+    let doors = doors(world);
+    for &door in &doors {
+        state.set_leaves(door, 0.0);
+    }
+    let (mut n_sides, mut n_bad, mut most) = (0, 0, 0);
+    for &door in &doors {
+        let portal = &world.graph[door];
+        let middle = portal.center();
+        for (side, cell) in [(-1.0, portal.cells[0]), (1.0, portal.cells[1])] {
+            let n = portal.normal.map(|n| n * side);
+            let eye = [0, 1, 2].map(|k| middle[k] + BEFORE * n[k]);
+            // Where something else is right before the door, nobody stands.
+            if sight.locate(eye) != Some(cell) {
+                continue;
+            }
+            // Narrow enough that nothing but the door is in view.
+            let view = View::perspective(eye, n.map(|x| -x), [0.0, 1.0, 0.0], 0.3, 1.0)?;
+            let seen = viewer.see(&sight, &state, &view);
+            let has_leaf = sight
+                .leaves(door)
+                .iter()
+                .any(|l| seen.details().contains(&l.detail));
+            n_sides += 1;
+            n_bad += usize::from(seen.cells().len() > 1 || !has_leaf);
+            most = most.max(seen.cells().len());
+        }
+    }
+    Ok(Figure {
+        value: f64::from(n_bad as u32),
+        most: 0.0,
+        note: format!(
+            "of {n_sides} sides of shut doors show another cell or no leaf; at most {most} cells seen"
+        ),
+    })
+}
+
+/// Pixels that culling loses in random states of doors, by the rule of `verify --views --doors`.
+pub(super) fn pixels_lost(world: &World) -> anyhow::Result<Figure> {
+    let gpu = Gpu::open(&AdapterChoice::Software)?;
+    let mut studio = Studio::new(gpu, world)?;
+    let bounds = studio.world.bounds();
+    let mut oracle = Oracle::new(world, &studio.sight);
+    let mut rng = Rng::new(1);
+    let (mut n_lost, mut n_pixels, mut n_views) = (0, 0, 0);
+    for _ in 0..VIEWS {
+        studio.state = enfilade_cli::doors::random_doors(&mut rng, &studio.sight);
+        oracle.follow(&studio.sight, &studio.state);
+        let camera = random_camera(&mut rng, world, &studio.sight, bounds);
+        if oracle.is_at_surface(camera.eye) {
+            continue;
+        }
+        n_views += 1;
+        let [whole, culled] = studio.ids_compared(&camera, SIZE)?;
+        for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
+            let difference = a.difference(b);
+            n_pixels += if layer == 0 { difference.n_pixels } else { 0 };
+            n_lost += (difference.lost.iter())
+                .filter(|l| {
+                    let drawn = f64::from(Camera::distance_of(l.found.1));
+                    !oracle.is_right(&camera, l.at, SIZE, drawn, layer == 1)
+                        && oracle.is_met(&camera, l.at, SIZE, l.expected.0, layer == 1)
+                })
+                .count();
+        }
+    }
+    Ok(Figure {
+        value: n_lost as f64,
+        most: 0.0,
+        note: format!("of {n_pixels} pixels of {n_views} views are lost"),
+    })
+}

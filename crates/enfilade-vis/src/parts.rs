@@ -1,0 +1,210 @@
+//! Which triangles and objects of each cell may be seen from each other cell: those that its visible volume meets.
+//!
+//! After Dirkse 2002, section 7.6.2 (objects by cell), by the triangles themselves rather than by boxes.
+//! Errs to visible: a triangle counts as seen where it touches a piece of the volume; all in a cell counts as seen from the cell itself.
+
+use enfilade_cpg::{
+    Batch, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes, World,
+};
+use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Plane, Triangle, world_tolerance};
+use rayon::prelude::*;
+
+use crate::hourglass::Hourglasses;
+use crate::polytope::clip;
+use crate::shade::Shade;
+use crate::sheets::Sheets;
+use crate::volumes::{ANY_ENTRY, volumes_of};
+
+/// Rounding of what is computed here. [Units: wu] The volumes hold the world's tolerance themselves.
+const EPS: f64 = 1e-9;
+
+/// What of each cell can be seen from each other, by pair of cells in the order of `pvs`: volumes, and the triangles and objects that they
+/// meet, less what walls inside the cell hide from the portals that lead into it.
+///
+/// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth. Walls are the world's structural
+/// triangles, but those that light passes; details hide nothing, as they may be moved.
+///
+/// Time grows with the sequences of portals that lines may pass, and with pairs of portals and what is in front of them; a building of 300 portals
+/// takes seconds. Threads come from the current rayon pool; the result does not depend on their number.
+///
+/// # Errors
+///
+/// A graph that is broken.
+pub fn see_parts(
+    world: &World,
+    pvs: &Pvs,
+) -> Result<(VisibleVolumes, VisibleParts), SightGraphError> {
+    let glasses = Hourglasses::new(&SightGraph::of_graph(&world.graph))?;
+    let (volumes, entries) = volumes_of(world, pvs, &glasses);
+    let (all, by_cell) = (all_parts(world), by_cell(world));
+    let candidates = candidates(pvs, &volumes, &entries, (&all, &by_cell));
+    let mut asked: Vec<(u32, u32)> = candidates.iter().flatten().copied().collect();
+    asked.par_sort_unstable();
+    asked.dedup();
+    asked.retain(|&(entry, _)| entry != ANY_ENTRY);
+    let walls = walls(world);
+    let bvh = Bvh::build(&walls);
+    let sheets = Sheets::new(&walls, &bvh);
+    let shade = Shade {
+        sheets: &sheets,
+        dirs: glasses.dirs(),
+        inset: glasses.clearance(),
+        rounding: glasses.tolerance().rounding,
+    };
+    let slack = world_tolerance(glasses.dirs().scale);
+    let is_hidden: Vec<bool> = (asked.par_iter())
+        .with_min_len(64)
+        .map(|&(entry, part)| {
+            let bounds = all[part as usize].bounds.expanded(slack);
+            shade.hides(glasses.place(entry), &bounds)
+        })
+        .collect();
+    let is_seen = |pair: &&(u32, u32)| match asked.binary_search(pair) {
+        Ok(at) => !is_hidden[at],
+        Err(_) => true,
+    };
+    let rows = candidates.iter().map(|row| {
+        let mut parts: Vec<u32> = row.iter().filter(is_seen).map(|pair| pair.1).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        parts
+    });
+    let parts = VisibleParts::of_ascending(rows);
+    Ok((volumes, parts))
+}
+
+/// By pair of cells, which parts of the second its pieces meet: the portal through which a piece is seen, and the part.
+fn candidates(
+    pvs: &Pvs,
+    volumes: &VisibleVolumes,
+    entries: &[u32],
+    (all, by_cell): (&[Part], &[Vec<u32>]),
+) -> Vec<Vec<(u32, u32)>> {
+    let mut first_piece = 0;
+    let pairs: Vec<(usize, u32)> = (pvs.pairs().enumerate())
+        .map(|(pair, (_, to))| {
+            let first = first_piece;
+            first_piece += volumes.pieces_of(pair).count();
+            (first, to.0)
+        })
+        .collect();
+    (pairs.par_iter().enumerate())
+        .with_min_len(4)
+        .map(|(pair, &(first, to))| {
+            let mut out = Vec::new();
+            for (piece, &entry) in volumes.pieces_of(pair).zip(&entries[first..]) {
+                let planes = planes(piece);
+                let met = by_cell[to as usize].iter().copied();
+                let met = met.filter(|&part| all[part as usize].meets(&planes));
+                out.extend(met.map(|part| (entry, part)));
+            }
+            out
+        })
+        .collect()
+}
+
+/// The structural triangles that block sight.
+fn walls(world: &World) -> Vec<Triangle> {
+    let blocks = |batch: &&Batch| {
+        let material = batch.primitive.material;
+        let material = material.and_then(|m| world.materials.get(m as usize));
+        material.is_none_or(|m| !m.transparent)
+    };
+    let batches = world.batches.iter().filter(blocks);
+    let triangles = batches.flat_map(|batch| {
+        let positions = &batch.primitive.positions;
+        let corners = move |t: &[u32]| [0, 1, 2].map(|k| point(positions[t[k] as usize]));
+        batch.primitive.indices.chunks_exact(3).map(corners)
+    });
+    triangles.collect()
+}
+
+/// A triangle of a batch, or those of a detail object.
+struct Part {
+    bounds: Aabb,
+    triangles: Vec<Triangle>,
+}
+
+impl Part {
+    fn new(triangles: Vec<Triangle>) -> Self {
+        Self {
+            bounds: Aabb::of_points(triangles.iter().flatten()),
+            triangles,
+        }
+    }
+
+    /// Whether it touches what lies in front of all planes.
+    fn meets(&self, planes: &[Plane]) -> bool {
+        let middle = self.bounds.center();
+        let half = self.bounds.size() * 0.5;
+        let mut cutting = Vec::new();
+        for plane in planes {
+            let height = plane.signed_distance(middle);
+            let reach = plane.normal.abs().dot(half) + EPS;
+            if height < -reach {
+                return false;
+            }
+            if height < reach {
+                cutting.push(plane);
+            }
+        }
+        let touches = |triangle: &Triangle| {
+            let mut points = triangle.to_vec();
+            cutting.iter().all(|plane| {
+                clip(&mut points, plane, EPS);
+                !points.is_empty()
+            })
+        };
+        self.triangles.iter().any(touches)
+    }
+}
+
+fn planes(piece: &[[f64; 4]]) -> Vec<Plane> {
+    let plane = |&[x, y, z, d]: &[f64; 4]| Plane {
+        normal: DVec3::new(x, y, z),
+        d,
+    };
+    piece.iter().map(plane).collect()
+}
+
+/// By [`PartNumbers`], all parts.
+fn all_parts(world: &World) -> Vec<Part> {
+    let triangles = world.batches.iter().flat_map(|batch| {
+        let positions = &batch.primitive.positions;
+        let corners = move |t: &[u32]| [0, 1, 2].map(|k| point(positions[t[k] as usize]));
+        batch.primitive.indices.chunks_exact(3).map(corners)
+    });
+    let objects = world.details.iter().map(|object| {
+        let to_world = DMat4::from_cols_array(&object.transform.map(f64::from));
+        let mut triangles = Vec::new();
+        for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+            let at = |i: u32| to_world.transform_point3(point(primitive.positions[i as usize]));
+            let corners = primitive.indices.chunks_exact(3);
+            triangles.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
+        }
+        triangles
+    });
+    let triangles = triangles.map(|t| vec![t]);
+    triangles.chain(objects).map(Part::new).collect()
+}
+
+/// By cell: what is seen from it without passing a portal, ascending.
+fn by_cell(world: &World) -> Vec<Vec<u32>> {
+    let numbers = PartNumbers::new(world);
+    let mut by_cell = vec![Vec::new(); world.graph.cells.len()];
+    for (i, batch) in world.batches.iter().enumerate() {
+        for cell in &batch.cells {
+            by_cell[cell.idx()].extend(numbers.of_batch(i));
+        }
+    }
+    for (i, object) in (0..).zip(&world.details) {
+        for cell in &object.cells {
+            by_cell[cell.idx()].push(numbers.of_detail(i));
+        }
+    }
+    by_cell
+}
+
+fn point(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
