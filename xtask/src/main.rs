@@ -42,7 +42,7 @@ usage: cargo xtask test
           choose by how names begin;
           trust: hostile and huge input, a row a figure; --rows (case, nasty, large, mutated) chooses;
           --count and --from choose the damaged files of `mutated`;
-          any other NAME (bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
+          any other NAME (bring, bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 
 --write puts the table into docs/benchmarks/. Real scenes (folders with a scene.glb) are looked for

@@ -13,13 +13,13 @@ use crate::hourglass::Hourglasses;
 use crate::polytope::clip;
 use crate::shade::Shade;
 use crate::sheets::Sheets;
-use crate::volumes::{ANY_ENTRY, volumes_of};
+use crate::volumes::{ANY_PORTAL, volumes_of};
 
 /// Rounding of what is computed here. [Units: wu] The volumes hold the world's tolerance themselves.
 const EPS: f64 = 1e-9;
 
 /// What of each cell can be seen from each other, by pair of cells in the order of `pvs`: volumes, and the triangles and objects that they
-/// meet, less what walls inside the cell hide from the portals that lead into it.
+/// meet, less what walls hide from the first or the last of the portals on the way.
 ///
 /// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth. Walls are the world's structural
 /// triangles, but those that light passes; details hide nothing, as they may be moved.
@@ -35,13 +35,14 @@ pub fn see_parts(
     pvs: &Pvs,
 ) -> Result<(VisibleVolumes, VisibleParts), SightGraphError> {
     let glasses = Hourglasses::new(&SightGraph::of_graph(&world.graph))?;
-    let (volumes, entries) = volumes_of(world, pvs, &glasses);
+    let (volumes, ends) = volumes_of(world, pvs, &glasses);
     let (all, by_cell) = (all_parts(world), by_cell(world));
-    let candidates = candidates(pvs, &volumes, &entries, (&all, &by_cell));
-    let mut asked: Vec<(u32, u32)> = candidates.iter().flatten().copied().collect();
+    let candidates = candidates(pvs, &volumes, &ends, (&all, &by_cell));
+    let both = |&(ends, part): &([u32; 2], u32)| ends.map(|portal| (portal, part));
+    let mut asked: Vec<(u32, u32)> = candidates.iter().flatten().flat_map(both).collect();
     asked.par_sort_unstable();
     asked.dedup();
-    asked.retain(|&(entry, _)| entry != ANY_ENTRY);
+    asked.retain(|&(portal, _)| portal != ANY_PORTAL);
     let walls = walls(world);
     let bvh = Bvh::build(&walls);
     let sheets = Sheets::new(&walls, &bvh);
@@ -54,14 +55,15 @@ pub fn see_parts(
     let slack = world_tolerance(glasses.dirs().scale);
     let is_hidden: Vec<bool> = (asked.par_iter())
         .with_min_len(64)
-        .map(|&(entry, part)| {
+        .map(|&(portal, part)| {
             let bounds = all[part as usize].bounds.expanded(slack);
-            shade.hides(glasses.place(entry), &bounds)
+            shade.hides(glasses.place(portal), &bounds)
         })
         .collect();
-    let is_seen = |pair: &&(u32, u32)| match asked.binary_search(pair) {
-        Ok(at) => !is_hidden[at],
-        Err(_) => true,
+    let is_open = |pair: (u32, u32)| asked.binary_search(&pair).is_ok_and(|at| !is_hidden[at]);
+    let is_seen = |&&(ends, part): &&([u32; 2], u32)| {
+        let mut portals = ends.into_iter();
+        portals.all(|portal| portal == ANY_PORTAL || is_open((portal, part)))
     };
     let rows = candidates.iter().map(|row| {
         let mut parts: Vec<u32> = row.iter().filter(is_seen).map(|pair| pair.1).collect();
@@ -73,13 +75,13 @@ pub fn see_parts(
     Ok((volumes, parts))
 }
 
-/// By pair of cells, which parts of the second its pieces meet: the portal through which a piece is seen, and the part.
+/// By pair of cells, which parts of the second its pieces meet: the first portal and the last through which a piece is seen, and the part.
 fn candidates(
     pvs: &Pvs,
     volumes: &VisibleVolumes,
-    entries: &[u32],
-    (all, by_cell): (&[Part], &[Vec<u32>]),
-) -> Vec<Vec<(u32, u32)>> {
+    ends: &[[u32; 2]],
+    (all, by_cell): (&[Shape], &[Vec<u32>]),
+) -> Vec<Vec<([u32; 2], u32)>> {
     let mut first_piece = 0;
     let pairs: Vec<(usize, u32)> = (pvs.pairs().enumerate())
         .map(|(pair, (_, to))| {
@@ -92,11 +94,11 @@ fn candidates(
         .with_min_len(4)
         .map(|(pair, &(first, to))| {
             let mut out = Vec::new();
-            for (piece, &entry) in volumes.pieces_of(pair).zip(&entries[first..]) {
+            for (piece, &ends) in volumes.pieces_of(pair).zip(&ends[first..]) {
                 let planes = planes(piece);
                 let met = by_cell[to as usize].iter().copied();
                 let met = met.filter(|&part| all[part as usize].meets(&planes));
-                out.extend(met.map(|part| (entry, part)));
+                out.extend(met.map(|part| (ends, part)));
             }
             out
         })
@@ -120,12 +122,12 @@ fn walls(world: &World) -> Vec<Triangle> {
 }
 
 /// A triangle of a batch, or those of a detail object.
-struct Part {
+struct Shape {
     bounds: Aabb,
     triangles: Vec<Triangle>,
 }
 
-impl Part {
+impl Shape {
     fn new(triangles: Vec<Triangle>) -> Self {
         Self {
             bounds: Aabb::of_points(triangles.iter().flatten()),
@@ -168,7 +170,7 @@ fn planes(piece: &[[f64; 4]]) -> Vec<Plane> {
 }
 
 /// By [`PartNumbers`], all parts.
-fn all_parts(world: &World) -> Vec<Part> {
+fn all_parts(world: &World) -> Vec<Shape> {
     let triangles = world.batches.iter().flat_map(|batch| {
         let positions = &batch.primitive.positions;
         let corners = move |t: &[u32]| [0, 1, 2].map(|k| point(positions[t[k] as usize]));
@@ -185,7 +187,7 @@ fn all_parts(world: &World) -> Vec<Part> {
         triangles
     });
     let triangles = triangles.map(|t| vec![t]);
-    triangles.chain(objects).map(Part::new).collect()
+    triangles.chain(objects).map(Shape::new).collect()
 }
 
 /// By cell: what is seen from it without passing a portal, ascending.

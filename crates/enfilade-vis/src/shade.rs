@@ -1,4 +1,4 @@
-//! What walls hide inside a cell from a portal that leads into it.
+//! What walls hide from a portal on the way to it.
 //!
 //! Behind a portal the visible volume is all that is in front of it, which in a street is the whole facade that the window is in. Here the lines
 //! from the portal to a box are held against the triangles, as `occlude` does between two portals: each face of the box by which they may come in

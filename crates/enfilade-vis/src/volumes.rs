@@ -29,15 +29,16 @@ const MAX_SEQUENCE: usize = 256;
 /// Corners this near to a plane count as on it. [Units: wu] Far below what any reader allows for.
 const EPS: f64 = 1e-9;
 
-/// The entry of a piece that is not seen through one portal alone.
-pub(crate) const ANY_ENTRY: u32 = u32::MAX;
+/// Stands for the portals of a piece that is not seen through one alone.
+pub(crate) const ANY_PORTAL: u32 = u32::MAX;
 
-/// The volumes of each pair, and by piece the portal through which its cell is seen: a direction of the graph, or [`ANY_ENTRY`].
+/// The volumes of each pair, and by piece the first portal and the last through which it is seen: directions of the graph, or
+/// [`ANY_PORTAL`].
 pub(crate) fn volumes_of(
     world: &World,
     pvs: &Pvs,
     glasses: &Hourglasses,
-) -> (VisibleVolumes, Vec<u32>) {
+) -> (VisibleVolumes, Vec<[u32; 2]>) {
     let dirs = glasses.dirs();
     let mut might = dirs.might_see(glasses.clearance(), None);
     let mut settled = BitTable::new(dirs.len(), dirs.len());
@@ -52,14 +53,14 @@ pub(crate) fn volumes_of(
     let rows: Vec<Vec<Vec<Piece>>> = (0..pvs.n_cells() as u32)
         .into_par_iter()
         .with_max_len(1)
-        .map(|cell| walk.from_cell(cell))
+        .map(|cell| walk.pieces_seen_from(cell))
         .collect();
     let pairs = || rows.iter().flatten();
     let four = |p: &Plane| [p.normal.x, p.normal.y, p.normal.z, p.d];
     let planes = |piece: &Piece| piece.planes.iter().map(four).collect();
     let volumes = VisibleVolumes::of_pairs(pairs().map(|pair| pair.iter().map(planes).collect()));
-    let entries = pairs().flatten().map(|piece| piece.ends[1]).collect();
-    (volumes, entries)
+    let ends = pairs().flatten().map(|piece| piece.ends).collect();
+    (volumes, ends)
 }
 
 /// The faces of a piece of a cell's visible volume, to be drawn: convex polygons around the part of the cell's box that the piece holds.
@@ -94,17 +95,17 @@ struct Walk<'a> {
 }
 
 /// The pieces of the cells that one cell sees.
-type Found = BTreeMap<u32, Vec<Piece>>;
+type Pieces = BTreeMap<u32, Vec<Piece>>;
 
 impl Walk<'_> {
     /// The pieces of each cell that `cell` sees, in the order of ids.
-    fn from_cell(&self, cell: u32) -> Vec<Vec<Piece>> {
+    fn pieces_seen_from(&self, cell: u32) -> Vec<Vec<Piece>> {
         let dirs = self.dirs();
-        let mut found = Found::new();
+        let mut found = Pieces::new();
         let at = dirs.cells.partition_point(|&c| c < cell);
         if dirs.cells.get(at) == Some(&cell) {
             for exit in dirs.exits(at as u32) {
-                self.from_exit(exit, &mut found);
+                self.add_exit(exit, &mut found);
             }
         }
         let row = self.pvs.visible_from(enfilade_cpg::CellId(cell));
@@ -122,7 +123,7 @@ impl Walk<'_> {
     /// The piece that is a whole cell.
     fn whole(&self, cell: u32) -> Piece {
         Piece {
-            ends: [ANY_ENTRY; 2],
+            ends: [ANY_PORTAL; 2],
             planes: Vec::new(),
             corners: self.bounds(cell).corners().to_vec(),
         }
@@ -143,7 +144,7 @@ impl Walk<'_> {
         self.pvs.sees(id(from), id(to))
     }
 
-    fn from_exit(&self, exit: usize, found: &mut Found) {
+    fn add_exit(&self, exit: usize, found: &mut Pieces) {
         let dirs = self.dirs();
         let Some(glass) = self.glasses.of_portal(dirs.all[exit].id) else {
             return;
@@ -270,7 +271,7 @@ impl Walk<'_> {
     }
 
     /// Adds a piece unless another holds it, and drops those that it holds.
-    fn add(&self, found: &mut Found, to: u32, piece: Piece) {
+    fn add(&self, found: &mut Pieces, to: u32, piece: Piece) {
         let pieces = found.entry(to).or_default();
         if pieces.iter().any(|p| p.holds(&piece)) {
             return;
@@ -288,7 +289,7 @@ impl Walk<'_> {
         ends.sort_unstable();
         ends.dedup();
         let whole = |ends: &[u32; 2]| {
-            if ends[0] == ANY_ENTRY {
+            if ends[0] == ANY_PORTAL {
                 return Some(self.whole(to));
             }
             let glass = if ends[0] == ends[1] {
@@ -325,9 +326,9 @@ struct State<'o> {
 }
 
 impl Piece {
-    /// Whether another piece of the same cell, seen through the same portal, lies in it.
+    /// Whether another piece of the same cell, seen through the same portals, lies in it.
     fn holds(&self, other: &Self) -> bool {
-        if self.ends[1] != ANY_ENTRY && self.ends[1] != other.ends[1] {
+        if self.ends[1] != ANY_PORTAL && self.ends != other.ends {
             return false;
         }
         let is_in = |plane: &Plane| {

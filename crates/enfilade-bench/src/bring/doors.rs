@@ -41,7 +41,7 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
     for &door in &doors {
         state.set_leaves(door, 0.0);
     }
-    let (mut n_sides, mut n_bad, mut most) = (0, 0, 0);
+    let (mut n_sides, mut bad, mut most) = (0, Vec::new(), 0);
     for &door in &doors {
         let portal = &world.graph[door];
         let middle = portal.center();
@@ -60,15 +60,18 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
                 .iter()
                 .any(|l| seen.details().contains(&l.detail));
             n_sides += 1;
-            n_bad += usize::from(seen.cells().len() > 1 || !has_leaf);
+            if seen.cells().len() > 1 || !has_leaf {
+                bad.push(format!("{door} from {cell}"));
+            }
             most = most.max(seen.cells().len());
         }
     }
     Ok(Figure {
-        value: f64::from(n_bad as u32),
+        value: bad.len() as f64,
         most: 0.0,
         note: format!(
-            "of {n_sides} sides of shut doors show another cell or no leaf; at most {most} cells seen"
+            "of {n_sides} sides of shut doors show another cell or no leaf; at most {most} cells seen {}",
+            bad.join(", ")
         ),
     })
 }

@@ -6,6 +6,7 @@
 mod doors;
 mod statistics;
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -73,7 +74,7 @@ pub(crate) fn bench_bring(is_json: bool, rows: &[String], scenes: &[String]) -> 
             };
             let ok = figure.as_ref().map(|f| f.value <= f.most);
             n_missed += usize::from(ok == Some(false));
-            print(is_json, row.name, scene, figure.as_ref());
+            print(is_json, row.name, scene, figure.as_ref())?;
         }
     }
     if n_missed > 0 {
@@ -82,7 +83,8 @@ pub(crate) fn bench_bring(is_json: bool, rows: &[String], scenes: &[String]) -> 
     Ok(())
 }
 
-fn print(is_json: bool, row: &str, scene: &str, figure: Option<&Figure>) {
+fn print(is_json: bool, row: &str, scene: &str, figure: Option<&Figure>) -> io::Result<()> {
+    let mut out = io::stdout().lock();
     let bar = figure.map(|f| format!("<= {}", f.most));
     let ok = figure.map(|f| f.value <= f.most);
     let note = figure.map_or("the scene is not there", |f| &f.note);
@@ -90,12 +92,15 @@ fn print(is_json: bool, row: &str, scene: &str, figure: Option<&Figure>) {
         let value = figure.map(|f| f.value);
         let line =
             json!({"row": row, "scene": scene, "value": value, "bar": bar, "ok": ok, "note": note});
-        println!("{line}");
+        writeln!(out, "{line}")
     } else {
         let value = figure.map_or_else(|| "–".to_owned(), |f| format!("{:.3}", f.value));
         let word = ok.map_or("–", |ok| if ok { "ok" } else { "NOT MET" });
         let bar = bar.unwrap_or_default();
-        println!("{row:<20} {scene:<16} {value:>10}  {bar:<8} {word} {note}");
+        writeln!(
+            out,
+            "{row:<20} {scene:<16} {value:>10}  {bar:<8} {word} {note}"
+        )
     }
 }
 

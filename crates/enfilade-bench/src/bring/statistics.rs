@@ -58,9 +58,6 @@ pub(super) fn measure(world: &World) -> anyhow::Result<Figure> {
             sums.n_triangles(&is_in),
             hits.iter().filter(|&&h| h).count(),
         ];
-        if std::env::var_os("ENFILADE_BRING_CELLS").is_some() {
-            eprintln!("{cell} seen {a} whole {b} reached {c}");
-        }
         seen += a as f64;
         whole += b as f64;
         reached += c as f64;

@@ -106,19 +106,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         .sum();
     let portal_corners = layout.view(corners as u64 * 12);
     let locator = lay_out_locator(layout, world);
-    let pvs = world.pvs.as_ref().map(|pvs| json::PvsJson {
-        rows: layout.view(pvs.ends.len() as u64 * 4),
-        runs: layout.view(pvs.runs.len() as u64 * 8),
-        parts: pvs.parts.as_ref().map(|parts| json::PartsJson {
-            rows: layout.view(parts.ends.len() as u64 * 4),
-            runs: layout.view(parts.runs.len() as u64 * 8),
-        }),
-        volumes: pvs.volumes.as_ref().map(|volumes| json::VolumesJson {
-            rows: layout.view(volumes.ends.len() as u64 * 4),
-            pieces: layout.view(volumes.piece_ends.len() as u64 * 4),
-            planes: layout.view(volumes.planes.len() as u64 * 32),
-        }),
-    });
+    let pvs = lay_out_pvs(layout, world);
     let n_runs: usize = world.batches.iter().map(|b| b.sources.runs().len()).sum();
     let source_runs = layout.view(n_runs as u64 * 8);
     let n_bin = layout.len.next_multiple_of(4);
@@ -167,6 +155,23 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
             lights: placed.lights,
         },
     }
+}
+
+/// What is seen from each cell, in the order in which [`visible::words`](super::visible::words) and its planes are written.
+fn lay_out_pvs(layout: &mut Layout<'_>, world: &World) -> Option<json::PvsJson> {
+    world.pvs.as_ref().map(|pvs| json::PvsJson {
+        rows: layout.view(pvs.ends.len() as u64 * 4),
+        runs: layout.view(pvs.runs.len() as u64 * 8),
+        parts: pvs.parts.as_ref().map(|parts| json::PartsJson {
+            rows: layout.view(parts.ends.len() as u64 * 4),
+            runs: layout.view(parts.runs.len() as u64 * 8),
+        }),
+        volumes: pvs.volumes.as_ref().map(|volumes| json::VolumesJson {
+            rows: layout.view(volumes.ends.len() as u64 * 4),
+            pieces: layout.view(volumes.piece_ends.len() as u64 * 4),
+            planes: layout.view(volumes.planes.len() as u64 * 32),
+        }),
+    })
 }
 
 /// One mesh for every set of cells; returns the batches in the world's order.

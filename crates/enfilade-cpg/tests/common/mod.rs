@@ -291,7 +291,7 @@ pub(crate) fn two_rooms_with_parts() -> World {
     let n_parts = PartNumbers::new(&world).n_parts();
     let pvs = world.pvs.as_mut().unwrap();
     let n_pairs = pvs.n_pairs() as u32;
-    let row = |pair: u32| (0..n_parts).filter(move |part| (part + pair) % 3 != 0);
+    let row = |pair: u32| (0..n_parts).filter(move |part| !(part + pair).is_multiple_of(3));
     pvs.parts = Some(VisibleParts::of_ascending((0..n_pairs).map(row)));
     let plane = |pair: u32| [0.0, 1.0, 0.0, f64::from(pair)];
     let pieces = |pair: u32| vec![vec![plane(pair); pair as usize % 3]; pair as usize % 2 + 1];
