@@ -99,7 +99,6 @@ proptest! {
             precomputed: true,
             // Fewer clips would be capped later: the answer would be smaller.
             max_clips: u32::MAX,
-            ..SeeOptions::default()
         };
         let mut viewers = [&single, &grouped].map(|s| Viewer::with_options(s, options));
         let mut state = SightState::new(&single);
