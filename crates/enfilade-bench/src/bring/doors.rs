@@ -63,10 +63,16 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
                 .iter()
                 .any(|l| seen.details().contains(&l.detail));
             n_sides += 1;
-            if seen.cells().len() > 1 || !has_leaf {
+            // Outdoors other openings lie behind the wall that the door is in: it hides them, and no portal does.
+            let n_cells = if world.graph[cell].outdoor {
+                1 + usize::from(seen.portals().contains(&door))
+            } else {
+                seen.cells().len()
+            };
+            if n_cells > 1 || !has_leaf {
                 bad.push(format!("{door} from {cell}"));
             }
-            most = most.max(seen.cells().len());
+            most = most.max(n_cells);
         }
     }
     Ok(Figure {
