@@ -32,7 +32,8 @@ pub(super) fn without_leaf(world: &World) -> anyhow::Result<Figure> {
     })
 }
 
-/// Sides of doors from which, all doors being shut, another cell is seen through one, or its leaf is not.
+/// Sides of doors from which, all doors being shut, another cell is seen, or the leaf is not. Through leaves of glass one may
+/// see.
 pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
     let sight = Sight::build(world)?;
     let mut state = SightState::new(&sight);
@@ -42,7 +43,9 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
         state.set_leaves(door, 0.0);
     }
     let (mut n_sides, mut bad, mut most) = (0, Vec::new(), 0);
-    for &door in &doors {
+    let solid = doors.iter().filter(|d| !state.is_open(**d));
+    let n_solid = solid.clone().count();
+    for &door in solid {
         let portal = &world.graph[door];
         let middle = portal.center();
         for (side, cell) in [(-1.0, portal.cells[0]), (1.0, portal.cells[1])] {
@@ -60,17 +63,23 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
                 .iter()
                 .any(|l| seen.details().contains(&l.detail));
             n_sides += 1;
-            if seen.cells().len() > 1 || !has_leaf {
+            // Outdoors other openings lie behind the wall that the door is in: it hides them, and no portal does.
+            let n_cells = if world.graph[cell].outdoor {
+                1 + usize::from(seen.portals().contains(&door))
+            } else {
+                seen.cells().len()
+            };
+            if n_cells > 1 || !has_leaf {
                 bad.push(format!("{door} from {cell}"));
             }
-            most = most.max(seen.cells().len());
+            most = most.max(n_cells);
         }
     }
     Ok(Figure {
         value: bad.len() as f64,
         most: 0.0,
         note: format!(
-            "of {n_sides} sides of shut doors show another cell or no leaf; at most {most} cells seen {}",
+            "of {n_sides} sides of {n_solid} doors that are not of glass show another cell or no leaf; at most {most} cells seen {}",
             bad.join(", ")
         ),
     })
