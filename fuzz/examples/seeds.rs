@@ -43,6 +43,11 @@ fn main() -> std::io::Result<()> {
             }
         }
     }
+    // Rooms with doors that turn, and what is seen from each.
+    let doors = enfilade_fuzz::world::with_doors();
+    for (to, head) in [("world", 0), ("report", 0), ("run_time", 96)] {
+        write(to, "doors", &[&vec![0; head][..], &doors].concat())?;
+    }
     let [evidence, checkpoint] = enfilade_fuzz::sight::seeds();
     write("evidence", "good", &evidence)?;
     write("checkpoint", "good", &checkpoint)?;

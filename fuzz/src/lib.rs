@@ -10,6 +10,9 @@ pub mod world;
 // The command's settings are built once more (`settings`), and ask for these by the name of its library.
 extern crate self as enfilade_cli;
 #[doc(hidden)]
+#[path = "../../crates/enfilade-cli/src/input.rs"]
+pub mod input;
+#[doc(hidden)]
 #[path = "../../crates/enfilade-cli/src/values.rs"]
 pub mod values;
 

@@ -65,9 +65,10 @@ pub fn run_time(data: &[u8]) {
         let id = u32::from(numbers.byte());
         if (id as usize) < sight.n_portals() {
             let portal = PortalId(id);
-            match id % 3 {
+            match id % 4 {
                 0 => state.close(portal),
                 1 => state.open(portal),
+                2 => state.set_leaves(portal, numbers.float(is_any)),
                 _ => state.narrow(portal, numbers.point(is_any), numbers.point(is_any)),
             }
         }
@@ -115,6 +116,17 @@ pub fn run_time(data: &[u8]) {
         decoded.is_some() || whole == by_cells,
         "{whole:?} {by_cells:?}"
     );
+}
+
+/// A seed: four rooms, a leaf in each doorway, half of them of glass.
+#[must_use]
+pub fn with_doors() -> Vec<u8> {
+    let grid = GridParams {
+        furniture: 0,
+        ..GridParams::offices(4, 2)
+    };
+    let world = enfilade_testkit::with_doors(room_grid(&grid), |portal| portal % 2 == 0);
+    encode_glb(&world).unwrap_or_default()
 }
 
 fn look(sight: &Sight, state: &SightState, world: &World, view: Option<View>, kind: u8, size: f32) {

@@ -12,7 +12,7 @@ mod shells;
 mod split;
 mod swing;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, PortalKind, World};
 use enfilade_geom::scene::Mesh;
@@ -20,7 +20,7 @@ use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, NearSeries, Triangle};
 use rayon::prelude::*;
 
 use opening::Rectangle;
-use parts::{Aperture, Leaf, Pose, Roles, roles};
+use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
 use swing::Around;
 
 /// An open leaf has no room where something else is nearer to it. [Units: wu]
@@ -32,7 +32,8 @@ struct Object {
     triangles: Vec<Triangle>,
     /// By triangle, and how many there are.
     shells: Vec<u32>,
-    n_shells: usize,
+    /// By shell.
+    bounds: Vec<Aabb>,
 }
 
 /// What an object is to a portal.
@@ -75,13 +76,21 @@ pub(super) fn fit(world: &mut World, walls: &Bvh) {
             near.map(|o| Role {
                 portal,
                 object: o as u32,
-                roles: roles(opening, &objects[o].triangles, &objects[o].shells),
+                roles: roles(opening, &objects[o].in_shells()),
             })
             .collect()
         })
         .collect();
     let found: Vec<Role> = found.into_iter().flatten().collect();
     let hung = hang(&found);
+    let mut of_portal = vec![Vec::new(); openings.len()];
+    let mut of_object = vec![Vec::new(); objects.len()];
+    for (h, leaf) in hung.iter().enumerate() {
+        of_object[leaf.object as usize].push(h);
+        for &p in &leaf.portals {
+            of_portal[p as usize].push(h);
+        }
+    }
     let fitted = Fitted {
         world,
         walls,
@@ -90,6 +99,8 @@ pub(super) fn fit(world: &mut World, walls: &Bvh) {
         objects: &objects,
         found: &found,
         hung: &hung,
+        of_portal,
+        of_object,
     };
     let motions: Vec<Motion> = (0..hung.len())
         .into_par_iter()
@@ -139,11 +150,26 @@ impl Object {
     fn of(world: &World, detail: u32) -> Self {
         let triangles = triangles_of(world, &world.details[detail as usize]);
         let (shells, n_shells) = shells::shells(&triangles);
+        let mut bounds = vec![Aabb::EMPTY; n_shells];
+        for (t, &shell) in triangles.iter().zip(&shells) {
+            let own = &mut bounds[shell as usize];
+            *own = own.union(Aabb::of_points(t));
+        }
         Self {
             detail,
             triangles,
             shells,
-            n_shells,
+            bounds,
+        }
+    }
+}
+
+impl Object {
+    fn in_shells(&self) -> InShells<'_> {
+        InShells {
+            triangles: &self.triangles,
+            shells: &self.shells,
+            bounds: &self.bounds,
         }
     }
 }
@@ -196,15 +222,20 @@ struct Fitted<'a> {
     /// By portal: details about its opening.
     near: &'a [Vec<u32>],
     objects: &'a [Object],
+    /// By portal, ascending.
     found: &'a [Role],
     hung: &'a [Hung],
+    /// Leaves by portal and by object, into `hung`.
+    of_portal: Vec<Vec<usize>>,
+    of_object: Vec<Vec<usize>>,
 }
 
 impl Fitted<'_> {
-    fn leaves_of(&self, portal: u32) -> impl Iterator<Item = &Hung> {
-        self.hung
-            .iter()
-            .filter(move |h| h.portals.contains(&portal))
+    /// What was found of a portal.
+    fn found_at(&self, portal: u32) -> &[Role] {
+        let first = self.found.partition_point(|r| r.portal < portal);
+        let rest = &self.found[first..];
+        &rest[..rest.partition_point(|r| r.portal == portal)]
     }
 
     /// How a leaf moves.
@@ -223,8 +254,8 @@ impl Fitted<'_> {
             }
         };
         let frame = self.frame(*portal, around);
-        let own: Vec<u32> = (self.found.iter())
-            .filter(|r| r.portal == *portal && is_part(&r.roles))
+        let own: Vec<u32> = (self.found_at(*portal).iter())
+            .filter(|r| is_part(&r.roles))
             .map(|r| self.objects[r.object as usize].detail)
             .collect();
         let reach = opening.map_or(Aabb::EMPTY, Aperture::reach);
@@ -243,7 +274,7 @@ impl Fitted<'_> {
             cells,
             volumes: cells.map(volume),
             frame,
-            n_leaves: self.leaves_of(*portal).count(),
+            n_leaves: self.of_portal[*portal as usize].len(),
             is_furnished: &|p| {
                 let near = others.any_within(p, ROOM, &mut NearSeries::default());
                 near.is_some()
@@ -255,15 +286,11 @@ impl Fitted<'_> {
     /// The middle, along the opening's normal, of what runs around it.
     fn frame(&self, portal: u32, around: &Rectangle) -> Option<f64> {
         let mut bounds = Aabb::EMPTY;
-        for role in self
-            .found
-            .iter()
-            .filter(|r| r.portal == portal && is_part(&r.roles))
-        {
+        for role in self.found_at(portal).iter().filter(|r| is_part(&r.roles)) {
             let object = &self.objects[role.object as usize];
             let is_leaf = |shell: u32| {
-                let mut own = self.hung.iter().filter(|h| h.object == role.object);
-                own.any(|h| h.leaf.shells.contains(&shell))
+                let mut own = self.of_object[role.object as usize].iter();
+                own.any(|&h| self.hung[h].leaf.shells.contains(&shell))
             };
             for (t, &shell) in object.triangles.iter().zip(&object.shells) {
                 if !is_leaf(shell) {
@@ -278,7 +305,8 @@ impl Fitted<'_> {
     fn still(&self) -> Vec<(u32, u32, FittingPart)> {
         let part = |r: &Role| {
             let claimed = !r.roles.leaves.is_empty();
-            let hung = self.leaves_of(r.portal).any(|h| h.object == r.object);
+            let mut own = self.of_portal[r.portal as usize].iter();
+            let hung = own.any(|&h| self.hung[h].object == r.object);
             if r.roles.is_pane {
                 Some(FittingPart::Pane)
             } else {
@@ -292,18 +320,21 @@ impl Fitted<'_> {
 
     /// Objects that lie on a leaf and move with it, handles and the glass in it: detail, and which leaf.
     fn carried(&self) -> Vec<(u32, usize)> {
-        let mut out: Vec<(u32, usize)> = Vec::new();
+        let mut out: BTreeMap<u32, usize> = BTreeMap::new();
         for role in self.found.iter().filter(|r| !is_part(&r.roles)) {
             let object = &self.objects[role.object as usize];
-            let is_hung = self.hung.iter().any(|h| h.object == role.object);
-            if is_hung || out.iter().any(|(d, _)| *d == object.detail) {
+            let is_hung = !self.of_object[role.object as usize].is_empty();
+            if is_hung || out.contains_key(&object.detail) {
                 continue;
             }
-            let on = (self.hung.iter().enumerate())
-                .find(|(_, h)| h.portal == role.portal && h.leaf.carries(&object.triangles));
-            out.extend(on.map(|(h, _)| (object.detail, h)));
+            let mut own = self.of_portal[role.portal as usize].iter();
+            let on = own.find(|&&h| {
+                let leaf = &self.hung[h];
+                leaf.portal == role.portal && leaf.leaf.carries(&object.triangles)
+            });
+            out.extend(on.map(|&h| (object.detail, h)));
         }
-        out
+        out.into_iter().collect()
     }
 }
 

@@ -4,6 +4,8 @@
 //! rails. A *ring* runs around something: a frame, or the rails of a leaf. All else is small, a handle or a hinge, and goes
 //! with the leaf whose middle it lies on.
 
+use std::collections::BTreeMap;
+
 use enfilade_cpg::{Portal, PortalKind};
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
@@ -173,9 +175,18 @@ impl<'t> Shell<'t> {
     }
 }
 
-/// What an object is to an opening. `shells` numbers its triangles' shells.
-pub(super) fn roles(opening: &Aperture, triangles: &[Triangle], shells: &[u32]) -> Roles {
-    let near = near_shells(opening, triangles, shells);
+/// An object in shells.
+pub(super) struct InShells<'a> {
+    pub(super) triangles: &'a [Triangle],
+    /// By triangle.
+    pub(super) shells: &'a [u32],
+    /// By shell.
+    pub(super) bounds: &'a [Aabb],
+}
+
+/// What an object is to an opening.
+pub(super) fn roles(opening: &Aperture, object: &InShells<'_>) -> Roles {
+    let near = near_shells(opening, object);
     let mut roles = Roles::default();
     if near.is_empty() {
         return roles;
@@ -213,27 +224,25 @@ pub(super) fn roles(opening: &Aperture, triangles: &[Triangle], shells: &[u32]) 
     roles
 }
 
-/// The shells of an object that lie about an opening.
-fn near_shells<'t>(
-    opening: &Aperture,
-    triangles: &'t [Triangle],
-    shells: &[u32],
-) -> Vec<Shell<'t>> {
-    let reach = opening.reach();
-    let n = shells.iter().max().map_or(0, |m| *m as usize + 1);
-    let mut of_shell: Vec<(Aabb, Vec<&Triangle>)> = vec![(Aabb::EMPTY, Vec::new()); n];
-    for (t, s) in triangles.iter().zip(shells) {
-        let (bounds, list) = &mut of_shell[*s as usize];
-        *bounds = bounds.union(Aabb::of_points(t));
-        list.push(t);
+/// The shells of an object that lie about an opening. Looks at triangles only where there are such.
+fn near_shells<'t>(opening: &Aperture, object: &InShells<'t>) -> Vec<Shell<'t>> {
+    let inside = opening.reach().expanded(OFF);
+    let is_near = |b: &Aabb| inside.contains(b.min) && inside.contains(b.max);
+    let mut near: BTreeMap<u32, Vec<&Triangle>> = (0..)
+        .zip(object.bounds)
+        .filter(|(_, bounds)| is_near(bounds))
+        .map(|(shell, _)| (shell, Vec::new()))
+        .collect();
+    if near.is_empty() {
+        return Vec::new();
     }
-    let is_near = |bounds: &Aabb| {
-        let inside = reach.expanded(OFF);
-        inside.contains(bounds.min) && inside.contains(bounds.max)
-    };
-    (of_shell.into_iter().enumerate())
-        .filter(|(_, (bounds, _))| is_near(bounds))
-        .map(|(i, (_, triangles))| Shell::of(i as u32, triangles))
+    for (t, shell) in object.triangles.iter().zip(object.shells) {
+        if let Some(own) = near.get_mut(shell) {
+            own.push(t);
+        }
+    }
+    let near = near.into_iter();
+    near.map(|(shell, triangles)| Shell::of(shell, triangles))
         .collect()
 }
 
@@ -449,14 +458,21 @@ mod tests {
     }
 
     /// Boxes across the opening, 4 cm thick, by the shell that each belongs to: left, foot, right, head.
-    fn object(boxes: &[(u32, [f64; 4])]) -> (Vec<Triangle>, Vec<u32>) {
-        let mut out = (Vec::new(), Vec::new());
+    fn roles_of(boxes: &[(u32, [f64; 4])]) -> Roles {
+        let (mut triangles, mut shells, mut bounds) = (Vec::new(), Vec::new(), Vec::new());
         for &(shell, [x0, y0, x1, y1]) in boxes {
             let b = Aabb::new(DVec3::new(x0, y0, -0.02), DVec3::new(x1, y1, 0.02));
-            out.0.extend(b.triangles());
-            out.1.extend([shell; 12]);
+            triangles.extend(b.triangles());
+            shells.extend([shell; 12]);
+            bounds.resize(bounds.len().max(shell as usize + 1), Aabb::EMPTY);
+            bounds[shell as usize] = bounds[shell as usize].union(b);
         }
-        out
+        let object = InShells {
+            triangles: &triangles,
+            shells: &shells,
+            bounds: &bounds,
+        };
+        roles(&doorway(), &object)
     }
 
     const FRAME: [(u32, [f64; 4]); 3] = [
@@ -479,8 +495,7 @@ mod tests {
     #[test]
     fn rails_go_with_their_pane_and_the_frame_stays() {
         let boxes = [&FRAME[..], &glazed(0.04, 1, 2), &glazed(0.9, 3, 4)].concat();
-        let (triangles, shells) = object(&boxes);
-        let roles = roles(&doorway(), &triangles, &shells);
+        let roles = roles_of(&boxes);
         let leaves: Vec<&[u32]> = roles.leaves.iter().map(|l| &l.shells[..]).collect();
         assert_eq!(leaves, [&[1, 2][..], &[3, 4]]);
         assert!(roles.is_frame);
@@ -489,8 +504,7 @@ mod tests {
     #[test]
     fn panes_in_rails_of_one_piece_are_one_leaf() {
         let boxes = [&FRAME[..], &glazed(0.04, 1, 2), &glazed(0.9, 1, 3)].concat();
-        let (triangles, shells) = object(&boxes);
-        let roles = roles(&doorway(), &triangles, &shells);
+        let roles = roles_of(&boxes);
         let leaves: Vec<&[u32]> = roles.leaves.iter().map(|l| &l.shells[..]).collect();
         assert_eq!(leaves, [&[1, 2, 3][..]]);
         assert!((roles.leaves[0].around.size().x - 1.72).abs() < 1e-9);

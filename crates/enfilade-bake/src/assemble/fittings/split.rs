@@ -26,7 +26,7 @@ pub(super) fn take_out(world: &mut World, objects: &[Object], hung: &[Hung]) -> 
         if leaves.is_empty() {
             continue;
         }
-        let mut part_of_shell = vec![REST; object.n_shells];
+        let mut part_of_shell = vec![REST; object.bounds.len()];
         for (k, &h) in (0..).zip(leaves) {
             for &s in &hung[h].leaf.shells {
                 part_of_shell[s as usize] = k;
