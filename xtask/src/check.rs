@@ -61,6 +61,16 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("build", || {
         run_to_end(&mut GATE.cargo("build", &["--workspace"]))
     })?;
+    steps.step("fuzz", || {
+        // A workspace of its own, which nothing above builds.
+        let mut check = cargo(&[
+            "check",
+            "--manifest-path",
+            "fuzz/Cargo.toml",
+            "--all-targets",
+        ]);
+        run_to_end(check.arg("--target-dir").arg(target_dir().join("fuzz")))
+    })?;
     steps.step("package", package)?;
     steps.step("demo", demo)?;
     let scenes = scenes();
