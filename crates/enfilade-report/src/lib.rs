@@ -12,6 +12,7 @@
 //! Everything here reads a valid world (`World::validate`) and gives the same bytes every time. A
 //! plan is a drawing: shapes are accurate to about a pixel of its sampling grid, not evidence.
 
+mod clip;
 mod drawing;
 mod floors;
 mod font;

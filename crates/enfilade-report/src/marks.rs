@@ -3,6 +3,7 @@
 use enfilade_cpg::{CellId, Portal, PortalId, PortalKind, World};
 use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
 
+use crate::clip::clipped;
 use crate::drawing::{Class, Item, Path};
 use crate::section::{Section, cell_of};
 use crate::storeys::Page;
@@ -66,6 +67,10 @@ impl View<'_> {
 
     /// The parts of a line of cut `k` that lie where that cut is shown.
     fn shown_parts(&self, k: usize, a: DVec2, b: DVec2) -> Vec<(DVec2, DVec2)> {
+        // What reaches far beyond the page would take as many steps.
+        let Some((a, b)) = clipped(a, b, self.section.surroundings()) else {
+            return Vec::new();
+        };
         let n = (a.distance(b) / self.section.step()).ceil().max(1.0) as usize;
         let at = |i: usize| a + (b - a) * (i as f64 / n as f64);
         let mut out = Vec::new();

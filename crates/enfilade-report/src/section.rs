@@ -250,6 +250,13 @@ impl Section {
         self.index(p).map_or(Label::Outdoor, |i| self.labels[i])
     }
 
+    /// The page, and eight times its size around it: beyond, nothing is cut.
+    pub(crate) fn surroundings(&self) -> [DVec2; 2] {
+        let size = DVec2::new(self.width as f64, self.height as f64) * self.step;
+        let around = 8.0 * size.max_element();
+        [self.origin - around, self.origin + size + around]
+    }
+
     /// Whether something near `p` is cut by cut `k`: `p` is a border point of its part of the page.
     pub(crate) fn is_cut_by(&self, k: usize, p: DVec2) -> bool {
         // A wall that is thinner than the grid is seen from its sides only.
