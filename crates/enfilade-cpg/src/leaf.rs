@@ -6,6 +6,12 @@ use crate::fitting::vector;
 use crate::{DetailObject, Motion, World};
 
 impl DetailObject {
+    /// From its mesh to the world, as [`DetailObject::transform`] says it.
+    #[must_use]
+    pub fn placement(&self) -> DMat4 {
+        DMat4::from_cols_array(&self.transform.map(f64::from))
+    }
+
     /// Its transform once `motion` has moved it to a share of the way from shut (0) to open (1); column-major, as
     /// [`DetailObject::transform`], and the same where the model has it there.
     #[must_use]
@@ -13,7 +19,7 @@ impl DetailObject {
         if share == motion.share_of_model() {
             return self.transform;
         }
-        let own = DMat4::from_cols_array(&self.transform.map(f64::from));
+        let own = self.placement();
         (motion.at(share) * own).to_cols_array().map(|x| x as f32)
     }
 }

@@ -10,7 +10,7 @@ use enfilade_cpg::{CellId, PortalId};
 use enfilade_runtime::{ChunkId, DetailId, Seen, Sight, SightState, View};
 use glam::Vec3;
 
-use crate::scene::{Finish, GpuWorld};
+use crate::scene::{Finish, GpuWorld, Span};
 
 /// Why something is drawn though it is not seen, for pictures that explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,20 @@ pub(crate) struct Run {
     pub(crate) instances: Range<u32>,
     /// `None` for the whole picture.
     pub(crate) scissor: Option<Scissor>,
+}
+
+impl Run {
+    fn of(span: &Span, instances: Range<u32>, scissor: Option<Scissor>) -> Self {
+        Self {
+            first: span.first,
+            n: span.n,
+            texture: span.texture,
+            finish: span.finish,
+            is_smooth: span.is_smooth,
+            instances,
+            scissor,
+        }
+    }
 }
 
 /// What far away rooms and objects are spared: all of it changes pictures, and is off unless asked for.
@@ -158,6 +172,8 @@ pub struct Lister {
     /// Mesh, level, object.
     details: Vec<(u32, u32, u32)>,
     plugs: Vec<PortalId>,
+    /// Those that are seen, ascending.
+    cells: Vec<CellId>,
     far: Vec<(f32, Run)>,
 }
 
@@ -267,16 +283,16 @@ impl Lister {
         if !sparing.stop_at_nothing {
             self.list.stand_ins.extend_from_slice(seen.stopped());
         }
-        self.plug(world, shot.state, |c| is_whole || seen.cells().contains(&c));
+        self.cells.clear();
+        self.cells.extend_from_slice(seen.cells());
+        self.cells.sort_unstable();
+        // What fills the portals that are shut of cells that are seen.
+        let shut = shot.state.shut_portals();
+        self.plugs.extend(shut.filter(|p| {
+            let mut ends = world.portal_cells[p.0 as usize].iter();
+            is_whole || ends.any(|c| self.cells.binary_search(c).is_ok())
+        }));
         self.finish(world, sight, shot.view.eye(), size)
-    }
-
-    /// Adds what fills the portals that are shut of cells that are seen.
-    fn plug(&mut self, world: &GpuWorld, state: &SightState, is_seen: impl Fn(CellId) -> bool) {
-        let cells = |p: PortalId| world.portal_cells[p.0 as usize];
-        let shut = state.shut_portals();
-        self.plugs
-            .extend(shut.filter(|p| cells(*p).into_iter().any(&is_seen)));
     }
 
     /// Chunks and details of one's own choice, colored by why they are drawn, and what fills all portals that `state` shuts.
@@ -361,15 +377,7 @@ impl Lister {
                 Some(None) => continue,
             };
             self.list.n_triangles += u64::from(span.n / 3);
-            let run = Run {
-                first: span.first,
-                n: span.n,
-                texture: span.texture,
-                finish: span.finish,
-                is_smooth: span.is_smooth,
-                instances: 0..1,
-                scissor,
-            };
+            let run = Run::of(&span, 0..1, scissor);
             if span.is_transparent {
                 let [low, high] = sight.chunks()[c as usize].aabb.map(Vec3::from);
                 self.far.push((((low + high) * 0.5).distance(eye), run));
@@ -380,16 +388,7 @@ impl Lister {
         for &portal in &self.plugs {
             let span = world.plugs[portal.0 as usize];
             self.list.n_triangles += u64::from(span.n / 3);
-            let run = Run {
-                first: span.first,
-                n: span.n,
-                texture: span.texture,
-                finish: span.finish,
-                is_smooth: span.is_smooth,
-                instances: 0..1,
-                scissor: None,
-            };
-            push_run(&mut self.list.opaque, run);
+            push_run(&mut self.list.opaque, Run::of(&span, 0..1, None));
         }
         self.details.sort_unstable();
         for group in (self.details).chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
@@ -401,15 +400,7 @@ impl Lister {
             let level = (world.meshes.get(mesh as usize)).and_then(|m| m.get(level as usize));
             for span in level.into_iter().flat_map(|l| &l.spans) {
                 self.list.n_triangles += u64::from(span.n / 3) * u64::from(last - first);
-                let run = |instances| Run {
-                    first: span.first,
-                    n: span.n,
-                    texture: span.texture,
-                    finish: span.finish,
-                    is_smooth: span.is_smooth,
-                    instances,
-                    scissor: None,
-                };
+                let run = |instances| Run::of(span, instances, None);
                 if span.is_transparent {
                     for (at, &(.., detail)) in (first..last).zip(group) {
                         let center = world.details[detail as usize].center;

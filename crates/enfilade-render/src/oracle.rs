@@ -12,7 +12,7 @@ use enfilade_geom::{Bvh, DMat4, DVec3, Ray, Triangle};
 use enfilade_runtime::{DetailId, Sight, SightState};
 
 use crate::camera::Camera;
-use crate::ids::Shown;
+use crate::ids::{LostPixel, Shown};
 use crate::materials::{Look, looks_of};
 use crate::scene::plug;
 
@@ -171,6 +171,20 @@ impl<'w> Oracle<'w> {
         })
     }
 
+    /// Whether a pixel that differs is lost: what is shown there is wrong, and what was expected is more than a crack.
+    #[must_use]
+    pub fn is_lost(
+        &self,
+        camera: &Camera,
+        pixel: &LostPixel,
+        size: [u32; 2],
+        is_transparent: bool,
+    ) -> bool {
+        let found = f64::from(Camera::distance_of(pixel.found.1));
+        !self.is_right(camera, pixel.at, size, found, is_transparent)
+            && self.is_met(camera, pixel.at, size, pixel.expected.0, is_transparent)
+    }
+
     /// Whether `shown` is what an exact ray through the middle of the pixel meets first, or among several
     /// in one place; and so do rays moved by a 64th of a pixel and twice the world's tolerance, in three directions or
     /// more, of eight that do not tell there from back.
@@ -282,7 +296,7 @@ fn add_detail(
     pose: Option<DMat4>,
 ) {
     let object = &world[id];
-    let own = DMat4::from_cols_array(&object.transform.map(f64::from));
+    let own = object.placement();
     let m = pose.map_or(own, |pose| pose * own);
     let mut n = first_of_mesh[object.mesh as usize];
     for primitive in &world.detail_meshes[object.mesh as usize].primitives {

@@ -18,13 +18,13 @@ use wgpu::util::DeviceExt;
 use crate::gpu::{Gpu, RenderError};
 use crate::marks::{Mark, Shape};
 use crate::materials::{Look, looks_of};
-use filling::{Filling, Level, Span};
+use filling::{Filling, Level};
 use placed::{Moving, Placed, bounds_of, placed};
 use textures::load_textures;
 
 pub use color::cell_color;
 pub(crate) use color::packed_cell_color;
-pub(crate) use filling::{CORNER_LAYOUT, Finish};
+pub(crate) use filling::{CORNER_LAYOUT, Finish, Span};
 pub(crate) use placed::{INSTANCE_LAYOUT, Instance};
 pub(crate) use plug::plug;
 pub(crate) use textures::texture_layout;

@@ -53,10 +53,7 @@ fn n_lost(studio: &mut Studio, world: &World, views: usize, seed: u64) -> [usize
         let [whole, culled] = studio.ids_compared(&camera, SIZE).unwrap();
         for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
             for l in a.difference(b).lost {
-                let drawn = f64::from(Camera::distance_of(l.found.1));
-                let is_lost = !oracle.is_right(&camera, l.at, SIZE, drawn, layer == 1)
-                    && oracle.is_met(&camera, l.at, SIZE, l.expected.0, layer == 1);
-                n[0] += usize::from(is_lost);
+                n[0] += usize::from(oracle.is_lost(&camera, &l, SIZE, layer == 1));
                 n[1] += 1;
             }
         }

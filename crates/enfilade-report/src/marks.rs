@@ -1,7 +1,7 @@
 //! What a plan shows beside the cells: walls, doorways, and the objects that stand there.
 
 use enfilade_cpg::{CellId, Portal, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
+use enfilade_geom::{Aabb, DVec2, DVec3, Plane, Winding};
 
 use crate::clip::clipped;
 use crate::drawing::{Class, Item, Path};
@@ -193,7 +193,7 @@ impl View<'_> {
 
     fn detail(&self, index: usize) -> Option<Item> {
         let detail = &self.world.details[index];
-        let place = DMat4::from_cols_array(&detail.transform.map(f64::from));
+        let place = detail.placement();
         let mesh = &self.world.detail_meshes[detail.mesh as usize];
         let mut bounds = Aabb::EMPTY;
         for p in mesh.primitives.iter().flat_map(|p| &p.positions) {

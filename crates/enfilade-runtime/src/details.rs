@@ -60,7 +60,7 @@ impl Details {
         let mut placed = Vec::new();
         let mut boxes = Vec::new();
         for (i, object) in world.details.iter().enumerate() {
-            let to_world = DMat4::from_cols_array(&object.transform.map(f64::from));
+            let to_world = object.placement();
             let inverse = to_world.inverse();
             let shape = &shapes[object.mesh as usize];
             let mut bounds = shape.bounds_under(&to_world);

@@ -1,7 +1,7 @@
 //! Leaves of doors: which portals each shuts, and the room that it takes on its way.
 
 use enfilade_cpg::{CellId, FittingPart, Motion, Portal, PortalId, World};
-use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_geom::{Aabb, DVec3};
 
 use crate::point::point;
 use crate::seen::DetailId;
@@ -160,7 +160,7 @@ impl Doors {
 /// Corners of an object in the model's pose.
 fn corners(world: &World, detail: DetailId) -> impl Iterator<Item = DVec3> {
     let object = &world[detail];
-    let transform = DMat4::from_cols_array(&object.transform.map(f64::from));
+    let transform = object.placement();
     let mesh = &world.detail_meshes[object.mesh as usize];
     let positions = mesh.primitives.iter().flat_map(|p| &p.positions);
     positions.map(move |p| transform.transform_point3(point(*p)))

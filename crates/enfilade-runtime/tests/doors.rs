@@ -8,14 +8,7 @@ use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 const DOOR: PortalId = PortalId(0);
 
 fn two_rooms(is_glass: bool) -> World {
-    let world = room_grid(&GridParams {
-        size: [2, 1, 1],
-        doors: 1.0,
-        windows: 0.0,
-        furniture: 0,
-        outdoors: false,
-        ..GridParams::offices(2, 1)
-    });
+    let world = room_grid(&GridParams::two_rooms());
     with_doors(world, |_| is_glass)
 }
 

@@ -219,13 +219,7 @@ fn a_hundred_thousand_hostile_questions_get_honest_answers() {
 
 #[test]
 fn a_plane_that_is_none_narrows_nothing() {
-    let world = room_grid(&GridParams {
-        size: [2, 1, 1],
-        doors: 1.0,
-        furniture: 0,
-        outdoors: false,
-        ..GridParams::offices(2, 1)
-    });
+    let world = room_grid(&GridParams::two_rooms());
     let lines = Sightlines::build(&world);
     let mut state = SightState::new(&Sight::build(&world).unwrap());
     let outline = &world.graph.portals[0].outline;

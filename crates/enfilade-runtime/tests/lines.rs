@@ -69,13 +69,7 @@ fn from_farther_off_than_numbers_can_tell_both_ways_answer_alike() {
 
 #[test]
 fn closed_doors_and_odd_points_stop_a_line() {
-    let world = room_grid(&GridParams {
-        size: [2, 1, 1],
-        doors: 1.0,
-        furniture: 0,
-        outdoors: false,
-        ..GridParams::offices(2, 1)
-    });
+    let world = room_grid(&GridParams::two_rooms());
     let lines = Sightlines::build(&world);
     let sight = Sight::build(&world).unwrap();
     let mut state = SightState::new(&sight);

@@ -41,6 +41,19 @@ pub struct GridParams {
 }
 
 impl GridParams {
+    /// Two rooms in a row along x with a doorway between them; no windows, no furniture, no outdoors.
+    #[must_use]
+    pub fn two_rooms() -> Self {
+        Self {
+            size: [2, 1, 1],
+            doors: 1.0,
+            windows: 0.0,
+            furniture: 0,
+            outdoors: false,
+            ..Self::offices(2, 1)
+        }
+    }
+
     /// About `rooms` office-like rooms on storeys of at most 100, unturned.
     #[must_use]
     pub fn offices(rooms: usize, seed: u64) -> Self {

@@ -6,7 +6,7 @@
 
 use enfilade_cpg::{CellId, DetailObject, Locator, World};
 use enfilade_geom::poly::{self, Poly};
-use enfilade_geom::{Aabb, DMat4, DVec3, Plane, Triangle};
+use enfilade_geom::{Aabb, DVec3, Plane, Triangle};
 use rayon::prelude::*;
 
 use crate::locator_cells::plane_of;
@@ -69,7 +69,7 @@ fn problem(world: &World, detail: &DetailObject, rounding: f64) -> Option<String
 }
 
 pub(crate) fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
-    let by = DMat4::from_cols_array(&detail.transform.map(f64::from));
+    let by = detail.placement();
     let mut out = Vec::new();
     for p in &world.detail_meshes[detail.mesh as usize].primitives {
         let place = |i: u32| by.transform_point3(to_dvec(p.positions[i as usize]));

@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::{Bvh, DMat4, DVec3, Ray, Triangle};
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -331,7 +331,7 @@ impl<'a> Court<'a> {
         let mut detail_of = Vec::new();
         let mut detail_sizes = Vec::new();
         for (i, detail) in world.details.iter().enumerate() {
-            let transform = DMat4::from_cols_array(&detail.transform.map(f64::from));
+            let transform = detail.placement();
             let before = triangles.len();
             for p in &world.detail_meshes[detail.mesh as usize].primitives {
                 triangles.extend(p.indices.chunks_exact(3).map(|t| {

@@ -6,7 +6,7 @@
 use enfilade_cpg::{
     Batch, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes, World,
 };
-use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Plane, Triangle, world_tolerance};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, world_tolerance};
 use rayon::prelude::*;
 
 use crate::hourglass::Hourglasses;
@@ -177,7 +177,7 @@ fn all_parts(world: &World) -> Vec<Shape> {
         batch.primitive.indices.chunks_exact(3).map(corners)
     });
     let objects = world.details.iter().map(|object| {
-        let to_world = DMat4::from_cols_array(&object.transform.map(f64::from));
+        let to_world = object.placement();
         let mut triangles = Vec::new();
         for primitive in &world.detail_meshes[object.mesh as usize].primitives {
             let at = |i: u32| to_world.transform_point3(point(primitive.positions[i as usize]));

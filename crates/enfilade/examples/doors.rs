@@ -9,13 +9,7 @@ use enfilade_testkit::{GridParams, room_grid, with_doors};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // Two rooms in a row, with one doorway.
-    let world = room_grid(&GridParams {
-        size: [2, 1, 1],
-        doors: 1.0,
-        furniture: 0,
-        outdoors: false,
-        ..GridParams::offices(2, 1)
-    });
+    let world = room_grid(&GridParams::two_rooms());
     let sight = Sight::build(&world)?;
     let lines = Sightlines::build(&world);
     let mut state = SightState::new(&sight);

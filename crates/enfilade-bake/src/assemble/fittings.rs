@@ -352,10 +352,7 @@ fn touching(reach: &Aabb, bounds: &[Aabb]) -> Vec<u32> {
 
 fn placed<'a>(world: &'a World, detail: &DetailObject) -> (&'a Mesh, DMat4) {
     let mesh = &world.detail_meshes[detail.mesh as usize];
-    (
-        mesh,
-        DMat4::from_cols_array(&detail.transform.map(f64::from)),
-    )
+    (mesh, detail.placement())
 }
 
 fn corners_of(world: &World, detail: &DetailObject) -> Vec<DVec3> {

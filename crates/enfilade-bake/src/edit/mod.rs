@@ -13,7 +13,7 @@ mod splice;
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{Cell, CellId, Portal, PortalId, SourceRuns, World};
-use enfilade_geom::{DMat4, DVec3, Plane, Triangle, Winding};
+use enfilade_geom::{DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::rounded_portal;
 use crate::complex::divide::{BACK, Cutter, FRONT, Undivided};
@@ -479,7 +479,7 @@ impl Parts {
             if d.cells.binary_search(&self.cell).is_err() {
                 continue;
             }
-            let transform = DMat4::from_cols_array(&d.transform.map(f64::from));
+            let transform = d.placement();
             let mut touched = Vec::new();
             for p in &out.detail_meshes[d.mesh as usize].primitives {
                 for t in p.indices.chunks_exact(3) {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, DetailObject, World};
 use enfilade_geom::scene::{Material, Primitive};
-use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_geom::{Aabb, DVec3};
 
 use super::merge::CostGraph;
 
@@ -123,7 +123,7 @@ pub(crate) fn surfaces_of(world: &World, cell: CellId, cost: &CostModel) -> Vec<
         }));
     }
     for d in world.details.iter().filter(|d| sees(&d.cells)) {
-        let transform = DMat4::from_cols_array(&d.transform.map(f64::from));
+        let transform = d.placement();
         let mesh = &world.detail_meshes[d.mesh as usize];
         let points = mesh.primitives.iter().flat_map(|p| &p.positions);
         let b = points.fold(Aabb::EMPTY, |b, p| {

@@ -3,7 +3,7 @@
 use enfilade::cpg::{PortalId, PortalKind, World};
 use enfilade::runtime::{Sight, SightState, View, Viewer};
 use enfilade_cli::cameras::random_camera;
-use enfilade_render::{AdapterChoice, Camera, Gpu, Oracle, Studio};
+use enfilade_render::{AdapterChoice, Gpu, Oracle, Studio};
 use enfilade_testkit::Rng;
 
 use super::Figure;
@@ -105,12 +105,9 @@ pub(super) fn pixels_lost(world: &World) -> anyhow::Result<Figure> {
         for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
             let difference = a.difference(b);
             n_pixels += if layer == 0 { difference.n_pixels } else { 0 };
-            n_lost += (difference.lost.iter())
-                .filter(|l| {
-                    let drawn = f64::from(Camera::distance_of(l.found.1));
-                    !oracle.is_right(&camera, l.at, SIZE, drawn, layer == 1)
-                        && oracle.is_met(&camera, l.at, SIZE, l.expected.0, layer == 1)
-                })
+            let lost = difference.lost.iter();
+            n_lost += lost
+                .filter(|l| oracle.is_lost(&camera, l, SIZE, layer == 1))
                 .count();
         }
     }

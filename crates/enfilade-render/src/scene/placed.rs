@@ -116,7 +116,7 @@ pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed
         if sight.portals_of(id).next().is_some() {
             moving.push(Moving {
                 detail: id,
-                transform: DMat4::from_cols_array(&detail.transform.map(f64::from)),
+                transform: detail.placement(),
                 center: details[details.len() - 1].center,
             });
         }

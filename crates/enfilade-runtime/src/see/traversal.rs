@@ -71,7 +71,8 @@ impl Traversal<'_, '_> {
             }
         }
         // An eye in two cells sees what either does; that is rare, and costs no more than without.
-        if self.viewer.pending.len() == 1 {
+        // All faces of a view begin alike.
+        if self.viewer.pending.len() == 1 && !self.viewer.is_bounded {
             self.viewer.bound_by(self.sight, cell);
         }
     }

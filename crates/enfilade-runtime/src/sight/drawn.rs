@@ -1,7 +1,7 @@
 //! What of a world is drawn, in pieces small enough to be left out one by one, and the trees over their boxes.
 
 use enfilade_cpg::{Batch, CellId, DetailObject, VisibleParts, World};
-use enfilade_geom::{Aabb, DMat4};
+use enfilade_geom::Aabb;
 
 use crate::boxes::{BoxTrees, Boxed, Root};
 use crate::chunks::{Chunk, chunks_of};
@@ -106,7 +106,7 @@ impl Drawn {
     fn add_detail(&mut self, world: &World, detail: &DetailObject) -> Option<()> {
         let mesh = world.detail_meshes.get(detail.mesh as usize);
         let mesh = mesh.filter(|_| exist(world, &detail.cells))?;
-        let transform = DMat4::from_cols_array(&detail.transform.map(f64::from));
+        let transform = detail.placement();
         let mut bounds = Aabb::EMPTY;
         let mut n_triangles = 0;
         for primitive in &mesh.primitives {

@@ -4,6 +4,8 @@ use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, MotionKin
 use enfilade_geom::scene::{Material, Mesh, Primitive};
 use enfilade_geom::{Aabb, DVec3};
 
+use super::world::box_indices;
+
 /// Half the thickness of a leaf, and how far its middle is from the portal's plane. [Units: wu]
 const HALF: f64 = 0.02;
 const OFF: f64 = 0.06;
@@ -89,20 +91,9 @@ fn plate(corner: DVec3, u: DVec3, v: DVec3, w: DVec3) -> Primitive {
         let bit = |b: usize| f64::from(u8::from(k & b != 0));
         corner + u * bit(1) + v * bit(2) + w * bit(4)
     };
-    let mut indices = Vec::new();
-    for quad in [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ] {
-        indices.extend([0, 1, 2, 0, 2, 3].map(|k: usize| quad[k]));
-    }
     Primitive {
         positions: (0..8).map(|k| at(k).as_vec3().to_array()).collect(),
-        indices,
+        indices: box_indices(),
         ..Primitive::default()
     }
 }

@@ -198,25 +198,28 @@ fn unit_cube() -> Mesh {
     let positions = (0..8)
         .map(|c| [0, 1, 2].map(|k| (c >> k & 1) as f32))
         .collect();
-    let mut indices = Vec::new();
-    for quad in [
+    Mesh {
+        name: "cube".into(),
+        primitives: vec![Primitive {
+            positions,
+            indices: box_indices(),
+            ..Primitive::default()
+        }],
+    }
+}
+
+/// The triangles of a box whose corners are numbered by a bit an axis.
+pub(super) fn box_indices() -> Vec<u32> {
+    let quads = [
         [0, 2, 3, 1],
         [4, 5, 7, 6],
         [0, 1, 5, 4],
         [2, 6, 7, 3],
         [0, 4, 6, 2],
         [1, 3, 7, 5],
-    ] {
-        indices.extend([0, 1, 2, 0, 2, 3].map(|k: usize| quad[k]));
-    }
-    Mesh {
-        name: "cube".into(),
-        primitives: vec![Primitive {
-            positions,
-            indices,
-            ..Primitive::default()
-        }],
-    }
+    ];
+    let triangles = quads.map(|quad| [0, 1, 2, 0, 2, 3].map(|k: usize| quad[k]));
+    triangles.concat()
 }
 
 fn to_f32(p: DVec3) -> [f32; 3] {

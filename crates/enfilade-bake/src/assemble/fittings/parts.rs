@@ -10,6 +10,7 @@ use enfilade_cpg::{Portal, PortalKind};
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
 use super::opening::{Mask, Rectangle};
+use crate::assemble::LEAST_DOOR;
 use crate::structure::{MAX_THICKNESS, thin_direction};
 
 /// A leaf's height over that of its opening; less where a light is above the door, more where it overlaps the frame.
@@ -32,9 +33,8 @@ const OFF: f64 = 0.15;
 const HAIR: f64 = 0.01;
 /// How far from the portal's plane a leaf or frame may stand, within a wall. [Units: wu]
 pub(super) const DEEP: f64 = 0.4;
-/// Openings of these widths and heights have doors. [Units: wu]
+/// Openings of these widths have doors. [Units: wu]
 const DOOR_WIDTH: [f64; 2] = [0.5, 6.0];
-const LEAST_DOOR_HEIGHT: f64 = 1.5;
 /// Least share of a door that all of an object covers to be its leaf though no shell of it is a plate.
 const WHOLE: f64 = 0.5;
 /// Least share of a window that a pane covers.
@@ -105,7 +105,7 @@ impl Aperture {
     /// Whether a door fits into it.
     fn takes_door(&self) -> bool {
         let size = self.around.size();
-        size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR_HEIGHT
+        size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR
     }
 
     /// The box in which its leaves, frames and panes lie.

@@ -12,7 +12,8 @@ use enfilade_geom::{Bvh, DMat4, DVec3};
 use super::opening::Rectangle;
 use super::parts::{Leaf, Pose};
 
-/// A single leaf that is wider slides. [Units: wu]
+/// A single leaf that is wider slides: those on hinges are made up to 1.25 m wide (DIN 18101), with some room for
+/// what else is in a model. [Units: wu]
 const WIDEST_TURN: f64 = 1.45;
 /// A handle is off the middle by this share of half the leaf's width at least.
 const HANDLE: f64 = 0.3;
