@@ -217,6 +217,21 @@ fn a_leaf_in_one_piece_with_its_frame_becomes_an_object() {
 }
 
 #[test]
+fn a_leaf_opens_to_the_side_where_it_has_room() {
+    // In the middle of the wall, without a handle or a frame: nothing but the wardrobe tells.
+    for (wardrobe, opens_to) in [([3.2, 3.8], 1.0), ([4.4, 5.0], -1.0)] {
+        let mut scene = two_rooms(&[([0.0, 0.0, 0.08], [1.0, 2.1, 0.12])]);
+        let block = ([wardrobe[0], 0.0, 0.8], [wardrobe[1], 2.0, 2.2]);
+        add_boxes(&mut scene, "wardrobe", Role::Detail, &[block]);
+        let world = baked(&scene);
+        let motion = leaves(the_door(&world)).next().unwrap().motion.unwrap();
+        let middle = motion.at(1.0).transform_point3(DVec3::new(4.1, 1.0, 1.5));
+        let off = (middle.x - 4.1) * opens_to;
+        assert!(off > 0.3, "{wardrobe:?}: it opens to {middle}");
+    }
+}
+
+#[test]
 fn two_leaves_part_in_the_middle() {
     let leaves_of_two = [
         ([0.0, 0.0, 0.05], [0.5, 2.1, 0.09]),

@@ -186,8 +186,8 @@ impl<'w> Oracle<'w> {
     }
 
     /// Whether `shown` is what an exact ray through the middle of the pixel meets first, or among several
-    /// in one place; and so do rays moved by a 64th of a pixel and twice the world's tolerance, in three directions or
-    /// more, of eight that do not tell there from back.
+    /// in one place; and so do rays moved by a 64th of a pixel and twice the world's tolerance, in at
+    /// least three of eight directions, a direction and its opposite being one.
     ///
     /// What is seen at the middle alone, or along a line through it, is seen through a slit between triangles whose corners
     /// were rounded, by the adapter or to 32 bits, or moved by less than the tolerance, which no promise of a world is

@@ -195,8 +195,8 @@ impl Sight {
         cells
     }
 
-    /// Where in its opening a portal is shut, along its normal from its plane: in the middle of its leaves, so that what
-    /// fills it there is hidden by them; 0 without leaves. [Units: wu]
+    /// How far from a portal's plane, along its normal, the middle of its shut leaves is: a panel put there to fill the opening
+    /// is hidden by them. 0 without leaves. [Units: wu]
     #[must_use]
     pub fn depth_of_leaves(&self, portal: PortalId) -> f32 {
         self.doors.depth(portal)

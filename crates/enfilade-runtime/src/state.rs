@@ -116,8 +116,8 @@ impl SightState {
         Some(self.shares[slot as usize].unwrap_or_else(as_modeled))
     }
 
-    /// What leaves moves objects from where the model has them, in world space: for each object that stands elsewhere, in
-    /// ascending order. Apply it after the object's own transform.
+    /// The leaves that were moved, in ascending order, each with the transform that takes it from where the model has it to
+    /// where it stands, in world space: to be applied after the object's own transform.
     pub fn moved(&self) -> impl Iterator<Item = (DetailId, DMat4)> {
         let shares = (0..).zip(&self.shares);
         shares.filter_map(|(slot, share)| {
@@ -126,7 +126,7 @@ impl SightState {
         })
     }
 
-    /// The same of one object; `None` for one that stands where the model has it. O(log leaves).
+    /// That transform of one object; `None` for one that was not moved. O(log leaves).
     #[must_use]
     pub fn pose(&self, detail: DetailId) -> Option<DMat4> {
         let slot = self.doors.slot(detail)?;
