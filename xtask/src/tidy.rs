@@ -27,7 +27,7 @@ const PRINT: &[&str] = &["println!", "eprintln!", "print!(", "eprint!("];
 /// Readers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 16] = [
+const FENCES: [Fence; 17] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -82,6 +82,12 @@ const FENCES: [Fence; 16] = [
         words: &["std::fs", "std::thread"],
     },
     Fence {
+        name: "enfilade-world",
+        siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-runtime"],
+        not: &["rayon", "anyhow", "serde_json"],
+        words: &["std::fs", "std::thread", "std::time"],
+    },
+    Fence {
         name: "enfilade-verify",
         siblings: &["enfilade-geom", "enfilade-cpg"],
         not: &["anyhow"],
@@ -110,6 +116,7 @@ const FENCES: [Fence; 16] = [
             "enfilade-render",
             "enfilade-verify",
             "enfilade-vis",
+            "enfilade-world",
         ],
         not: &["anyhow", "clap", "rayon"],
         words: &["std::thread"],

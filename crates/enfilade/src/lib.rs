@@ -113,6 +113,7 @@
 //! | `vis` | `vis` | what can be seen from each cell, before run-time |
 //! | `render` | `render` | pictures of a world with wgpu |
 //! | `verify` | `verify` | tests the promises of a world |
+//! | `world` | `world` | what lives in a world: things, paths, sound, contacts, moving rooms |
 //!
 //! None is on by default: a game that reads worlds and asks them links neither importers nor builders.
 //!
@@ -144,6 +145,8 @@ pub use enfilade_render as render;
 pub use enfilade_verify as verify;
 #[cfg(feature = "vis")]
 pub use enfilade_vis as vis;
+#[cfg(feature = "world")]
+pub use enfilade_world as world;
 
 pub use cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Exit, Portal, PortalId, PortalKind, Pvs,

@@ -1,0 +1,14 @@
+//! What lives in a world of cells and portals: what is where, what is touched, lit, heard and reached.
+//!
+//! Sight, light, sound, paths and collision are one walk over portals with different *carriers*: what is handed on through a
+//! portal, and when it stops. All of them read one [`Layout`], made once from a world, and one
+//! [`SightState`](enfilade_runtime::SightState), which says how doors stand. None knows another.
+//!
+//! # What is promised
+//!
+//! - **Nothing is allocated** in a question once the buffers have grown.
+//! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
+
+mod layout;
+
+pub use layout::{CellShape, Exit, Layout, Opening};
