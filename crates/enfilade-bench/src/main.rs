@@ -5,7 +5,9 @@ mod bring;
 mod bsp;
 mod builders;
 mod facade;
+mod living;
 mod measure;
+mod rows;
 mod sight;
 mod subject;
 mod table;
@@ -17,10 +19,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use enfilade::runtime::SightOptions;
 
-use bring::bench_bring;
 use bsp::{bench_bsp, bench_simplify};
 use builders::bench_builders;
 use facade::bench_facade;
+use rows::bench_rows;
 use sight::{bench_los, bench_maze, bench_see, bench_tight};
 use table::Table;
 use walkthrough::Walkthrough;
@@ -44,6 +46,15 @@ enum What {
         #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
         rows: Vec<String>,
         /// Only scenes whose names begin so. Scenes are folders of $ENFILADE_SCENES, or of ../shared/scenes.
+        #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
+        scenes: Vec<String>,
+    },
+    /// Things, paths, sound, contacts and moving rooms, a row a figure with the value that it must reach.
+    Living {
+        /// Only rows whose names begin so.
+        #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
+        rows: Vec<String>,
+        /// Only scenes whose names begin so.
         #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
         scenes: Vec<String>,
     },
@@ -141,7 +152,8 @@ enum What {
 fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
-        What::Bring { rows, scenes } => return bench_bring(args.json, rows, scenes),
+        What::Bring { rows, scenes } => return bench_rows(&bring::ROWS, args.json, rows, scenes),
+        What::Living { rows, scenes } => return bench_rows(living::ROWS, args.json, rows, scenes),
         What::Bsp {
             scenes,
             heuristics,

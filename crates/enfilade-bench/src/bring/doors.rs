@@ -6,7 +6,7 @@ use enfilade_cli::cameras::random_camera;
 use enfilade_render::{AdapterChoice, Gpu, Oracle, Studio};
 use enfilade_testkit::Rng;
 
-use super::Figure;
+use crate::rows::Figure;
 
 /// Views in random states of doors, and the size of their pictures.
 const VIEWS: usize = 1000;

@@ -8,7 +8,7 @@ use enfilade::vis::{VisConfig, VisContext, see_all, see_parts};
 use enfilade_testkit::Rng;
 use enfilade_verify::structural_triangles;
 
-use super::Figure;
+use crate::rows::Figure;
 
 /// Rays from each cell.
 const RAYS: usize = 100_000;
