@@ -124,6 +124,18 @@ impl Locator {
     /// No cell that it touches is missing; a few may be in it that only come near. Points that are not finite touch nothing.
     /// `O(points)` for each node that the hull reaches.
     pub fn cells_near(&self, points: &[DVec3], margin: f64, cells: &mut Vec<CellId>) {
+        self.cells_near_with(points, margin, cells, &mut Vec::new());
+    }
+
+    /// The same, with a buffer that is kept from question to question: nothing is allocated once it has grown. Its contents
+    /// do not matter.
+    pub fn cells_near_with(
+        &self,
+        points: &[DVec3],
+        margin: f64,
+        cells: &mut Vec<CellId>,
+        stack: &mut Vec<i32>,
+    ) {
         if points.is_empty() || points.iter().any(|p| !p.is_finite()) {
             return;
         }
@@ -139,7 +151,8 @@ impl Locator {
         if !(self.bounds.contains(reach.min) && self.bounds.contains(reach.max)) {
             add(self.outside);
         }
-        let mut stack = vec![self.root];
+        stack.clear();
+        stack.push(self.root);
         while let Some(at) = stack.pop() {
             if at < 0 {
                 add((at <= -2).then(|| CellId((-2 - at) as u32)));

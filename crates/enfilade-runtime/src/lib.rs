@@ -88,7 +88,7 @@ pub use follow::{Follower, Step};
 pub use options::SightOptions;
 pub use pick::{Hit, NotFinite, Target};
 pub use region::Narrowing;
-pub use see::{SeeOptions, Viewer};
+pub use see::{Crossing, SeeOptions, StepQuestion, Viewer, Window};
 pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};
 pub use sight::Sight;
 pub use sight_error::SightError;

@@ -18,6 +18,7 @@
 
 mod listing;
 mod queue;
+mod steps;
 mod traversal;
 mod viewer;
 
@@ -30,6 +31,7 @@ use crate::state::SightState;
 use crate::view::View;
 use traversal::Traversal;
 
+pub use steps::{Crossing, StepQuestion, Window};
 pub use viewer::{SeeOptions, Viewer};
 
 impl Viewer {

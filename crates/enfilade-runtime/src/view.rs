@@ -225,6 +225,19 @@ impl View {
         self.eye.as_vec3().to_array()
     }
 
+    /// The same view of a world in another frame: `turn` takes that frame's directions to those of this one, `at` is where its
+    /// origin is in this one. [Units: wu]
+    #[must_use]
+    pub fn in_frame(&self, turn: &DMat3, at: DVec3) -> Self {
+        let mut view = self.clone();
+        view.eye = turn.transpose() * (self.eye - at);
+        for face in &mut view.faces {
+            face.map *= *turn;
+            face.normals *= *turn;
+        }
+        view
+    }
+
     /// How many pixels a meter has, at most, where a sphere is that is in view, in a picture of `size`: for levels of
     /// detail. To first order in what moves, which is little where it matters.
     ///

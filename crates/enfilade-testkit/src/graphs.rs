@@ -5,6 +5,7 @@
 
 mod doors;
 mod grid;
+mod scale;
 mod world;
 
 use std::collections::BTreeMap;
@@ -15,6 +16,7 @@ use enfilade_geom::{Aabb, DMat3, DVec3};
 use crate::rng::Rng;
 pub use doors::with_doors;
 use grid::{Face, Grid};
+pub use scale::scaled_world;
 use world::{FaceHole, world_of};
 
 /// What grid of rooms to make.

@@ -207,6 +207,25 @@ impl Layout {
         self.locator.locate(p)
     }
 
+    /// Adds the cells that the hull of `points` may touch, grown by `margin`, to `cells`, which stays ascending and without
+    /// repeats; `stack` is a buffer to be kept. As [`Locator::cells_near`]. [Units: wu]
+    pub fn cells_near(
+        &self,
+        points: &[DVec3],
+        margin: f64,
+        cells: &mut Vec<CellId>,
+        stack: &mut Vec<i32>,
+    ) {
+        self.locator.cells_near_with(points, margin, cells, stack);
+    }
+
+    /// The cell that is the space around the building, if there is one. O(cells).
+    #[must_use]
+    pub fn outdoors(&self) -> Option<CellId> {
+        let at = self.cells.iter().position(|c| c.is_outdoor)?;
+        Some(CellId(at as u32))
+    }
+
     /// How far what is stored may be off what is true, by rounding. [Units: wu]
     #[must_use]
     pub fn tolerance(&self) -> f64 {

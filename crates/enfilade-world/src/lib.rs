@@ -10,5 +10,13 @@
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
 mod layout;
+mod look;
+mod pose;
+mod shape;
+mod space;
 
 pub use layout::{CellShape, Exit, Layout, Opening};
+pub use look::{SpaceSeen, SpaceViewer};
+pub use pose::Pose;
+pub use shape::{Shape, ShapeError};
+pub use space::{PartId, Place, Space, SpaceError};

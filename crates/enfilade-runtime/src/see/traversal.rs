@@ -5,6 +5,7 @@ use std::cmp::Reverse;
 use enfilade_cpg::{CellId, PortalId};
 use glam::DVec3;
 
+use super::steps::Window;
 use super::viewer::{NONE, Pending, Stage, Viewer};
 use crate::boxes::Planes;
 use crate::exits::{Exit, Group};
@@ -42,6 +43,10 @@ impl Traversal<'_, '_> {
     /// Queues the eye's cell, and those that it may as well be in.
     pub(super) fn start(&mut self, cell: Option<u32>) {
         self.begin_face();
+        self.add_eye(cell);
+    }
+
+    pub(super) fn add_eye(&mut self, cell: Option<u32>) {
         let Some(cell) = cell else {
             self.viewer.out.counts.is_eye_lost = true;
             self.enter_all_in_view();
@@ -78,6 +83,9 @@ impl Traversal<'_, '_> {
     }
 
     fn push_start(&mut self, cell: u32) {
+        if self.viewer.stepping.is_border(cell) {
+            self.viewer.stepping.note(cell, NONE, Window::screen());
+        }
         self.push(cell, NONE, Region::screen(), None, 0.0);
     }
 
@@ -179,6 +187,10 @@ impl Traversal<'_, '_> {
         self.set_planes(&Region::screen(), None);
         self.viewer.shadows.clear();
         self.add_visit(cell, via, &Region::screen(), 0.0);
+        let stepping = &mut self.viewer.stepping;
+        if stepping.is_border(cell) || stepping.is_watched(cell) {
+            stepping.note(cell, via, Window::screen());
+        }
         self.cull(self.sight.cell_roots[cell as usize]);
     }
 
@@ -201,6 +213,14 @@ impl Traversal<'_, '_> {
                 .cast(&sight.occluders, cell, self.view.eye, margin);
         }
         self.add_visit(cell, via, &region, near);
+        if self.viewer.stepping.is_watched(cell) {
+            let window = Window {
+                region,
+                entry,
+                near,
+            };
+            self.viewer.stepping.note(cell, via, window);
+        }
         self.cull(self.sight.cell_roots[cell as usize]);
         let entry_in_clip = entry.map(|(n, h)| (self.face.normals * n, h - 2.0 * sight.tolerance));
         let mut runs = sight.runs_of(cell);
@@ -295,6 +315,16 @@ impl Traversal<'_, '_> {
         let beyond = (ahead > 16.0 * tolerance).then_some((normal, ahead));
         self.add_portal(exit.portal);
         // Along every ray it lies beyond the portal entered by; less is rounding, or comes of joining.
-        self.push(exit.to, exit.portal, narrowed, beyond, near.max(nearest));
+        let near = near.max(nearest);
+        if self.viewer.stepping.is_border(exit.to) {
+            let window = Window {
+                region: narrowed,
+                entry: beyond,
+                near,
+            };
+            self.viewer.stepping.note(exit.to, exit.portal, window);
+            return;
+        }
+        self.push(exit.to, exit.portal, narrowed, beyond, near);
     }
 }

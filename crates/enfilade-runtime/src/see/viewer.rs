@@ -5,6 +5,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
+use super::steps::Stepping;
 use crate::occluder::Shadows;
 use crate::region::{Clipper, Narrowing, Region};
 use crate::seen::{Lists, SeeCounts};
@@ -91,6 +92,7 @@ pub struct Viewer {
     pub(super) clipper: Clipper,
     pub(super) shadows: Shadows,
     pub(super) out: Lists,
+    pub(super) stepping: Stepping,
 }
 
 impl Viewer {
@@ -125,6 +127,7 @@ impl Viewer {
             clipper: Clipper::new(),
             shadows: Shadows::new(),
             out: Lists::default(),
+            stepping: Stepping::default(),
         }
     }
 

@@ -1,0 +1,206 @@
+//! What an eye sees of a world and of the worlds that move in it.
+//!
+//! Each part is followed by its own [`Viewer`], in its own frame. A view that leaves a part through one of its doors goes on in
+//! the places around that the door leads to, and in the doors that it meets; a view of a cell in which parts stand goes on to
+//! these from outside. The part of the screen is handed on as it is: it depends on the eye alone, not on the frame. Parts take
+//! turns until none has anything new, which ends because each adds only what it had not seen.
+
+use enfilade_cpg::CellId;
+use enfilade_runtime::{Crossing, SeeOptions, Seen, StepQuestion, View, Viewer, Window};
+
+use crate::space::{PartId, Place, Space};
+
+/// Asks what one eye sees of a [`Space`], frame by frame; keeps its buffers.
+pub struct SpaceViewer {
+    parts: Vec<PartView>,
+    options: SeeOptions,
+    queue: Vec<(PartId, CellId, Window)>,
+    crossings: Vec<Crossing>,
+    seen: Vec<PartId>,
+}
+
+struct PartView {
+    viewer: Viewer,
+    /// In the part's frame; `None` until the part comes into the question.
+    view: Option<View>,
+    /// Whether the current face was begun.
+    is_begun: bool,
+}
+
+impl SpaceViewer {
+    /// A viewer of `space`.
+    #[must_use]
+    pub fn new(space: &Space) -> Self {
+        Self::with_options(space, SeeOptions::default())
+    }
+
+    /// A viewer of `space` that follows views so.
+    #[must_use]
+    pub fn with_options(space: &Space, options: SeeOptions) -> Self {
+        let mut viewer = Self {
+            parts: Vec::new(),
+            options,
+            queue: Vec::new(),
+            crossings: Vec::new(),
+            seen: Vec::new(),
+        };
+        viewer.grow(space);
+        viewer
+    }
+
+    /// Room for parts that were added.
+    fn grow(&mut self, space: &Space) {
+        for part in &space.parts[self.parts.len()..] {
+            self.parts.push(PartView {
+                viewer: Viewer::with_options(&part.sight, self.options),
+                view: None,
+                is_begun: false,
+            });
+        }
+    }
+
+    /// What `view`, which is in the frame of part `frame`, sees. A view given in the frame of the part that the eye is in is
+    /// exact wherever that part is.
+    ///
+    /// Time grows with what is seen, and a little with the number of parts. Allocates only while buffers grow.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such part, or `space` is not the one that the viewer was made for.
+    pub fn see<'a>(&'a mut self, space: &Space, frame: PartId, view: &View) -> SpaceSeen<'a> {
+        self.grow(space);
+        for id in self.seen.drain(..) {
+            self.parts[id.idx()].view = None;
+        }
+        let eye = enfilade_geom::DVec3::from_array(view.eye().map(f64::from));
+        let at = space.locate(frame, eye);
+        for face in 0..view.n_faces() {
+            for &id in &self.seen {
+                self.parts[id.idx()].is_begun = false;
+            }
+            self.see_face(space, frame, view, face, at);
+        }
+        self.seen.sort_unstable();
+        SpaceSeen { viewer: self }
+    }
+
+    fn see_face(
+        &mut self,
+        space: &Space,
+        frame: PartId,
+        view: &View,
+        face: usize,
+        at: Option<Place>,
+    ) {
+        // An eye in no cell sees all that is in view, of all parts.
+        let start = at.map_or(PartId::ROOT, |place| place.part);
+        self.begin(space, frame, view, face, start);
+        let part = &mut self.parts[start.idx()];
+        let question = question_of(space, start, part.view.as_ref().unwrap_or(view), face);
+        part.viewer.add_eye(&question, at.map(|place| place.cell));
+        part.viewer.advance(&question);
+        part.viewer.take_crossings(&mut self.crossings);
+        self.hand_on(space, start);
+        if at.is_none() {
+            for id in (1..space.parts.len() as u32).map(PartId) {
+                if let Some(border) = space.parts[id.idx()].border {
+                    self.queue.push((id, border, Window::screen()));
+                }
+            }
+        }
+        while let Some((id, cell, window)) = self.queue.pop() {
+            self.begin(space, frame, view, face, id);
+            let part = &mut self.parts[id.idx()];
+            let question = question_of(space, id, part.view.as_ref().unwrap_or(view), face);
+            part.viewer.add_window(&question, cell, &window);
+            part.viewer.advance(&question);
+            part.viewer.take_crossings(&mut self.crossings);
+            self.hand_on(space, id);
+        }
+    }
+
+    /// Makes a part ready for a face, if it is not.
+    fn begin(&mut self, space: &Space, frame: PartId, view: &View, face: usize, id: PartId) {
+        let part = &mut self.parts[id.idx()];
+        if part.view.is_none() {
+            let to_frame = space.between(id, frame);
+            part.view = Some(view.in_frame(&to_frame.matrix3(), to_frame.at));
+            part.viewer.begin_steps();
+            part.is_begun = false;
+            self.seen.push(id);
+        }
+        let part = &mut self.parts[id.idx()];
+        if !part.is_begun {
+            part.is_begun = true;
+            let question = question_of(space, id, part.view.as_ref().unwrap_or(view), face);
+            part.viewer.begin_face(&question);
+        }
+    }
+
+    /// Queues what goes on in other parts.
+    fn hand_on(&mut self, space: &Space, from: PartId) {
+        let own = &space.parts[from.idx()];
+        let queue = &mut self.queue;
+        let mut add = |to: PartId, cell: CellId, window: &Window| {
+            let turn = space.between(to, from).matrix3();
+            queue.push((to, cell, window.in_frame(&turn)));
+        };
+        for crossing in self.crossings.drain(..) {
+            let window = &crossing.window;
+            if own.border != Some(crossing.cell) {
+                for &guest in &own.guests[crossing.cell.idx()] {
+                    if let Some(border) = space.parts[guest.idx()].border {
+                        add(guest, border, window);
+                    }
+                }
+                continue;
+            }
+            let is_way = |portal| crossing.via.is_none_or(|via| via == portal);
+            for door in own.doors.iter().filter(|d| is_way(d.portal)) {
+                for place in &door.leads_to {
+                    add(place.part, place.cell, window);
+                }
+                for &(other, _) in &door.meets {
+                    if let Some(border) = space.parts[other.idx()].border {
+                        add(other, border, window);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn question_of<'a>(space: &'a Space, id: PartId, view: &'a View, face: usize) -> StepQuestion<'a> {
+    let part = &space.parts[id.idx()];
+    StepQuestion {
+        sight: &part.sight,
+        state: &part.state,
+        view,
+        face,
+        border: part.border,
+        is_watched: &part.has_guests,
+    }
+}
+
+/// What a view sees, part by part.
+#[derive(Clone, Copy)]
+pub struct SpaceSeen<'a> {
+    viewer: &'a SpaceViewer,
+}
+
+impl<'a> SpaceSeen<'a> {
+    /// The parts of which something is seen, ascending, each with what is seen of it, in its own frame: to be drawn at its
+    /// [pose](Space::pose). The cell that is a part's border stands for its outside.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
+        let viewer = self.viewer;
+        let answer = |id: &PartId| (*id, viewer.parts[id.idx()].viewer.answer());
+        viewer.seen.iter().map(answer)
+    }
+
+    /// What is seen of one part; `None` for nothing.
+    #[must_use]
+    pub fn of_part(&self, part: PartId) -> Option<Seen<'a>> {
+        let is_seen = self.viewer.seen.binary_search(&part).is_ok();
+        is_seen.then(|| self.viewer.parts[part.idx()].viewer.answer())
+    }
+}

@@ -1,0 +1,523 @@
+//! A world, and worlds that move in it: a lift in its shaft, a boat on the sea, a cabin on the boat (Dirkse 2002, sections 5.2
+//! and 5.5.4).
+//!
+//! Each *part* is a world with cells and portals of its own, in a frame of its own: a tree of rigid motions, the first part at
+//! its root. A part stands in cells of the part above it, its *host*. What is outdoors to it, its *border*, is no place: it
+//! stands for whatever is around, so a portal to it leads into the host's cells that its opening touches where it is now. So
+//! doors that meet lead from one to the other, doors that part lead into the air between them, and a door before a wall
+//! leads nowhere, without a rule for each.
+//!
+//! Coordinates are a part's own; poses are in `f64`, so that a part ten kilometers away is as exact as a near one.
+
+use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_geom::{Aabb, DVec3};
+use enfilade_runtime::{Sight, SightError, SightState};
+
+use crate::layout::Layout;
+use crate::pose::Pose;
+use crate::shape::is_near;
+
+/// Which part of a [`Space`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PartId(pub u32);
+
+impl PartId {
+    /// The part that does not move and holds all others.
+    pub const ROOT: Self = Self(0);
+
+    pub(crate) fn idx(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A cell of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Place {
+    /// The part.
+    pub part: PartId,
+    /// The cell, of the part's own graph.
+    pub cell: CellId,
+}
+
+/// Why a part cannot be added or moved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpaceError {
+    /// A world that cannot be looked at.
+    #[error("part {part}: {source}")]
+    Sight {
+        /// Its number.
+        part: u32,
+        /// Why.
+        source: SightError,
+    },
+    /// There is no such part.
+    #[error("there is no part {part}; there are {n_parts}")]
+    NoPart {
+        /// The number asked for.
+        part: u32,
+        /// How many there are.
+        n_parts: usize,
+    },
+    /// A pose with a number that is not finite, or whose turn is none.
+    #[error(
+        "the pose of part {part} is no rigid motion: its numbers must be finite and its turn of unit length"
+    )]
+    NotRigid {
+        /// Its number.
+        part: u32,
+    },
+    /// The root stands still.
+    #[error("part 0 is the world that all others move in; it cannot be moved")]
+    RootMoved,
+}
+
+/// A world that stands in another.
+pub(crate) struct Part {
+    pub(crate) layout: Layout,
+    pub(crate) sight: Sight,
+    pub(crate) state: SightState,
+    /// What stands for the surroundings.
+    pub(crate) border: Option<CellId>,
+    pub(crate) host: PartId,
+    pub(crate) children: Vec<PartId>,
+    /// To the host's frame, and to the root's.
+    pub(crate) local: Pose,
+    pub(crate) pose: Pose,
+    /// Around all that is in it, in its own frame.
+    pub(crate) hull: Aabb,
+    /// The portals to the border.
+    pub(crate) doors: Vec<BorderDoor>,
+    /// Where it stands.
+    pub(crate) stands_in: Vec<Place>,
+    /// By cell the parts that stand in it, ascending.
+    pub(crate) guests: Vec<Vec<PartId>>,
+    pub(crate) has_guests: Vec<bool>,
+    /// Of its cells among those of all parts.
+    pub(crate) first_cell: u32,
+}
+
+/// A portal from a part to what is around it.
+pub(crate) struct BorderDoor {
+    pub(crate) portal: PortalId,
+    /// The cell within.
+    pub(crate) inner: CellId,
+    /// The places around that its opening touches.
+    pub(crate) leads_to: Vec<Place>,
+    /// Doors of other parts that it meets.
+    pub(crate) meets: Vec<(PartId, PortalId)>,
+}
+
+/// A world and the worlds that move in it.
+pub struct Space {
+    pub(crate) parts: Vec<Part>,
+    n_cells: usize,
+    buffers: Buffers,
+}
+
+#[derive(Default)]
+struct Buffers {
+    points: Vec<DVec3>,
+    other: Vec<DVec3>,
+    cells: Vec<CellId>,
+    stack: Vec<i32>,
+    order: Vec<PartId>,
+}
+
+impl Space {
+    /// A world in which nothing moves yet.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be looked at ([`Sight::build`]).
+    pub fn new(world: &World) -> Result<Self, SpaceError> {
+        let mut space = Self {
+            parts: Vec::new(),
+            n_cells: 0,
+            buffers: Buffers::default(),
+        };
+        space.push(world, PartId::ROOT, Pose::IDENTITY)?;
+        Ok(space)
+    }
+
+    /// Adds a world that stands in another, with its pose in that one's frame. Its outdoors stands for what is around it; a
+    /// world without one is closed: nobody looks in or out. O(its size).
+    ///
+    /// # Errors
+    ///
+    /// A world that cannot be looked at, a host that does not exist, a pose that is no rigid motion.
+    pub fn add_part(
+        &mut self,
+        world: &World,
+        host: PartId,
+        pose: Pose,
+    ) -> Result<PartId, SpaceError> {
+        self.check(host)?;
+        let part = self.parts.len() as u32;
+        if !pose.is_rigid() {
+            return Err(SpaceError::NotRigid { part });
+        }
+        self.push(world, host, pose)?;
+        self.parts[host.idx()].children.push(PartId(part));
+        self.set_pose(PartId(part), pose)?;
+        Ok(PartId(part))
+    }
+
+    fn push(&mut self, world: &World, host: PartId, local: Pose) -> Result<(), SpaceError> {
+        let part = self.parts.len() as u32;
+        let sight = Sight::build(world).map_err(|source| SpaceError::Sight { part, source })?;
+        let layout = Layout::new(world);
+        let n_cells = layout.n_cells();
+        let border = layout.outdoors().filter(|_| part > 0);
+        let exits = border.map_or(&[][..], |cell| layout.exits(cell));
+        let doors = exits
+            .iter()
+            .map(|exit| BorderDoor {
+                portal: exit.portal,
+                inner: exit.to,
+                leads_to: Vec::new(),
+                meets: Vec::new(),
+            })
+            .collect();
+        self.parts.push(Part {
+            hull: hull_of(world, &layout),
+            state: SightState::new(&sight),
+            sight,
+            border,
+            host,
+            children: Vec::new(),
+            local,
+            pose: local,
+            doors,
+            stands_in: Vec::new(),
+            guests: vec![Vec::new(); n_cells],
+            has_guests: vec![false; n_cells],
+            first_cell: self.n_cells as u32,
+            layout,
+        });
+        self.n_cells += n_cells;
+        Ok(())
+    }
+
+    /// Moves a part, and all that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they touch).
+    /// Allocates nothing once its lists have grown.
+    ///
+    /// # Errors
+    ///
+    /// A part that does not exist, or is the root; a pose that is no rigid motion.
+    pub fn set_pose(&mut self, part: PartId, pose: Pose) -> Result<(), SpaceError> {
+        self.check(part)?;
+        if part == PartId::ROOT {
+            return Err(SpaceError::RootMoved);
+        }
+        if !pose.is_rigid() {
+            return Err(SpaceError::NotRigid { part: part.0 });
+        }
+        self.parts[part.idx()].local = pose;
+        let mut buffers = std::mem::take(&mut self.buffers);
+        buffers.order.clear();
+        buffers.order.push(part);
+        let mut at = 0;
+        while let Some(&moved) = buffers.order.get(at) {
+            at += 1;
+            let host = self.parts[moved.idx()].host;
+            let host_pose = self.parts[host.idx()].pose;
+            let own = &mut self.parts[moved.idx()];
+            own.pose = host_pose.after(&own.local);
+            buffers.order.extend_from_slice(&own.children);
+            // What stands wholly within its host has moved with it.
+            let is_within = own.stands_in.iter().all(|p| p.part == host);
+            if moved == part || !is_within {
+                self.settle(moved, &mut buffers);
+            }
+        }
+        self.buffers = buffers;
+        Ok(())
+    }
+
+    /// Finds out where a part stands now, and where its doors lead.
+    fn settle(&mut self, id: PartId, buffers: &mut Buffers) {
+        let mut stands_in = std::mem::take(&mut self.parts[id.idx()].stands_in);
+        for place in stands_in.drain(..) {
+            let host = &mut self.parts[place.part.idx()];
+            let guests = &mut host.guests[place.cell.idx()];
+            guests.retain(|g| *g != id);
+            host.has_guests[place.cell.idx()] = !guests.is_empty();
+        }
+        let own = &self.parts[id.idx()];
+        buffers.points.clear();
+        let corners = own.hull.corners();
+        buffers.points.extend(corners.map(|p| own.local.point(p)));
+        if !own.hull.is_empty() {
+            self.touched(own.host, own.layout.tolerance(), buffers, &mut stands_in);
+        }
+        for place in &stands_in {
+            let host = &mut self.parts[place.part.idx()];
+            let guests = &mut host.guests[place.cell.idx()];
+            if let Err(at) = guests.binary_search(&id) {
+                guests.insert(at, id);
+            }
+            host.has_guests[place.cell.idx()] = true;
+        }
+        self.parts[id.idx()].stands_in = stands_in;
+        for door in 0..self.parts[id.idx()].doors.len() {
+            let mut leads_to = std::mem::take(&mut self.parts[id.idx()].doors[door].leads_to);
+            leads_to.clear();
+            let own = &self.parts[id.idx()];
+            let opening = own.layout.opening(own.doors[door].portal);
+            buffers.points.clear();
+            let corners = opening.pieces().flatten();
+            buffers.points.extend(corners.map(|p| own.local.point(*p)));
+            self.touched(own.host, own.layout.tolerance(), buffers, &mut leads_to);
+            self.parts[id.idx()].doors[door].leads_to = leads_to;
+        }
+        self.meet(id, buffers);
+    }
+
+    /// Adds the places that the hull of `buffers.points`, in the frame of `host`, may touch; beyond a host's border those of
+    /// the host's host.
+    fn touched(&self, host: PartId, margin: f64, buffers: &mut Buffers, places: &mut Vec<Place>) {
+        let part = &self.parts[host.idx()];
+        buffers.cells.clear();
+        let margin = margin + part.layout.tolerance();
+        let Buffers {
+            points,
+            cells,
+            stack,
+            ..
+        } = &mut *buffers;
+        part.layout.cells_near(points, margin, cells, stack);
+        let mut is_beyond = false;
+        for &cell in &*cells {
+            if part.border == Some(cell) {
+                is_beyond = true;
+            } else {
+                places.push(Place { part: host, cell });
+            }
+        }
+        if is_beyond {
+            for p in points {
+                *p = part.local.point(*p);
+            }
+            self.touched(part.host, margin, buffers, places);
+        }
+    }
+
+    /// Finds out which doors of other parts the doors of a part meet, both ways.
+    fn meet(&mut self, id: PartId, buffers: &mut Buffers) {
+        let n_parts = self.parts.len();
+        for other in (1..n_parts as u32).map(PartId).filter(|p| *p != id) {
+            for door in &mut self.parts[other.idx()].doors {
+                door.meets.retain(|m| m.0 != id);
+            }
+            for door in &mut self.parts[id.idx()].doors {
+                door.meets.retain(|m| m.0 != other);
+            }
+            if !self.are_near(id, other) {
+                continue;
+            }
+            let to_own = self.between(other, id);
+            for a in 0..self.parts[id.idx()].doors.len() {
+                for b in 0..self.parts[other.idx()].doors.len() {
+                    let (own, its) = (&self.parts[id.idx()], &self.parts[other.idx()]);
+                    let portals = [own.doors[a].portal, its.doors[b].portal];
+                    if !is_met([own, its], portals, &to_own, &mut buffers.other) {
+                        continue;
+                    }
+                    let doors = &mut self.parts[id.idx()].doors;
+                    doors[a].meets.push((other, portals[1]));
+                    let doors = &mut self.parts[other.idx()].doors;
+                    doors[b].meets.push((id, portals[0]));
+                }
+            }
+        }
+    }
+
+    /// Whether the hulls of two parts may touch.
+    fn are_near(&self, a: PartId, b: PartId) -> bool {
+        let [a, b] = [a, b].map(|p| &self.parts[p.idx()]);
+        if a.hull.is_empty() || b.hull.is_empty() {
+            return false;
+        }
+        let [middle_a, middle_b] = [a, b].map(|p| p.pose.point(p.hull.center()));
+        let reach = (a.hull.size().length() + b.hull.size().length()) * 0.5;
+        middle_a.distance(middle_b) <= reach + a.layout.tolerance() + b.layout.tolerance()
+    }
+
+    fn check(&self, part: PartId) -> Result<(), SpaceError> {
+        let n_parts = self.parts.len();
+        if part.idx() < n_parts {
+            Ok(())
+        } else {
+            Err(SpaceError::NoPart {
+                part: part.0,
+                n_parts,
+            })
+        }
+    }
+
+    /// How many parts there are, the root included.
+    #[must_use]
+    pub fn n_parts(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// How many cells all parts have.
+    #[must_use]
+    pub fn n_cells(&self) -> usize {
+        self.n_cells
+    }
+
+    /// The cells and portals of a part.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such part; so all questions about one.
+    #[must_use]
+    pub fn layout(&self, part: PartId) -> &Layout {
+        &self.parts[part.idx()].layout
+    }
+
+    /// What is seen in a part.
+    #[must_use]
+    pub fn sight(&self, part: PartId) -> &Sight {
+        &self.parts[part.idx()].sight
+    }
+
+    /// How the doors of a part stand.
+    #[must_use]
+    pub fn state(&self, part: PartId) -> &SightState {
+        &self.parts[part.idx()].state
+    }
+
+    /// The same, to open and close them.
+    pub fn state_mut(&mut self, part: PartId) -> &mut SightState {
+        &mut self.parts[part.idx()].state
+    }
+
+    /// Where a part is in the root's frame.
+    #[must_use]
+    pub fn pose(&self, part: PartId) -> &Pose {
+        &self.parts[part.idx()].pose
+    }
+
+    /// Where it is in its host's frame.
+    #[must_use]
+    pub fn local_pose(&self, part: PartId) -> &Pose {
+        &self.parts[part.idx()].local
+    }
+
+    /// The part that it stands in; the root for the root.
+    #[must_use]
+    pub fn host(&self, part: PartId) -> PartId {
+        self.parts[part.idx()].host
+    }
+
+    /// The motion that takes points of one part's frame to another's.
+    #[must_use]
+    pub fn between(&self, from: PartId, to: PartId) -> Pose {
+        if from == to {
+            return Pose::IDENTITY;
+        }
+        self.pose(to).inverse().after(self.pose(from))
+    }
+
+    /// The parts that stand in a cell, ascending.
+    #[must_use]
+    pub fn guests(&self, place: Place) -> &[PartId] {
+        &self.parts[place.part.idx()].guests[place.cell.idx()]
+    }
+
+    /// The doors of other parts that a part's door meets now.
+    #[must_use]
+    pub fn meets(&self, part: PartId, portal: PortalId) -> &[(PartId, PortalId)] {
+        let doors = &self.parts[part.idx()].doors;
+        let door = doors.iter().find(|d| d.portal == portal);
+        door.map_or(&[], |d| &d.meets)
+    }
+
+    /// The places around a part that one of its doors leads to now; none before a wall, and for portals within it.
+    #[must_use]
+    pub fn leads_to(&self, part: PartId, portal: PortalId) -> &[Place] {
+        let doors = &self.parts[part.idx()].doors;
+        let door = doors.iter().find(|d| d.portal == portal);
+        door.map_or(&[], |d| &d.leads_to)
+    }
+
+    /// The place of a point of a part's frame: a cell of the innermost part that holds it; `None` in solid matter of all.
+    /// O(depth of the locators), and for each part that stands where the point is. A point in the walls of a part counts as
+    /// in what is around that part.
+    #[must_use]
+    pub fn locate(&self, frame: PartId, p: DVec3) -> Option<Place> {
+        let p = if frame == PartId::ROOT {
+            p
+        } else {
+            self.pose(frame).point(p)
+        };
+        self.locate_within(PartId::ROOT, p, p)
+    }
+
+    /// Within a part or what stands in it. `own` is `p`, of the root's frame, in the part's frame.
+    fn locate_within(&self, id: PartId, p: DVec3, own: DVec3) -> Option<Place> {
+        let part = &self.parts[id.idx()];
+        let cell = part.layout.locate(own).filter(|c| part.border != Some(*c));
+        let guests = match cell {
+            Some(cell) if part.has_guests[cell.idx()] => &part.guests[cell.idx()],
+            Some(_) => &[][..],
+            None => &part.children,
+        };
+        for &guest in guests {
+            let its = &self.parts[guest.idx()];
+            let q = its.pose.point_back(p);
+            if its.hull.contains(q)
+                && let Some(place) = self.locate_within(guest, p, q)
+            {
+                return Some(place);
+            }
+        }
+        cell.map(|cell| Place { part: id, cell })
+    }
+}
+
+/// Whether openings of two parts touch; `between` takes points of the second to the frame of the first.
+fn is_met(
+    parts: [&Part; 2],
+    portals: [PortalId; 2],
+    between: &Pose,
+    buffer: &mut Vec<DVec3>,
+) -> bool {
+    let margin = parts[0].layout.tolerance() + parts[1].layout.tolerance();
+    let opening = parts[0].layout.opening(portals[0]);
+    let beyond = parts[1].layout.opening(portals[1]);
+    let reach = opening.radius() + beyond.radius() + margin;
+    let center = between.point(beyond.center());
+    opening.center().distance(center) <= reach
+        && beyond.pieces().any(|piece| {
+            buffer.clear();
+            buffer.extend(piece.iter().map(|p| between.point(*p)));
+            opening.pieces().any(|p| is_near(p, buffer, margin))
+        })
+}
+
+/// Around all cells but the outdoors, and all triangles.
+fn hull_of(world: &World, layout: &Layout) -> Aabb {
+    let point = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
+    let mut hull = Aabb::EMPTY;
+    for (cell, _) in world.graph.indoor_cells() {
+        hull = hull.union(layout.cell(cell).bounds);
+    }
+    for batch in &world.batches {
+        let corners = batch.primitive.positions.iter();
+        hull = corners.fold(hull, |hull, p| hull.including(point(p)));
+    }
+    for object in &world.details {
+        let placement = object.placement();
+        for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+            let corners = primitive.positions.iter();
+            hull = corners.fold(hull, |hull, p| {
+                hull.including(placement.transform_point3(point(p)))
+            });
+        }
+    }
+    hull
+}
