@@ -373,3 +373,51 @@ fn what_is_no_motion_is_refused_and_changes_nothing() {
     assert_eq!(space.set_pose(PartId(9), Pose::IDENTITY).unwrap_err(), none);
     assert_eq!(space.locate(PartId::ROOT, DVec3::NAN), None);
 }
+
+#[test]
+fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
+    // Beyond a world without outdoors there is nothing.
+    let root = room_grid(&GridParams::two_rooms());
+    let [a, b] = [cabin(1, 1.0), cabin(1, 1.0)];
+    let mut space = Space::new(&root).unwrap();
+    let far = Pose::from_translation(DVec3::new(100.0, 0.0, 0.0));
+    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, far).unwrap());
+    let mut viewer = SpaceViewer::new(&space);
+    let window = space.layout(a_id).opening(PortalId(0));
+    let turned = Pose::about(window.center(), DVec3::Y, std::f64::consts::PI);
+    let eye = a.graph.cells[0].aabb.map(point);
+    let eye = ((eye[0] + eye[1]) * 0.5).as_vec3().to_array();
+    let view = View::around(eye).unwrap();
+    for (turn, sees) in [(Pose::IDENTITY, false), (turned, true)] {
+        space.set_pose(b_id, far.after(&turn)).unwrap();
+        let apart = Pose::from_translation(DVec3::X * 50.0);
+        if !sees {
+            space.set_pose(b_id, apart).unwrap();
+        }
+        let seen = viewer.see(&space, a_id, &view);
+        let is_room = |s: enfilade_runtime::Seen| s.cells().contains(&CellId(0));
+        assert_eq!(seen.of_part(b_id).is_some_and(is_room), sees);
+    }
+}
+
+#[test]
+fn what_stands_beside_a_room_that_moves_is_found_where_it_comes_to() {
+    let root = furnished_cabin(2, 30.0, 0);
+    let mut space = Space::new(&root).unwrap();
+    let away = Pose::from_translation(DVec3::X * -500.0);
+    let ship = space.add_part(&cabin(1, 1.0), PartId::ROOT, away).unwrap();
+    let beside = Pose::from_translation(DVec3::X * 8.0);
+    let boat = space.add_part(&cabin(1, 0.5), ship, beside).unwrap();
+    let hall = |cell| Place {
+        part: PartId::ROOT,
+        cell,
+    };
+    assert_eq!(space.guests(hall(outdoors_of(&root))), [ship, boat]);
+    let [low, high] = root.graph.cells[0].aabb.map(point);
+    let inside = Pose::from_translation((low + high) * 0.5);
+    space.set_pose(ship, inside).unwrap();
+    assert_eq!(space.guests(hall(outdoors_of(&root))), []);
+    assert_eq!(space.guests(hall(CellId(0))), [ship, boat]);
+    let found = space.locate(boat, DVec3::splat(0.5));
+    assert_eq!(found.map(|p| p.part), Some(boat));
+}
