@@ -21,6 +21,7 @@ mod queue;
 mod steps;
 mod traversal;
 mod viewer;
+mod window;
 
 use enfilade_cpg::CellId;
 
@@ -31,8 +32,9 @@ use crate::state::SightState;
 use crate::view::View;
 use traversal::Traversal;
 
-pub use steps::{Crossing, StepQuestion, Window};
+pub use steps::StepQuestion;
 pub use viewer::{SeeOptions, Viewer};
+pub use window::{Crossing, Window};
 
 impl Viewer {
     /// What `view` sees of `sight` in `state`. `sight` is the one the viewer was made for, or one of a

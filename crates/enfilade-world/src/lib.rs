@@ -9,14 +9,18 @@
 //! - **Nothing is allocated** in a question once the buffers have grown.
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
+mod flood;
 mod layout;
 mod look;
 mod pose;
 mod shape;
 mod space;
+mod things;
 
+pub use flood::{Flood, Posted};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use look::{SpaceSeen, SpaceViewer};
 pub use pose::Pose;
 pub use shape::{Shape, ShapeError};
 pub use space::{PartId, Place, Space, SpaceError};
+pub use things::{Moved, ThingError, ThingId, Things, Tie};

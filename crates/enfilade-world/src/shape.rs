@@ -102,12 +102,6 @@ impl Shape {
     }
 }
 
-/// The box around points, grown by a radius.
-#[must_use]
-pub(crate) fn bounds_of(points: &[DVec3], radius: f64) -> Aabb {
-    Aabb::of_points(points).expanded(radius)
-}
-
 /// Whether the hulls of two sets of points are no farther apart than `reach`. What is within rounding of that counts as near.
 #[must_use]
 pub(crate) fn is_near(a: &[DVec3], b: &[DVec3], reach: f64) -> bool {

@@ -4,7 +4,7 @@ use enfilade_cpg::{CellId, PortalId};
 use glam::{DVec3, Vec3};
 
 use super::traversal::Traversal;
-use super::viewer::NONE;
+use super::window::NONE;
 use crate::boxes::Root;
 use crate::exits::Exit;
 use crate::region::Region;

@@ -5,7 +5,8 @@ use std::cmp::Reverse;
 use glam::DVec3;
 
 use super::traversal::Traversal;
-use super::viewer::{Mark, NONE, Pending, Stage};
+use super::viewer::{Mark, Pending, Stage};
+use super::window::NONE;
 use crate::region::Region;
 
 /// Visits of one cell that wait at the same time; more are joined.

@@ -1,60 +1,16 @@
 //! A question asked in steps, for worlds that move within worlds: each world has its own [`Sight`] and its own [`Viewer`], and
 //! what is seen of one through an opening of another is handed on as a [`Window`].
 
-use enfilade_cpg::{CellId, PortalId};
-use enfilade_geom::DMat3;
-use glam::DVec3;
+use enfilade_cpg::CellId;
 
 use super::traversal::Traversal;
-use super::viewer::{NONE, Viewer};
+use super::viewer::Viewer;
+use super::window::{Crossing, NONE, Window};
 use crate::boxes::Planes;
-use crate::region::Region;
 use crate::seen::Seen;
 use crate::sight::Sight;
 use crate::state::SightState;
 use crate::view::View;
-
-/// A part of the screen, through which something is seen.
-#[derive(Clone, Copy, Debug)]
-pub struct Window {
-    pub(super) region: Region,
-    /// Normal of the plane beyond which it is seen, and that plane's distance from the eye.
-    pub(super) entry: Option<(DVec3, f64)>,
-    pub(super) near: f64,
-}
-
-impl Window {
-    /// The whole screen.
-    #[must_use]
-    pub fn screen() -> Self {
-        Self {
-            region: Region::screen(),
-            entry: None,
-            near: 0.0,
-        }
-    }
-
-    /// The same for a view [in another frame](View::in_frame): `turn` takes that frame's directions to those of this one.
-    #[must_use]
-    pub fn in_frame(&self, turn: &DMat3) -> Self {
-        let turned = |(n, h): (DVec3, f64)| (turn.transpose() * n, h);
-        Self {
-            entry: self.entry.map(turned),
-            ..*self
-        }
-    }
-}
-
-/// Where a view left a world, or came to a cell that was watched.
-#[derive(Clone, Copy, Debug)]
-pub struct Crossing {
-    /// The cell that was watched, or the one that is the world's border.
-    pub cell: CellId,
-    /// The portal that it was entered by; `None` for the eye's own cell, and where that is not known.
-    pub via: Option<PortalId>,
-    /// The part of the screen.
-    pub window: Window,
-}
 
 /// One face of a view of one world that is asked in steps.
 #[derive(Clone, Copy)]
@@ -71,35 +27,6 @@ pub struct StepQuestion<'a> {
     pub border: Option<CellId>,
     /// By cell, whether visits of it are [told](Viewer::take_crossings).
     pub is_watched: &'a [bool],
-}
-
-/// How a stepped question differs from one in one go.
-#[derive(Default)]
-pub(super) struct Stepping {
-    is_on: bool,
-    border: Option<u32>,
-    is_watched: Vec<bool>,
-    crossings: Vec<Crossing>,
-}
-
-impl Stepping {
-    #[inline]
-    pub(super) fn is_border(&self, cell: u32) -> bool {
-        self.is_on && self.border == Some(cell)
-    }
-
-    #[inline]
-    pub(super) fn is_watched(&self, cell: u32) -> bool {
-        self.is_on && self.is_watched.get(cell as usize) == Some(&true)
-    }
-
-    pub(super) fn note(&mut self, cell: u32, via: u32, window: Window) {
-        self.crossings.push(Crossing {
-            cell: CellId(cell),
-            via: (via != NONE).then_some(PortalId(via)),
-            window,
-        });
-    }
 }
 
 /// In steps: [`begin_steps`](Viewer::begin_steps); for each face of the view [`begin_face`](Viewer::begin_face), then

@@ -5,8 +5,8 @@ use std::cmp::Reverse;
 use enfilade_cpg::{CellId, PortalId};
 use glam::DVec3;
 
-use super::steps::Window;
-use super::viewer::{NONE, Pending, Stage, Viewer};
+use super::viewer::{Pending, Stage, Viewer};
+use super::window::{NONE, Window};
 use crate::boxes::Planes;
 use crate::exits::{Exit, Group};
 use crate::point::point;

@@ -5,13 +5,11 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::steps::Stepping;
+use super::window::{NONE, Stepping};
 use crate::occluder::Shadows;
 use crate::region::{Clipper, Narrowing, Region};
 use crate::seen::{Lists, SeeCounts};
 use crate::sight::Sight;
-
-pub(super) const NONE: u32 = u32::MAX;
 
 /// How a view is followed.
 #[derive(Clone, Copy, Debug)]

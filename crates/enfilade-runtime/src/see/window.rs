@@ -1,0 +1,81 @@
+//! What is handed on from one world to another: parts of the screen.
+
+use enfilade_cpg::{CellId, PortalId};
+use enfilade_geom::DMat3;
+use glam::DVec3;
+
+use crate::region::Region;
+
+/// Stands for no portal, and no visit.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// A part of the screen, through which something is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Window {
+    pub(super) region: Region,
+    /// Normal of the plane beyond which it is seen, and that plane's distance from the eye.
+    pub(super) entry: Option<(DVec3, f64)>,
+    pub(super) near: f64,
+}
+
+impl Window {
+    /// The whole screen.
+    #[must_use]
+    pub fn screen() -> Self {
+        Self {
+            region: Region::screen(),
+            entry: None,
+            near: 0.0,
+        }
+    }
+
+    /// The same for a view [in another frame](View::in_frame): `turn` takes that frame's directions to those of this one.
+    #[must_use]
+    pub fn in_frame(&self, turn: &DMat3) -> Self {
+        let turned = |(n, h): (DVec3, f64)| (turn.transpose() * n, h);
+        Self {
+            entry: self.entry.map(turned),
+            ..*self
+        }
+    }
+}
+
+/// Where a view left a world, or came to a cell that was watched.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    /// The cell that was watched, or the one that is the world's border.
+    pub cell: CellId,
+    /// The portal that it was entered by; `None` for the eye's own cell, and where that is not known.
+    pub via: Option<PortalId>,
+    /// The part of the screen.
+    pub window: Window,
+}
+
+/// How a stepped question differs from one in one go.
+#[derive(Default)]
+pub(super) struct Stepping {
+    pub(super) is_on: bool,
+    pub(super) border: Option<u32>,
+    pub(super) is_watched: Vec<bool>,
+    pub(super) crossings: Vec<Crossing>,
+}
+
+impl Stepping {
+    #[inline]
+    pub(super) fn is_border(&self, cell: u32) -> bool {
+        self.is_on && self.border == Some(cell)
+    }
+
+    #[inline]
+    pub(super) fn is_watched(&self, cell: u32) -> bool {
+        self.is_on && self.is_watched.get(cell as usize) == Some(&true)
+    }
+
+    pub(super) fn note(&mut self, cell: u32, via: u32, window: Window) {
+        self.crossings.push(Crossing {
+            cell: CellId(cell),
+            via: (via != NONE).then_some(PortalId(via)),
+            window,
+        });
+    }
+}
