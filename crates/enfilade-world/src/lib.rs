@@ -11,16 +11,20 @@
 
 mod flood;
 mod layout;
+mod lights;
 mod look;
 mod pose;
 mod shape;
 mod space;
+mod sweep;
 mod things;
 
 pub use flood::{Flood, Posted};
 pub use layout::{CellShape, Exit, Layout, Opening};
+pub use lights::{Lamp, LampError, LampId, Lights};
 pub use look::{SpaceSeen, SpaceViewer};
 pub use pose::Pose;
 pub use shape::{Shape, ShapeError};
 pub use space::{PartId, Place, Space, SpaceError};
+pub use sweep::Passing;
 pub use things::{Moved, ThingError, ThingId, Things, Tie};

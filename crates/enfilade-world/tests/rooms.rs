@@ -1,4 +1,4 @@
-//! Rooms that move within rooms (W5): what rays hit at a pose is in the answer, and nothing is where it is not.
+//! Rooms that move within rooms: what rays hit at a pose is in the answer, and nothing is where it is not. Covers W5.
 
 use std::collections::HashSet;
 

@@ -1,4 +1,4 @@
-//! Things are in the cells that they reach (W3), change over as they move (W4) or as rooms move (W5), and are seen.
+//! Things are in the cells that they reach, change over as they move or as rooms move, and are seen. Covers W3 and W4.
 
 use std::collections::BTreeSet;
 
@@ -233,6 +233,23 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
     let sea = Some(place(PartId::ROOT, root.graph.outdoors().unwrap()));
     let places = |things: &Things| [man, bird, hat, buoy].map(|id| things.place(id).unwrap());
     assert_eq!(places(&things), [inside, inside, inside, sea]);
+    // Who leans out of a window is at sea, too.
+    let window = space.layout(ship).opening(PortalId(0)).center();
+    let lean = things.add(
+        &space,
+        ball(),
+        ship,
+        Pose::from_translation(window),
+        Tie::Carried,
+    );
+    let both = BTreeSet::from([inside.unwrap(), sea.unwrap()]);
+    assert_eq!(
+        things
+            .places(&space, lean.unwrap())
+            .collect::<BTreeSet<_>>(),
+        both
+    );
+    things.remove(lean.unwrap()).unwrap();
     // The ship sails on: who stands on it comes along, the bird is left behind, and the buoy, which did not move, is inside.
     let on = Pose::from_translation(DVec3::new(-40.0, 0.0, 0.0));
     space.set_pose(ship, on).unwrap();

@@ -1,0 +1,249 @@
+//! Lamps: what each can light, and which of them matter to a view.
+//!
+//! A lamp lights what is within its range and can be seen from it: its light is narrowed by portals just as a view is (Dirkse
+//! 2002, section 5.1.3, figure 39), closed doors stop it, and rooms that move carry it along. So no light shines through a
+//! wall into the next room, and none is switched off while what it lights is in view, wherever the lamp itself is.
+//!
+//! What a lamp lights is found when it is asked for after a change, O(what it lights), and kept.
+
+use enfilade_geom::DVec3;
+use enfilade_runtime::{SeeOptions, View};
+
+use crate::look::{SpaceSeen, SpaceViewer};
+use crate::space::{PartId, Place, Space};
+
+/// Which lamp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LampId(pub u32);
+
+/// A lamp that shines in all directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lamp {
+    /// The part in whose frame it stands, and with which it moves.
+    pub frame: PartId,
+    /// Where. [Units: wu]
+    pub at: [f32; 3],
+    /// How far it shines. [Units: wu] [Limit: above 0]
+    pub range: f32,
+}
+
+/// Why there is no such lamp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LampError {
+    /// A place that is not finite, or a range that is not above 0.
+    #[error("a lamp's place must be finite, and its range above 0")]
+    NotPositive,
+    /// A frame that does not exist.
+    #[error("there is no such part")]
+    NoPart,
+    /// A lamp that does not exist.
+    #[error("there is no such lamp")]
+    NoLamp,
+}
+
+/// A cell that a lamp lights, through one part of what it shines through.
+#[derive(Clone, Copy, Debug)]
+struct Beam {
+    place: Place,
+    /// Of its half-spaces, in the frame of the cell's part.
+    first_plane: u32,
+    n_planes: u32,
+}
+
+#[derive(Clone, Debug)]
+struct Lit {
+    lamp: Lamp,
+    is_current: bool,
+    beams: Vec<Beam>,
+    planes: Vec<[f32; 4]>,
+}
+
+/// The lamps of a [`Space`].
+pub struct Lights {
+    lamps: Vec<Lit>,
+    viewer: SpaceViewer,
+    seen: Vec<LampId>,
+}
+
+impl Lights {
+    /// No lamps.
+    #[must_use]
+    pub fn new(space: &Space) -> Self {
+        let options = SeeOptions {
+            // Large polygons inside a cell may hide a part of it from the lamp as they may from an eye.
+            occlusion: true,
+            ..SeeOptions::default()
+        };
+        Self {
+            lamps: Vec::new(),
+            viewer: SpaceViewer::with_options(space, options),
+            seen: Vec::new(),
+        }
+    }
+
+    /// Adds a lamp.
+    ///
+    /// # Errors
+    ///
+    /// A place that is not finite, a range that is not above 0, a frame that does not exist.
+    pub fn add(&mut self, space: &Space, lamp: Lamp) -> Result<LampId, LampError> {
+        check(space, &lamp)?;
+        self.lamps.push(Lit {
+            lamp,
+            is_current: false,
+            beams: Vec::new(),
+            planes: Vec::new(),
+        });
+        Ok(LampId(self.lamps.len() as u32 - 1))
+    }
+
+    /// Moves a lamp, or changes its range.
+    ///
+    /// # Errors
+    ///
+    /// As [`Lights::add`], and a lamp that does not exist.
+    pub fn set(&mut self, space: &Space, id: LampId, lamp: Lamp) -> Result<(), LampError> {
+        check(space, &lamp)?;
+        let lit = self.lamps.get_mut(id.0 as usize);
+        let lit = lit.ok_or(LampError::NoLamp)?;
+        lit.is_current &= lit.lamp == lamp;
+        lit.lamp = lamp;
+        Ok(())
+    }
+
+    /// To be called after a part has moved: lamps in it, and those whose light may come to it, are looked at anew.
+    pub fn part_moved(&mut self, space: &Space, part: PartId) {
+        let own = &space.parts[part.idx()];
+        for lit in &mut self.lamps {
+            let comes = |b: &Beam| b.place.part == part || own.stands_in.contains(&b.place);
+            lit.is_current &= lit.lamp.frame != part && !lit.beams.iter().any(comes);
+        }
+        for &child in &own.children {
+            self.part_moved(space, child);
+        }
+    }
+
+    /// To be called after a door has opened, closed or moved: lamps that shine into a cell beside it are looked at anew.
+    pub fn door_changed(&mut self, space: &Space, part: PartId, portal: enfilade_cpg::PortalId) {
+        let own = &space.parts[part.idx()];
+        let cells = own.layout.opening(portal).cells();
+        let around = space.leads_to(part, portal);
+        for lit in &mut self.lamps {
+            let is_beside = |b: &Beam| {
+                b.place.part == part && cells.contains(&b.place.cell) || around.contains(&b.place)
+            };
+            lit.is_current &= !lit.beams.iter().any(is_beside);
+        }
+    }
+
+    /// Brings all that has changed up to date; other questions answer by this. Allocates only while buffers grow.
+    pub fn update(&mut self, space: &Space) {
+        for lit in &mut self.lamps {
+            if !lit.is_current {
+                lit.find(space, &mut self.viewer);
+                lit.is_current = true;
+            }
+        }
+    }
+
+    /// The places that a lamp lights, each once or more; none for a lamp that does not exist. None that it lights is missing.
+    pub fn lit_by(&self, id: LampId) -> impl Iterator<Item = Place> + use<'_> {
+        let lit = self.lamps.get(id.0 as usize);
+        lit.into_iter().flat_map(|l| &l.beams).map(|b| b.place)
+    }
+
+    /// Whether a lamp may light a point of a place, in the frame of its part. Never false for a point that the lamp does
+    /// light.
+    #[must_use]
+    pub fn may_light(&self, space: &Space, id: LampId, place: Place, p: DVec3) -> bool {
+        let Some(lit) = self.lamps.get(id.0 as usize) else {
+            return false;
+        };
+        let at = DVec3::from_array(lit.lamp.at.map(f64::from));
+        let at = space.between(lit.lamp.frame, place.part).point(at);
+        let range = f64::from(lit.lamp.range) + space.layout(place.part).tolerance();
+        at.distance(p) <= range
+            && lit.beams.iter().any(|b| {
+                b.place == place
+                    && lit.planes_of(b).iter().all(|&[x, y, z, d]| {
+                        let n = DVec3::new(x.into(), y.into(), z.into());
+                        n.dot(p) + f64::from(d) >= -1e-4 * n.length()
+                    })
+            })
+    }
+
+    /// The lamps whose light may fall on what a view sees, ascending: those that light a cell that it sees, and whose range
+    /// comes into what it sees of it.
+    pub fn that_matter(&mut self, space: &Space, seen: &SpaceSeen) -> &[LampId] {
+        self.seen.clear();
+        for (id, lit) in (0..).map(LampId).zip(&self.lamps) {
+            if lit.matters(space, seen) {
+                self.seen.push(id);
+            }
+        }
+        &self.seen
+    }
+}
+
+impl Lit {
+    fn planes_of(&self, beam: &Beam) -> &[[f32; 4]] {
+        let first = beam.first_plane as usize;
+        &self.planes[first..first + beam.n_planes as usize]
+    }
+
+    fn find(&mut self, space: &Space, viewer: &mut SpaceViewer) {
+        self.beams.clear();
+        self.planes.clear();
+        let around = View::around(self.lamp.at).and_then(|v| v.with_far(self.lamp.range));
+        let Ok(view) = around else {
+            return; // Lamps are checked when they are added.
+        };
+        let seen = viewer.see(space, self.lamp.frame, &view);
+        for (part, seen) in seen.parts() {
+            let border = space.parts[part.idx()].border;
+            for visit in seen.visits().iter().filter(|v| border != Some(v.cell)) {
+                let planes = seen.planes(visit);
+                self.beams.push(Beam {
+                    place: Place {
+                        part,
+                        cell: visit.cell,
+                    },
+                    first_plane: self.planes.len() as u32,
+                    n_planes: planes.len() as u32,
+                });
+                self.planes.extend_from_slice(planes);
+            }
+        }
+    }
+
+    fn matters(&self, space: &Space, seen: &SpaceSeen) -> bool {
+        let at = DVec3::from_array(self.lamp.at.map(f64::from));
+        self.beams.iter().any(|beam| {
+            let Some(seen) = seen.of_part(beam.place.part) else {
+                return false;
+            };
+            let at = space.between(self.lamp.frame, beam.place.part).point(at);
+            let mut visits = seen.visits().iter();
+            visits.any(|visit| {
+                visit.cell == beam.place.cell
+                    && seen.planes(visit).iter().all(|&[x, y, z, d]| {
+                        let n = DVec3::new(x.into(), y.into(), z.into());
+                        n.dot(at) + f64::from(d) >= -f64::from(self.lamp.range) * n.length()
+                    })
+            })
+        })
+    }
+}
+
+fn check(space: &Space, lamp: &Lamp) -> Result<(), LampError> {
+    if lamp.frame.idx() >= space.n_parts() {
+        return Err(LampError::NoPart);
+    }
+    let is_finite = lamp.at.iter().all(|x| x.is_finite()) && lamp.range.is_finite();
+    if is_finite && lamp.range > 0.0 {
+        Ok(())
+    } else {
+        Err(LampError::NotPositive)
+    }
+}

@@ -1,0 +1,164 @@
+//! What a lamp lights is known to it, through portals and moving rooms, and nothing behind walls. Covers W3.
+
+use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_geom::DVec3;
+use enfilade_runtime::{Sightlines, View};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_world::{Lamp, LampError, LampId, Lights, PartId, Place, Pose, Space, SpaceViewer};
+
+fn offices(seed: u64) -> World {
+    let mut world = room_grid(&GridParams {
+        merges: 0.2,
+        turn: 0.3,
+        holes: 0.2,
+        ..GridParams::offices(60, seed)
+    });
+    world.details.clear();
+    world
+}
+
+fn random_indoors(space: &Space, rng: &mut Rng) -> (CellId, DVec3) {
+    let layout = space.layout(PartId::ROOT);
+    loop {
+        let cell = CellId(rng.below(layout.n_cells()) as u32);
+        let b = layout.cell(cell).bounds;
+        let p = DVec3::from_array([0, 1, 2].map(|k| rng.range(b.min[k], b.max[k])));
+        if let Some(found) = layout.locate(p).filter(|c| !layout.cell(*c).is_outdoor) {
+            return (found, p);
+        }
+    }
+}
+
+fn root(cell: CellId) -> Place {
+    let part = PartId::ROOT;
+    Place { part, cell }
+}
+
+#[test]
+fn a_point_that_a_lamp_reaches_is_lit_and_the_lamp_matters_to_who_sees_it() {
+    let world = offices(1);
+    let mut space = Space::new(&world).unwrap();
+    for portal in world.graph.portal_ids().step_by(3) {
+        space.state_mut(PartId::ROOT).close(portal);
+    }
+    let lines = Sightlines::build(&world);
+    let mut rng = Rng::new(2);
+    let mut lights = Lights::new(&space);
+    let lamps: Vec<Lamp> = (0..60)
+        .map(|_| Lamp {
+            frame: PartId::ROOT,
+            at: random_indoors(&space, &mut rng).1.as_vec3().to_array(),
+            range: rng.range(1.0, 12.0) as f32,
+        })
+        .collect();
+    for lamp in &lamps {
+        lights.add(&space, *lamp).unwrap();
+    }
+    lights.update(&space);
+    let state = space.state(PartId::ROOT);
+    let (mut n_lit, mut n_dark) = (0, 0);
+    let mut viewer = SpaceViewer::new(&space);
+    for _ in 0..30_000 {
+        let (cell, p) = random_indoors(&space, &mut rng);
+        let k = rng.below(lamps.len());
+        let (lamp, id) = (&lamps[k], LampId(k as u32));
+        let at = DVec3::from_array(lamp.at.map(f64::from));
+        let is_lit = at.distance(p) < f64::from(lamp.range)
+            && lines.is_clear(state, lamp.at, p.as_vec3().to_array());
+        let may = lights.may_light(&space, id, root(cell), p);
+        assert!(may || !is_lit, "{id:?} at {at} lights {p} in {cell}");
+        n_lit += usize::from(is_lit);
+        n_dark += usize::from(!may);
+        if is_lit && n_lit % 4 == 0 {
+            // An eye that sees the lit point.
+            let (_, eye) = random_indoors(&space, &mut rng);
+            let [eye, p] = [eye, p].map(|q| q.as_vec3());
+            if lines.is_clear(state, eye.to_array(), p.to_array()) {
+                let toward = (p - eye).to_array();
+                let view =
+                    View::perspective(eye.to_array(), toward, [0.0, 1.0, 0.0], 0.1, 1.0).unwrap();
+                let seen = viewer.see(&space, PartId::ROOT, &view);
+                assert!(lights.that_matter(&space, &seen).contains(&id));
+            }
+        }
+    }
+    assert!(n_lit > 300 && n_dark > 15_000, "{n_lit} {n_dark}");
+}
+
+#[test]
+fn a_door_that_closes_and_a_room_that_comes_change_what_is_lit() {
+    let world = room_grid(&GridParams::two_rooms());
+    let mut space = Space::new(&world).unwrap();
+    let mut lights = Lights::new(&space);
+    let middle = space.layout(PartId::ROOT).opening(PortalId(0)).center();
+    let normal = space.layout(PartId::ROOT).opening(PortalId(0)).normal();
+    let lamp = Lamp {
+        frame: PartId::ROOT,
+        at: (middle - normal * 0.5).as_vec3().to_array(),
+        range: 5.0,
+    };
+    let id = lights.add(&space, lamp).unwrap();
+    let lit = |lights: &mut Lights, space: &Space| {
+        lights.update(space);
+        let mut cells: Vec<Place> = lights.lit_by(id).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    };
+    assert_eq!(lit(&mut lights, &space), [0, 1].map(|c| root(CellId(c))));
+    space.state_mut(PartId::ROOT).close(PortalId(0));
+    lights.door_changed(&space, PartId::ROOT, PortalId(0));
+    assert_eq!(lit(&mut lights, &space), [root(CellId(0))]);
+    // A cabin with windows comes to stand in the room that is lit.
+    let cabin = room_grid(&GridParams {
+        size: [1, 1, 1],
+        windows: 1.0,
+        ..GridParams::offices(1, 1)
+    });
+    let cabin = enfilade_testkit::scaled_world(cabin, 0.2);
+    let far = Pose::from_translation(DVec3::X * 500.0);
+    let part = space.add_part(&cabin, PartId::ROOT, far).unwrap();
+    lights.part_moved(&space, part);
+    assert_eq!(lit(&mut lights, &space).len(), 1);
+    let beside = Pose::from_translation(middle - normal * 2.0 - DVec3::Y * 0.3);
+    space.set_pose(part, beside).unwrap();
+    lights.part_moved(&space, part);
+    let inside = Place {
+        part,
+        cell: CellId(0),
+    };
+    assert!(lit(&mut lights, &space).contains(&inside));
+    space.set_pose(part, far).unwrap();
+    lights.part_moved(&space, part);
+    assert!(!lit(&mut lights, &space).contains(&inside));
+}
+
+#[test]
+fn lamps_that_are_none_are_refused() {
+    let space = Space::new(&offices(2)).unwrap();
+    let mut lights = Lights::new(&space);
+    let lamp = Lamp {
+        frame: PartId::ROOT,
+        at: [0.0; 3],
+        range: 1.0,
+    };
+    let with = |range: f32, x: f32| Lamp {
+        at: [x, 0.0, 0.0],
+        range,
+        ..lamp
+    };
+    for bad in [
+        with(0.0, 0.0),
+        with(f32::NAN, 0.0),
+        with(f32::INFINITY, 0.0),
+        with(1.0, f32::NAN),
+    ] {
+        assert_eq!(lights.add(&space, bad), Err(LampError::NotPositive));
+    }
+    let elsewhere = Lamp {
+        frame: PartId(3),
+        ..lamp
+    };
+    assert_eq!(lights.add(&space, elsewhere), Err(LampError::NoPart));
+    assert_eq!(lights.set(&space, LampId(0), lamp), Err(LampError::NoLamp));
+}
