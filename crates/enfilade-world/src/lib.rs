@@ -9,6 +9,8 @@
 //! - **Nothing is allocated** in a question once the buffers have grown.
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
+mod contacts;
 mod layout;
 
+pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
 pub use layout::{CellShape, Exit, Layout, Opening};
