@@ -4,6 +4,9 @@
 //! them, and a cell's triangles count from then on. So the order of the list of portals does not matter, and no cell is looked
 //! at that is reached only after the impact. With a queue that is searched straight through, since a body touches few
 //! openings: O(log n) for each cell's tree, and O(k²) for k cells.
+//!
+//! In a cell, triangles are tried in the order in which the box around the body touches their boxes, so that those behind the
+//! impact are not tried at all. They are gathered first, [`BATCH`] at a time, which bounds how far behind it one looks.
 
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::{Aabb, DMat3, DVec3, Ray, Triangle};
@@ -15,6 +18,8 @@ use super::walls::{Contacts, TriangleOf};
 
 /// What approaches slower than this share of its motion goes no deeper: it passes along.
 const ALONG: f64 = 1e-9;
+/// Triangles gathered before they are tried, and in how many are then tried. 32 is more than most rooms have on a body's way.
+const BATCH: usize = 32;
 
 /// A body that moves straight, without turning.
 #[derive(Clone, Copy, Debug)]
@@ -64,9 +69,11 @@ pub struct Contact {
 pub struct CastCounts {
     /// Cells whose trees were asked.
     pub cells: u32,
-    /// Candidates: triangles tried one by one, openings' among them. All that the box around the body touches before the impact,
-    /// and some of those behind it.
+    /// Candidates: triangles of obstacles that were tried one by one. All whose boxes the box around the body touches before the
+    /// impact, and a few behind it.
     pub triangles: u32,
+    /// Triangles of openings that were tried.
+    pub openings: u32,
 }
 
 /// Asks what bodies touch. Holds the buffers of the flood; one a thread.
@@ -79,6 +86,7 @@ pub struct Caster {
     question: u32,
     waiting: Vec<CellId>,
     cells: Vec<CellId>,
+    gathered: Vec<Gathered>,
     counts: CastCounts,
 }
 
@@ -101,12 +109,41 @@ struct Moving {
     by: DVec3,
 }
 
+/// A triangle on the way: when the boxes meet, and its corners relative to where the body is when it reaches the cell.
+#[derive(Clone, Copy, Debug)]
+struct Gathered {
+    enter: f64,
+    order: u32,
+    /// The cell that it opens to.
+    opens_to: Option<CellId>,
+    /// What it is, if it is in the way.
+    target: Option<Target>,
+    corners: Triangle,
+}
+
 /// An obstacle on the way: in which cell, what it is, its corners relative to where the body is at `since`.
 struct Candidate<'a> {
     cell: CellId,
     target: Target,
     corners: &'a Triangle,
     since: f64,
+}
+
+/// What does not change in a question.
+struct Question<'a> {
+    contacts: &'a Contacts,
+    state: &'a SightState,
+    moving: &'a Moving,
+}
+
+/// A cell that the body is in from `since` on, and how much of the motion is left then.
+struct Stay {
+    cell: CellId,
+    since: f64,
+    start: DVec3,
+    left: f64,
+    /// Whether `left` is that much because of an impact.
+    is_met: bool,
 }
 
 impl Caster {
@@ -118,6 +155,7 @@ impl Caster {
             question: 0,
             waiting: Vec::new(),
             cells: Vec::new(),
+            gathered: Vec::with_capacity(BATCH),
             counts: CastCounts::default(),
         }
     }
@@ -264,20 +302,27 @@ impl Caster {
         mut counts: impl FnMut(DetailId) -> bool,
         mut visit: impl FnMut(&Candidate<'_>, &mut f64),
     ) {
+        let question = &Question {
+            contacts,
+            state,
+            moving,
+        };
         self.begin();
         self.reach(start, 0.0);
-        let mut limit = 1.0;
+        let (mut limit, mut is_met) = (1.0, false);
         while let Some((cell, since)) = self.next_cell(limit) {
             self.cells.push(cell);
-            limit = self.walls(contacts, state, moving, (cell, since), limit, &mut visit);
-            limit = self.objects(
-                (contacts, state),
-                moving,
-                (cell, since),
-                limit,
-                &mut counts,
-                &mut visit,
-            );
+            let mut stay = Stay {
+                cell,
+                since,
+                start: moving.from + moving.by * since,
+                left: limit - since,
+                is_met,
+            };
+            self.gather_walls(question, &mut stay, &mut visit);
+            self.gather_objects(question, &mut stay, &mut counts, &mut visit);
+            self.try_gathered(moving, &mut stay, &mut visit);
+            (limit, is_met) = (since + stay.left, stay.is_met);
         }
         self.counts.cells = self.cells.len() as u32;
     }
@@ -328,75 +373,62 @@ impl Caster {
         (known.since <= limit).then_some((cell, known.since))
     }
 
-    /// Structural triangles and openings of one cell, which the body is in from `since` on; the new limit.
-    fn walls(
+    /// Structural triangles and openings of one cell.
+    fn gather_walls(
         &mut self,
-        contacts: &Contacts,
-        state: &SightState,
-        moving: &Moving,
-        (cell, since): (CellId, f64),
-        limit: f64,
+        question: &Question<'_>,
+        stay: &mut Stay,
         visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
-    ) -> f64 {
-        let walls = &contacts.cells[cell.idx()];
-        let start = moving.from + moving.by * since;
-        let ray = moving.ray(start, limit - since);
-        let mut left = ray.t_max;
+    ) {
+        let Question {
+            contacts,
+            state,
+            moving,
+        } = *question;
+        let walls = &contacts.cells[stay.cell.idx()];
+        let ray = moving.ray(stay.start, stay.left);
         walls
             .bvh
             .for_each_swept(&ray, moving.grown_reach, |i, t, t_max| {
-                let corners = t.map(|p| p - start);
-                let bounds = Aabb::of_points(&corners);
+                let shut = |portal: u32| {
+                    let portal = PortalId(portal);
+                    (!state.is_open(portal)).then_some(Target::Portal(portal))
+                };
+                let (mut opens_to, mut reach) = (None, moving.reach);
                 let target = match walls.surfaces[i as usize] {
-                    TriangleOf::Wall { batch, triangle } => Target::Wall { batch, triangle },
+                    TriangleOf::Wall { batch, triangle } => Some(Target::Wall { batch, triangle }),
                     TriangleOf::Opening { portal, is_panel } => {
                         let [a, b] = contacts.portal_cells[portal as usize];
-                        let to = if a == cell { b } else { a };
-                        if !self.is_done(to)
-                            && boxes_meet(moving.grown_reach, moving.by, left, &bounds)
-                        {
-                            self.counts.triangles += 1;
-                            if let Some(touch) = sweep(&moving.grown, moving.by, left, &corners) {
-                                self.reach(to, since + touch.t);
-                            }
-                        }
-                        if !is_panel || state.is_open(PortalId(portal)) {
-                            return;
-                        }
-                        Target::Portal(PortalId(portal))
+                        opens_to = Some(if a == stay.cell { b } else { a });
+                        reach = moving.grown_reach;
+                        shut(portal).filter(|_| is_panel)
                     }
-                    TriangleOf::Panel { portal } if state.is_open(PortalId(portal)) => return,
-                    TriangleOf::Panel { portal } => Target::Portal(PortalId(portal)),
+                    TriangleOf::Panel { portal } => shut(portal),
                 };
-                if boxes_meet(moving.reach, moving.by, left, &bounds) {
-                    self.counts.triangles += 1;
-                    let candidate = Candidate {
-                        cell,
-                        target,
-                        corners: &corners,
-                        since,
-                    };
-                    visit(&candidate, &mut left);
-                    *t_max = t_max.min(left);
+                if target.is_some() || opens_to.is_some_and(|to| !self.is_done(to)) {
+                    let corners = t.map(|p| p - stay.start);
+                    self.gather((opens_to, target), &corners, reach, moving, stay, visit);
+                    *t_max = t_max.min(stay.left);
                 }
             });
-        since + left
     }
 
-    /// Objects of one cell, which the body is in from `since` on; the new limit.
-    fn objects(
+    /// Objects of one cell.
+    fn gather_objects(
         &mut self,
-        (contacts, state): (&Contacts, &SightState),
-        moving: &Moving,
-        (cell, since): (CellId, f64),
-        limit: f64,
+        question: &Question<'_>,
+        stay: &mut Stay,
         counts: &mut impl FnMut(DetailId) -> bool,
         visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
-    ) -> f64 {
-        let walls = &contacts.cells[cell.idx()];
-        let start = moving.from + moving.by * since;
-        let mut left = limit - since;
-        let ends = Aabb::of_points(&[start, start + moving.by * left]);
+    ) {
+        let Question {
+            contacts,
+            state,
+            moving,
+        } = *question;
+        let walls = &contacts.cells[stay.cell.idx()];
+        let start = stay.start;
+        let ends = Aabb::of_points(&[start, start + moving.by * stay.left]);
         let way = Aabb::new(ends.min - moving.reach, ends.max + moving.reach);
         walls.tree.for_each_in_box(&way, |slot| {
             let detail = walls.details[slot as usize];
@@ -404,15 +436,13 @@ impl Caster {
                 return;
             };
             let bounds = Aabb::new(placed.bounds.min - start, placed.bounds.max - start);
-            if !boxes_meet(moving.reach, moving.by, left, &bounds) || !counts(DetailId(detail)) {
+            let meet = boxes_meet(moving.reach, moving.by, stay.left, &bounds);
+            if meet.is_none() || !counts(DetailId(detail)) {
                 return;
             }
             let (mut to_world, mut to_mesh) = (placed.to_world, placed.to_mesh);
-            if let Some(pose) = placed
-                .is_leaf
-                .then(|| state.pose(DetailId(detail)))
-                .flatten()
-            {
+            let pose = placed.is_leaf.then(|| state.pose(DetailId(detail)));
+            if let Some(pose) = pose.flatten() {
                 to_world = pose * to_world;
                 to_mesh *= pose.inverse();
             }
@@ -421,30 +451,91 @@ impl Caster {
             let ray = Ray {
                 origin: to_mesh.transform_point3(start),
                 direction: to_mesh.transform_vector3(moving.by),
-                t_max: left,
+                t_max: stay.left,
             };
             mesh.bvh.for_each_swept(&ray, reach, |i, t, t_max| {
                 let corners = t.map(|p| to_world.transform_point3(p) - start);
-                if !boxes_meet(moving.reach, moving.by, left, &Aabb::of_points(&corners)) {
-                    return;
-                }
-                self.counts.triangles += 1;
                 let (primitive, triangle) = mesh.named(i);
-                let candidate = Candidate {
-                    cell,
-                    target: Target::Detail {
-                        detail: DetailId(detail),
-                        primitive,
-                        triangle,
-                    },
-                    corners: &corners,
-                    since,
+                let target = Target::Detail {
+                    detail: DetailId(detail),
+                    primitive,
+                    triangle,
                 };
-                visit(&candidate, &mut left);
-                *t_max = t_max.min(left);
+                let what = (None, Some(target));
+                self.gather(what, &corners, moving.reach, moving, stay, visit);
+                *t_max = t_max.min(stay.left);
             });
         });
-        since + left
+    }
+
+    /// Notes a triangle to be tried, if the boxes meet; tries all when there are enough.
+    #[inline]
+    fn gather(
+        &mut self,
+        (opens_to, target): (Option<CellId>, Option<Target>),
+        corners: &Triangle,
+        reach: DVec3,
+        moving: &Moving,
+        stay: &mut Stay,
+        visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
+    ) {
+        let bounds = Aabb::of_points(corners);
+        let meet = |reach| boxes_meet(reach, moving.by, stay.left, &bounds);
+        let Some(mut enter) = meet(reach) else {
+            return;
+        };
+        // What an opening's growth adds is for those who pass along it, not for those who stop right there.
+        if opens_to.is_some() {
+            enter = meet(moving.reach).unwrap_or(enter);
+        }
+        if self.gathered.len() == BATCH {
+            self.try_gathered(moving, stay, visit);
+        }
+        self.gathered.push(Gathered {
+            enter,
+            order: self.gathered.len() as u32,
+            opens_to,
+            target,
+            corners: *corners,
+        });
+    }
+
+    /// Tries what was gathered, from near to far, as long as anything is left of the motion.
+    fn try_gathered(
+        &mut self,
+        moving: &Moving,
+        stay: &mut Stay,
+        visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
+    ) {
+        // What is in the way first: it may spare the openings beside it.
+        let rank = |a: &Gathered| (a.target.is_none(), a.order);
+        self.gathered
+            .sort_unstable_by(|a, b| a.enter.total_cmp(&b.enter).then(rank(a).cmp(&rank(b))));
+        for i in 0..self.gathered.len() {
+            let it = self.gathered[i];
+            if it.enter > stay.left || it.enter == stay.left && stay.is_met {
+                break;
+            }
+            if let Some(to) = it.opens_to.filter(|&to| !self.is_done(to)) {
+                self.counts.openings += 1;
+                if let Some(touch) = sweep(&moving.grown, moving.by, stay.left, &it.corners) {
+                    self.reach(to, stay.since + touch.t);
+                }
+            }
+            if let Some(target) = it.target {
+                self.counts.triangles += 1;
+                let candidate = Candidate {
+                    cell: stay.cell,
+                    target,
+                    corners: &it.corners,
+                    since: stay.since,
+                };
+                let before = stay.left;
+                visit(&candidate, &mut stay.left);
+                stay.is_met |= stay.left < before;
+            }
+        }
+        self.gathered.clear();
     }
 }
 

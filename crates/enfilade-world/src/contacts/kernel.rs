@@ -61,16 +61,17 @@ impl Meeting {
     }
 }
 
-/// Whether the box around a body that moves by `by` from the origin touches the box around a triangle before `t_max`.
+/// When the box around a body that moves by `by` from the origin first touches the box around a triangle, up to `t_max`.
 ///
 /// `reach`: half sizes of the box around the body.
 #[inline]
-pub(super) fn boxes_meet(reach: DVec3, by: DVec3, t_max: f64, bounds: &Aabb) -> bool {
+pub(super) fn boxes_meet(reach: DVec3, by: DVec3, t_max: f64, bounds: &Aabb) -> Option<f64> {
     let mut span = Meeting {
         enter: 0.0,
         leave: t_max,
     };
-    (0..3).all(|k| span.narrow(by[k], reach[k], bounds.min[k], bounds.max[k]))
+    let meet = (0..3).all(|k| span.narrow(by[k], reach[k], bounds.min[k], bounds.max[k]));
+    meet.then_some(span.enter)
 }
 
 /// When a body that moves by `by` first touches a triangle, up to `t_max`. Corners are relative to the body's center.
