@@ -9,8 +9,13 @@
 //! - **Nothing is allocated** in a question once the buffers have grown.
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
+mod actors;
 mod contacts;
 mod layout;
 
+pub use actors::{
+    ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
+    WayPoint,
+};
 pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
 pub use layout::{CellShape, Exit, Layout, Opening};

@@ -2,6 +2,7 @@
 //!
 //! A row is a file beside this one and a line in [`ROWS`].
 
+mod actors;
 mod bodies;
 
 use crate::rows::Measure::{Baked, Made};
@@ -37,5 +38,15 @@ pub(crate) const ROWS: &[Row] = &[
         name: "bodies: time",
         scenes: &["institute"],
         measure: Baked(bodies::time),
+    },
+    Row {
+        name: "actors: state",
+        scenes: &["offices-10000"],
+        measure: Made(actors::state),
+    },
+    Row {
+        name: "actors: cost",
+        scenes: &["offices-10000"],
+        measure: Made(actors::cost),
     },
 ];

@@ -1,0 +1,360 @@
+//! All actors: their plans, the events that change these, and who is in which cell.
+//!
+//! Each actor has one plan at a time. A wheel tells whose plan leaves its cell or ends; these alone are looked at as time goes by: O(1) for
+//! each, and O(log places) when several of their changes have passed at once. Cells list who is in them (Gjørup 1999, section 3.3.4).
+//! An event happens at its own time, not at that of the frame that finds it due, so frames do not matter.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use enfilade_cpg::CellId;
+use enfilade_geom::DVec3;
+
+use crate::actors::chance::Chance;
+use crate::actors::plan::{Knot, PlanDraft, next_change, place_at};
+use crate::actors::wheel::Wheel;
+
+/// A plan takes at least so long, so that events cannot be without end. [Units: s]
+const LEAST_PLAN: f64 = 1e-3;
+/// Of no actor.
+const NONE: u32 = u32::MAX;
+
+/// An actor of [`Actors`], counted from 0 in the order of their coming.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ActorId(pub u32);
+
+/// Why an actor needs a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cause {
+    /// It has just come.
+    Came,
+    /// Its plan is at its end.
+    Done,
+    /// It was [told](Actors::tell) something.
+    Told(u32),
+}
+
+/// The moment at which an actor gets a plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActorEvent {
+    /// Whose.
+    pub actor: ActorId,
+    /// The how manyth of this actor, from 0.
+    pub number: u32,
+    /// When. [Units: s]
+    pub time: f64,
+    /// Where it is then. [Units: wu]
+    pub at: DVec3,
+    /// In which cell.
+    pub cell: CellId,
+    /// Why.
+    pub cause: Cause,
+}
+
+/// Where an actor is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActorPlace {
+    /// [Units: wu]
+    pub at: DVec3,
+    /// Which way it goes, and how fast; 0 for one that stays. [Units: wu/s]
+    pub velocity: DVec3,
+    /// In which cell.
+    pub cell: CellId,
+}
+
+/// Something that an actor will be told, in the order of times and then of telling.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Told {
+    /// Bits of the time, which order as times do.
+    time: u64,
+    order: u64,
+    actor: u32,
+    what: u32,
+}
+
+/// An actor, but for its plan.
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    cell: CellId,
+    /// Neighbors in the list of the cell.
+    before: u32,
+    after: u32,
+    n_events: u32,
+    is_gone: bool,
+}
+
+/// All actors of a world.
+///
+/// Nothing is allocated as time goes by, once plans have been as long as they get.
+#[derive(Clone, Debug)]
+pub struct Actors {
+    seed: u64,
+    now: f64,
+    members: Vec<Member>,
+    plans: Vec<Vec<Knot>>,
+    /// By cell, who is first in its list.
+    heads: Vec<u32>,
+    wheel: Wheel,
+    told: BinaryHeap<Reverse<Told>>,
+    n_told: u64,
+    due: Vec<u32>,
+    n_updates: u64,
+}
+
+impl Actors {
+    /// Nobody, at time 0.
+    #[must_use]
+    pub fn new(n_cells: usize, seed: u64) -> Self {
+        Self {
+            seed,
+            now: 0.0,
+            members: Vec::new(),
+            plans: Vec::new(),
+            heads: vec![NONE; n_cells],
+            wheel: Wheel::new(),
+            told: BinaryHeap::new(),
+            n_told: 0,
+            due: Vec::new(),
+            n_updates: 0,
+        }
+    }
+
+    /// Adds an actor, which comes now. `plan` gives it its first plan, as in [`Actors::advance`].
+    ///
+    /// # Panics
+    ///
+    /// When there is no such cell.
+    pub fn add(
+        &mut self,
+        at: DVec3,
+        cell: CellId,
+        plan: impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
+    ) -> ActorId {
+        let id = self.members.len() as u32;
+        self.members.push(Member {
+            cell,
+            before: NONE,
+            after: NONE,
+            n_events: 0,
+            is_gone: false,
+        });
+        let time = self.now;
+        self.plans.push(vec![Knot { time, at, cell }]);
+        self.wheel.add();
+        self.link(id, cell);
+        self.event(id, time, Cause::Came, &mut { plan });
+        self.settle(id, time);
+        ActorId(id)
+    }
+
+    /// Takes an actor away; its number is not given again. One that is gone already stays so.
+    ///
+    /// # Panics
+    ///
+    /// When there was never such an actor.
+    pub fn remove(&mut self, actor: ActorId) {
+        let member = &mut self.members[actor.0 as usize];
+        if !std::mem::replace(&mut member.is_gone, true) {
+            self.unlink(actor.0);
+            self.wheel.set(actor.0, f64::INFINITY);
+            self.plans[actor.0 as usize] = Vec::new();
+        }
+    }
+
+    /// Tells an actor something at a time: it gets a new plan then, whatever it was doing. A time that has passed, or is
+    /// none, counts as now, at the next [`Actors::advance`]. [Units: s]
+    pub fn tell(&mut self, actor: ActorId, time: f64, what: u32) {
+        let time = time.max(self.now);
+        self.n_told += 1;
+        self.told.push(Reverse(Told {
+            time: ordered(time),
+            order: self.n_told,
+            actor: actor.0,
+            what,
+        }));
+    }
+
+    /// Lets time go by until `time`; time does not run back. [Units: s]
+    ///
+    /// `plan` is called for each event on the way, with its moment, chance that is this event's own, and the plan to be made, which
+    /// starts there and then. Where it adds nothing, the actor stays for ever, or until it is told something. It must depend
+    /// on nothing but its arguments and what never changes; then who is where at a time does not depend on the times at which this is called.
+    /// For an actor, events come in the order of their times; between actors, in none.
+    ///
+    /// O(actors that changed their cell + Σ events); nothing for those who stay.
+    pub fn advance(
+        &mut self,
+        time: f64,
+        mut plan: impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
+    ) {
+        self.n_updates = 0;
+        if !(time >= self.now && time.is_finite()) {
+            return;
+        }
+        while let Some(&Reverse(told)) = self.told.peek() {
+            let when = unordered(told.time);
+            if when > time {
+                break;
+            }
+            self.told.pop();
+            if self
+                .members
+                .get(told.actor as usize)
+                .is_some_and(|m| !m.is_gone)
+            {
+                self.events_until(told.actor, when, &mut plan);
+                self.event(told.actor, when, Cause::Told(told.what), &mut plan);
+                // What it does next is due from here on.
+                self.settle(told.actor, when);
+            }
+        }
+        let mut due = std::mem::take(&mut self.due);
+        due.clear();
+        self.wheel.due(self.now, time, &mut due);
+        for &id in &due {
+            self.events_until(id, time, &mut plan);
+            self.settle(id, time);
+        }
+        self.n_updates += due.len() as u64;
+        self.due = due;
+        self.now = time;
+    }
+
+    /// The time. [Units: s]
+    #[must_use]
+    pub fn now(&self) -> f64 {
+        self.now
+    }
+
+    /// How many actors there were, with those that are gone.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Whether there was never one.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
+    /// How many actors the last [`Actors::advance`] looked at.
+    #[must_use]
+    pub fn n_updates(&self) -> u64 {
+        self.n_updates
+    }
+
+    /// Where an actor is now; `None` for one that is gone. O(log places of its plan), and nothing is stored: asking changes nothing.
+    ///
+    /// # Panics
+    ///
+    /// When there was never such an actor.
+    #[must_use]
+    pub fn place(&self, actor: ActorId) -> Option<ActorPlace> {
+        if self.members[actor.0 as usize].is_gone {
+            return None;
+        }
+        let (at, velocity, cell) = place_at(&self.plans[actor.0 as usize], self.now);
+        Some(ActorPlace { at, velocity, cell })
+    }
+
+    /// Who is in a cell now, in no order that means anything; nobody for a cell that does not exist.
+    pub fn in_cell(&self, cell: CellId) -> impl Iterator<Item = ActorId> + '_ {
+        let some = |id: u32| (id != NONE).then_some(id);
+        let first = self.heads.get(cell.idx()).and_then(|&id| some(id));
+        let next = move |&id: &u32| some(self.members[id as usize].after);
+        std::iter::successors(first, next).map(ActorId)
+    }
+
+    /// All events of an actor up to a time at which its plan is at its end.
+    fn events_until(
+        &mut self,
+        id: u32,
+        time: f64,
+        plan: &mut impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
+    ) {
+        while let [_, .., last] = self.plans[id as usize][..] {
+            if last.time > time {
+                break;
+            }
+            self.event(id, last.time, Cause::Done, plan);
+        }
+    }
+
+    /// Gives an actor a new plan from a time on, at which its plan was not yet, or just, at its end.
+    fn event(
+        &mut self,
+        id: u32,
+        time: f64,
+        cause: Cause,
+        plan: &mut impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
+    ) {
+        let knots = &mut self.plans[id as usize];
+        let (at, _, cell) = place_at(knots, time);
+        let member = &mut self.members[id as usize];
+        let event = ActorEvent {
+            actor: ActorId(id),
+            number: member.n_events,
+            time,
+            at,
+            cell,
+            cause,
+        };
+        member.n_events += 1;
+        let mut chance = Chance::new(self.seed, id, event.number);
+        let mut draft = PlanDraft::new(knots, Knot { time, at, cell });
+        plan(&event, &mut chance, &mut draft);
+        let rest = LEAST_PLAN - (draft.end() - time);
+        if rest > 0.0 && knots.len() > 1 {
+            PlanDraft::resume(knots).wait(rest);
+        }
+    }
+
+    /// Lists an actor where its plan is at a time, and sets when it is to be looked at again.
+    fn settle(&mut self, id: u32, time: f64) {
+        let knots = &self.plans[id as usize];
+        let (_, _, cell) = place_at(knots, time);
+        let due = next_change(knots, time);
+        if self.members[id as usize].cell != cell {
+            self.unlink(id);
+            self.link(id, cell);
+        }
+        self.wheel.set(id, due);
+    }
+
+    fn link(&mut self, id: u32, cell: CellId) {
+        let head = &mut self.heads[cell.idx()];
+        let after = std::mem::replace(head, id);
+        if after != NONE {
+            self.members[after as usize].before = id;
+        }
+        let member = &mut self.members[id as usize];
+        (member.cell, member.before, member.after) = (cell, NONE, after);
+    }
+
+    fn unlink(&mut self, id: u32) {
+        let Member {
+            cell,
+            before,
+            after,
+            ..
+        } = self.members[id as usize];
+        match before {
+            NONE => self.heads[cell.idx()] = after,
+            b => self.members[b as usize].after = after,
+        }
+        if after != NONE {
+            self.members[after as usize].before = before;
+        }
+    }
+}
+
+/// Bits of a number that order as the numbers do.
+fn ordered(x: f64) -> u64 {
+    let bits = x.to_bits();
+    bits ^ if bits >> 63 == 1 { u64::MAX } else { 1 << 63 }
+}
+
+fn unordered(bits: u64) -> f64 {
+    f64::from_bits(bits ^ if bits >> 63 == 0 { u64::MAX } else { 1 << 63 })
+}
