@@ -2,6 +2,8 @@
 //!
 //! Each actor has one plan at a time. A wheel tells whose plan leaves its cell or ends; these alone are looked at as time goes by: O(1) for
 //! each, and O(log places) when several of their changes have passed at once. Cells list who is in them (Gjørup 1999, section 3.3.4).
+//! Among many actors each is a wait for memory, so all that a change needs stands in one line of it, and changes are made in rounds of one
+//! kind of work, in which the processor can wait for several at once.
 //! An event happens at its own time, not at that of the frame that finds it due, so frames do not matter.
 
 use std::cmp::Reverse;
@@ -11,7 +13,7 @@ use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
 
 use crate::actors::chance::Chance;
-use crate::actors::plan::{Knot, PlanDraft, next_change, place_at};
+use crate::actors::plan::{Knot, PlanDraft, next_change, part_at, place_at};
 use crate::actors::wheel::Wheel;
 
 /// A plan takes at least so long, so that events cannot be without end. [Units: s]
@@ -72,15 +74,20 @@ struct Told {
     what: u32,
 }
 
-/// An actor, but for its plan.
-#[derive(Clone, Copy, Debug)]
+/// An actor, but for the points of its plan.
+#[derive(Clone, Debug)]
 struct Member {
-    cell: CellId,
+    /// When it is to be looked at again. [Units: s]
+    due: f64,
+    knots: Vec<Knot>,
+    /// The part of its plan that it was in when it was last looked at.
+    part: u32,
+    /// Where it is listed; [`NONE`] for one that is gone.
+    cell: u32,
     /// Neighbors in the list of the cell.
     before: u32,
     after: u32,
     n_events: u32,
-    is_gone: bool,
 }
 
 /// All actors of a world.
@@ -91,7 +98,8 @@ pub struct Actors {
     seed: u64,
     now: f64,
     members: Vec<Member>,
-    plans: Vec<Vec<Knot>>,
+    /// By actor: the points of its plan.
+    points: Vec<Vec<DVec3>>,
     /// By cell, who is first in its list.
     heads: Vec<u32>,
     wheel: Wheel,
@@ -109,7 +117,7 @@ impl Actors {
             seed,
             now: 0.0,
             members: Vec::new(),
-            plans: Vec::new(),
+            points: Vec::new(),
             heads: vec![NONE; n_cells],
             wheel: Wheel::new(),
             told: BinaryHeap::new(),
@@ -131,19 +139,21 @@ impl Actors {
         plan: impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
     ) -> ActorId {
         let id = self.members.len() as u32;
+        let time = self.now;
         self.members.push(Member {
-            cell,
+            due: f64::INFINITY,
+            knots: vec![Knot { time, cell }],
+            part: 0,
+            cell: cell.0,
             before: NONE,
             after: NONE,
             n_events: 0,
-            is_gone: false,
         });
-        let time = self.now;
-        self.plans.push(vec![Knot { time, at, cell }]);
-        self.wheel.add();
-        self.link(id, cell);
+        self.points.push(vec![at]);
+        self.link(id, cell.0);
         self.event(id, time, Cause::Came, &mut { plan });
-        self.settle(id, time);
+        self.look_ahead(id, time);
+        self.list(id);
         ActorId(id)
     }
 
@@ -153,11 +163,12 @@ impl Actors {
     ///
     /// When there was never such an actor.
     pub fn remove(&mut self, actor: ActorId) {
-        let member = &mut self.members[actor.0 as usize];
-        if !std::mem::replace(&mut member.is_gone, true) {
+        if self.members[actor.0 as usize].cell != NONE {
             self.unlink(actor.0);
-            self.wheel.set(actor.0, f64::INFINITY);
-            self.plans[actor.0 as usize] = Vec::new();
+            let member = &mut self.members[actor.0 as usize];
+            (member.cell, member.due) = (NONE, f64::INFINITY);
+            member.knots = Vec::new();
+            self.points[actor.0 as usize] = Vec::new();
         }
     }
 
@@ -197,24 +208,30 @@ impl Actors {
                 break;
             }
             self.told.pop();
-            if self
-                .members
-                .get(told.actor as usize)
-                .is_some_and(|m| !m.is_gone)
-            {
+            let member = self.members.get(told.actor as usize);
+            if member.is_some_and(|m| m.cell != NONE) {
                 self.events_until(told.actor, when, &mut plan);
                 self.event(told.actor, when, Cause::Told(told.what), &mut plan);
                 // What it does next is due from here on.
-                self.settle(told.actor, when);
+                self.look_ahead(told.actor, when);
+                self.list(told.actor);
             }
         }
         let mut due = std::mem::take(&mut self.due);
         due.clear();
-        self.wheel.due(self.now, time, &mut due);
+        let members = &mut self.members;
+        let when = |id: u32| {
+            let due = &mut members[id as usize].due;
+            // Once only, though several entries may be left of it.
+            let next = if *due <= time { f64::INFINITY } else { *due };
+            std::mem::replace(due, next)
+        };
+        self.wheel.due(self.now, time, when, &mut due);
         for &id in &due {
             self.events_until(id, time, &mut plan);
-            self.settle(id, time);
+            self.look_ahead(id, time);
         }
+        due.iter().for_each(|&id| self.list(id));
         self.n_updates += due.len() as u64;
         self.due = due;
         self.now = time;
@@ -251,11 +268,18 @@ impl Actors {
     /// When there was never such an actor.
     #[must_use]
     pub fn place(&self, actor: ActorId) -> Option<ActorPlace> {
-        if self.members[actor.0 as usize].is_gone {
+        let member = &self.members[actor.0 as usize];
+        if member.cell == NONE {
             return None;
         }
-        let (at, velocity, cell) = place_at(&self.plans[actor.0 as usize], self.now);
-        Some(ActorPlace { at, velocity, cell })
+        let part = part_at(&member.knots, member.part as usize, self.now);
+        let plan = (&member.knots[..], &self.points[actor.0 as usize][..]);
+        let (at, velocity) = place_at(plan, part, self.now);
+        Some(ActorPlace {
+            at,
+            velocity,
+            cell: member.knots[part].cell,
+        })
     }
 
     /// Who is in a cell now, in no order that means anything; nobody for a cell that does not exist.
@@ -273,7 +297,7 @@ impl Actors {
         time: f64,
         plan: &mut impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
     ) {
-        while let [_, .., last] = self.plans[id as usize][..] {
+        while let [_, .., last] = self.members[id as usize].knots[..] {
             if last.time > time {
                 break;
             }
@@ -289,9 +313,11 @@ impl Actors {
         cause: Cause,
         plan: &mut impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
     ) {
-        let knots = &mut self.plans[id as usize];
-        let (at, _, cell) = place_at(knots, time);
         let member = &mut self.members[id as usize];
+        let (knots, points) = (&mut member.knots, &mut self.points[id as usize]);
+        let part = part_at(knots, member.part as usize, time);
+        let (at, _) = place_at((knots, points), part, time);
+        let cell = knots[part].cell;
         let event = ActorEvent {
             actor: ActorId(id),
             number: member.n_events,
@@ -301,29 +327,34 @@ impl Actors {
             cause,
         };
         member.n_events += 1;
+        member.part = 0;
         let mut chance = Chance::new(self.seed, id, event.number);
-        let mut draft = PlanDraft::new(knots, Knot { time, at, cell });
+        let mut draft = PlanDraft::new((knots, points), Knot { time, cell }, at);
         plan(&event, &mut chance, &mut draft);
-        let rest = LEAST_PLAN - (draft.end() - time);
-        if rest > 0.0 && knots.len() > 1 {
-            PlanDraft::resume(knots).wait(rest);
-        }
+        draft.take_at_least(time, LEAST_PLAN);
     }
 
-    /// Lists an actor where its plan is at a time, and sets when it is to be looked at again.
-    fn settle(&mut self, id: u32, time: f64) {
-        let knots = &self.plans[id as usize];
-        let (_, _, cell) = place_at(knots, time);
-        let due = next_change(knots, time);
-        if self.members[id as usize].cell != cell {
+    /// Finds the part of its plan that an actor is in at a time, and when it is to be looked at again.
+    fn look_ahead(&mut self, id: u32, time: f64) {
+        let member = &mut self.members[id as usize];
+        let part = part_at(&member.knots, member.part as usize, time);
+        member.part = part as u32;
+        member.due = next_change(&member.knots, part);
+    }
+
+    /// Lists an actor in the cell that it is in, and for when it is due.
+    fn list(&mut self, id: u32) {
+        let member = &self.members[id as usize];
+        let (cell, due) = (member.knots[member.part as usize].cell.0, member.due);
+        if member.cell != cell {
             self.unlink(id);
             self.link(id, cell);
         }
         self.wheel.set(id, due);
     }
 
-    fn link(&mut self, id: u32, cell: CellId) {
-        let head = &mut self.heads[cell.idx()];
+    fn link(&mut self, id: u32, cell: u32) {
+        let head = &mut self.heads[cell as usize];
         let after = std::mem::replace(head, id);
         if after != NONE {
             self.members[after as usize].before = id;
@@ -340,7 +371,7 @@ impl Actors {
             ..
         } = self.members[id as usize];
         match before {
-            NONE => self.heads[cell.idx()] = after,
+            NONE => self.heads[cell as usize] = after,
             b => self.members[b as usize].after = after,
         }
         if after != NONE {

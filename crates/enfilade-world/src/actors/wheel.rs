@@ -1,30 +1,35 @@
 //! Who is due when: a hashed timing wheel.
 //!
 //! After Varghese and Lauck, "Hashed and hierarchical timing wheels" (SOSP 1987), scheme 6: a slot for each tick, the ticks modulo the
-//! number of slots; entries of later rounds stay where they are. Entries are the actors themselves, linked, so that nothing is
-//! allocated. O(1) to set, and for each tick that passes O(entries of its slot); whatever time goes by, no more than all entries
-//! once.
+//! number of slots; entries of later rounds stay where they are. Slots are chains of blocks of a cache line, out of one
+//! pool: linked actors would cost a wait for memory each, one after another. What is set anew leaves its old entry behind, which is dropped
+//! when its slot comes up. O(1) to set, and for each tick that passes O(entries of its slot); whatever time goes by, no more
+//! than all entries once.
 
 /// Ticks in a second; each has a slot.
 const TICKS: f64 = 64.0;
-/// Slots: a round is 64 seconds, longer than most legs.
-const SLOTS: usize = 4096;
-/// Of no entry.
+/// Slots: a round is 256 seconds, longer than most stays.
+const SLOTS: usize = 16_384;
+/// Of no block.
 const NONE: u32 = u32::MAX;
+/// Entries of a block: with their number and the next block, 64 bytes.
+const ENTRIES: usize = 14;
 
-/// All entries by the time that they are due.
+/// All entries by the time that they are due. When each is due, the caller knows.
 #[derive(Clone, Debug)]
 pub(super) struct Wheel {
     heads: Vec<u32>,
-    entries: Vec<Entry>,
+    blocks: Vec<Block>,
+    /// Blocks of no slot.
+    free: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Entry {
-    /// Infinite where it is in no slot. [Units: s]
-    due: f64,
-    before: u32,
-    after: u32,
+#[repr(align(64))]
+struct Block {
+    ids: [u32; ENTRIES],
+    n: u32,
+    next: u32,
 }
 
 fn tick(time: f64) -> i64 {
@@ -39,63 +44,68 @@ impl Wheel {
     pub(super) fn new() -> Self {
         Self {
             heads: vec![NONE; SLOTS],
-            entries: Vec::new(),
+            blocks: Vec::new(),
+            free: NONE,
         }
     }
 
-    /// Adds one that is never due.
-    pub(super) fn add(&mut self) {
-        self.entries.push(Entry {
-            due: f64::INFINITY,
-            before: NONE,
-            after: NONE,
-        });
-    }
-
-    /// Sets when one is due, in place of what was; never where that is infinite.
+    /// Notes when one is due; never where that is infinite.
     pub(super) fn set(&mut self, id: u32, due: f64) {
-        let Entry {
-            due: was,
-            before,
-            after,
-        } = self.entries[id as usize];
-        if was.is_finite() {
-            match before {
-                NONE => self.heads[slot(tick(was))] = after,
-                b => self.entries[b as usize].after = after,
-            }
-            if after != NONE {
-                self.entries[after as usize].before = before;
-            }
-        }
-        let mut entry = Entry {
-            due,
-            before: NONE,
-            after: NONE,
-        };
         if due.is_finite() {
-            let head = &mut self.heads[slot(tick(due))];
-            entry.after = *head;
-            *head = id;
-            if entry.after != NONE {
-                self.entries[entry.after as usize].before = id;
-            }
+            self.add(slot(tick(due)), id);
         }
-        self.entries[id as usize] = entry;
     }
 
-    /// Adds all to `due` that are due between two times, both included; they stay in their slots until set anew.
-    pub(super) fn due(&self, from: f64, until: f64, due: &mut Vec<u32>) {
+    fn add(&mut self, slot: usize, id: u32) {
+        let head = self.heads[slot];
+        if head == NONE || self.blocks[head as usize].n as usize == ENTRIES {
+            let block = Block {
+                ids: [NONE; ENTRIES],
+                n: 0,
+                next: head,
+            };
+            let at = self.free;
+            if at == NONE {
+                self.heads[slot] = self.blocks.len() as u32;
+                self.blocks.push(block);
+            } else {
+                self.free = self.blocks[at as usize].next;
+                self.blocks[at as usize] = block;
+                self.heads[slot] = at;
+            }
+        }
+        let block = &mut self.blocks[self.heads[slot] as usize];
+        block.ids[block.n as usize] = id;
+        block.n += 1;
+    }
+
+    /// Adds all to `due` that are due between two times, both included, and forgets them; `when` tells and may change when one is
+    /// due.
+    pub(super) fn due(
+        &mut self,
+        from: f64,
+        until: f64,
+        mut when: impl FnMut(u32) -> f64,
+        due: &mut Vec<u32>,
+    ) {
         let first = tick(from);
         let n = tick(until).saturating_sub(first).saturating_add(1);
         for k in 0..n.clamp(0, SLOTS as i64) {
-            let mut at = self.heads[slot(first.wrapping_add(k))];
+            let this = slot(first.wrapping_add(k));
+            let mut at = std::mem::replace(&mut self.heads[this], NONE);
             while at != NONE {
-                let entry = &self.entries[at as usize];
-                if entry.due <= until {
-                    due.push(at);
+                let block = self.blocks[at as usize];
+                self.blocks[at as usize].next = self.free;
+                self.free = at;
+                for &id in &block.ids[..block.n as usize] {
+                    let time = when(id);
+                    if time <= until {
+                        due.push(id);
+                    } else if time.is_finite() && slot(tick(time)) == this {
+                        self.add(this, id);
+                    }
                 }
-                at = entry.after;
+                at = block.next;
             }
         }
     }
@@ -112,34 +122,33 @@ mod tests {
         let mut rng = Rng::new(3);
         let mut wheel = Wheel::new();
         let mut times = vec![f64::INFINITY; 300];
-        for _ in 0..300 {
-            wheel.add();
-        }
         let mut now = -10.0;
         for round in 0..4000 {
             let id = rng.below(300);
             times[id] = if rng.chance(0.1) {
                 f64::INFINITY
             } else {
-                now + rng.range(0.0, 200.0)
+                now + rng.range(0.0, 600.0)
             };
             wheel.set(id as u32, times[id]);
-            let then = now
-                + if round % 100 == 0 {
-                    500.0
-                } else {
-                    rng.range(0.0, 0.3)
-                };
-            let mut due = Vec::new();
-            wheel.due(now, then, &mut due);
-            due.sort_unstable();
+            let far = round % 100 == 0;
+            let then = now + if far { 900.0 } else { rng.range(0.0, 0.3) };
             let expected: Vec<u32> = (0..300).filter(|&i| times[i as usize] <= then).collect();
+            let mut due = Vec::new();
+            let when = |id: u32| {
+                let time = &mut times[id as usize];
+                let was = *time;
+                if was <= then {
+                    *time = f64::INFINITY;
+                }
+                was
+            };
+            wheel.due(now, then, when, &mut due);
+            due.sort_unstable();
             assert_eq!(due, expected);
-            for id in due {
-                times[id as usize] = f64::INFINITY;
-                wheel.set(id, f64::INFINITY);
-            }
             now = then;
         }
+        // Blocks are used again.
+        assert!(wheel.blocks.len() < 600, "{}", wheel.blocks.len());
     }
 }
