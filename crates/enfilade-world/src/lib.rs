@@ -12,6 +12,7 @@
 mod actors;
 mod contacts;
 mod layout;
+mod walker;
 
 pub use actors::{
     ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
@@ -19,3 +20,4 @@ pub use actors::{
 };
 pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
 pub use layout::{CellShape, Exit, Layout, Opening};
+pub use walker::{Build, Walker};

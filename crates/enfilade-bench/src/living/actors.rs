@@ -109,7 +109,7 @@ impl Town {
         let mut errands = Errands::default();
         move |event, chance, plan| {
             errands.plan(chance, plan, PLACES, |to, way| {
-                self.way(event.cell, to, way)
+                self.way(event.cell, to, way);
             });
         }
     }

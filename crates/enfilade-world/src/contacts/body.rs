@@ -85,6 +85,8 @@ impl Body {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BodyCore {
     pub(super) axes: [DVec3; 3],
+    /// Of a box, their directions, though it may have no size along them.
+    pub(super) directions: [DVec3; 3],
     /// How many of these count.
     pub(super) n_axes: usize,
     /// 0 for boxes.
@@ -96,18 +98,22 @@ impl BodyCore {
         match *body {
             Body::Sphere { radius } => Self {
                 axes: [DVec3::ZERO; 3],
+                directions: DVec3::AXES,
                 n_axes: 0,
                 radius,
             },
             Body::Capsule { half, radius } => Self {
                 axes: [half, DVec3::ZERO, DVec3::ZERO],
+                directions: DVec3::AXES,
                 n_axes: 1,
                 radius,
             },
             Body::Box { half, turn } => {
                 let turn = DMat3::from_quat(turn);
+                let directions = [turn.x_axis, turn.y_axis, turn.z_axis];
                 Self {
-                    axes: [0, 1, 2].map(|k| turn.col(k) * half[k]),
+                    axes: [0, 1, 2].map(|k| directions[k] * half[k]),
+                    directions,
                     n_axes: 3,
                     radius: 0.0,
                 }

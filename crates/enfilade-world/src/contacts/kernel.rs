@@ -8,6 +8,7 @@
 //!   they start where the separating axes of the triangle's plane and of the world end. Where the body only grazes, steps
 //!   halve; those that are left over after [`MAX_STEPS`] count as touching.
 //!
+//! All intervals are wider by [`TOUCH`]: what has no thickness touches a triangle for an instant only, and two axes round it differently.
 //! The parry library's way (GJK on the difference) was measured and not taken: see `docs/living.md`.
 //! Coordinates are taken relative to the body's start, so that their rounding is that of the file.
 
@@ -61,6 +62,12 @@ impl Meeting {
     }
 }
 
+/// Half of what a body takes along a direction, with what counts as touching.
+#[inline]
+fn reach_along(core: &BodyCore, axis: DVec3) -> f64 {
+    core.support(axis) + TOUCH * axis.abs().element_sum()
+}
+
 /// When the box around a body that moves by `by` from the origin first touches the box around a triangle, up to `t_max`.
 ///
 /// `reach`: half sizes of the box around the body.
@@ -70,7 +77,7 @@ pub(super) fn boxes_meet(reach: DVec3, by: DVec3, t_max: f64, bounds: &Aabb) -> 
         enter: 0.0,
         leave: t_max,
     };
-    let meet = (0..3).all(|k| span.narrow(by[k], reach[k], bounds.min[k], bounds.max[k]));
+    let meet = (0..3).all(|k| span.narrow(by[k], reach[k] + TOUCH, bounds.min[k], bounds.max[k]));
     meet.then_some(span.enter)
 }
 
@@ -111,10 +118,7 @@ pub(super) fn point_of_contact(core: &BodyCore, triangle: &Triangle) -> DVec3 {
     corners[..3].copy_from_slice(triangle);
     let mut n = 3;
     let slack = 1e-6 + 1e-6 * core.reach().max_element();
-    for axis in core.axes {
-        let Some(u) = axis.try_normalize() else {
-            continue;
-        };
+    for (axis, u) in core.axes.iter().zip(core.directions) {
         for side in [1.0, -1.0] {
             let mut kept = [DVec3::ZERO; 12];
             let mut n_kept = 0;
@@ -150,7 +154,7 @@ fn sweep_round(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<F
     let at = face.dot(t[0]);
     // Planes of slivers are noise.
     let is_sure = face.length_squared() > 1e-20;
-    let reach = core.support(face) * (1.0 + 1e-12);
+    let reach = reach_along(core, face);
     if is_sure && !span.narrow(face.dot(by), reach, at, at) {
         return None;
     }
@@ -158,7 +162,7 @@ fn sweep_round(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<F
         let axis = DVec3::AXES[k];
         let [a, b, c] = t.map(|p| p[k]);
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        if !span.narrow(by[k], core.support(axis), low, high) {
+        if !span.narrow(by[k], reach_along(core, axis), low, high) {
             return None;
         }
     }
@@ -203,17 +207,17 @@ fn normal_of(away: DVec3, t: &Triangle, center: DVec3, by: DVec3) -> DVec3 {
 #[inline]
 fn for_each_axis(core: &BodyCore, t: &Triangle, mut visit: impl FnMut(DVec3) -> bool) -> bool {
     let edges = [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
-    if !core.axes.iter().all(|&a| a == DVec3::ZERO || visit(a)) {
+    if !core.directions.iter().all(|&a| visit(a)) {
         return false;
     }
     let face = edges[0].cross(edges[1]);
     if face.length_squared() > 1e-20 && !visit(face) {
         return false;
     }
-    core.axes.iter().all(|a| {
+    core.directions.iter().all(|a| {
         edges.iter().all(|e| {
             let axis = a.cross(*e);
-            let noise = 1e-20 * a.length_squared() * e.length_squared();
+            let noise = 1e-20 * e.length_squared();
             axis.length_squared() <= noise || visit(axis)
         })
     })
@@ -236,7 +240,7 @@ fn sweep_box(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<Fir
         let (low, high) = extent(axis, t);
         let before = span.enter;
         let speed = axis.dot(by);
-        let is_left = span.narrow(speed, core.support(axis), low, high);
+        let is_left = span.narrow(speed, reach_along(core, axis), low, high);
         if span.enter > before {
             last = Some(axis * -speed.signum());
         }

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::ray::segment_to_triangle_distance;
 use enfilade_geom::{Aabb, DMat3, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
-use enfilade_runtime::{DetailId, Sight, SightState, Target};
+use enfilade_runtime::{DetailId, Sight, SightState, Sightlines, Target};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
 use super::{Body, Cast, Caster, Contact, Contacts, Impact};
@@ -323,6 +323,46 @@ fn casts_meet_what_trying_every_reachable_triangle_meets() {
         }
     }
     assert!(n[0] > 200 && n[1] > 2 * n[0] / 2, "{n:?}");
+}
+
+#[test]
+fn points_meet_what_lines_of_sight_meet() {
+    let mut rng = Rng::new(8);
+    let (mut n_hits, mut n_flat) = (0, 0);
+    for (seed, turn) in [(1, 0.0), (2, 0.7)] {
+        let mut site = Site::new(room_grid(&GridParams { turn, ..grid(seed) }));
+        for portal in site.world.graph.portal_ids().filter(|p| p.0 % 3 == 0) {
+            site.state.close(portal);
+        }
+        let lines = Sightlines::build(&site.world);
+        for _ in 0..2000 {
+            // As lines of sight have them.
+            let from = random_point(&mut rng, &site.world).as_vec3();
+            let to = random_point(&mut rng, &site.world).as_vec3();
+            let (a, b) = (from.as_dvec3(), to.as_dvec3());
+            if site.layout.locate(a).is_none() {
+                continue;
+            }
+            let hit = lines
+                .pick(&site.state, from.to_array(), to.to_array())
+                .unwrap();
+            let found = site.cast(&Body::Sphere { radius: 0.0 }, a, b - a);
+            assert_eq!(found.is_some(), hit.is_some(), "{a} {b} {found:?} {hit:?}");
+            if let (Some(found), Some(hit)) = (found, hit) {
+                assert!((found.t - hit.t).abs() < 1e-7, "{a} {b} {found:?} {hit:?}");
+                n_hits += 1;
+            }
+            // A box without any size is a point, too.
+            let speck = Body::Box {
+                half: DVec3::ZERO,
+                turn: DQuat::from_rotation_x(0.4),
+            };
+            let flat = site.cast(&speck, a, b - a);
+            assert_eq!(flat.is_some(), found.is_some());
+            n_flat += usize::from(flat.is_some());
+        }
+    }
+    assert!(n_hits > 1000 && n_flat == n_hits, "{n_hits}");
 }
 
 /// Two rooms in a row with a doorway, the middle of the first, and the doorway's middle.
