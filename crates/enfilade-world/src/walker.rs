@@ -126,7 +126,6 @@ impl Walker {
     fn slide(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, flat: DVec3) {
         let (body, below) = self.body();
         let mut left = flat;
-        let mut met: Option<DVec3> = None;
         for _ in 0..SLIDES {
             let length = left.length();
             let from = self.eye + below;
@@ -155,11 +154,6 @@ impl Walker {
             self.eye += direction * free;
             left -= direction * free;
             left -= normal * normal.dot(left).min(0.0);
-            // In a corner, along neither wall.
-            if met.is_some_and(|m| m.dot(left) < -1e-12) {
-                return;
-            }
-            met = Some(normal);
         }
     }
 

@@ -2,8 +2,9 @@
 
 use std::cell::RefCell;
 
-use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_cpg::{CellId, DetailObject, PortalId, World};
 use enfilade_geom::ray::segment_to_triangle_distance;
+use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DMat3, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
 use enfilade_runtime::{DetailId, Sight, SightState, Sightlines, Target};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
@@ -95,7 +96,8 @@ impl Site {
     }
 
     /// When a body first meets something, by trying all triangles of all cells in the order in which it reaches them.
-    fn brute(&self, body: &Body, margin: f64, from: DVec3, by: DVec3) -> Option<f64> {
+    /// And when it reaches each cell.
+    fn brute(&self, body: &Body, margin: f64, from: DVec3, by: DVec3) -> (Option<f64>, Vec<f64>) {
         let grown = |margin: f64| body.grown(margin);
         let n_cells = self.world.graph.cells.len();
         let mut since = vec![f64::INFINITY; n_cells];
@@ -128,7 +130,7 @@ impl Site {
                 }
             }
         }
-        first.is_finite().then_some(first)
+        (first.is_finite().then_some(first), since)
     }
 }
 
@@ -269,8 +271,8 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
         let found = site.cast(&body, from, by);
         n_cells += site.caster.borrow().cells().len();
         n_impacts += usize::from(found.is_some());
-        let latest = site.brute(&body, -margin, from, by);
-        let earliest = site.brute(&body, margin, from, by);
+        let (latest, _) = site.brute(&body, -margin, from, by);
+        let (earliest, since) = site.brute(&body, margin, from, by);
         let t = found.map_or(f64::INFINITY, |i| i.t);
         let [latest, earliest] = [latest, earliest].map(|t| t.unwrap_or(f64::INFINITY));
         assert!(
@@ -281,6 +283,9 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
             t >= earliest - 1e-9,
             "too early: {body:?} {from} {by}: {t} {earliest}"
         );
+        for cell in site.caster.borrow().cells() {
+            assert!(since[cell.idx()] <= t + 1e-9, "{cell} is behind the impact");
+        }
         if let Some(impact) = found {
             let at = from + by * impact.t;
             let own = body.bounds(at).expanded(1e-5);
@@ -429,6 +434,44 @@ fn only_cells_whose_openings_are_touched_are_asked() {
     // What stops at the wall reaches nothing behind it, and what turns back before the opening does not, either.
     let _ = site.cast(&body, middle, DVec3::Z * 20.0);
     assert_eq!(cells(), [CellId(0)]);
+}
+
+#[test]
+fn what_stands_behind_a_wall_counts_from_when_its_cell_is_reached() {
+    // A ball that bulges through the wall beside a doorway, and a box behind the wall, before the doorway. The wall's own triangles
+    // would stop it at their seams.
+    let mut world = room_grid(&GridParams::two_rooms());
+    world.batches.clear();
+    let hole = *Layout::new(&world).opening(PortalId(0)).bounds();
+    let at = DVec3::new(hole.min.x - 0.3, 0.6, hole.min.z - 0.5);
+    let low = DVec3::new(hole.min.x + 0.02, 0.2, at.z + 0.31);
+    let block = Aabb::new(low, low + DVec3::new(0.3, 0.8, 0.1)).triangles();
+    let positions: Vec<[f32; 3]> =
+        (block.iter().flatten().map(|p| p.as_vec3().to_array())).collect();
+    world.detail_meshes.push(Mesh {
+        primitives: vec![Primitive {
+            indices: (0..positions.len() as u32).collect(),
+            positions,
+            ..Primitive::default()
+        }],
+        ..Mesh::default()
+    });
+    world.details.push(DetailObject {
+        name: String::new(),
+        mesh: world.detail_meshes.len() as u32 - 1,
+        transform: DMat4::IDENTITY.to_cols_array().map(|x| x as f32),
+        cells: vec![CellId(1)],
+        source: None,
+        part_of: None,
+    });
+    let site = Site::new(world);
+    let body = Body::Sphere { radius: 0.4 };
+    let bulge = (0.4_f64.powi(2) - 0.3_f64.powi(2)).sqrt();
+    assert_eq!(site.cast(&body, at, DVec3::Z * 0.2), None, "passes the box");
+    let impact = site.cast(&body, at, DVec3::Z * 0.4).unwrap();
+    assert!(matches!(impact.target, Target::Detail { .. }), "{impact:?}");
+    let when = (0.5 - bulge) / 0.4;
+    assert!((impact.t - when).abs() < 1e-3, "{} {when}", impact.t);
 }
 
 #[test]
