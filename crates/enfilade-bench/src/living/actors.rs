@@ -279,11 +279,11 @@ pub(super) fn cost(scene: &str) -> anyhow::Result<Figure> {
     let mean = times.iter().sum::<f64>() / FRAMES as f64;
     times.sort_by(f64::total_cmp);
     Ok(Figure {
-        value: mean,
+        // The middle: on a machine that others use, the mean tells how often they took over.
+        value: times[FRAMES / 2],
         most: 50.0,
         note: format!(
-            "µs a frame in the mean, {:.1} in the middle, {:.1} of 99 in 100; {ACTORS} actors in {} rooms, of whom {:.0} a frame change their room or plan and {:.0} are awake",
-            times[FRAMES / 2],
+            "µs a frame in the middle, {mean:.1} in the mean, 99 in 100 below {:.1}; {ACTORS} actors in {} rooms, of whom {:.0} a frame change their room or plan and {:.0} are awake",
             times[FRAMES * 99 / 100],
             town.layout.n_cells(),
             n_updates as f64 / FRAMES as f64,

@@ -18,6 +18,8 @@ use super::walls::{Contacts, TriangleOf};
 
 /// What approaches slower than this share of its motion goes no deeper: it passes along.
 const ALONG: f64 = 1e-9;
+/// Impacts so near in time are one: shares of the motion.
+const SAME: f64 = 1e-12;
 /// Triangles gathered before they are tried, and in how many are then tried. 32 is more than most rooms have on a body's way.
 const BATCH: usize = 32;
 
@@ -513,7 +515,9 @@ impl Caster {
             .sort_unstable_by(|a, b| a.enter.total_cmp(&b.enter).then(rank(a).cmp(&rank(b))));
         for i in 0..self.gathered.len() {
             let it = self.gathered[i];
-            if it.enter > stay.left || it.enter == stay.left && stay.is_met {
+            // Of walls in one plane one is enough, though rounding may tell them apart.
+            let rounding = if stay.is_met { SAME } else { 0.0 };
+            if it.enter > stay.left - rounding {
                 break;
             }
             if let Some(to) = it.opens_to.filter(|&to| !self.is_done(to)) {

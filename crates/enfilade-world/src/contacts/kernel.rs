@@ -172,7 +172,8 @@ fn sweep_round(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<F
         let away = p - q;
         let distance = away.length();
         let gap = distance - core.radius;
-        if gap <= TOUCH {
+        // Where intervals begin, it is within the sum of what widened them.
+        if gap <= 2.0 * TOUCH {
             let normal = normal_of(away, t, by * now, by);
             return Some(FirstTouch { t: now, normal });
         }
