@@ -9,11 +9,13 @@
 //! | `body.rs` | spheres, capsules, boxes |
 //! | `kernel.rs` | one body, one triangle: touching, and when first touched |
 //! | `walls.rs` | triangles by cell, made once |
-//! | `caster.rs` | the flood, casts and contacts |
+//! | `flood.rs` | the cells and triangles on a body's way |
+//! | `caster.rs` | casts and contacts |
 //! | `pairs.rs` | bodies that may touch each other |
 
 mod body;
 mod caster;
+mod flood;
 mod kernel;
 mod pairs;
 #[cfg(test)]
@@ -21,6 +23,7 @@ mod tests;
 mod walls;
 
 pub use body::Body;
-pub use caster::{Cast, CastCounts, Caster, Contact, Impact};
+pub use caster::{Cast, Caster, Contact, Impact};
+pub use flood::CastCounts;
 pub use pairs::Pairs;
 pub use walls::Contacts;

@@ -284,7 +284,7 @@ mod tests {
         });
     }
 
-    /// W12: nobody gets through a wall, however he runs and turns, or deep into one.
+    /// Covers W12: nobody gets through a wall, however he runs and turns, or deep into one.
     #[test]
     fn walls_and_furniture_hold_whoever_runs_about() {
         let world = room_grid(&GridParams {
@@ -324,7 +324,7 @@ mod tests {
         assert_eq!(site.walker.cell(), Some(CellId(0)));
     }
 
-    /// W12: along a wall one slides at the speed that is left, and in a corner one stands still.
+    /// Covers W12: along a wall one slides at the speed that is left, and in a corner one stands still.
     #[test]
     fn who_runs_into_a_wall_slides_along_it() {
         let world = room_grid(&GridParams {
@@ -346,7 +346,7 @@ mod tests {
         assert!(site.walker.eye.distance(corner) < 1e-3);
     }
 
-    /// W12: what is low is climbed, what is high stops, and over an edge one falls.
+    /// Covers W12: what is low is climbed, what is high stops, and over an edge one falls.
     #[test]
     fn steps_are_climbed_and_tables_stop() {
         for (height, is_stopped) in [(0.75, true), (0.28, false)] {
@@ -379,7 +379,7 @@ mod tests {
         }
     }
 
-    /// W12: a leaf that swings shut takes whoever stands in its way along, and does not pass him.
+    /// Covers W12: a leaf that swings shut takes whoever stands in its way along, and does not pass him.
     #[test]
     fn a_leaf_pushes_whoever_is_in_its_way() {
         let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
@@ -404,7 +404,7 @@ mod tests {
         );
     }
 
-    /// W12: through a hole in the floor one falls into the room below, whose cell is another.
+    /// Covers W12: through a hole in the floor one falls into the room below, whose cell is another.
     #[test]
     fn holes_in_floors_lead_down() {
         let world = room_grid(&GridParams {
@@ -430,7 +430,7 @@ mod tests {
         assert!((site.walker.eye.y - hole.y - 1.6).abs() < 0.01);
     }
 
-    /// W12.
+    /// Covers W12.
     #[test]
     fn walking_allocates_nothing_once_warm() {
         let world = with_doors(room_grid(&GridParams::offices(20, 2)), |_| false);

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
     use enfilade_cpg::{CellSet, Pvs};
 
-    /// W13: effects of cells that are not seen or heard sleep, after a while.
+    /// Covers W13: effects of cells that are not seen or heard sleep, after a while.
     #[test]
     fn cells_sleep_a_while_after_they_were_last_seen_or_heard() {
         let row = |cells: &[u32]| {

@@ -53,7 +53,7 @@ impl Chance {
 mod tests {
     use super::*;
 
-    /// W13: neither neighbors in actor nor in event are alike, and all numbers come up.
+    /// Covers W13: neither neighbors in actor nor in event are alike, and all numbers come up.
     #[test]
     fn chance_is_spread_and_decided_by_seed_actor_and_event() {
         let first = |seed, actor, event| Chance::new(seed, actor, event).bits();

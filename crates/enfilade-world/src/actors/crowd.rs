@@ -93,6 +93,29 @@ struct Member {
 /// All actors of a world.
 ///
 /// Nothing is allocated as time goes by, once plans have been as long as they get.
+///
+/// ```
+/// use enfilade_cpg::CellId;
+/// use enfilade_geom::DVec3;
+/// use enfilade_world::{ActorEvent, Actors, Chance, PlanDraft, WayPoint};
+///
+/// // A guard who walks up and down between two rooms, resting a while at each end.
+/// let ends = [DVec3::ZERO, DVec3::X * 8.0];
+/// let mut plan = |event: &ActorEvent, chance: &mut Chance, plan: &mut PlanDraft<'_>| {
+///     let here = event.cell.0 as usize;
+///     plan.walk(WayPoint { at: (ends[0] + ends[1]) * 0.5, cell: event.cell }, 1.4);
+///     plan.walk(WayPoint { at: ends[1 - here], cell: CellId(1 - here as u32) }, 1.4);
+///     plan.wait(chance.range([2.0, 10.0]));
+/// };
+/// let mut actors = Actors::new(2, 7);
+/// let guard = actors.add(ends[0], CellId(0), &mut plan);
+///
+/// // In one go, or frame by frame: it is in the same place.
+/// let mut other = actors.clone();
+/// actors.advance(3600.0, &mut plan);
+/// (0..=3600).for_each(|s| other.advance(f64::from(s), &mut plan));
+/// assert_eq!(actors.place(guard), other.place(guard));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Actors {
     seed: u64,

@@ -1,4 +1,4 @@
-//! W13: who is where at a time depends on seed and events alone, and is what stepping everybody through every frame gives.
+//! Covers W13: who is where at a time depends on seed and events alone, and is what stepping everybody through every frame gives.
 
 use std::collections::VecDeque;
 

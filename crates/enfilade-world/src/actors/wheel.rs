@@ -116,7 +116,7 @@ mod tests {
     use super::*;
     use enfilade_testkit::Rng;
 
-    /// W13: who is due is who a list would say, over rounds and jumps.
+    /// Covers W13: who is due is who a list would say, over rounds and jumps.
     #[test]
     fn due_are_those_whose_time_has_come() {
         let mut rng = Rng::new(3);

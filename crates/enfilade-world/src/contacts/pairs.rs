@@ -90,7 +90,7 @@ mod tests {
     use enfilade_testkit::Rng;
     use std::collections::BTreeSet;
 
-    /// W12: pairs that share a cell and overlap, each once, as trying all pairs finds them.
+    /// Covers W12: pairs that share a cell and overlap, each once, as trying all pairs finds them.
     #[test]
     fn pairs_are_those_that_share_a_cell_and_overlap() {
         let mut rng = Rng::new(5);

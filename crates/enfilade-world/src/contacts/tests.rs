@@ -1,4 +1,4 @@
-//! W12: casts and contacts against trying every triangle, by distances that share no code with the kernels.
+//! Covers W12: casts and contacts against trying every triangle, by distances that share no code with the kernels.
 
 use std::cell::RefCell;
 
