@@ -19,14 +19,14 @@ const ENTRIES: usize = 14;
 #[derive(Clone, Debug)]
 pub(super) struct Wheel {
     heads: Vec<u32>,
-    blocks: Vec<Block>,
+    blocks: Vec<WheelBlock>,
     /// Blocks of no slot.
     free: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Block {
+struct WheelBlock {
     ids: [u32; ENTRIES],
     n: u32,
     next: u32,
@@ -59,7 +59,7 @@ impl Wheel {
     fn add(&mut self, slot: usize, id: u32) {
         let head = self.heads[slot];
         if head == NONE || self.blocks[head as usize].n as usize == ENTRIES {
-            let block = Block {
+            let block = WheelBlock {
                 ids: [NONE; ENTRIES],
                 n: 0,
                 next: head,

@@ -8,7 +8,7 @@ use enfilade_geom::{DVec3, Triangle};
 use enfilade_runtime::{DetailId, SightState, Target};
 
 use super::body::Body;
-use super::flood::{CastCounts, Flood, Moving, Question};
+use super::flood::{BodyFlood, CastCounts, Moving, Question};
 use super::kernel::{depth, point_of_contact, sweep};
 use super::walls::Contacts;
 
@@ -93,7 +93,7 @@ pub struct Contact {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Caster {
-    flood: Flood,
+    flood: BodyFlood,
 }
 
 impl Caster {
@@ -101,7 +101,7 @@ impl Caster {
     #[must_use]
     pub fn new(contacts: &Contacts) -> Self {
         Self {
-            flood: Flood::new(contacts),
+            flood: BodyFlood::new(contacts),
         }
     }
 

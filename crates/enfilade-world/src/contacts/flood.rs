@@ -35,7 +35,7 @@ pub struct CastCounts {
 
 /// Goes from cell to cell with a body. Holds the buffers.
 #[derive(Clone, Debug)]
-pub(super) struct Flood {
+pub(super) struct BodyFlood {
     /// By cell.
     reached: Vec<Reached>,
     question: u32,
@@ -101,7 +101,7 @@ struct Stay {
     is_met: bool,
 }
 
-impl Flood {
+impl BodyFlood {
     pub(super) fn new(contacts: &Contacts) -> Self {
         Self {
             reached: vec![Reached::default(); contacts.n_cells()],
