@@ -35,7 +35,7 @@ pub struct Build {
     pub eye: f64,
     /// What is no higher is stepped onto or over. [Units: wu] [Limit: >= 0]
     pub step: f64,
-    /// How fast one rises when climbing. [Units: wu/s] [Limit: > 0]
+    /// How fast one rises when climbing. [Units: wu/s] [Limit: above 0]
     pub climb: f64,
 }
 

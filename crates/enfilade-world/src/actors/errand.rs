@@ -6,7 +6,7 @@ use crate::actors::plan::{PlanDraft, WayPoint};
 /// Going from room to room: how fast, and how long one stays.
 #[derive(Clone, Debug)]
 pub struct Errands {
-    /// Least and greatest speed; each errand has its own. [Units: wu/s] [Limit: > 0]
+    /// Least and greatest speed; each errand has its own. [Units: wu/s] [Limit: above 0]
     pub speed: [f64; 2],
     /// Least and greatest stay at the end of a way. [Units: s] [Limit: >= 0]
     pub stay: [f64; 2],
