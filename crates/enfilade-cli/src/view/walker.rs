@@ -1,120 +1,35 @@
-//! Somebody who walks: gravity, steps, walls, furniture, doors.
+//! Somebody who walks in the window, or flies: the walker of the living world, with an eye of its own.
 
-use enfilade::cpg::{DetailObject, PortalId, World};
-use enfilade::geom::scene::Primitive;
-use enfilade::geom::{Aabb, Bvh, DVec3, Ray, Triangle, closest_point_on_triangle};
-use enfilade::runtime::{DetailId, Sight, SightState};
+use enfilade::cpg::World;
+use enfilade::geom::DVec3;
+use enfilade::runtime::{Sight, SightState};
+use enfilade::world::{Build, Contacts, Layout, Walker as Body};
 
 use enfilade_cli::cameras::EYE_HEIGHT;
 
-/// Half the breadth of a body. [Units: wu]
-const RADIUS: f64 = 0.22;
-/// What is no higher is stepped onto or over. [Units: wu]
-const STEP: f64 = 0.3;
-const EYE: f64 = EYE_HEIGHT as f64;
-
 /// A body in a world; or, when it flies, an eye.
 pub(super) struct Walker {
-    /// Walls and furniture.
-    still: Bvh,
-    leaves: Vec<Leaf>,
-    openings: Openings,
+    layout: Layout,
+    contacts: Contacts,
+    body: Body,
     pub(super) eye: DVec3,
-    /// Downwards. [Units: wu/s]
-    falling: f64,
     pub(super) flies: bool,
-}
-
-/// The leaf of a door.
-struct Leaf {
-    detail: DetailId,
-    /// As the model has it.
-    bvh: Bvh,
-}
-
-/// What portals without leaves are filled with when they are closed.
-struct Openings {
-    bvh: Bvh,
-    triangles: Vec<Triangle>,
-    portals: Vec<PortalId>,
-}
-
-impl Openings {
-    fn of(world: &World, sight: &Sight) -> Self {
-        let (mut triangles, mut portals) = (Vec::new(), Vec::new());
-        for (id, portal) in (0..).map(PortalId).zip(&world.graph.portals) {
-            if !sight.leaves(id).is_empty() {
-                continue;
-            }
-            for piece in &portal.pieces {
-                let corner = |i: usize| DVec3::from(piece[i].map(f64::from));
-                for k in 2..piece.len() {
-                    triangles.push([0, k - 1, k].map(corner));
-                    portals.push(id);
-                }
-            }
-        }
-        Self {
-            bvh: Bvh::build(&triangles),
-            triangles,
-            portals,
-        }
-    }
-
-    /// The nearest point of what is closed, within a body's reach.
-    fn nearest(&self, p: DVec3, state: &SightState) -> Option<DVec3> {
-        let mut best: Option<DVec3> = None;
-        self.bvh
-            .for_each_in_box(&Aabb::new(p, p).expanded(RADIUS), |t| {
-                let at = closest_point_on_triangle(p, &self.triangles[t as usize]);
-                let limit = best.map_or(RADIUS, |b| b.distance(p));
-                if !state.is_open(self.portals[t as usize]) && at.distance(p) < limit {
-                    best = Some(at);
-                }
-            });
-        best
-    }
-}
-
-fn triangles_of(primitive: &Primitive, place: impl Fn(DVec3) -> DVec3) -> Vec<Triangle> {
-    let corner = |i: u32| place(DVec3::from(primitive.positions[i as usize].map(f64::from)));
-    let corners = primitive.indices.chunks_exact(3);
-    corners.map(|t| [t[0], t[1], t[2]].map(corner)).collect()
-}
-
-fn triangles_of_detail(world: &World, detail: &DetailObject) -> Vec<Triangle> {
-    let transform = detail.placement();
-    let mesh = &world.detail_meshes[detail.mesh as usize];
-    let primitives = mesh.primitives.iter();
-    primitives
-        .flat_map(|p| triangles_of(p, |q| transform.transform_point3(q)))
-        .collect()
 }
 
 impl Walker {
     pub(super) fn new(world: &World, sight: &Sight, eye: [f32; 3]) -> Self {
-        let mut still: Vec<Triangle> = Vec::new();
-        for batch in &world.batches {
-            still.extend(triangles_of(&batch.primitive, |p| p));
-        }
-        let mut leaves = Vec::new();
-        for (id, detail) in (0..).map(DetailId).zip(&world.details) {
-            let triangles = triangles_of_detail(world, detail);
-            if sight.portals_of(id).next().is_some() {
-                leaves.push(Leaf {
-                    detail: id,
-                    bvh: Bvh::build(&triangles),
-                });
-            } else {
-                still.extend(triangles);
-            }
-        }
+        let layout = Layout::new(world);
+        let contacts = Contacts::new(world, sight, &layout);
+        let build = Build {
+            eye: EYE_HEIGHT.into(),
+            ..Build::default()
+        };
+        let eye = DVec3::from(eye.map(f64::from));
         Self {
-            still: Bvh::build(&still),
-            leaves,
-            openings: Openings::of(world, sight),
-            eye: DVec3::from(eye.map(f64::from)),
-            falling: 0.0,
+            body: Body::new(&contacts, build, eye),
+            layout,
+            contacts,
+            eye,
             flies: false,
         }
     }
@@ -122,79 +37,24 @@ impl Walker {
     /// Moves by `wish` (meters a second) for `seconds`, stopped by walls, furniture, leaves of doors as `state` has them, and
     /// portals that it closes.
     pub(super) fn step(&mut self, wish: DVec3, seconds: f64, state: &SightState) {
-        let seconds = seconds.clamp(0.0, 0.1);
         if self.flies {
-            self.eye += wish * seconds;
+            self.eye += wish * seconds.clamp(0.0, 0.1);
             return;
         }
-        let flat = DVec3::new(wish.x, 0.0, wish.z) * seconds;
-        // In steps shorter than the body is wide, so that no wall is jumped over.
-        let n = (flat.length() / (RADIUS * 0.5)).ceil().max(1.0);
-        for _ in 0..n as usize {
-            self.eye += flat / n;
-            self.push_out(state);
-        }
-        self.stand(seconds);
-    }
-
-    /// Out of what stands in the way, at the height of the eye, the hips and above a step.
-    fn push_out(&mut self, state: &SightState) {
-        for _ in 0..3 {
-            for height in [0.0, 0.55, EYE - STEP - RADIUS] {
-                let p = self.eye - DVec3::Y * height;
-                let Some(near) = self.nearest(p, state) else {
-                    continue;
-                };
-                let away = p - near;
-                let flat = DVec3::new(away.x, 0.0, away.z);
-                if let Some(direction) = flat.try_normalize() {
-                    self.eye += direction * (RADIUS - away.length());
-                }
-            }
-        }
-    }
-
-    /// The nearest point of what stands in the way, within a body's reach.
-    fn nearest(&self, p: DVec3, state: &SightState) -> Option<DVec3> {
-        let still = self.still.nearest(p, RADIUS).map(|n| n.point);
-        let leaves = self.leaves.iter().filter_map(|leaf| {
-            let pose = state.pose(leaf.detail);
-            let local = pose.map_or(p, |m| m.inverse().transform_point3(p));
-            let near = leaf.bvh.nearest(local, RADIUS)?.point;
-            Some(pose.map_or(near, |m| m.transform_point3(near)))
-        });
-        let closed = self.openings.nearest(p, state);
-        (still.into_iter().chain(closed).chain(leaves))
-            .min_by(|a, b| a.distance(p).total_cmp(&b.distance(p)))
-    }
-
-    /// Onto the floor, or towards it.
-    fn stand(&mut self, seconds: f64) {
-        let knee = self.eye - DVec3::Y * (EYE - STEP);
-        let far = 500.0;
-        let ray = Ray::segment(knee, knee - DVec3::Y * far);
-        let Some(hit) = self.still.closest_hit(&ray, |_| false) else {
-            // Nothing below: there is nothing to fall onto.
-            self.falling = 0.0;
-            return;
-        };
-        let above = hit.t * far - STEP;
-        self.falling += 9.81 * seconds;
-        if above <= self.falling * seconds {
-            self.falling = 0.0;
-            // Steps are climbed in a few frames.
-            self.eye.y -= above.clamp(-6.0 * seconds, above.max(0.0));
-        } else {
-            self.eye.y -= self.falling * seconds;
-        }
+        self.body.eye = self.eye;
+        let (contacts, layout) = (&self.contacts, &self.layout);
+        self.body.step(contacts, layout, state, wish, seconds);
+        self.eye = self.body.eye;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use enfilade::cpg::{DetailObject, PortalId};
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
-    use enfilade::geom::scene::Mesh;
+    use enfilade::geom::Aabb;
+    use enfilade::geom::scene::{Mesh, Primitive};
     use enfilade_testkit::{GridParams, room_grid};
 
     /// Rooms in a row, and somebody in the middle of the first.
@@ -257,7 +117,11 @@ mod tests {
         let cell = &world.graph.cells[0];
         walk(&mut walker, &state, DVec3::new(6.0, 0.0, 2.0));
         let floor = f64::from(cell.aabb[0][1]);
-        assert!((walker.eye.y - floor - EYE).abs() < 0.02, "{}", walker.eye);
+        assert!(
+            (walker.eye.y - floor - f64::from(EYE_HEIGHT)).abs() < 0.02,
+            "{}",
+            walker.eye
+        );
         for (k, at) in [(0, walker.eye.x), (2, walker.eye.z)] {
             assert!(at < f64::from(cell.aabb[1][k]) && at > f64::from(cell.aabb[0][k]));
         }

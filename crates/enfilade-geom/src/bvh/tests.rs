@@ -151,6 +151,22 @@ proptest! {
     }
 
     #[test]
+    fn a_moving_box_finds_every_triangle_that_it_touches_on_its_way(
+        soup in soup(), a in point(), b in point(), half in [0.0..2.0f64, 0.0..2.0, 0.0..2.0],
+    ) {
+        let half = DVec3::from_array(half);
+        let bvh = Bvh::build(&soup);
+        for end in [a, b] {
+            let mut found = Vec::new();
+            bvh.for_each_swept(&Ray::segment(a, end), half, |i, _, _| found.push(i));
+            for step in 0..=20 {
+                let p = a.lerp(end, f64::from(step) / 20.0);
+                bvh.for_each_in_box(&Aabb::new(p - half, p + half), |i| assert!(found.contains(&i), "{i}"));
+            }
+        }
+    }
+
+    #[test]
     fn triangles_near_a_segment_are_those_within_the_radius(soup in soup(), a in point(), b in point(), radius in 0.0..2.0f64) {
         let bvh = Bvh::build(&soup);
         let mut found = Vec::new();

@@ -1,0 +1,314 @@
+//! Actors far and near: that who is where does not depend on who looks, and what a frame of many costs.
+//!
+//! People in generated offices without an outdoors go to one of 64 rooms, by the middles of openings, stay, and go on. What a
+//! camera perceives is all within three portals of its cell.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use anyhow::Context;
+use enfilade::CellId;
+use enfilade::cpg::{CellSet, Pvs};
+use enfilade::geom::DVec3;
+use enfilade::world::{
+    ActorEvent, ActorId, Actors, AwakeCells, Chance, Errands, Exit, Layout, PlanDraft, WayPoint,
+};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+
+use crate::rows::Figure;
+
+const ACTORS: u32 = 100_000;
+const PLACES: u32 = 64;
+const SEED: u64 = 5;
+/// Of frames a second.
+const RATE: f64 = 60.0;
+/// No exit.
+const NONE: u8 = u8::MAX;
+
+/// Rooms, and from each the way to some places.
+struct Town {
+    layout: Layout,
+    places: Vec<CellId>,
+    /// By exit of cell: the point of the opening, and the cell behind it; where each cell's begin.
+    hops: Vec<(DVec3, CellId)>,
+    first: Vec<u32>,
+    /// By place and cell: which exit of it is the next; [`NONE`] at the place, and from where there is no way.
+    next: Vec<Vec<u8>>,
+    pvs: Pvs,
+}
+
+impl Town {
+    fn new(scene: &str) -> anyhow::Result<Self> {
+        let n = scene.strip_prefix("offices-").context("offices-N")?;
+        let layout = Layout::new(&room_grid(&GridParams {
+            outdoors: false,
+            furniture: 0,
+            ..GridParams::offices(n.parse()?, 1)
+        }));
+        let n_cells = layout.n_cells();
+        let mut rng = Rng::new(1);
+        let mut any = || CellId(rng.below(n_cells) as u32);
+        let places: Vec<CellId> = (0..PLACES).map(|_| any()).collect();
+        let (mut hops, mut first) = (Vec::new(), Vec::new());
+        for c in (0..n_cells as u32).map(CellId) {
+            first.push(hops.len() as u32);
+            let point = |e: &Exit| (layout.opening(e.portal).center(), e.to);
+            hops.extend(layout.exits(c).iter().map(point));
+        }
+        let next = places.iter().map(|&place| {
+            let mut row = vec![NONE; n_cells];
+            let mut queue = VecDeque::from([place]);
+            while let Some(c) = queue.pop_front() {
+                for exit in layout.exits(c) {
+                    let mut back = layout.exits(exit.to).iter();
+                    let at = back.position(|e| e.portal == exit.portal);
+                    if exit.to != place && row[exit.to.idx()] == NONE {
+                        row[exit.to.idx()] = at.map_or(NONE, |i| i as u8);
+                        queue.push_back(exit.to);
+                    }
+                }
+            }
+            row
+        });
+        let next = next.collect();
+        let near = |c: u32| {
+            let mut set = CellSet::new(n_cells);
+            set.insert(CellId(c));
+            let mut edge = vec![CellId(c)];
+            for _ in 0..3 {
+                let around = edge.iter().flat_map(|&c| layout.exits(c)).map(|e| e.to);
+                edge = around.filter(|&c| set.insert(c)).collect();
+            }
+            set
+        };
+        let rows: Vec<CellSet> = (0..n_cells as u32).map(near).collect();
+        let pvs = Pvs::of_rows(&rows);
+        Ok(Self {
+            layout,
+            places,
+            hops,
+            first,
+            next,
+            pvs,
+        })
+    }
+
+    fn way(&self, mut cell: CellId, place: u32, way: &mut Vec<WayPoint>) {
+        let next = &self.next[place as usize];
+        while next[cell.idx()] != NONE {
+            let hop = self.first[cell.idx()] + u32::from(next[cell.idx()]);
+            let (at, to) = self.hops[hop as usize];
+            way.push(WayPoint { at, cell });
+            cell = to;
+        }
+        if cell == self.places[place as usize] {
+            let at = self.layout.cell(cell).bounds.center();
+            way.push(WayPoint { at, cell });
+        }
+    }
+
+    fn home(&self, id: u32) -> (DVec3, CellId) {
+        let cell =
+            CellId((u64::from(id) * self.layout.n_cells() as u64 / u64::from(ACTORS)) as u32);
+        (self.layout.cell(cell).bounds.center(), cell)
+    }
+
+    fn populate(&self) -> Actors {
+        let mut actors = Actors::new(self.layout.n_cells(), SEED);
+        let mut plans = self.plans();
+        for id in 0..ACTORS {
+            let (at, cell) = self.home(id);
+            actors.add(at, cell, &mut plans);
+        }
+        actors
+    }
+
+    fn plans(&self) -> impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>) + '_ {
+        let mut errands = Errands::default();
+        move |event, chance, plan| {
+            errands.plan(chance, plan, PLACES, |to, way| {
+                self.way(event.cell, to, way);
+            });
+        }
+    }
+
+    /// The cell of a camera that strolls.
+    fn stroll(&self, eye: CellId, rng: &mut Rng) -> CellId {
+        let exits = self.layout.exits(eye);
+        if exits.is_empty() || rng.chance(0.02) {
+            return CellId(rng.below(self.layout.n_cells()) as u32);
+        }
+        exits[rng.below(exits.len())].to
+    }
+}
+
+/// Of all places, to the bit.
+fn hash(actors: &Actors) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for id in 0..actors.len() as u32 {
+        let Some(place) = actors.place(ActorId(id)) else {
+            continue;
+        };
+        for x in place.at.to_array().map(f64::to_bits) {
+            hash = (hash ^ x ^ u64::from(place.cell.0))
+                .wrapping_mul(0x0100_0000_01b3)
+                .rotate_left(17);
+        }
+    }
+    hash
+}
+
+/// An actor that every frame steps.
+struct Stepped {
+    at: DVec3,
+    cell: CellId,
+    from: (f64, DVec3),
+    then: VecDeque<(f64, WayPoint)>,
+    n_events: u32,
+}
+
+impl Stepped {
+    fn step(&mut self, town: &Town, id: u32, now: f64) {
+        loop {
+            while let Some(&(time, to)) = self.then.front() {
+                self.cell = to.cell;
+                if now < time {
+                    let share = (now - self.from.0) / (time - self.from.0);
+                    self.at = self.from.1 + (to.at - self.from.1) * share;
+                    return;
+                }
+                self.from = (time, to.at);
+                self.then.pop_front();
+            }
+            let mut chance = Chance::new(SEED, id, self.n_events);
+            self.n_events += 1;
+            let usual = Errands::default();
+            let to = chance.below(PLACES);
+            let speed = chance.range(usual.speed);
+            let stay = chance.range(usual.stay);
+            let mut way = Vec::new();
+            town.way(self.cell, to, &mut way);
+            let (mut time, mut at) = self.from;
+            let mut cell = self.cell;
+            for point in way {
+                let seconds = at.distance(point.at) / speed;
+                (time, at) = (time + seconds, point.at);
+                if seconds > 0.0 {
+                    self.then.push_back((time, point));
+                }
+                cell = point.cell;
+            }
+            let stays = WayPoint { at, cell };
+            self.then.push_back((time + stay, stays));
+        }
+    }
+}
+
+/// Camera walks after which somebody is elsewhere, and actors that are not where stepping them takes them.
+pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
+    const WALKS: u64 = 100;
+    const END: f64 = 300.0;
+    let town = Town::new(scene)?;
+    let mut whole = town.populate();
+    whole.advance(END, town.plans());
+    let expected = hash(&whole);
+    let mut n_other = 0;
+    let mut n_frames = 0;
+    for walk in 0..WALKS {
+        let mut rng = Rng::new(walk);
+        let mut actors = town.populate();
+        let mut plans = town.plans();
+        let mut awake = AwakeCells::new(town.layout.n_cells(), 3.0);
+        let mut eye = CellId(0);
+        let longest = [0.05, 1.0, 20.0][walk as usize % 3];
+        while actors.now() < END {
+            let now = (actors.now() + rng.range(longest * 0.2, longest)).min(END);
+            actors.advance(now, &mut plans);
+            eye = town.stroll(eye, &mut rng);
+            awake.update(now, town.pvs.visible_from(eye));
+            let seen = awake.cells().iter().flat_map(|&c| actors.in_cell(c));
+            let sum: DVec3 = seen.filter_map(|a| actors.place(a)).map(|p| p.at).sum();
+            std::hint::black_box(sum);
+            n_frames += 1;
+        }
+        n_other += u64::from(hash(&actors) != expected);
+    }
+    let start = Instant::now();
+    let mut n_off = 0_u64;
+    for id in 0..ACTORS {
+        let (at, cell) = town.home(id);
+        let mut stepped = Stepped {
+            at,
+            cell,
+            from: (0.0, at),
+            then: VecDeque::new(),
+            n_events: 0,
+        };
+        for frame in 0..=(END * RATE) as u32 {
+            stepped.step(&town, id, f64::from(frame) / RATE);
+        }
+        let place = whole.place(ActorId(id)).context("all stay")?;
+        n_off += u64::from(place.at != stepped.at || place.cell != stepped.cell);
+    }
+    let stepping = start.elapsed().as_secs_f64() / (END * RATE) * 1e6;
+    Ok(Figure {
+        value: (n_other + n_off) as f64,
+        most: 0.0,
+        note: format!(
+            "of {WALKS} camera walks of {n_frames} frames in all, {n_other} have another state of {ACTORS} actors after {END} s; \
+             {n_off} actors are not where stepping all through every frame takes them, to the bit; that takes {stepping:.0} µs a frame"
+        ),
+    })
+}
+
+/// Microseconds a frame of all actors: time goes by, cells wake, those who are in them are placed.
+pub(super) fn cost(scene: &str) -> anyhow::Result<Figure> {
+    const FRAMES: usize = 3600;
+    let town = Town::new(scene)?;
+    let mut actors = town.populate();
+    let mut plans = town.plans();
+    // Past the first minutes, in which all set out at once.
+    let begin = 600.0;
+    actors.advance(begin, &mut plans);
+    let mut awake = AwakeCells::new(town.layout.n_cells(), 3.0);
+    let mut rng = Rng::new(2);
+    let mut eye = CellId(17);
+    let (mut times, mut advancing, mut n_updates, mut n_awake) = (Vec::new(), Vec::new(), 0, 0);
+    for frame in 0..FRAMES {
+        // From room to room every three seconds.
+        if frame % 180 == 0 {
+            eye = town.stroll(eye, &mut rng);
+        }
+        let now = begin + frame as f64 / RATE;
+        let start = Instant::now();
+        actors.advance(now, &mut plans);
+        advancing.push(start.elapsed().as_secs_f64() * 1e6);
+        awake.update(now, town.pvs.visible_from(eye));
+        let mut sum = DVec3::ZERO;
+        for actor in awake.cells().iter().flat_map(|&c| actors.in_cell(c)) {
+            if let Some(place) = actors.place(actor) {
+                sum += place.at;
+                n_awake += 1;
+            }
+        }
+        std::hint::black_box(sum);
+        times.push(start.elapsed().as_secs_f64() * 1e6);
+        n_updates += actors.n_updates();
+    }
+    let mean = times.iter().sum::<f64>() / FRAMES as f64;
+    times.sort_by(f64::total_cmp);
+    advancing.sort_by(f64::total_cmp);
+    Ok(Figure {
+        // The middle: on a machine that others use, the mean tells how often they took over.
+        value: times[FRAMES / 2],
+        most: 50.0,
+        note: format!(
+            "µs a frame in the middle, {:.1} of them for time to go by; {mean:.1} in the mean, 99 in 100 below {:.1}; {ACTORS} actors in {} rooms, of whom {:.0} a frame change their room or plan and {:.0} are awake",
+            advancing[FRAMES / 2],
+            times[FRAMES * 99 / 100],
+            town.layout.n_cells(),
+            n_updates as f64 / FRAMES as f64,
+            f64::from(n_awake) / FRAMES as f64,
+        ),
+    })
+}

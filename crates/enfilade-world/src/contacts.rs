@@ -1,0 +1,29 @@
+//! What a body touches: walls, objects and shut doors of the cells that it reaches, and no others.
+//!
+//! Candidates are found by flooding (Gjørup 1999, section 3.3.4): from the body's cell through each portal that it touches, with
+//! a stamp for each cell so that none is visited twice. He asks for the portals that the bounding sphere touches; here the body
+//! itself is tried against the pieces of the opening, grown by the layout's tolerance, so that rounding errs to "touches".
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `body.rs` | spheres, capsules, boxes |
+//! | `kernel.rs` | one body, one triangle: touching, and when first touched |
+//! | `walls.rs` | triangles by cell, made once |
+//! | `flood.rs` | the cells and triangles on a body's way |
+//! | `caster.rs` | casts and contacts |
+//! | `pairs.rs` | bodies that may touch each other |
+
+mod body;
+mod caster;
+mod flood;
+mod kernel;
+mod pairs;
+#[cfg(test)]
+mod tests;
+mod walls;
+
+pub use body::Body;
+pub use caster::{Cast, Caster, Contact, Impact};
+pub use flood::CastCounts;
+pub use pairs::Pairs;
+pub use walls::Contacts;

@@ -1,0 +1,452 @@
+//! Somebody who walks: gravity, steps, and what is in the way.
+//!
+//! Collide and slide (Fauerby, *Improved collision detection and response*, 2003), with a capsule that begins above a step's height: it
+//! moves by casts, loses of its motion what leads into what it meets, and goes on, a few times. So it is not stopped by what it
+//! can step over, and the floor is found apart from that, straight below. What has moved into it meanwhile, as leaves of doors
+//! do, pushes it out. Two to five casts a step.
+//!
+//! A gap is kept to all that is met ([`GAP`]); without it, rounding decides at seams of walls. Motion is level, so normals count by
+//! their level parts.
+
+use enfilade_cpg::CellId;
+use enfilade_geom::DVec3;
+use enfilade_runtime::SightState;
+
+use crate::contacts::{Body, Cast, Caster, Contacts};
+use crate::layout::Layout;
+
+/// Kept to walls. [Units: wu]
+const GAP: f64 = 0.005;
+/// How often one goes on in another direction in a step: along a wall, then along the next one of a corner.
+const SLIDES: usize = 4;
+/// How far down one looks for a floor. [Units: wu]
+const FAR: f64 = 500.0;
+/// Longest step of time. [Units: s]
+const LONGEST: f64 = 0.1;
+/// [Units: wu/s²]
+const GRAVITY: f64 = 9.81;
+
+/// How somebody is built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Build {
+    /// Half the breadth. [Units: wu] [Limit: > 0.01]
+    pub radius: f64,
+    /// From the floor to the eye. [Units: wu] [Limit: > step + radius]
+    pub eye: f64,
+    /// What is no higher is stepped onto or over. [Units: wu] [Limit: >= 0]
+    pub step: f64,
+    /// How fast one rises when climbing. [Units: wu/s] [Limit: above 0]
+    pub climb: f64,
+}
+
+impl Default for Build {
+    /// A grown person: 44 cm broad, eyes at 1.6 m, steps of 30 cm.
+    fn default() -> Self {
+        Self {
+            radius: 0.22,
+            eye: 1.6,
+            step: 0.3,
+            climb: 6.0,
+        }
+    }
+}
+
+/// Somebody who walks in a world. Nothing is allocated once the buffers have grown.
+#[derive(Clone, Debug)]
+pub struct Walker {
+    /// Where the eye is; may be set. [Units: wu]
+    pub eye: DVec3,
+    build: Build,
+    /// Downwards. [Units: wu/s]
+    falling: f64,
+    /// The last one that it was in.
+    cell: Option<CellId>,
+    caster: Caster,
+}
+
+impl Walker {
+    /// Somebody whose eye is at a point, at rest.
+    #[must_use]
+    pub fn new(contacts: &Contacts, build: Build, eye: DVec3) -> Self {
+        Self {
+            eye,
+            build,
+            falling: 0.0,
+            cell: None,
+            caster: Caster::new(contacts),
+        }
+    }
+
+    /// The cell that it is in, or was in last; `None` before the first step, and for one that was never in any.
+    #[must_use]
+    pub fn cell(&self) -> Option<CellId> {
+        self.cell
+    }
+
+    /// Walks by `wish`, of which the level part counts, for some seconds, at most a tenth: stopped by walls, objects, leaves of
+    /// doors as `state` has them and openings that it shuts; falls, and climbs what is no higher than a step. In no
+    /// cell, nothing stops it and it does not fall. [Units: wu/s, s]
+    ///
+    /// # Panics
+    ///
+    /// When `contacts` and `layout` are not of one world.
+    pub fn step(
+        &mut self,
+        contacts: &Contacts,
+        layout: &Layout,
+        state: &SightState,
+        wish: DVec3,
+        seconds: f64,
+    ) {
+        let seconds = seconds.clamp(0.0, LONGEST);
+        let flat = DVec3::new(wish.x, 0.0, wish.z) * seconds;
+        if !(flat.is_finite() && self.eye.is_finite()) {
+            return;
+        }
+        self.slide(contacts, layout, state, flat);
+        self.push_out(contacts, layout, state);
+        self.stand(contacts, layout, state, seconds);
+    }
+
+    /// From a step's height up to the eye, and where its center is below the eye.
+    fn body(&self) -> (Body, DVec3) {
+        let Build {
+            radius, eye, step, ..
+        } = self.build;
+        let half = DVec3::Y * (0.5 * (eye - step - radius)).max(0.0);
+        (Body::Capsule { half, radius }, -half)
+    }
+
+    /// The cell of a point of it; where that is matter, the last one.
+    fn locate(&mut self, layout: &Layout, p: DVec3) -> Option<CellId> {
+        self.cell = layout.locate(p).or(self.cell);
+        self.cell
+    }
+
+    fn slide(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, flat: DVec3) {
+        let (body, below) = self.body();
+        let mut left = flat;
+        for _ in 0..SLIDES {
+            let length = left.length();
+            let from = self.eye + below;
+            let Some(cell) = self.locate(layout, from).filter(|_| length > 1e-9) else {
+                self.eye += left;
+                return;
+            };
+            // Farther by what the gap may take of it where it is met at a slant.
+            let direction = left / length;
+            let cast = Cast {
+                body: &body,
+                from,
+                by: direction * (length + GAP),
+                cell,
+            };
+            let Some(impact) = self.caster.cast(contacts, state, &cast) else {
+                self.eye += left;
+                return;
+            };
+            let level = DVec3::new(impact.normal.x, 0.0, impact.normal.z);
+            let Some(normal) = level.try_normalize() else {
+                return;
+            };
+            let gap = GAP / -impact.normal.dot(direction);
+            let free = (impact.t * (length + GAP) - gap).clamp(0.0, length);
+            self.eye += direction * free;
+            left -= direction * free;
+            left -= normal * normal.dot(left).min(0.0);
+        }
+    }
+
+    /// Out of what it is in, deepest first.
+    fn push_out(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState) {
+        let (body, below) = self.body();
+        for _ in 0..SLIDES {
+            let at = self.eye + below;
+            let Some(cell) = self.locate(layout, at) else {
+                return;
+            };
+            let mut deepest = (0.0, DVec3::ZERO);
+            self.caster
+                .for_each_contact(contacts, state, &body, at, cell, |contact| {
+                    let level = DVec3::new(contact.normal.x, 0.0, contact.normal.z);
+                    if contact.depth > deepest.0
+                        && let Some(normal) = level.try_normalize()
+                    {
+                        deepest = (contact.depth, normal);
+                    }
+                });
+            let (depth, normal) = deepest;
+            if depth == 0.0 {
+                return;
+            }
+            self.eye += normal * (depth + GAP);
+        }
+    }
+
+    /// Onto the floor, or towards it.
+    fn stand(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, seconds: f64) {
+        let Build {
+            eye, step, climb, ..
+        } = self.build;
+        let knee = self.eye - DVec3::Y * (eye - step);
+        let point = Body::Sphere { radius: 0.0 };
+        let floor = self.locate(layout, knee).and_then(|cell| {
+            let cast = Cast {
+                body: &point,
+                from: knee,
+                by: -DVec3::Y * FAR,
+                cell,
+            };
+            self.caster.cast(contacts, state, &cast)
+        });
+        let Some(floor) = floor else {
+            // Nothing below: there is nothing to fall onto.
+            self.falling = 0.0;
+            return;
+        };
+        let above = floor.t * FAR - step;
+        self.falling += GRAVITY * seconds;
+        if above <= self.falling * seconds {
+            self.falling = 0.0;
+            // Steps are climbed in a few frames.
+            self.eye.y -= above.clamp(-climb * seconds, above.max(0.0));
+        } else {
+            self.eye.y -= self.falling * seconds;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_cpg::{DetailObject, PortalId, World};
+    use enfilade_geom::scene::{Mesh, Primitive};
+    use enfilade_geom::{Aabb, DMat4};
+    use enfilade_runtime::Sight;
+    use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
+
+    struct Site {
+        contacts: Contacts,
+        layout: Layout,
+        state: SightState,
+        walker: Walker,
+    }
+
+    impl Site {
+        fn new(world: &World, eye: DVec3) -> Self {
+            let sight = Sight::build(world).unwrap();
+            let layout = Layout::new(world);
+            let contacts = Contacts::new(world, &sight, &layout);
+            Self {
+                walker: Walker::new(&contacts, Build::default(), eye),
+                state: SightState::new(&sight),
+                layout,
+                contacts,
+            }
+        }
+
+        fn walk(&mut self, wish: DVec3, seconds: f64) {
+            for _ in 0..(seconds / 0.02).round() as usize {
+                let (contacts, layout) = (&self.contacts, &self.layout);
+                self.walker.step(contacts, layout, &self.state, wish, 0.02);
+            }
+        }
+    }
+
+    fn middle(world: &World) -> DVec3 {
+        let [low, high] = world.graph.cells[0]
+            .aabb
+            .map(|p| DVec3::from(p.map(f64::from)));
+        (low + high) * 0.5
+    }
+
+    fn add_box(world: &mut World, low: DVec3, high: DVec3) {
+        let triangles = Aabb::new(low, high).triangles();
+        let corners = triangles.iter().flatten();
+        let positions: Vec<[f32; 3]> = corners.map(|p| p.as_vec3().to_array()).collect();
+        let primitives = vec![Primitive {
+            indices: (0..positions.len() as u32).collect(),
+            positions,
+            ..Primitive::default()
+        }];
+        let mesh = world.detail_meshes.len() as u32;
+        world.detail_meshes.push(Mesh {
+            primitives,
+            ..Mesh::default()
+        });
+        world.details.push(DetailObject {
+            name: String::new(),
+            mesh,
+            transform: DMat4::IDENTITY.to_cols_array().map(|x| x as f32),
+            cells: vec![CellId(0)],
+            source: None,
+            part_of: None,
+        });
+    }
+
+    /// Covers W12: nobody gets through a wall, however he runs and turns, or deep into one.
+    #[test]
+    fn walls_and_furniture_hold_whoever_runs_about() {
+        let world = room_grid(&GridParams {
+            outdoors: false,
+            doors: 0.0,
+            windows: 0.0,
+            holes: 0.0,
+            ..GridParams::offices(9, 5)
+        });
+        let mut site = Site::new(&world, middle(&world));
+        let room = site.layout.cell(CellId(0)).bounds;
+        let mut rng = Rng::new(6);
+        let radius = Build::default().radius;
+        // Not in a cupboard.
+        loop {
+            let share = DVec3::new(rng.unit(), 0.53, rng.unit());
+            let from = room.min + room.size() * share;
+            site.walker.eye = from;
+            site.walk(DVec3::X, 0.5);
+            if site.walker.eye.x > from.x + 0.45 {
+                break;
+            }
+        }
+        let start = site.walker.eye;
+        let mut farthest = 0.0_f64;
+        for _ in 0..300 {
+            let wish = DVec3::new(rng.range(-30.0, 30.0), 0.0, rng.range(-30.0, 30.0));
+            site.walk(wish, 0.2);
+            let eye = site.walker.eye;
+            for k in [0, 2] {
+                assert!(eye[k] > room.min[k] + radius - 1e-6, "{eye}");
+                assert!(eye[k] < room.max[k] - radius + 1e-6, "{eye}");
+            }
+            farthest = farthest.max(eye.distance(start));
+        }
+        assert!(farthest > 1.0);
+        assert_eq!(site.walker.cell(), Some(CellId(0)));
+    }
+
+    /// Covers W12: along a wall one slides at the speed that is left, and in a corner one stands still.
+    #[test]
+    fn who_runs_into_a_wall_slides_along_it() {
+        let world = room_grid(&GridParams {
+            size: [1, 1, 1],
+            doors: 0.0,
+            windows: 0.0,
+            furniture: 0,
+            ..GridParams::offices(1, 1)
+        });
+        let mut site = Site::new(&world, middle(&world));
+        site.walk(DVec3::X * 5.0, 2.0);
+        let from = site.walker.eye;
+        site.walk(DVec3::new(1.0, 0.0, 1.0), 0.5);
+        let by = site.walker.eye - from;
+        assert!((by.z - 0.5).abs() < 0.01 && by.x.abs() < 0.02, "{by}");
+        site.walk(DVec3::new(3.0, 0.0, 2.0), 3.0);
+        let corner = site.walker.eye;
+        site.walk(DVec3::new(3.0, 0.0, 2.0), 1.0);
+        assert!(site.walker.eye.distance(corner) < 1e-3);
+    }
+
+    /// Covers W12: what is low is climbed, what is high stops, and over an edge one falls.
+    #[test]
+    fn steps_are_climbed_and_tables_stop() {
+        for (height, is_stopped) in [(0.75, true), (0.28, false)] {
+            let mut world = room_grid(&GridParams {
+                size: [1, 1, 1],
+                windows: 0.0,
+                furniture: 0,
+                ..GridParams::offices(1, 1)
+            });
+            let from = middle(&world);
+            let [low, high] = world.graph.cells[0]
+                .aabb
+                .map(|p| DVec3::from(p.map(f64::from)));
+            let edge = DVec3::new(from.x + 0.6, low.y, low.z);
+            let far = DVec3::new(from.x + 0.9, low.y + height, high.z);
+            add_box(&mut world, edge, far);
+            let mut site = Site::new(&world, from);
+            site.walk(DVec3::ZERO, 2.0);
+            let floor = site.walker.eye.y;
+            assert!((floor - low.y - Build::default().eye).abs() < 0.01);
+            let mut highest = floor;
+            for _ in 0..60 {
+                site.walk(DVec3::X, 0.02);
+                highest = highest.max(site.walker.eye.y);
+            }
+            assert_eq!(site.walker.eye.x < edge.x, is_stopped, "{height}");
+            assert_eq!(highest > floor + 0.25, !is_stopped, "{highest}");
+            site.walk(DVec3::X, 2.0);
+            assert!((site.walker.eye.y - floor).abs() < 0.01);
+        }
+    }
+
+    /// Covers W12: a leaf that swings shut takes whoever stands in its way along, and does not pass him.
+    #[test]
+    fn a_leaf_pushes_whoever_is_in_its_way() {
+        let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
+        let door = Layout::new(&world).opening(PortalId(0)).center();
+        let mut site = Site::new(&world, middle(&world));
+        site.state.set_leaves(PortalId(0), 1.0);
+        site.walker.eye = DVec3::new(door.x + 0.4, 1.6, door.z);
+        site.walk(DVec3::ZERO, 1.0);
+        let before = site.walker.eye;
+        for i in 1..=100 {
+            site.state.set_leaves(PortalId(0), 1.0 - i as f32 / 100.0);
+            site.walk(DVec3::ZERO, 0.02);
+        }
+        let after = site.walker.eye;
+        assert!(before.distance(after) > 0.05, "{before} {after}");
+        // Out of the doorway on one side or the other, not in the shut leaf, which is 6 to 10 cm behind the opening.
+        let radius = Build::default().radius;
+        let off = after.x - door.x;
+        assert!(
+            off < 0.06 - radius + 1e-3 || off > 0.1 + radius - 1e-3,
+            "{off}"
+        );
+    }
+
+    /// Covers W12: through a hole in the floor one falls into the room below, whose cell is another.
+    #[test]
+    fn holes_in_floors_lead_down() {
+        let world = room_grid(&GridParams {
+            size: [1, 2, 1],
+            holes: 1.0,
+            furniture: 0,
+            outdoors: false,
+            ..GridParams::offices(1, 3)
+        });
+        let hole = Layout::new(&world).opening(PortalId(0)).center();
+        let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
+        site.walk(DVec3::ZERO, 3.0);
+        assert!(
+            (site.walker.eye.y - 1.6).abs() < 0.01,
+            "{}",
+            site.walker.eye
+        );
+        assert_eq!(site.walker.cell(), Some(CellId(0)));
+        // Shut, it holds.
+        let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
+        site.state.close(PortalId(0));
+        site.walk(DVec3::ZERO, 3.0);
+        assert!((site.walker.eye.y - hole.y - 1.6).abs() < 0.01);
+    }
+
+    /// Covers W12.
+    #[test]
+    fn walking_allocates_nothing_once_warm() {
+        let world = with_doors(room_grid(&GridParams::offices(20, 2)), |_| false);
+        let mut site = Site::new(&world, middle(&world));
+        for portal in world.graph.portal_ids() {
+            site.state.open(portal);
+        }
+        let mut rng = Rng::new(1);
+        let mut walk = |n: usize| {
+            for _ in 0..n {
+                let wish = DVec3::new(rng.range(-4.0, 4.0), 0.0, rng.range(-4.0, 4.0));
+                site.walk(wish, 0.4);
+            }
+        };
+        walk(200);
+        let counted = allocation_counter::measure(|| walk(50));
+        assert_eq!(counted.count_total, 0);
+    }
+}
