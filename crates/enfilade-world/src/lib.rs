@@ -10,5 +10,7 @@
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
 mod layout;
+mod search;
 
 pub use layout::{CellShape, Exit, Layout, Opening};
+pub use search::{Arrival, LengthSearch, Reached, Sampling, Ways};
