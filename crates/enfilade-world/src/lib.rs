@@ -9,8 +9,11 @@
 //! - **Nothing is allocated** in a question once the buffers have grown.
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
+mod all_pairs;
+mod hops;
 mod layout;
 mod search;
 
+pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use search::{Arrival, LengthSearch, Reached, Sampling, Ways};
