@@ -10,10 +10,16 @@
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
 mod all_pairs;
+mod columns;
+mod floors;
 mod hops;
 mod layout;
+mod paths;
 mod search;
+mod strides;
 
+pub use floors::{Floors, Walker};
 pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
+pub use paths::{NoPath, Path, PathSearch, WalkMap};
 pub use search::{Arrival, LengthSearch, Reached, Sampling, Ways};

@@ -144,13 +144,14 @@ impl Ways {
         &self.points[range.start as usize..range.end as usize]
     }
 
+    /// The numbers of a portal's points among those of all.
+    pub(crate) fn range(&self, portal: PortalId) -> std::ops::Range<u32> {
+        self.first_point[portal.idx()]..self.first_point[portal.idx() + 1]
+    }
+
     fn exits_of(&self, cell: CellId) -> &[Exit] {
         let first = &self.first_exit[cell.idx()..];
         &self.exits[first[0] as usize..first[1] as usize]
-    }
-
-    fn range(&self, portal: PortalId) -> std::ops::Range<u32> {
-        self.first_point[portal.idx()]..self.first_point[portal.idx() + 1]
     }
 
     /// From one point of a cell to those of one of its portals, which come in their order.
@@ -414,6 +415,12 @@ impl LengthSearch {
         &self.cells
     }
 
+    /// Where it started; `None` before the first search. [Units: wu]
+    #[must_use]
+    pub fn start(&self) -> Option<(CellId, DVec3)> {
+        self.start
+    }
+
     /// The ways to a point in `cell`, the shortest first: each with its own sequence of portals, none longer than `most` times
     /// the shortest, at most `n`. Straight lines from the last portal to the point. `arrivals` is cleared. [Units: wu]
     ///
@@ -494,12 +501,19 @@ impl LengthSearch {
     /// `crossings` is cleared. [Units: wu]
     pub fn crossings(&self, ways: &Ways, arrival: &Arrival, crossings: &mut Vec<(Exit, DVec3)>) {
         crossings.clear();
-        let mut at = arrival.node.unwrap_or(START);
-        while at != START {
-            crossings.push((ways.exit_of(at), ways.points[at as usize / 2]));
-            at = self.labels[at as usize].before;
-        }
+        let back = self.back(ways, arrival);
+        crossings.extend(back.map(|(exit, k)| (exit, ways.points[k as usize])));
         crossings.reverse();
+    }
+
+    /// The portals of a way from its end to the start, each with the number of the point among those of all portals.
+    pub(crate) fn back(&self, ways: &Ways, arrival: &Arrival) -> impl Iterator<Item = (Exit, u32)> {
+        let mut at = arrival.node.unwrap_or(START);
+        std::iter::from_fn(move || {
+            let node = Some(at).filter(|&node| node != START)?;
+            at = self.labels[node as usize].before;
+            Some((ways.exit_of(node), node / 2))
+        })
     }
 }
 
