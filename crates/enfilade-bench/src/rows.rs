@@ -26,7 +26,6 @@ pub(crate) enum Measure {
     /// On the bake of a scene of the shared ones.
     Baked(fn(&World) -> anyhow::Result<Figure>),
     /// On what the row makes by itself; it is told the name of the scene.
-    #[expect(dead_code, reason = "used by the rows of the living world")]
     Made(fn(&str) -> anyhow::Result<Figure>),
 }
 

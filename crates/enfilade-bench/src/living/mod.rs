@@ -2,6 +2,44 @@
 //!
 //! A row is a file beside this one and a line in [`ROWS`].
 
+mod graphs;
+mod paths;
+
+use crate::rows::Measure::{Baked, Made};
 use crate::rows::Row;
 
-pub(crate) const ROWS: &[Row] = &[];
+/// Graphs of 1,500 cells.
+const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
+
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        name: "paths: distances",
+        scenes: GRAPHS,
+        measure: Made(paths::distances),
+    },
+    Row {
+        name: "paths: contraction",
+        scenes: &["tower-1500", "city-1500"],
+        measure: Made(paths::contraction),
+    },
+    Row {
+        name: "paths: next hop",
+        scenes: GRAPHS,
+        measure: Made(paths::next_hop),
+    },
+    Row {
+        name: "paths: door flip",
+        scenes: GRAPHS,
+        measure: Made(paths::door_flip),
+    },
+    Row {
+        name: "paths: length",
+        scenes: &["institute"],
+        measure: Baked(paths::institute),
+    },
+    Row {
+        name: "paths: length",
+        scenes: &["recast-dungeon"],
+        measure: Baked(paths::dungeon),
+    },
+];
