@@ -23,6 +23,17 @@ pub(crate) struct Link {
     pub(crate) is_open: bool,
 }
 
+const NO_WAY: Way = Way {
+    length: FAR,
+    last: NONE,
+};
+
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    length: u32,
+    last: u32,
+}
+
 /// The table, and the graph that it is of.
 #[derive(Clone, Debug)]
 pub(crate) struct AllPairs {
@@ -32,9 +43,8 @@ pub(crate) struct AllPairs {
     first: Vec<u32>,
     /// Links of nodes, with the node at the other end.
     around: Vec<(u32, u32)>,
-    length: Vec<u32>,
-    /// The last link on the way from the source.
-    last: Vec<u32>,
+    /// By source and node: the length of the way, and its last link. Side by side, since who asks for one asks for the other.
+    ways: Vec<Way>,
     heap: BinaryHeap<Reverse<(u32, u32)>>,
     /// Nodes behind a closed link, and a mark for each.
     behind: Vec<u32>,
@@ -58,14 +68,13 @@ impl AllPairs {
             links,
             first: first.collect(),
             around: around.iter().map(|e| (e.1, e.2)).collect(),
-            length: vec![FAR; n * n],
-            last: vec![NONE; n * n],
+            ways: vec![NO_WAY; n * n],
             heap: BinaryHeap::new(),
             behind: Vec::new(),
             is_behind: vec![false; n],
         };
         for source in 0..n {
-            table.length[source * n + source] = 0;
+            table.ways[source * n + source].length = 0;
             table.heap.push(Reverse((0, source as u32)));
             table.spread(source);
         }
@@ -79,14 +88,14 @@ impl AllPairs {
     /// From one node to another; [`FAR`] where there is no way.
     #[inline]
     pub(crate) fn length(&self, from: u32, to: u32) -> u32 {
-        self.length[from as usize * self.n + to as usize]
+        // Links lead both ways: it is that of the way back, beside which is its last link, the first one there.
+        self.ways[to as usize * self.n + from as usize].length
     }
 
     /// The first link on the way from one node to another; [`NONE`] where there is no way, or none is needed.
     #[inline]
     pub(crate) fn first_link(&self, from: u32, to: u32) -> u32 {
-        // Links lead both ways: it is the last one on the way back.
-        self.last[to as usize * self.n + from as usize]
+        self.ways[to as usize * self.n + from as usize].last
     }
 
     /// Opens or closes a link. O(n + pairs whose way changes).
@@ -105,14 +114,16 @@ impl AllPairs {
             for [from, to] in [ends, [ends[1], ends[0]]] {
                 let at = row + to as usize;
                 if is_open {
-                    let through = sum(self.length[row + from as usize], length);
-                    if through < self.length[at] {
-                        self.length[at] = through;
-                        self.last[at] = link;
+                    let through = sum(self.ways[row + from as usize].length, length);
+                    if through < self.ways[at].length {
+                        self.ways[at] = Way {
+                            length: through,
+                            last: link,
+                        };
                         self.heap.push(Reverse((through, to)));
                         self.spread(source);
                     }
-                } else if self.last[at] == link {
+                } else if self.ways[at].last == link {
                     self.cut(source, to);
                     break;
                 }
@@ -124,7 +135,7 @@ impl AllPairs {
     fn spread(&mut self, source: usize) {
         let row = source * self.n;
         while let Some(Reverse((length, node))) = self.heap.pop() {
-            if length > self.length[row + node as usize] {
+            if length > self.ways[row + node as usize].length {
                 continue;
             }
             for i in self.first[node as usize]..self.first[node as usize + 1] {
@@ -135,9 +146,11 @@ impl AllPairs {
                     ..
                 } = self.links[link as usize];
                 let (through, at) = (sum(length, leg), row + to as usize);
-                if is_open && through < self.length[at] {
-                    self.length[at] = through;
-                    self.last[at] = link;
+                if is_open && through < self.ways[at].length {
+                    self.ways[at] = Way {
+                        length: through,
+                        last: link,
+                    };
                     self.heap.push(Reverse((through, to)));
                 }
             }
@@ -157,7 +170,7 @@ impl AllPairs {
             for i in self.first[from as usize]..self.first[from as usize + 1] {
                 let (link, to) = self.around[i as usize];
                 // Ways from a source are a tree: a link into `from` is the last one of no other.
-                if self.last[row + to as usize] == link && !self.is_behind[to as usize] {
+                if self.ways[row + to as usize].last == link && !self.is_behind[to as usize] {
                     self.is_behind[to as usize] = true;
                     self.behind.push(to);
                 }
@@ -172,13 +185,15 @@ impl AllPairs {
                     length, is_open, ..
                 } = self.links[link as usize];
                 if is_open && !self.is_behind[from as usize] {
-                    let through = sum(self.length[row + from as usize], length);
+                    let through = sum(self.ways[row + from as usize].length, length);
                     best = best.min((through, link));
                 }
             }
             let at = row + to as usize;
-            self.length[at] = best.0;
-            self.last[at] = if best.0 == FAR { NONE } else { best.1 };
+            self.ways[at] = match best {
+                (FAR, _) => NO_WAY,
+                (length, last) => Way { length, last },
+            };
             if best.0 != FAR {
                 self.heap.push(Reverse((best.0, to)));
             }

@@ -4,7 +4,7 @@
 //! top of matter that is flat enough and has room for the walker above; a step leads to the floor beside it that is not too much
 //! higher or lower, with room on the way. Floors nearer to a wall or an edge than the walker's radius are left out, by distances
 //! along the floors (Danielsson, "Euclidean distance mapping", 1980). Each floor knows its cell, and a step from cell to cell its
-//! portal: windows and cracks are none for walkers, nor is what is too narrow, too low or above a sill that is no step.
+//! portal: cracks are none for walkers, nor windows with anything in them, nor what is too narrow, too low or above a sill that is no step.
 //!
 //! O(squares covered) memory, about 40 bytes a floor, and a heap's logarithm more time. Walls are up to one square too thick, and
 //! distances up to half a square wrong: a walker may come nearer to a wall than its radius by half a square, and fails at a doorway
@@ -122,7 +122,13 @@ impl Floors {
             walker,
         };
         floors.keep(layout, &grounds, &is_clear);
-        floors.find_crossings(layout);
+        // What bakes call a window may be an opening with a sill on one side only: there the floor tells. Behind glass, none does.
+        let is_open = |p: PortalId| match layout.opening(p).kind() {
+            PortalKind::Open | PortalKind::Door => true,
+            PortalKind::Window => world.graph[p].fittings.is_empty(),
+            PortalKind::Crack => false,
+        };
+        floors.find_crossings(layout, is_open);
         floors
     }
 
@@ -150,8 +156,8 @@ impl Floors {
         self.first = first_of(&self.squares, self.floors.iter().map(|f| f.square));
     }
 
-    /// Finds the portals of steps from cell to cell; takes away those through none, and through windows and cracks.
-    fn find_crossings(&mut self, layout: &Layout) {
+    /// Finds the portals of steps from cell to cell; takes away those through none.
+    fn find_crossings(&mut self, layout: &Layout, is_open: impl Fn(PortalId) -> bool) {
         for i in 0..self.floors.len() as u32 {
             for direction in 0..2 {
                 let floor = self.floors[i as usize];
@@ -163,18 +169,11 @@ impl Floors {
                 let middle =
                     (self.point(i) + self.point(to)) * 0.5 + DVec3::Y * 0.5 * self.walker.height;
                 let near = |p: &PortalId| layout.opening(*p).bounds().distance_squared(middle);
-                let between = layout
-                    .exits(floor.cell)
-                    .iter()
-                    .filter(|e| e.to == other.cell);
-                let nearest =
-                    (between.map(|e| e.portal)).min_by(|a, b| near(a).total_cmp(&near(b)));
-                let portal = nearest.filter(|p| {
-                    matches!(
-                        layout.opening(*p).kind(),
-                        PortalKind::Open | PortalKind::Door
-                    )
-                });
+                let between = layout.exits(floor.cell).iter();
+                let open = between.filter(|e| e.to == other.cell && is_open(e.portal));
+                let nearest = open.min_by(|a, b| near(&a.portal).total_cmp(&near(&b.portal)));
+                let is_there = |p: &PortalId| near(p) <= self.walker.radius.powi(2);
+                let portal = nearest.map(|e| e.portal).filter(is_there);
                 match portal {
                     Some(portal) => {
                         let back = direction + 2;
@@ -256,7 +255,9 @@ impl Floors {
                     if down < -self.walker.step || down > self.walker.height {
                         continue;
                     }
-                    let away = (q - p).with_y(0.0).length() + down.abs() * 0.5;
+                    // Anywhere in its own square it is on the floor.
+                    let beside = (q - p).with_y(0.0).length() * f64::from(dx != 0 || dz != 0);
+                    let away = beside + down.abs() * 0.5;
                     if best.is_none_or(|b| away < b.0) {
                         best = Some((away, floor));
                     }

@@ -245,7 +245,8 @@ fn a_second_path_allocates_nothing() {
         let _ = search.cells_within(&map, &layout, ends[0], 20.0, |_| true);
         let _ = search.distance(&map, &layout, ends[1]);
     };
-    ask();
+    // Buffers change places, so that it takes a few to grow all.
+    (0..4).for_each(|_| ask());
     assert_eq!(allocation_counter::measure(ask).count_total, 0);
 }
 
@@ -254,7 +255,7 @@ fn hall(boxes: &[Aabb]) -> (World, Layout) {
     let bounds = Aabb::new(DVec3::new(0.0, -0.5, 0.0), DVec3::new(10.0, 6.0, 4.0));
     let floor = Aabb::new(bounds.min, bounds.max.with_y(0.0));
     let corners: Vec<DVec3> = (boxes.iter().chain([&floor]))
-        .flat_map(|b| b.triangles())
+        .flat_map(Aabb::triangles)
         .flatten()
         .collect();
     let positions: Vec<[f32; 3]> = corners.iter().map(|p| p.as_vec3().to_array()).collect();
@@ -325,16 +326,16 @@ fn stairs_are_walked_and_ledges_are_not() {
 #[test]
 fn a_walker_needs_its_room() {
     let straight = walk(&[], 0.0).unwrap();
-    eprintln!("{straight:?}");
     assert!((straight.length - 8.0).abs() < 1e-6 && straight.points.len() == 2);
     let pillar = walk(&[block([4.0, 0.0, 1.0], [5.0, 3.0, 3.2])], 0.0).unwrap();
-    // By the side of z = 1, which is nearer, at 0.3 m from it.
-    let around = 2.0 * (3.0_f64.hypot(1.3) + 0.3).min(9.0) + 1.0;
-    assert!(
-        pillar.length > 8.5 && pillar.length < around + 0.2,
-        "{}",
-        pillar.length
-    );
+    // By the side of z = 1, which is nearer, at 0.3 m from it: tangents, arcs about both corners, and the meter between.
+    let corner = |far: f64| {
+        let d = far.hypot(1.0);
+        (d * d - 0.09).sqrt() + 0.3 * ((1.0 / far).atan() + (0.3 / d).asin())
+    };
+    let around = corner(3.0) + 1.0 + corner(4.0);
+    let off = pillar.length - around;
+    assert!(off > -0.04 && off < 0.08, "{} {around}", pillar.length);
     assert!(pillar.points.iter().all(|p| p.z < 2.1));
     let wall_with_gap = |gap: f64, lintel: f64| {
         [
@@ -352,6 +353,5 @@ fn a_walker_needs_its_room() {
         walk(&wall_with_gap(0.9, 1.7), 0.0).unwrap_err(),
         NoPath::NoWay
     );
-    let filled = block([8.0, 0.0, 0.0], [10.0, 5.9, 4.0]);
-    assert_eq!(walk(&[filled], 0.0).unwrap_err(), NoPath::NoFloorAtEnd);
+    assert_eq!(walk(&[], 3.0).unwrap_err(), NoPath::NoFloorAtEnd);
 }
