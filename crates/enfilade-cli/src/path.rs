@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
-use enfilade::world::{Layout, Path, PathSearch, WalkMap, Walker};
+use enfilade::world::{Agent, Layout, Path, PathSearch, WalkMap};
 
 use crate::output::print_json;
 use enfilade_cli::values::point;
@@ -68,11 +68,11 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         bail!("--closed {p}: the world has {n_portals} portals, counted from 0");
     }
     let layout = Layout::new(&world);
-    let walker = Walker {
+    let walker = Agent {
         radius: args.radius,
         height: args.height,
         step: args.step,
-        ..Walker::default()
+        ..Agent::default()
     };
     let map = WalkMap::new(&layout, &world, walker);
     let ends = [args.from, args.to].map(|p| DVec3::from_array(p.map(f64::from)));

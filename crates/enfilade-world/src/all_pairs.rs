@@ -17,7 +17,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// A link between two nodes, both ways.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Link {
+pub(crate) struct Edge {
     pub(crate) ends: [u32; 2],
     pub(crate) length: u32,
     pub(crate) is_open: bool,
@@ -38,7 +38,7 @@ struct Way {
 #[derive(Clone, Debug)]
 pub(crate) struct AllPairs {
     n: usize,
-    links: Vec<Link>,
+    links: Vec<Edge>,
     /// By node its first link, and the number of all.
     first: Vec<u32>,
     /// Links of nodes, with the node at the other end.
@@ -53,7 +53,7 @@ pub(crate) struct AllPairs {
 
 impl AllPairs {
     /// Of `n` nodes. O(n · links · log n).
-    pub(crate) fn new(n: usize, links: Vec<Link>) -> Self {
+    pub(crate) fn new(n: usize, links: Vec<Edge>) -> Self {
         let mut around: Vec<(u32, u32, u32)> = Vec::new();
         for (i, link) in (0..).zip(&links) {
             let [a, b] = link.ends;
@@ -105,7 +105,7 @@ impl AllPairs {
             return;
         }
         at.is_open = is_open;
-        let Link { ends, length, .. } = *at;
+        let Edge { ends, length, .. } = *at;
         if ends[0] == ends[1] {
             return;
         }
@@ -140,7 +140,7 @@ impl AllPairs {
             }
             for i in self.first[node as usize]..self.first[node as usize + 1] {
                 let (link, to) = self.around[i as usize];
-                let Link {
+                let Edge {
                     length: leg,
                     is_open,
                     ..
@@ -181,7 +181,7 @@ impl AllPairs {
             let mut best = (FAR, NONE);
             for i in self.first[to as usize]..self.first[to as usize + 1] {
                 let (link, from) = self.around[i as usize];
-                let Link {
+                let Edge {
                     length, is_open, ..
                 } = self.links[link as usize];
                 if is_open && !self.is_behind[from as usize] {

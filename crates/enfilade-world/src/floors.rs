@@ -21,7 +21,7 @@ use crate::layout::Layout;
 
 /// Who walks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Walker {
+pub struct Agent {
     /// Keeps so far from walls. [Units: wu] [Limit: > 0]
     pub radius: f64,
     /// Needs so much room above the floor. [Units: wu] [Limit: > 0]
@@ -32,7 +32,7 @@ pub struct Walker {
     pub slope: f64,
 }
 
-impl Default for Walker {
+impl Default for Agent {
     /// A grown-up: 0.3 m around, 1.8 m high, steps of 0.4 m, slopes of 45°.
     fn default() -> Self {
         Self {
@@ -59,7 +59,7 @@ pub struct Floors {
     floors: Vec<Floor>,
     /// Floors of each cell, cell by cell.
     crossings: Vec<Crossing>,
-    walker: Walker,
+    walker: Agent,
 }
 
 /// A place to stand, of one square.
@@ -92,7 +92,7 @@ impl Floors {
     /// Of the structure of a world, without its objects, outdoors included as far as there is ground. Squares are a quarter of the walker's radius
     /// wide, but wider where there would be more than 16 million.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, walker: Walker) -> Self {
+    pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let triangles = || {
             world
                 .batches
@@ -206,7 +206,7 @@ impl Floors {
 
     /// For whom they are.
     #[must_use]
-    pub fn walker(&self) -> &Walker {
+    pub fn walker(&self) -> &Agent {
         &self.walker
     }
 
@@ -349,7 +349,7 @@ fn first_of(squares: &Squares, floors: impl Iterator<Item = u32>) -> Vec<u32> {
 }
 
 /// Links each floor with the nearest in height beside it.
-fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walker: &Walker) {
+fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walker: &Agent) {
     for i in 0..grounds.len() {
         let Ground {
             square, y, ceiling, ..

@@ -11,7 +11,7 @@
 
 use enfilade_cpg::{CellId, PortalId};
 
-use crate::all_pairs::{AllPairs, FAR, Link, NONE, sum};
+use crate::all_pairs::{AllPairs, Edge, FAR, NONE, sum};
 use crate::layout::{Exit, Layout};
 
 /// Whole units of length in a meter.
@@ -68,12 +68,12 @@ struct Node {
     height: u32,
     /// Number in its tree, and the first after all below it.
     below: [u32; 2],
-    place: Place,
+    place: RootPlace,
 }
 
 /// Of a root.
 #[derive(Clone, Copy, Debug)]
-enum Place {
+enum RootPlace {
     Tree,
     Junction(u32),
     /// A chain, and its place in it.
@@ -304,7 +304,7 @@ impl Hops {
     /// The ways from a root to junctions: to itself, or to the ends of its chain that are open.
     fn outs(&self, root: CellId) -> [Option<Out>; 2] {
         match self.nodes[root.idx()].place {
-            Place::Junction(junction) => {
+            RootPlace::Junction(junction) => {
                 let here = Out {
                     junction,
                     length: 0,
@@ -312,8 +312,8 @@ impl Hops {
                 };
                 [Some(here), None]
             }
-            Place::Chain(chain, place) => [0, 1].map(|end| self.out(chain, place, end)),
-            Place::Tree => [None, None],
+            RootPlace::Chain(chain, place) => [0, 1].map(|end| self.out(chain, place, end)),
+            RootPlace::Tree => [None, None],
         }
     }
 
@@ -370,7 +370,7 @@ impl Hops {
 
     /// From a junction into the chain of a root, whose way out to that junction is given.
     fn back_in(&self, root: CellId, out: Out) -> Option<Exit> {
-        let Place::Chain(chain, place) = self.nodes[root.idx()].place else {
+        let RootPlace::Chain(chain, place) = self.nodes[root.idx()].place else {
             return None;
         };
         let end = usize::from(out.through != Some(self.along(chain, place, 0)));
@@ -380,7 +380,7 @@ impl Hops {
     /// Between two stops of one chain, without leaving it.
     fn along_chain(&self, from: CellId, to: CellId) -> (u32, Option<Exit>) {
         let places = [from, to].map(|c| self.nodes[c.idx()].place);
-        if let [Place::Chain(chain, i), Place::Chain(other, j)] = places
+        if let [RootPlace::Chain(chain, i), RootPlace::Chain(other, j)] = places
             && chain == other
         {
             let first = self.chains[chain as usize].first_stop;
@@ -423,7 +423,7 @@ impl<'a> Core<'a> {
             top: cell,
             height: 0,
             below: [0, 1],
-            place: Place::Junction(NONE),
+            place: RootPlace::Junction(NONE),
         });
         let mut core = Self {
             layout,
@@ -447,7 +447,7 @@ impl<'a> Core<'a> {
         let up = self.first_left(cell)?;
         self.steps[up.portal.idx()].role = Role::Branch(cell);
         let node = &mut self.nodes[cell.idx()];
-        (node.up, node.place) = (up, Place::Tree);
+        (node.up, node.place) = (up, RootPlace::Tree);
         self.degree[cell.idx()] = 0;
         let degree = &mut self.degree[up.to.idx()];
         *degree -= 1;
@@ -479,7 +479,7 @@ impl<'a> Core<'a> {
             cell_of_junction: Vec::new(),
         };
         let all: Vec<CellId> = (0..self.nodes.len() as u32).map(CellId).collect();
-        let is_root = |nodes: &[Node], c: &CellId| !matches!(nodes[c.idx()].place, Place::Tree);
+        let is_root = |nodes: &[Node], c: &CellId| !matches!(nodes[c.idx()].place, RootPlace::Tree);
         let roots: Vec<CellId> = all
             .into_iter()
             .filter(|c| is_root(&self.nodes, c))
@@ -494,12 +494,12 @@ impl<'a> Core<'a> {
         }
         // What is left are rings of two-portal cells: one of each decides which way round.
         for &cell in &roots {
-            if matches!(self.nodes[cell.idx()].place, Place::Junction(NONE)) {
+            if matches!(self.nodes[cell.idx()].place, RootPlace::Junction(NONE)) {
                 let junction = self.add_junction(&mut hops, cell);
                 self.follow_chains(&mut hops, junction);
             }
         }
-        let links = hops.chains.iter().map(|c| Link {
+        let links = hops.chains.iter().map(|c| Edge {
             ends: c.ends,
             length: c.length,
             is_open: true,
@@ -513,7 +513,7 @@ impl<'a> Core<'a> {
     fn add_junction(&mut self, hops: &mut Hops, cell: CellId) -> u32 {
         let junction = hops.cell_of_junction.len() as u32;
         hops.cell_of_junction.push(cell);
-        self.nodes[cell.idx()].place = Place::Junction(junction);
+        self.nodes[cell.idx()].place = RootPlace::Junction(junction);
         junction
     }
 
@@ -528,11 +528,11 @@ impl<'a> Core<'a> {
                 step.role = Role::Rail(chain, n_stops);
                 length = sum(length, step.length);
                 hops.rails.push(at.portal);
-                let is_stop = matches!(self.nodes[at.to.idx()].place, Place::Junction(NONE));
+                let is_stop = matches!(self.nodes[at.to.idx()].place, RootPlace::Junction(NONE));
                 let Some(next) = self.first_left(at.to).filter(|_| is_stop) else {
                     break;
                 };
-                self.nodes[at.to.idx()].place = Place::Chain(chain, n_stops);
+                self.nodes[at.to.idx()].place = RootPlace::Chain(chain, n_stops);
                 hops.stops.push(Stop {
                     cell: at.to,
                     offset: length,
@@ -541,7 +541,7 @@ impl<'a> Core<'a> {
                 n_stops += 1;
                 at = next;
             }
-            let Place::Junction(end) = self.nodes[at.to.idx()].place else {
+            let RootPlace::Junction(end) = self.nodes[at.to.idx()].place else {
                 unreachable!("a chain ends at a junction");
             };
             hops.chains.push(Chain {
@@ -564,7 +564,7 @@ impl<'a> Core<'a> {
         }
         let mut next_number = 0;
         for (node, &size) in self.nodes.iter_mut().zip(&size) {
-            if !matches!(node.place, Place::Tree) {
+            if !matches!(node.place, RootPlace::Tree) {
                 node.below = [next_number, next_number + size];
                 next_number += size;
             }

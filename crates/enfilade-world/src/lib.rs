@@ -18,8 +18,8 @@ mod paths;
 mod search;
 mod strides;
 
-pub use floors::{Floors, Walker};
+pub use floors::{Agent, Floors};
 pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use paths::{NoPath, Path, PathSearch, WalkMap};
-pub use search::{Arrival, LengthSearch, Reached, Sampling, Ways};
+pub use search::{Arrival, LengthSearch, PassedPortal, Sampling, Ways};

@@ -13,7 +13,7 @@
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 
-use crate::floors::{Floors, Walker};
+use crate::floors::{Agent, Floors};
 use crate::layout::{Exit, Layout};
 use crate::search::{Arrival, LengthSearch, Ways};
 use crate::strides::{Strides, walk_straight};
@@ -36,7 +36,7 @@ impl WalkMap {
     /// Of the structure of a world, without its objects. Seconds for a large building: the floors are laid out in squares of a
     /// quarter of the walker's radius, and each cell's walked from each of its portals.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, walker: Walker) -> Self {
+    pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let floors = Floors::new(layout, world, walker);
         let mut chosen: Vec<(PortalId, [u32; 2])> = Vec::new();
         let mut by_portal: Vec<(PortalId, u32, u32)> = Vec::new();

@@ -211,7 +211,7 @@ impl Arrival {
 
 /// A portal that a search passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reached {
+pub struct PassedPortal {
     /// The portal, and the cell entered through it.
     pub exit: Exit,
     /// Least length to a point of it, extra costs included, its own too. [Units: wu]
@@ -247,7 +247,7 @@ pub struct LengthSearch {
     entered: Vec<u32>,
     stamp: u32,
     heap: BinaryHeap<Reverse<(u64, u32)>>,
-    reached: Vec<Reached>,
+    reached: Vec<PassedPortal>,
     cells: Vec<(CellId, f64)>,
     start: Option<(CellId, DVec3)>,
 }
@@ -363,7 +363,7 @@ impl LengthSearch {
         let toll = &mut self.tolls[2 * portal + side(ways.cells[portal], exit.to)];
         if !toll.is_reached {
             toll.is_reached = true;
-            self.reached.push(Reached { exit, length });
+            self.reached.push(PassedPortal { exit, length });
             self.enter(exit.to, length);
         }
     }
@@ -405,7 +405,7 @@ impl LengthSearch {
 
     /// The portals passed, ascending by length.
     #[must_use]
-    pub fn reached(&self) -> &[Reached] {
+    pub fn reached(&self) -> &[PassedPortal] {
         &self.reached
     }
 

@@ -16,13 +16,13 @@ use crate::floors::{Floors, NONE};
 /// A search over the floors of one cell, with buffers that are used again.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Strides {
-    labels: Vec<Label>,
+    labels: Vec<Footprint>,
     stamp: u32,
     heap: BinaryHeap<Reverse<(u32, u32)>>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Label {
+struct Footprint {
     length: f32,
     before: u32,
     stamp: u32,
@@ -37,12 +37,12 @@ impl Strides {
             self.stamp = 1;
         }
         if self.labels.len() < floors.n_floors() {
-            self.labels.resize(floors.n_floors(), Label::default());
+            self.labels.resize(floors.n_floors(), Footprint::default());
         }
         self.heap.clear();
         let target = goal.map(|g| floors.point(g));
         let ahead = |floor: u32| target.map_or(0.0, |t| floors.point(floor).distance(t) as f32);
-        self.labels[start as usize] = Label {
+        self.labels[start as usize] = Footprint {
             length: 0.0,
             before: NONE,
             stamp: self.stamp,
@@ -62,7 +62,7 @@ impl Strides {
                 let through = length + floors.point(to).distance(from) as f32;
                 let label = &mut self.labels[to as usize];
                 if label.stamp != self.stamp || through < label.length {
-                    *label = Label {
+                    *label = Footprint {
                         length: through,
                         before: at,
                         stamp: self.stamp,

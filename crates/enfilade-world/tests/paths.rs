@@ -6,7 +6,7 @@ use enfilade_cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, PortalId, Worl
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 use enfilade_testkit::{GridParams, Rng, room_grid};
-use enfilade_world::{Layout, NoPath, Path, PathSearch, WalkMap, Walker};
+use enfilade_world::{Agent, Layout, NoPath, Path, PathSearch, WalkMap};
 
 /// One storey of rooms, some of them concave, with doorways and no windows.
 fn rooms(seed: u64) -> (World, Layout, WalkMap) {
@@ -21,7 +21,7 @@ fn rooms(seed: u64) -> (World, Layout, WalkMap) {
         ..GridParams::offices(12, seed)
     });
     let layout = Layout::new(&world);
-    let map = WalkMap::new(&layout, &world, Walker::default());
+    let map = WalkMap::new(&layout, &world, Agent::default());
     (world, layout, map)
 }
 
@@ -289,7 +289,7 @@ fn hall(boxes: &[Aabb]) -> (World, Layout) {
 
 fn walk(boxes: &[Aabb], to_y: f64) -> Result<Path, NoPath> {
     let (world, layout) = hall(boxes);
-    let map = WalkMap::new(&layout, &world, Walker::default());
+    let map = WalkMap::new(&layout, &world, Agent::default());
     let mut path = Path::default();
     let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, to_y, 2.0)];
     PathSearch::new().find(&map, &layout, ends, |_| true, &mut path)?;

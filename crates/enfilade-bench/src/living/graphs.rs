@@ -32,7 +32,10 @@ fn tower() -> (Vec<DVec3>, Layout) {
         let n = room.parts.iter().map(|p| p.corners.len()).sum::<usize>();
         corners.sum::<DVec3>() / n.max(1) as f64
     });
-    let walked = truth.openings.iter().filter(|o| o.kind != OpeningKind::Window);
+    let walked = truth
+        .openings
+        .iter()
+        .filter(|o| o.kind != OpeningKind::Window);
     let portals = walked.filter_map(|o| match o.rooms {
         [Side::Room(a), Side::Room(b)] if a != b => Some(([a, b], o.center)),
         _ => None,
@@ -55,7 +58,13 @@ fn city(n_cells: usize, n_crossings: usize, seed: u64) -> (Vec<DVec3>, Layout) {
         let right = (i % along + 1 < along).then_some(i + 1);
         let down = Some(i + along).filter(|&j| j < n_nodes);
         // Some blocks are joined.
-        streets.extend([right, down].into_iter().flatten().filter(|_| rng.chance(0.85)).map(|j| (i, j)));
+        streets.extend(
+            [right, down]
+                .into_iter()
+                .flatten()
+                .filter(|_| rng.chance(0.85))
+                .map(|j| (i, j)),
+        );
     }
     let mut portals: Vec<([usize; 2], DVec3)> = Vec::new();
     let n_segments = n_cells - n_nodes;

@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::Context;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
-use enfilade::world::{Exit, Hops, Layout, NoPath, Path, PathSearch, WalkMap, Walker};
+use enfilade::world::{Agent, Exit, Hops, Layout, NoPath, Path, PathSearch, WalkMap};
 use enfilade_testkit::Rng;
 
 use super::graphs::graph;
@@ -22,7 +22,9 @@ fn hops(name: &str) -> anyhow::Result<(Layout, Vec<f64>, Hops)> {
     let steps: Vec<f64> = (0..layout.n_portals() as u32)
         .map(|p| {
             let opening = layout.opening(PortalId(p));
-            let [a, b] = opening.cells().map(|c| middles[c.idx()].distance(opening.center()));
+            let [a, b] = opening
+                .cells()
+                .map(|c| middles[c.idx()].distance(opening.center()));
             a + b
         })
         .collect();
@@ -57,8 +59,12 @@ pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
             is_open[p.idx()] ^= true;
             hops.set_open(p, is_open[p.idx()]);
         }
-        let step = |e: Exit| is_open[e.portal.idx()].then(|| (steps[e.portal.idx()] * 1e4).round() as u64);
-        let whole = |a, b| hops.distance(a, b).map_or(u64::MAX, |d| (d * 1e4).round() as u64);
+        let step =
+            |e: Exit| is_open[e.portal.idx()].then(|| (steps[e.portal.idx()] * 1e4).round() as u64);
+        let whole = |a, b| {
+            hops.distance(a, b)
+                .map_or(u64::MAX, |d| (d * 1e4).round() as u64)
+        };
         for from in (0..layout.n_cells() as u32).map(CellId) {
             let expected = dijkstra(&layout, from, step);
             for to in (0..layout.n_cells() as u32).map(CellId) {
@@ -86,7 +92,10 @@ pub(super) fn contraction(name: &str) -> anyhow::Result<Figure> {
     Ok(Figure {
         value: n as f64 / of as f64,
         most: 0.2,
-        note: format!("{of} cells, {n} junctions: {:.1} times fewer", of as f64 / n as f64),
+        note: format!(
+            "{of} cells, {n} junctions: {:.1} times fewer",
+            of as f64 / n as f64
+        ),
     })
 }
 
@@ -128,7 +137,10 @@ pub(super) fn door_flip(name: &str) -> anyhow::Result<Figure> {
     Ok(Figure {
         value: least.into_iter().fold(0.0, f64::max),
         most: 1.0,
-        note: format!("ms, the slowest of {n}; {mean:.4} on average; {} junctions", hops.n_junctions()),
+        note: format!(
+            "ms, the slowest of {n}; {mean:.4} on average; {} junctions",
+            hops.n_junctions()
+        ),
     })
 }
 
@@ -140,7 +152,7 @@ const DUNGEON: &str = include_str!("../../peers/recast-dungeon.csv");
 fn lengths(world: &World, pairs: &str) -> anyhow::Result<Figure> {
     let layout = Layout::new(world);
     let start = Instant::now();
-    let map = WalkMap::new(&layout, world, Walker::default());
+    let map = WalkMap::new(&layout, world, Agent::default());
     let made = start.elapsed().as_secs_f64();
     let (mut search, mut path) = (PathSearch::new(), Path::default());
     let (mut ours, mut theirs, mut worst, mut n) = (0.0, 0.0, 0.0_f64, 0);
