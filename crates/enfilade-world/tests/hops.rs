@@ -1,4 +1,6 @@
 //! Distances and next portals against Dijkstra's algorithm on all cells (W10).
+//!
+//! Covers W10.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,4 +1,6 @@
 //! Paths of walkers against plain geometry (W10).
+//!
+//! Covers W10.
 
 use std::collections::BTreeSet;
 

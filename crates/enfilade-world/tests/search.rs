@@ -1,4 +1,6 @@
 //! The length search against plain oracles (W10).
+//!
+//! Covers W10.
 
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;

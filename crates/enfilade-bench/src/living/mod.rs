@@ -29,8 +29,13 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         name: "paths: door flip",
-        scenes: GRAPHS,
+        scenes: &["tower-1500", "city-1500"],
         measure: Made(paths::door_flip),
+    },
+    Row {
+        name: "paths: flip, mean",
+        scenes: &["lattice-1500"],
+        measure: Made(paths::mean_flip),
     },
     Row {
         name: "paths: length",
