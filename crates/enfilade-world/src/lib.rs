@@ -11,14 +11,18 @@
 
 mod all_pairs;
 mod columns;
+mod edges;
 mod floors;
+mod geodesics;
 mod hops;
 mod layout;
 mod paths;
 mod search;
 mod strides;
 
+pub use edges::Corner;
 pub use floors::{Agent, Floors};
+pub use geodesics::Geodesics;
 pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use paths::{NoPath, Path, PathSearch, WalkMap};
