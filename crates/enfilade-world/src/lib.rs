@@ -17,6 +17,8 @@ mod geodesics;
 mod hops;
 mod layout;
 mod paths;
+mod pull;
+mod sampling;
 mod search;
 mod strides;
 
@@ -26,4 +28,5 @@ pub use geodesics::Geodesics;
 pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use paths::{NoPath, Path, PathSearch, WalkMap};
-pub use search::{Arrival, LengthSearch, PassedPortal, Sampling, Ways};
+pub use sampling::Sampling;
+pub use search::{Arrival, LengthSearch, PassedPortal, Ways};

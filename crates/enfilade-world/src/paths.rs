@@ -15,6 +15,7 @@ use enfilade_geom::DVec3;
 
 use crate::floors::{Agent, Floors};
 use crate::layout::{Exit, Layout};
+use crate::pull::{Bend, pull_taut};
 use crate::search::{Arrival, LengthSearch, Ways};
 use crate::strides::{Strides, walk_straight};
 
@@ -184,8 +185,6 @@ pub struct PathSearch {
     profile: Vec<DVec3>,
     kept: Vec<(usize, usize)>,
 }
-
-type Bend = (DVec3, u32);
 
 /// Sequences of portals that are pulled taut, at most.
 const N_SEQUENCES: usize = 4;
@@ -421,109 +420,4 @@ impl PathSearch {
             }
         }
     }
-}
-
-/// Rounds of moving bends, at most; each halves what is left, or more.
-const ROUNDS: usize = 12;
-
-/// Pulls a way taut: takes away bends that straight lines pass, and moves the others towards the line between their neighbors.
-fn pull_taut(floors: &Floors, bends: &mut Vec<Bend>, may_pass: &mut impl FnMut(PortalId) -> bool) {
-    drop_bends(floors, bends, may_pass);
-    for round in 0..ROUNDS {
-        // More bends than corners, so that a line can lie against two of them.
-        if round % 4 == 0 {
-            add_middles(floors, bends, may_pass);
-        }
-        let mut moved = 0.0;
-        for i in 1..bends.len().saturating_sub(1) {
-            moved += move_bend(floors, bends, i, may_pass);
-        }
-        drop_bends(floors, bends, may_pass);
-        if moved < 1e-4 && round % 4 == 3 {
-            break;
-        }
-    }
-}
-
-fn straight(
-    floors: &Floors,
-    from: Bend,
-    to: DVec3,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
-) -> Option<u32> {
-    walk_straight(floors, from, to, may_pass, |_, _, _| {})
-}
-
-/// Takes away all bends that a straight line passes, from the start on.
-fn drop_bends(floors: &Floors, bends: &mut Vec<Bend>, may_pass: &mut impl FnMut(PortalId) -> bool) {
-    let mut n_kept = 1;
-    for i in 1..bends.len() {
-        let next = bends.get(i + 1).copied();
-        let can_skip = next.is_some_and(|next| {
-            straight(floors, bends[n_kept - 1], next.0, may_pass) == Some(next.1)
-        });
-        if !can_skip {
-            bends[n_kept] = bends[i];
-            n_kept += 1;
-        }
-    }
-    bends.truncate(n_kept);
-}
-
-fn add_middles(
-    floors: &Floors,
-    bends: &mut Vec<Bend>,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
-) {
-    let least = 4.0 * floors.squares().side;
-    let mut i = 0;
-    while i + 1 < bends.len() {
-        let (a, b) = (bends[i], bends[i + 1]);
-        let middle = (a.0 + b.0) * 0.5;
-        i += 1;
-        if a.0.distance(b.0) > least
-            && let Some(floor) = straight(floors, a, middle, may_pass)
-        {
-            bends.insert(i, (middle.with_y(floors.point(floor).y), floor));
-            i += 1;
-        }
-    }
-}
-
-/// Moves a bend as far towards the line between its neighbors as the floors allow; how much shorter the way is then.
-fn move_bend(
-    floors: &Floors,
-    bends: &mut [Bend],
-    i: usize,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
-) -> f64 {
-    let [a, b, c] = [bends[i - 1], bends[i], bends[i + 1]];
-    let line = (c.0 - a.0).with_y(0.0);
-    let t = (b.0 - a.0).with_y(0.0).dot(line) / line.length_squared().max(1e-12);
-    let target = a.0 + line * t.clamp(0.0, 1.0);
-    let (mut low, mut high) = (0.0, 1.0);
-    let mut best = b;
-    for _ in 0..7 {
-        let share: f64 = if low == 0.0 && high == 1.0 {
-            1.0
-        } else {
-            0.5 * (low + high)
-        };
-        let p = b.0.lerp(target, share);
-        let floor = straight(floors, a, p, may_pass);
-        let fits = floor.filter(|&f| straight(floors, (p, f), c.0, may_pass) == Some(c.1));
-        match fits {
-            Some(floor) => {
-                best = (p.with_y(floors.point(floor).y), floor);
-                low = share;
-            }
-            None => high = share,
-        }
-        if low == 1.0 {
-            break;
-        }
-    }
-    bends[i] = best;
-    let plan = |p: DVec3, q: DVec3| (p - q).with_y(0.0).length();
-    plan(a.0, b.0) + plan(b.0, c.0) - plan(a.0, best.0) - plan(best.0, c.0)
 }
