@@ -11,10 +11,10 @@
 
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::scene::Primitive;
-use enfilade_geom::{Bvh, DVec3, Triangle};
+use enfilade_geom::{Bvh, DVec3, Triangle, Winding};
 
 use crate::edges::{Corner, corners};
-use crate::layout::Layout;
+use crate::layout::{Layout, Opening};
 use crate::search::Ways;
 
 /// Between points along an edge. [Units: wu]
@@ -23,6 +23,8 @@ const SPACING: f64 = 1.0;
 const MAX_CORNERS: usize = 256;
 /// Corners this near to each other are one at first. [Units: wu]
 const NEAR: f64 = 0.05;
+/// Points of a cell's portals, at most: with more, as about a tower of a thousand windows, lines stay straight.
+const MAX_POINTS: usize = 2048;
 /// How far points lie off walls and portals. [Units: wu]
 const OFF: f64 = 1e-3;
 /// Times that each bend of a way slides.
@@ -31,7 +33,7 @@ const SLIDES: usize = 24;
 /// What is known of the concave cells of a world. Made once.
 #[derive(Clone, Debug)]
 pub struct Geodesics {
-    /// By cell; `None` where lines between any two points stay in the air.
+    /// By cell; `None` where lines between any two points stay in the air, or are taken to.
     cells: Vec<Option<Concave>>,
     off: f64,
 }
@@ -68,7 +70,7 @@ impl Geodesics {
         Self { cells, off }
     }
 
-    /// Whether lines between points of a cell may meet its walls.
+    /// Whether lines between points of a cell may meet its walls, and ways around them are known: not in a cell with more than 2,048 points.
     ///
     /// # Panics
     ///
@@ -138,8 +140,11 @@ impl Geodesics {
 }
 
 impl Concave {
-    /// `None` for a cell without corners.
+    /// `None` for a cell without corners, or with too many points.
     fn new(layout: &Layout, world: &World, ways: &Ways, cell: CellId, off: f64) -> Option<Self> {
+        if ways.points_of(cell).count() > MAX_POINTS {
+            return None;
+        }
         let batches = world.batches_of(cell);
         let mut walls: Vec<Triangle> = batches.flat_map(|b| triangles(&b.primitive)).collect();
         let mut corners = corners(layout, cell, &walls, SPACING, off);
@@ -153,16 +158,9 @@ impl Concave {
                 walls.extend(fan.map(|w| [piece[0], w[0], w[1]]));
             }
         }
-        let points = ways.points_of(cell).map(|(portal, p)| {
-            let opening = layout.opening(portal);
-            let into = opening.normal()
-                * if opening.cells()[1] == cell {
-                    off
-                } else {
-                    -off
-                };
-            p + into + (opening.center() - p).normalize_or_zero() * off
-        });
+        let points = ways
+            .points_of(cell)
+            .map(|(portal, p)| into_cell(&layout.opening(portal), cell, p, off));
         let mut concave = Self {
             walls: Bvh::build(&walls),
             points: points.collect(),
@@ -228,20 +226,18 @@ impl Concave {
     /// Lengths between the points of its portals.
     fn between_points(&self) -> Vec<f64> {
         let (n, n_points) = (self.corners.len(), self.points.len());
-        let mut lengths = Vec::with_capacity(n_points * n_points);
+        let mut lengths = vec![0.0; n_points * n_points];
         for i in 0..n_points {
-            for j in 0..n_points {
+            for j in 0..i {
                 let mut least = self.straight(self.points[i], self.points[j]);
-                if i == j {
-                    least = 0.0;
-                }
                 if least == f64::INFINITY {
                     let [a, b] = [i, j].map(|k| &self.of_points[k * n..][..n]);
                     // From one point to a corner by its way, and from there to the other by its own.
                     let through = a.iter().zip(b).map(|(x, y)| x + y);
                     least = f64::from(through.fold(f32::INFINITY, f32::min));
                 }
-                lengths.push(least);
+                lengths[i * n_points + j] = least;
+                lengths[j * n_points + i] = least;
             }
         }
         lengths
@@ -308,6 +304,25 @@ fn shortest_about([a, b]: [DVec3; 2], p: DVec3, q: DVec3) -> DVec3 {
     let (h, g) = (away(p), away(q));
     let t = (along(p) * g + along(q) * h) / (h + g).max(1e-12);
     a + d * t.clamp(0.0, length)
+}
+
+/// A point of an opening, taken a little into a cell and off the walls at its edges.
+fn into_cell(opening: &Opening<'_>, cell: CellId, p: DVec3, off: f64) -> DVec3 {
+    let side = if opening.cells()[1] == cell {
+        1.0
+    } else {
+        -1.0
+    };
+    // Away from the edges of its own piece: the middle of all may lie in a wall between two.
+    let holds = |piece: &&[DVec3]| Winding::new(piece.to_vec()).contains_in_plane(p, 0.1 * off);
+    let piece = opening.pieces().find(holds).unwrap_or(&[]);
+    let middle = piece.iter().sum::<DVec3>() / piece.len().max(1) as f64;
+    let inward = if piece.is_empty() {
+        DVec3::ZERO
+    } else {
+        middle - p
+    };
+    p + opening.normal() * side * off + inward.clamp_length_max(off)
 }
 
 /// Leaves out corners near to others, until there are not too many.
