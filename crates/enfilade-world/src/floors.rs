@@ -22,11 +22,11 @@ use crate::layout::Layout;
 /// Who walks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agent {
-    /// Keeps so far from walls. [Units: wu] [Limit: > 0]
+    /// Keeps so far from walls. [Units: wu] [Limit: above 0]
     pub radius: f64,
-    /// Needs so much room above the floor. [Units: wu] [Limit: > 0]
+    /// Needs so much room above the floor. [Units: wu] [Limit: above 0]
     pub height: f64,
-    /// The highest step, up or down. [Units: wu] [Limit: >= 0]
+    /// The highest step, up or down. [Units: wu] [Limit: at least 0]
     pub step: f64,
     /// The steepest floor. [Units: rad]
     pub slope: f64,

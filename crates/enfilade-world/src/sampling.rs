@@ -7,9 +7,9 @@ use enfilade_geom::{DVec3, Winding};
 /// Where crossings lie in an opening.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Between neighboring points, at most. Infinite: one point a piece, its middle. [Units: wu] [Limit: > 0]
+    /// Between neighboring points, at most. Infinite: one point a piece, its middle. [Units: wu] [Limit: above 0]
     pub spacing: f64,
-    /// Points of one piece, at most: a larger piece has them farther apart. [Limit: > 0]
+    /// Points of one piece, at most: a larger piece has them farther apart. [Limit: above 0]
     pub most: usize,
 }
 
