@@ -91,7 +91,7 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         length_in_plan: path.length_in_plan,
         cells: start.into_iter().chain(cells).map(|c| c.0).collect(),
         portals: path.portals.iter().map(|e| e.portal.0).collect(),
-        points: path.points.iter().map(|p| p.to_array()).collect(),
+        points: path.points.iter().map(DVec3::to_array).collect(),
     };
     let mut out = BufWriter::new(io::stdout().lock());
     if args.json {
