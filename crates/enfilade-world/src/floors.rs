@@ -48,7 +48,10 @@ impl Default for Agent {
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Squares at most: more make them wider.
-const MAX_SQUARES: f64 = 16e6;
+const MAX_SQUARES: f64 = 8e6;
+
+/// Floors outdoors are laid out this far around the rooms. [Units: wu]
+const GROUND: f64 = 30.0;
 
 /// The floors of a world for one walker.
 #[derive(Clone, Debug)]
@@ -90,7 +93,7 @@ struct Ground {
 
 impl Floors {
     /// Of the structure of a world, without its objects, outdoors included as far as there is ground. Squares are a quarter of the walker's radius
-    /// wide, but wider where there would be more than 16 million.
+    /// wide, but wider where there would be more than 8 million; the ground is laid out to 30 m around the rooms.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let triangles = || {
@@ -99,13 +102,7 @@ impl Floors {
                 .iter()
                 .flat_map(|b| triangles_of(&b.primitive))
         };
-        let corners = triangles().flatten();
-        let bounds = corners.fold(
-            Aabb::EMPTY,
-            |b, p| {
-                if p.is_finite() { b.including(p) } else { b }
-            },
-        );
+        let bounds = bounds_of(layout, triangles().flatten());
         let squares = squares_of(&bounds, walker.radius / 4.0);
         let spans = spans(&squares, triangles(), walker.slope);
         let mut grounds = grounds(&spans, walker.height as f32);
@@ -239,6 +236,13 @@ impl Floors {
     /// diameter in plan, where the point is nearer to a wall than walkers get. `None` where there is none. [Units: wu]
     pub(crate) fn below(&self, p: DVec3) -> Option<u32> {
         let reach = (2.0 * self.walker.radius / self.squares.side).ceil() as isize;
+        let is_near = |k: usize| {
+            let x = self.squares.along(p)[k];
+            x > -(reach as f64) && x < self.squares.n[k] as f64 + reach as f64
+        };
+        if !(is_near(0) && is_near(1) && p.y.is_finite()) {
+            return None;
+        }
         let [x, z] = self.squares.along(p).map(|x| x.floor() as isize);
         let mut best: Option<(f64, u32)> = None;
         for dz in -reach..=reach {
@@ -302,6 +306,20 @@ fn triangles_of(primitive: &enfilade_geom::scene::Primitive) -> impl Iterator<It
         DVec3::from_array(p.map(f64::from))
     };
     (primitive.indices.chunks_exact(3)).map(move |t| [corner(t[0]), corner(t[1]), corner(t[2])])
+}
+
+/// Around all corners, but not far from the rooms: there may be a sky.
+fn bounds_of(layout: &Layout, corners: impl Iterator<Item = DVec3>) -> Aabb {
+    let finite = corners.filter(|p| p.is_finite());
+    let all = finite.fold(Aabb::EMPTY, Aabb::including);
+    let cells = (0..layout.n_cells() as u32).map(|c| layout.cell(CellId(c)));
+    let rooms = cells.filter(|c| !c.is_outdoor);
+    let rooms = rooms.fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
+    if rooms.is_empty() {
+        all
+    } else {
+        all.intersection(rooms.expanded(GROUND))
+    }
 }
 
 fn squares_of(bounds: &Aabb, side: f64) -> Squares {

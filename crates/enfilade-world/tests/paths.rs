@@ -420,3 +420,49 @@ fn a_walker_needs_its_room() {
     );
     assert_eq!(walk(&[], 3.0).unwrap_err(), NoPath::NoFloorAtEnd);
 }
+
+/// W10: what is no point, or far from everything, has no floor; a world of nothing neither. Nothing panics.
+#[test]
+fn points_from_nowhere_have_no_floor() {
+    let (world, layout) = hall(&[]);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    let (mut search, mut path) = (PathSearch::new(), Path::default());
+    let inside = DVec3::new(5.0, 0.0, 2.0);
+    for x in [
+        f64::NAN,
+        f64::INFINITY,
+        -f64::INFINITY,
+        1e300,
+        -1e300,
+        1e9,
+        11.0,
+    ] {
+        for axis in 0..3 {
+            let mut p = inside;
+            p[axis] = x;
+            let found = search.find(&map, &layout, [p, inside], |_| true, &mut path);
+            assert_eq!(found, Err(NoPath::NoFloorAtStart), "{p}");
+            let found = search.find(&map, &layout, [inside, p], |_| true, &mut path);
+            assert_eq!(found, Err(NoPath::NoFloorAtEnd), "{p}");
+        }
+    }
+    let nothing = World::default();
+    let layout = Layout::new(&nothing);
+    let map = WalkMap::new(&layout, &nothing, Agent::default());
+    let found = search.find(&map, &layout, [inside; 2], |_| true, &mut path);
+    assert_eq!(found, Err(NoPath::NoFloorAtStart));
+    assert_eq!(search.distance(&map, &layout, inside), None);
+}
+
+/// W10: a path to where one stands has no length.
+#[test]
+fn a_path_to_where_one_stands_has_no_length() {
+    let (world, layout) = hall(&[]);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    let (mut search, mut path) = (PathSearch::new(), Path::default());
+    let p = DVec3::new(5.0, 0.0, 2.0);
+    search
+        .find(&map, &layout, [p; 2], |_| true, &mut path)
+        .unwrap();
+    assert!(path.length < 1e-9 && path.portals.is_empty() && !path.points.is_empty());
+}

@@ -38,6 +38,11 @@ pub(crate) const ROWS: &[Row] = &[
         measure: Made(paths::mean_flip),
     },
     Row {
+        name: "paths: search",
+        scenes: &["offices-1000"],
+        measure: Made(paths::search),
+    },
+    Row {
         name: "paths: length",
         scenes: &["institute"],
         measure: Baked(paths::institute),

@@ -8,8 +8,10 @@ use std::time::Instant;
 use anyhow::Context;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
-use enfilade::world::{Agent, Exit, Hops, Layout, NoPath, Path, PathSearch, WalkMap};
-use enfilade_testkit::Rng;
+use enfilade::world::{
+    Agent, Exit, Hops, Layout, LengthSearch, NoPath, Path, PathSearch, Sampling, WalkMap, Ways,
+};
+use enfilade_testkit::{GridParams, Rng, room_grid};
 
 use super::graphs::graph;
 use crate::rows::Figure;
@@ -163,6 +165,38 @@ pub(super) fn mean_flip(name: &str) -> anyhow::Result<Figure> {
         value,
         most: 1.0,
         note,
+    })
+}
+
+/// Milliseconds of a length search through 1,000 rooms, to all portals, with one point in each.
+pub(super) fn search(_: &str) -> anyhow::Result<Figure> {
+    let params = GridParams {
+        outdoors: false,
+        ..GridParams::offices(1000, 1)
+    };
+    let layout = Layout::new(&room_grid(&params));
+    let mut times = [Sampling::MIDDLES, Sampling::default()].map(|sampling| {
+        let ways = Ways::new(&layout, sampling);
+        let (mut search, mut least) = (LengthSearch::new(), f64::INFINITY);
+        for i in 0..20 {
+            let cell = CellId(i * 31 % layout.n_cells() as u32);
+            let start = Instant::now();
+            let from = layout.cell(cell).bounds.center();
+            search.run(&ways, cell, from, f64::INFINITY, |_| Some(0.0));
+            least = least.min(start.elapsed().as_secs_f64() * 1e3);
+        }
+        least
+    });
+    times.sort_by(f64::total_cmp);
+    Ok(Figure {
+        value: times[0],
+        // What 64 sources have that take 5 µs each.
+        most: 0.32,
+        note: format!(
+            "ms with one point a portal; {:.2} ms with ten; {} portals",
+            times[1],
+            layout.n_portals()
+        ),
     })
 }
 
