@@ -23,16 +23,17 @@ pub(crate) struct Edge {
     pub(crate) is_open: bool,
 }
 
-const NO_WAY: Way = Way {
-    length: FAR,
-    last: NONE,
-};
-
+/// A link as left from one of its nodes.
 #[derive(Clone, Copy, Debug)]
-struct Way {
-    length: u32,
-    last: u32,
+struct Leg {
+    link: u32,
+    to: u32,
+    /// Its place among the links of the node that it leads to.
+    place: u16,
 }
+
+/// No link's place.
+const NOWHERE: u16 = u16::MAX;
 
 /// The table, and the graph that it is of.
 #[derive(Clone, Debug)]
@@ -41,10 +42,13 @@ pub(crate) struct AllPairs {
     links: Vec<Edge>,
     /// By node its first link, and the number of all.
     first: Vec<u32>,
-    /// Links of nodes, with the node at the other end.
-    around: Vec<(u32, u32)>,
-    /// By source and node: the length of the way, and its last link. Side by side, since who asks for one asks for the other.
-    ways: Vec<Way>,
+    /// Links of nodes, node by node.
+    around: Vec<Leg>,
+    /// By source and node, the length of the way.
+    length: Vec<u32>,
+    /// Its last link, by its place among those of the node. Apart from lengths, and short: next hops read no more, and the less memory
+    /// there is, the more of it is near.
+    last: Vec<u16>,
     heap: BinaryHeap<Reverse<(u32, u32)>>,
     /// Nodes behind a closed link, and a mark for each.
     behind: Vec<u32>,
@@ -53,6 +57,10 @@ pub(crate) struct AllPairs {
 
 impl AllPairs {
     /// Of `n` nodes. O(n · links · log n).
+    ///
+    /// # Panics
+    ///
+    /// When a node has more than 65,535 links.
     pub(crate) fn new(n: usize, links: Vec<Edge>) -> Self {
         let mut around: Vec<(u32, u32, u32)> = Vec::new();
         for (i, link) in (0..).zip(&links) {
@@ -63,18 +71,34 @@ impl AllPairs {
         }
         around.sort_unstable();
         let first = (0..=n as u32).map(|x| around.partition_point(|e| e.0 < x) as u32);
+        let first: Vec<u32> = first.collect();
+        let legs = around.iter().map(|&(from, link, to)| {
+            let place =
+                around.partition_point(|e| *e < (to, link, from)) as u32 - first[to as usize];
+            assert!(
+                place < u32::from(NOWHERE),
+                "a node has 65,535 links at most"
+            );
+            Leg {
+                link,
+                to,
+                place: place as u16,
+            }
+        });
+        let around = legs.collect();
         let mut table = Self {
             n,
             links,
-            first: first.collect(),
-            around: around.iter().map(|e| (e.1, e.2)).collect(),
-            ways: vec![NO_WAY; n * n],
+            first,
+            around,
+            length: vec![FAR; n * n],
+            last: vec![NOWHERE; n * n],
             heap: BinaryHeap::new(),
             behind: Vec::new(),
             is_behind: vec![false; n],
         };
         for source in 0..n {
-            table.ways[source * n + source].length = 0;
+            table.length[source * n + source] = 0;
             table.heap.push(Reverse((0, source as u32)));
             table.spread(source);
         }
@@ -88,14 +112,17 @@ impl AllPairs {
     /// From one node to another; [`FAR`] where there is no way.
     #[inline]
     pub(crate) fn length(&self, from: u32, to: u32) -> u32 {
-        // Links lead both ways: it is that of the way back, beside which is its last link, the first one there.
-        self.ways[to as usize * self.n + from as usize].length
+        self.length[to as usize * self.n + from as usize]
     }
 
     /// The first link on the way from one node to another; [`NONE`] where there is no way, or none is needed.
     #[inline]
     pub(crate) fn first_link(&self, from: u32, to: u32) -> u32 {
-        self.ways[to as usize * self.n + from as usize].last
+        // Links lead both ways: it is the last one of the way back.
+        match self.last[to as usize * self.n + from as usize] {
+            NOWHERE => NONE,
+            place => self.around[self.first[from as usize] as usize + usize::from(place)].link,
+        }
     }
 
     /// Opens or closes a link. O(n + pairs whose way changes).
@@ -109,21 +136,25 @@ impl AllPairs {
         if ends[0] == ends[1] {
             return;
         }
+        let places = ends.map(|node| {
+            let own = self.first[node as usize]..self.first[node as usize + 1];
+            let place = own.clone().find(|&i| self.around[i as usize].link == link);
+            place.map_or(NOWHERE, |i| (i - own.start) as u16)
+        });
         for source in 0..self.n {
             let row = source * self.n;
-            for [from, to] in [ends, [ends[1], ends[0]]] {
+            for (from, to, place) in [(ends[0], ends[1], places[1]), (ends[1], ends[0], places[0])]
+            {
                 let at = row + to as usize;
                 if is_open {
-                    let through = sum(self.ways[row + from as usize].length, length);
-                    if through < self.ways[at].length {
-                        self.ways[at] = Way {
-                            length: through,
-                            last: link,
-                        };
+                    let through = sum(self.length[row + from as usize], length);
+                    if through < self.length[at] {
+                        self.length[at] = through;
+                        self.last[at] = place;
                         self.heap.push(Reverse((through, to)));
                         self.spread(source);
                     }
-                } else if self.ways[at].last == link {
+                } else if self.last[at] == place {
                     self.cut(source, to);
                     break;
                 }
@@ -135,22 +166,20 @@ impl AllPairs {
     fn spread(&mut self, source: usize) {
         let row = source * self.n;
         while let Some(Reverse((length, node))) = self.heap.pop() {
-            if length > self.ways[row + node as usize].length {
+            if length > self.length[row + node as usize] {
                 continue;
             }
             for i in self.first[node as usize]..self.first[node as usize + 1] {
-                let (link, to) = self.around[i as usize];
+                let Leg { link, to, place } = self.around[i as usize];
                 let Edge {
                     length: leg,
                     is_open,
                     ..
                 } = self.links[link as usize];
                 let (through, at) = (sum(length, leg), row + to as usize);
-                if is_open && through < self.ways[at].length {
-                    self.ways[at] = Way {
-                        length: through,
-                        last: link,
-                    };
+                if is_open && through < self.length[at] {
+                    self.length[at] = through;
+                    self.last[at] = place;
                     self.heap.push(Reverse((through, to)));
                 }
             }
@@ -168,9 +197,9 @@ impl AllPairs {
             let from = self.behind[next];
             next += 1;
             for i in self.first[from as usize]..self.first[from as usize + 1] {
-                let (link, to) = self.around[i as usize];
+                let Leg { to, place, .. } = self.around[i as usize];
                 // Ways from a source are a tree: a link into `from` is the last one of no other.
-                if self.ways[row + to as usize].last == link && !self.is_behind[to as usize] {
+                if self.last[row + to as usize] == place && !self.is_behind[to as usize] {
                     self.is_behind[to as usize] = true;
                     self.behind.push(to);
                 }
@@ -178,22 +207,20 @@ impl AllPairs {
         }
         for k in 0..self.behind.len() {
             let to = self.behind[k];
-            let mut best = (FAR, NONE);
-            for i in self.first[to as usize]..self.first[to as usize + 1] {
-                let (link, from) = self.around[i as usize];
+            let (mut best, own) = ((FAR, NOWHERE), self.first[to as usize]);
+            for i in own..self.first[to as usize + 1] {
+                let Leg { link, to: from, .. } = self.around[i as usize];
                 let Edge {
                     length, is_open, ..
                 } = self.links[link as usize];
                 if is_open && !self.is_behind[from as usize] {
-                    let through = sum(self.ways[row + from as usize].length, length);
-                    best = best.min((through, link));
+                    let through = sum(self.length[row + from as usize], length);
+                    best = best.min((through, (i - own) as u16));
                 }
             }
             let at = row + to as usize;
-            self.ways[at] = match best {
-                (FAR, _) => NO_WAY,
-                (length, last) => Way { length, last },
-            };
+            self.length[at] = best.0;
+            self.last[at] = if best.0 == FAR { NOWHERE } else { best.1 };
             if best.0 != FAR {
                 self.heap.push(Reverse((best.0, to)));
             }

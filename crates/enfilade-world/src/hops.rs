@@ -13,6 +13,7 @@ use enfilade_cpg::{CellId, PortalId};
 
 use crate::all_pairs::{AllPairs, Edge, FAR, NONE, sum};
 use crate::layout::{Exit, Layout};
+use crate::trees::number_trees;
 
 /// Whole units of length in a meter.
 const UNITS: f64 = 1e4;
@@ -114,8 +115,8 @@ impl Hops {
     /// Of a layout in which a step through a portal, from the middle of one of its cells to that of the other, is so long;
     /// `None`: it is never passed. All are open. [Units: wu]
     ///
-    /// O(cells) and, for `n` junctions with `l` chains, `O(n · l · log n)` time and 8 · n² bytes. A length that is not finite or
-    /// below 0 counts as `None`.
+    /// O(cells) and, for `n` junctions with `l` chains, `O(n · l · log n)` time and 6 · n² bytes. A length that is not finite or
+    /// below 0 counts as `None`. Panics when a junction has more than 65,535 chains.
     #[must_use]
     pub fn new(layout: &Layout, mut step: impl FnMut(PortalId) -> Option<f64>) -> Self {
         let steps = (0..layout.n_portals() as u32).map(PortalId).map(|p| {
@@ -249,6 +250,19 @@ impl Hops {
         if a.top != a.root || b.top != b.root {
             return None;
         }
+        if let [RootPlace::Junction(x), RootPlace::Junction(y)] =
+            [a, b].map(|n| self.nodes[n.root.idx()].place)
+        {
+            // What most ask for in a world without chains: no length is needed.
+            let link = self.junctions.first_link(x, y);
+            return (link != NONE).then(|| {
+                if from == a.root {
+                    self.onto_from(link, x)
+                } else {
+                    a.up
+                }
+            });
+        }
         let (length, exit) = self.core_way(a.root, b.root);
         if length == FAR {
             return None;
@@ -288,8 +302,7 @@ impl Hops {
                     let exit = out.through.or_else(|| {
                         let link = self.junctions.first_link(out.junction, into.junction);
                         if link != NONE {
-                            let ends = self.chains[link as usize].ends;
-                            return Some(self.onto(link, usize::from(ends[0] != out.junction)));
+                            return Some(self.onto_from(link, out.junction));
                         }
                         // The junction is an end of the other's chain.
                         self.back_in(to, into)
@@ -366,6 +379,11 @@ impl Hops {
             portal: self.rails[(c.first_rail + rail) as usize],
             to: first.map_or(other, |s| s.cell),
         }
+    }
+
+    fn onto_from(&self, chain: u32, junction: u32) -> Exit {
+        let ends = self.chains[chain as usize].ends;
+        self.onto(chain, usize::from(ends[0] != junction))
     }
 
     /// From a junction into the chain of a root, whose way out to that junction is given.
@@ -478,12 +496,9 @@ impl<'a> Core<'a> {
             junctions: AllPairs::new(0, Vec::new()),
             cell_of_junction: Vec::new(),
         };
-        let all: Vec<CellId> = (0..self.nodes.len() as u32).map(CellId).collect();
-        let is_root = |nodes: &[Node], c: &CellId| !matches!(nodes[c.idx()].place, RootPlace::Tree);
-        let roots: Vec<CellId> = all
-            .into_iter()
-            .filter(|c| is_root(&self.nodes, c))
-            .collect();
+        let all = (0..self.nodes.len() as u32).map(CellId);
+        let is_root = |c: &CellId| !matches!(self.nodes[c.idx()].place, RootPlace::Tree);
+        let roots: Vec<CellId> = all.filter(is_root).collect();
         for &cell in &roots {
             if self.degree[cell.idx()] != 2 {
                 self.add_junction(&mut hops, cell);
@@ -557,28 +572,16 @@ impl<'a> Core<'a> {
     /// Numbers the cells so that all below one follow it. First branches by cell, the branches, the cells by number.
     fn number_trees(&mut self) -> (Vec<u32>, Vec<CellId>, Vec<CellId>) {
         let n = self.nodes.len();
-        let mut size = vec![1; n];
-        for &cell in &self.peeled {
-            let up = self.nodes[cell.idx()].up.to;
-            size[up.idx()] += size[cell.idx()];
+        let ups: Vec<[usize; 2]> = (self.peeled.iter())
+            .map(|cell| [cell.idx(), self.nodes[cell.idx()].up.to.idx()])
+            .collect();
+        for (node, below) in self.nodes.iter_mut().zip(number_trees(n, &ups)) {
+            node.below = below;
         }
-        let mut next_number = 0;
-        for (node, &size) in self.nodes.iter_mut().zip(&size) {
-            if !matches!(node.place, RootPlace::Tree) {
-                node.below = [next_number, next_number + size];
-                next_number += size;
-            }
-        }
-        // By cell the number of the next one below it.
-        let mut next: Vec<u32> = self.nodes.iter().map(|n| n.below[0] + 1).collect();
         for &cell in self.peeled.iter().rev() {
             let Exit { portal, to } = self.nodes[cell.idx()].up;
-            let first = next[to.idx()];
-            next[to.idx()] += size[cell.idx()];
-            next[cell.idx()] = first + 1;
             let above = self.nodes[to.idx()];
             let node = &mut self.nodes[cell.idx()];
-            node.below = [first, first + size[cell.idx()]];
             (node.root, node.top) = (above.root, above.root);
             node.height = sum(above.height, self.steps[portal.idx()].length);
         }
@@ -586,13 +589,11 @@ impl<'a> Core<'a> {
         for (i, node) in (0..).zip(&self.nodes) {
             by_number[node.below[0] as usize] = CellId(i);
         }
-        let mut branches = self.peeled.clone();
-        let key = |c: &CellId| {
-            let node = &self.nodes[c.idx()];
-            (node.up.to, node.below[0])
-        };
-        branches.sort_unstable_by_key(key);
-        let first = (0..=n as u32).map(|c| branches.partition_point(|b| key(b).0.0 < c) as u32);
+        let up = |c: &CellId| self.nodes[c.idx()].up.to;
+        let hangs = |c: &CellId| matches!(self.nodes[c.idx()].place, RootPlace::Tree);
+        let mut branches: Vec<CellId> = by_number.iter().copied().filter(hangs).collect();
+        branches.sort_by_key(up);
+        let first = (0..=n as u32).map(|c| branches.partition_point(|b| up(b).0 < c) as u32);
         (first.collect(), branches, by_number)
     }
 }

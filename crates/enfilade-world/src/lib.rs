@@ -21,6 +21,7 @@ mod pull;
 mod sampling;
 mod search;
 mod strides;
+mod trees;
 
 pub use edges::Corner;
 pub use floors::{Agent, Floors};
