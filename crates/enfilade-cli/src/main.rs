@@ -15,6 +15,7 @@ mod inspect;
 mod locate;
 mod manual;
 mod output;
+mod path;
 mod plan;
 mod progress;
 mod progress_lines;
@@ -56,6 +57,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Man(manual::Man),
+    Path(path::WalkedPath),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
     Render(render::Render),
@@ -80,6 +82,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),
+        Command::Path(args) => path::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::Render(args) => render::run(&args),

@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// What `--json` of each command has in it, among other things; files are those that the rows before left.
-const COMMANDS: [(&str, &[&str]); 16] = [
+const COMMANDS: [(&str, &[&str]); 17] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -38,6 +38,10 @@ const COMMANDS: [(&str, &[&str]); 16] = [
     (
         "render world.glb --size 64x36 --plain --adapter software --walk 2 -o x.png",
         &["pictures"],
+    ),
+    (
+        "path world.glb --from 2,1,2 --to 8,1,3",
+        &["length", "portals", "points"],
     ),
     (
         "report world.glb --no-pictures --views 2 -o r.html",

@@ -10,16 +10,28 @@
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
 mod actors;
+mod all_pairs;
+mod columns;
 mod contacts;
+mod edges;
 mod flood;
+mod floors;
+mod geodesics;
+mod hops;
 mod layout;
 mod lights;
 mod look;
+mod paths;
 mod pose;
+mod pull;
+mod sampling;
+mod search;
 mod shape;
 mod space;
+mod strides;
 mod sweep;
 mod things;
+mod trees;
 mod walker;
 
 pub use actors::{
@@ -27,11 +39,18 @@ pub use actors::{
     WayPoint,
 };
 pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
+pub use edges::Corner;
 pub use flood::{Flood, Posted};
+pub use floors::{Agent, Floors};
+pub use geodesics::Geodesics;
+pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use look::{SpaceSeen, SpaceViewer};
+pub use paths::{NoPath, Path, PathSearch, WalkMap};
 pub use pose::Pose;
+pub use sampling::Sampling;
+pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
 pub use shape::{Shape, ShapeError};
 pub use space::{PartId, Place, Space, SpaceError};
 pub use sweep::Passing;

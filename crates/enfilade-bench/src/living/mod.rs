@@ -4,49 +4,63 @@
 
 mod actors;
 mod bodies;
+mod graphs;
+mod paths;
 
-use crate::rows::Measure::{Baked, Made};
-use crate::rows::Row;
+use enfilade::cpg::World;
+
+use crate::rows::{Figure, Measure, Row};
+
+/// Graphs of 1,500 cells.
+const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
+/// Those of them that contract.
+const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
 pub(crate) const ROWS: &[Row] = &[
-    Row {
-        name: "bodies: missed",
-        scenes: &["offices-1000"],
-        measure: Made(bodies::missed_in),
-    },
-    Row {
-        name: "bodies: missed",
-        scenes: &["institute"],
-        measure: Baked(bodies::missed),
-    },
-    Row {
-        name: "bodies: candidates",
-        scenes: &["offices-1000"],
-        measure: Made(bodies::candidates_in),
-    },
-    Row {
-        name: "bodies: candidates",
-        scenes: &["institute"],
-        measure: Baked(bodies::candidates),
-    },
-    Row {
-        name: "bodies: time",
-        scenes: &["offices-1000"],
-        measure: Made(bodies::time_in),
-    },
-    Row {
-        name: "bodies: time",
-        scenes: &["institute"],
-        measure: Baked(bodies::time),
-    },
-    Row {
-        name: "actors: state",
-        scenes: &["offices-10000"],
-        measure: Made(actors::state),
-    },
-    Row {
-        name: "actors: cost",
-        scenes: &["offices-10000"],
-        measure: Made(actors::cost),
-    },
+    made("bodies: missed", &["offices-1000"], bodies::missed_in),
+    baked("bodies: missed", &["institute"], bodies::missed),
+    made(
+        "bodies: candidates",
+        &["offices-1000"],
+        bodies::candidates_in,
+    ),
+    baked("bodies: candidates", &["institute"], bodies::candidates),
+    made("bodies: time", &["offices-1000"], bodies::time_in),
+    baked("bodies: time", &["institute"], bodies::time),
+    made("actors: state", &["offices-10000"], actors::state),
+    made("actors: cost", &["offices-10000"], actors::cost),
+    made("paths: distances", GRAPHS, paths::distances),
+    made("paths: contraction", CONTRACTING, paths::contraction),
+    made("paths: next hop", GRAPHS, paths::next_hop),
+    made("paths: door flip", CONTRACTING, paths::door_flip),
+    made("paths: flip, mean", &["lattice-1500"], paths::mean_flip),
+    made("paths: search", &["offices-1000"], paths::search),
+    baked("paths: length", &["institute"], paths::institute),
+    baked("paths: length", &["recast-dungeon"], paths::dungeon),
 ];
+
+const fn made(
+    name: &'static str,
+    scenes: &'static [&'static str],
+    measure: fn(&str) -> anyhow::Result<Figure>,
+) -> Row {
+    let measure = Measure::Made(measure);
+    Row {
+        name,
+        scenes,
+        measure,
+    }
+}
+
+const fn baked(
+    name: &'static str,
+    scenes: &'static [&'static str],
+    measure: fn(&World) -> anyhow::Result<Figure>,
+) -> Row {
+    let measure = Measure::Baked(measure);
+    Row {
+        name,
+        scenes,
+        measure,
+    }
+}

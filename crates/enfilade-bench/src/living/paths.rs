@@ -1,0 +1,253 @@
+//! Rows of paths: distances between all cells, how small their table is, how fast hops and flips are; walked lengths beside Recast.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::hint::black_box;
+use std::time::Instant;
+
+use anyhow::Context;
+use enfilade::cpg::{CellId, PortalId, World};
+use enfilade::geom::DVec3;
+use enfilade::world::{
+    Agent, Exit, Hops, Layout, LengthSearch, NoPath, Path, PathSearch, Sampling, WalkMap, Ways,
+};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+
+use super::graphs::graph;
+use crate::rows::Figure;
+
+/// Times that something is done to time it.
+const REPEATS: usize = 5;
+
+fn hops(name: &str) -> anyhow::Result<(Layout, Vec<f64>, Hops)> {
+    let (middles, layout) = graph(name)?;
+    let steps: Vec<f64> = (0..layout.n_portals() as u32)
+        .map(|p| {
+            let opening = layout.opening(PortalId(p));
+            let [a, b] = opening
+                .cells()
+                .map(|c| middles[c.idx()].distance(opening.center()));
+            a + b
+        })
+        .collect();
+    let hops = Hops::new(&layout, |p| Some(steps[p.idx()]));
+    Ok((layout, steps, hops))
+}
+
+/// Lengths from a cell to all, in whole tenths of a millimeter.
+fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -> Vec<u64> {
+    let mut lengths = vec![u64::MAX; layout.n_cells()];
+    let mut heap = BinaryHeap::from([Reverse((0, from.0))]);
+    while let Some(Reverse((length, cell))) = heap.pop() {
+        if lengths[cell as usize] == u64::MAX {
+            lengths[cell as usize] = length;
+            let exits = layout.exits(CellId(cell)).iter();
+            heap.extend(exits.filter_map(|&e| Some(Reverse((length + step(e)?, e.to.0)))));
+        }
+    }
+    lengths
+}
+
+/// Pairs of cells whose distance is not that of Dijkstra's algorithm on all cells, or whose next portal leads elsewhere: after
+/// making, and after doors were flipped by chance.
+pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
+    let (layout, steps, mut hops) = hops(name)?;
+    let mut rng = Rng::new(1);
+    let mut is_open = vec![true; layout.n_portals()];
+    let (mut n_pairs, mut n_wrong) = (0_u64, 0_u64);
+    for n_flips in [0, 20, 200] {
+        for _ in 0..n_flips {
+            let p = PortalId(rng.below(layout.n_portals()) as u32);
+            is_open[p.idx()] ^= true;
+            hops.set_open(p, is_open[p.idx()]);
+        }
+        let step =
+            |e: Exit| is_open[e.portal.idx()].then(|| (steps[e.portal.idx()] * 1e4).round() as u64);
+        let whole = |a, b| {
+            hops.distance(a, b)
+                .map_or(u64::MAX, |d| (d * 1e4).round() as u64)
+        };
+        for from in (0..layout.n_cells() as u32).map(CellId) {
+            let expected = dijkstra(&layout, from, step);
+            for to in (0..layout.n_cells() as u32).map(CellId) {
+                n_pairs += 1;
+                let least = expected[to.idx()];
+                let is_next = match hops.next(to, from) {
+                    Some(exit) => step(exit).is_some_and(|s| s + expected[exit.to.idx()] == least),
+                    None => from == to || least == u64::MAX,
+                };
+                n_wrong += u64::from(whole(from, to) != least || !is_next);
+            }
+        }
+    }
+    Ok(Figure {
+        value: n_wrong as f64,
+        most: 0.0,
+        note: format!("pairs that differ, of {n_pairs}, with 0, 20 and 220 flips"),
+    })
+}
+
+/// Junctions by cells.
+pub(super) fn contraction(name: &str) -> anyhow::Result<Figure> {
+    let (layout, _, hops) = hops(name)?;
+    let (n, of) = (hops.n_junctions(), layout.n_cells());
+    Ok(Figure {
+        value: n as f64 / of as f64,
+        most: 0.2,
+        note: format!(
+            "{of} cells, {n} junctions: {:.1} times fewer",
+            of as f64 / n as f64
+        ),
+    })
+}
+
+/// Nanoseconds to the next portal, for pairs of cells by chance.
+pub(super) fn next_hop(name: &str) -> anyhow::Result<Figure> {
+    let (layout, _, hops) = hops(name)?;
+    let mut rng = Rng::new(2);
+    let mut cell = || CellId(rng.below(layout.n_cells()) as u32);
+    let pairs: Vec<[CellId; 2]> = (0..1 << 16).map(|_| [cell(), cell()]).collect();
+    let mut least = f64::INFINITY;
+    // The table is larger than what is near a processor: others on the machine slow most of them down.
+    for _ in 0..20 * REPEATS {
+        let start = Instant::now();
+        for &[from, to] in &pairs {
+            black_box(hops.next(from, to));
+        }
+        least = least.min(start.elapsed().as_secs_f64() / pairs.len() as f64);
+    }
+    Ok(Figure {
+        value: least * 1e9,
+        most: 100.0,
+        note: "ns".into(),
+    })
+}
+
+/// Milliseconds of each flip of all doors, and the number of junctions.
+fn flips(name: &str) -> anyhow::Result<(Vec<f64>, usize)> {
+    let (layout, _, mut hops) = hops(name)?;
+    // Of each flip the quickest of several: what another program takes is none of its.
+    let mut least = vec![f64::INFINITY; 2 * layout.n_portals()];
+    for _ in 0..REPEATS {
+        for (i, least) in least.iter_mut().enumerate() {
+            let start = Instant::now();
+            hops.set_open(PortalId(i as u32 / 2), i % 2 == 1);
+            *least = least.min(start.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    Ok((least, hops.n_junctions()))
+}
+
+/// The slowest flip and the mean, with a note.
+fn slowest_and_mean(name: &str) -> anyhow::Result<(f64, f64, String)> {
+    let (flips, n_junctions) = flips(name)?;
+    let slowest = flips.iter().copied().fold(0.0, f64::max);
+    let (n, mean) = (flips.len(), flips.iter().sum::<f64>() / flips.len() as f64);
+    let note = format!(
+        "ms; {n} flips: {slowest:.3} the slowest, {mean:.4} on average; {n_junctions} junctions"
+    );
+    Ok((slowest, mean, note))
+}
+
+/// Milliseconds of the slowest flip of all doors.
+pub(super) fn door_flip(name: &str) -> anyhow::Result<Figure> {
+    let (value, _, note) = slowest_and_mean(name)?;
+    Ok(Figure {
+        value,
+        most: 1.0,
+        note,
+    })
+}
+
+/// Milliseconds of a flip on average, where hardly a cell leaves the table.
+pub(super) fn mean_flip(name: &str) -> anyhow::Result<Figure> {
+    let (_, value, note) = slowest_and_mean(name)?;
+    Ok(Figure {
+        value,
+        most: 1.0,
+        note,
+    })
+}
+
+/// Milliseconds of a length search through 1,000 rooms, to all portals, with one point in each.
+pub(super) fn search(_: &str) -> anyhow::Result<Figure> {
+    let params = GridParams {
+        outdoors: false,
+        ..GridParams::offices(1000, 1)
+    };
+    let layout = Layout::new(&room_grid(&params));
+    let mut times = [Sampling::MIDDLES, Sampling::default()].map(|sampling| {
+        let ways = Ways::new(&layout, sampling);
+        let (mut search, mut least) = (LengthSearch::new(), f64::INFINITY);
+        for i in 0..20 {
+            let cell = CellId(i * 31 % layout.n_cells() as u32);
+            let start = Instant::now();
+            let from = layout.cell(cell).bounds.center();
+            search.run(&ways, cell, from, f64::INFINITY, |_| Some(0.0));
+            least = least.min(start.elapsed().as_secs_f64() * 1e3);
+        }
+        least
+    });
+    times.sort_by(f64::total_cmp);
+    Ok(Figure {
+        value: times[0],
+        // What 64 sources have that take 5 µs each.
+        most: 0.32,
+        note: format!(
+            "ms with one point a portal; {:.2} ms with ten; {} portals",
+            times[1],
+            layout.n_portals()
+        ),
+    })
+}
+
+/// Pairs of points and Recast's lengths, made by `scripts/recast_lengths.mjs`.
+const INSTITUTE: &str = include_str!("../../peers/recast-institute.csv");
+const DUNGEON: &str = include_str!("../../peers/recast-dungeon.csv");
+
+/// Our length by Recast's where both find a way, of the worst pair and on average.
+fn lengths(world: &World, pairs: &str) -> anyhow::Result<Figure> {
+    let layout = Layout::new(world);
+    let start = Instant::now();
+    let map = WalkMap::new(&layout, world, Agent::default());
+    let made = start.elapsed().as_secs_f64();
+    let (mut search, mut path) = (PathSearch::new(), Path::default());
+    let (mut ours, mut theirs, mut worst, mut n) = (0.0, 0.0, 0.0_f64, 0);
+    let (mut n_rows, mut n_over, mut n_lost, mut seconds) = (0, 0, 0, 0.0);
+    for line in pairs.lines().skip(1) {
+        let numbers: Result<Vec<f64>, _> = line.split(',').map(str::parse).collect();
+        let row = numbers.with_context(|| line.to_owned())?;
+        let ends = [DVec3::from_slice(&row), DVec3::from_slice(&row[3..])];
+        n_rows += 1;
+        let start = Instant::now();
+        let found = search.find(&map, &layout, ends, |_| true, &mut path);
+        seconds += start.elapsed().as_secs_f64();
+        match found {
+            Ok(()) => {
+                n += 1;
+                let ratio = path.length_in_plan / row[6];
+                (ours, theirs) = (ours + path.length_in_plan, theirs + row[6]);
+                n_over += usize::from(ratio > 1.02);
+                worst = worst.max(ratio);
+            }
+            Err(NoPath::NoWay | NoPath::NoFloorAtStart | NoPath::NoFloorAtEnd) => n_lost += 1,
+        }
+    }
+    Ok(Figure {
+        value: ours / theirs,
+        most: 1.02,
+        note: format!(
+            "sum of our lengths in plan by Recast's, {n} pairs, {n_over} above 1.02, worst {worst:.3}; {n_lost} of {n_rows} that \
+             only Recast finds; {made:.1} s to make, {:.2} ms a path",
+            seconds * 1e3 / f64::from(n_rows)
+        ),
+    })
+}
+
+pub(super) fn institute(world: &World) -> anyhow::Result<Figure> {
+    lengths(world, INSTITUTE)
+}
+
+pub(super) fn dungeon(world: &World) -> anyhow::Result<Figure> {
+    lengths(world, DUNGEON)
+}

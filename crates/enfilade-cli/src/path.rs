@@ -1,0 +1,125 @@
+//! `enfilade path`: how one walks from a point to another.
+
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use enfilade::cpg::PortalId;
+use enfilade::geom::DVec3;
+use enfilade::world::{Agent, Layout, Path, PathSearch, WalkMap};
+
+use crate::output::print_json;
+use enfilade_cli::values::point;
+use enfilade_cli::world::read_world;
+
+/// Prints the way that someone walks from a point to another: its length, the portals it passes, and the points where it bends.
+///
+/// Over floors, stairs and ramps, around walls; through doors, which are open but for those of `--closed`, not through windows.
+/// Furniture is not in the way.
+#[derive(clap::Args)]
+pub(crate) struct WalkedPath {
+    /// World written by `enfilade bake`; `-` for standard input.
+    world: PathBuf,
+    /// Where it starts, in meters: at the feet, or any height up to the head.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    from: [f32; 3],
+    /// Where it ends, in meters.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    to: [f32; 3],
+    /// The walker keeps so far from walls, in meters.
+    #[arg(long, value_name = "METERS", default_value_t = 0.3)]
+    radius: f64,
+    /// The walker's height, in meters.
+    #[arg(long, value_name = "METERS", default_value_t = 1.8)]
+    height: f64,
+    /// The highest step, up or down, in meters.
+    #[arg(long, value_name = "METERS", default_value_t = 0.4)]
+    step: f64,
+    /// Portals that are closed, by number.
+    #[arg(long, value_name = "PORTAL,…", value_delimiter = ',')]
+    closed: Vec<u32>,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(serde::Serialize)]
+struct PathReport {
+    length: f64,
+    length_in_plan: f64,
+    cells: Vec<u32>,
+    portals: Vec<u32>,
+    points: Vec<[f64; 3]>,
+}
+
+pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
+    for (name, value) in [("radius", args.radius), ("height", args.height)] {
+        if !(value > 0.0 && value < 100.0) {
+            bail!("--{name} {value}: a length above 0 and below 100 is needed");
+        }
+    }
+    if !(0.0..100.0).contains(&args.step) {
+        bail!("--step {}: a length of at least 0 is needed", args.step);
+    }
+    let world = read_world(&args.world)?;
+    let n_portals = world.graph.portals.len();
+    if let Some(p) = args.closed.iter().find(|p| **p as usize >= n_portals) {
+        bail!("--closed {p}: the world has {n_portals} portals, counted from 0");
+    }
+    let layout = Layout::new(&world);
+    let walker = Agent {
+        radius: args.radius,
+        height: args.height,
+        step: args.step,
+        ..Agent::default()
+    };
+    let map = WalkMap::new(&layout, &world, walker);
+    let ends = [args.from, args.to].map(|p| DVec3::from_array(p.map(f64::from)));
+    let mut path = Path::default();
+    PathSearch::new().find(
+        &map,
+        &layout,
+        ends,
+        |portal: PortalId| !args.closed.contains(&portal.0),
+        &mut path,
+    )?;
+    let start = layout.locate(path.points[0] + DVec3::Y * 0.5 * args.height);
+    let cells = path.portals.iter().map(|e| e.to);
+    let report = PathReport {
+        length: path.length,
+        length_in_plan: path.length_in_plan,
+        cells: start.into_iter().chain(cells).map(|c| c.0).collect(),
+        portals: path.portals.iter().map(|e| e.portal.0).collect(),
+        points: path.points.iter().map(DVec3::to_array).collect(),
+    };
+    let mut out = BufWriter::new(io::stdout().lock());
+    if args.json {
+        return print_json(out, &report);
+    }
+    let many = |n: usize, thing: &str| format!("{n} {thing}{}", if n == 1 { "" } else { "s" });
+    writeln!(
+        out,
+        "{:.2} m ({:.2} m in plan), {}, {}",
+        report.length,
+        report.length_in_plan,
+        many(report.portals.len(), "portal"),
+        many(report.points.len(), "point")
+    )?;
+    let name = |c: u32| world.graph.cells[c as usize].name.as_str();
+    if let Some(&first) = report.cells.first() {
+        writeln!(out, "from {}", name(first))?;
+    }
+    for exit in &path.portals {
+        writeln!(
+            out,
+            "{:>12}  into {}",
+            exit.portal.to_string(),
+            name(exit.to.0)
+        )?;
+    }
+    for [x, y, z] in &report.points {
+        writeln!(out, "{x:>10.3} {y:>10.3} {z:>10.3}")?;
+    }
+    out.flush().context("cannot write to standard output")
+}

@@ -1,0 +1,83 @@
+//! Runs `path` on worlds made in code. Covers W10.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use enfilade_cpg::wire::encode_glb;
+use enfilade_testkit::{GridParams, room_grid};
+use serde_json::Value;
+
+fn enfilade(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+/// Two rooms with a doorway between them, and a point on the floor of each.
+fn two_rooms(name: &str) -> (String, [String; 2]) {
+    let world = room_grid(&GridParams::two_rooms());
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::write(&path, encode_glb(&world).unwrap()).unwrap();
+    let points = [0, 1].map(|c| {
+        let [low, high] = world.graph.cells[c].aabb;
+        format!(
+            "{},0.5,{}",
+            (low[0] + high[0]) / 2.0,
+            (low[2] + high[2]) / 2.0
+        )
+    });
+    (path.to_str().unwrap().to_owned(), points)
+}
+
+#[test]
+fn a_path_goes_through_the_doorway() {
+    let (world, [from, to]) = two_rooms("path.glb");
+    let args = [
+        "path", &world, "--from", &from, "--to", &to, "--radius", "0.2",
+    ];
+    let done = enfilade(&[&args[..], &["--json"]].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(report["cells"], serde_json::json!([0, 1]));
+    assert_eq!(report["portals"], serde_json::json!([0]));
+    let points = report["points"].as_array().unwrap();
+    assert!(points.len() >= 2 && points.iter().all(|p| p[1].as_f64().unwrap().abs() < 1e-3));
+    let length = report["length"].as_f64().unwrap();
+    assert!(length > 2.0 && length < 20.0);
+    let plain = enfilade(&args);
+    assert!(
+        text(&plain.stdout).starts_with(&format!("{length:.2} m")),
+        "{}",
+        text(&plain.stdout)
+    );
+    assert!(text(&plain.stdout).contains("portal-0  into cell-1"));
+}
+
+#[test]
+fn no_path_is_an_error_that_says_why() {
+    let (world, [from, to]) = two_rooms("no_path.glb");
+    let args = ["path", &world, "--from", &from, "--to", &to];
+    for (more, says) in [
+        (["--closed", "0"], "no way"),
+        (["--radius", "9"], "no floor"),
+        (["--closed", "7"], "1 portals"),
+        (["--radius", "0"], "above 0"),
+        (["--step", "-1"], "at least 0"),
+    ] {
+        let more = [format!("{}={}", more[0], more[1])];
+        let done = enfilade(&[&args[..], &[more[0].as_str()]].concat());
+        assert_eq!(done.status.code(), Some(1), "{more:?}");
+        assert!(
+            text(&done.stderr).contains(says),
+            "{more:?}: {}",
+            text(&done.stderr)
+        );
+        assert!(done.stdout.is_empty());
+    }
+}

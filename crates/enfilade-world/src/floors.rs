@@ -1,0 +1,448 @@
+//! Floors: where a walker can stand, and from where to where step.
+//!
+//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009): a floor is the
+//! top of matter that is flat enough and has room for the walker above; a step leads to the floor beside it that is not too much
+//! higher or lower, with room on the way. Floors nearer to a wall or an edge than the walker's radius are left out, by distances
+//! along the floors (Danielsson, "Euclidean distance mapping", 1980). Each floor knows its cell, and a step from cell to cell its
+//! portal: cracks are none for walkers, nor windows with anything in them, nor what is too narrow, too low or above a sill that is no step.
+//!
+//! O(squares covered) memory, about 40 bytes a floor, and a heap's logarithm more time. Walls are up to one square too thick, and
+//! distances up to half a square wrong: a walker may come nearer to a wall than its radius by half a square, and fails at a doorway
+//! that is wider than itself by less than two.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use enfilade_cpg::{CellId, PortalId, PortalKind, World};
+use enfilade_geom::{Aabb, DVec3, Triangle};
+
+use crate::columns::{Span, Squares, spans};
+use crate::layout::Layout;
+
+/// Who walks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agent {
+    /// Keeps so far from walls. [Units: wu] [Limit: above 0]
+    pub radius: f64,
+    /// Needs so much room above the floor. [Units: wu] [Limit: above 0]
+    pub height: f64,
+    /// The highest step, up or down. [Units: wu] [Limit: at least 0]
+    pub step: f64,
+    /// The steepest floor. [Units: rad]
+    pub slope: f64,
+}
+
+impl Default for Agent {
+    /// A grown-up: 0.3 m around, 1.8 m high, steps of 0.4 m, slopes of 45°.
+    fn default() -> Self {
+        Self {
+            radius: 0.3,
+            height: 1.8,
+            step: 0.4,
+            slope: std::f64::consts::FRAC_PI_4,
+        }
+    }
+}
+
+/// No floor.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Squares at most: more make them wider.
+const MAX_SQUARES: f64 = 8e6;
+
+/// Floors outdoors are laid out this far around the rooms. [Units: wu]
+const GROUND: f64 = 30.0;
+
+/// The floors of a world for one walker.
+#[derive(Clone, Debug)]
+pub struct Floors {
+    squares: Squares,
+    /// By square its first floor, and the number of all.
+    first: Vec<u32>,
+    floors: Vec<Floor>,
+    /// Floors of each cell, cell by cell.
+    crossings: Vec<Crossing>,
+    walker: Agent,
+}
+
+/// A place to stand, of one square.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Floor {
+    pub(crate) square: u32,
+    pub(crate) y: f32,
+    pub(crate) cell: CellId,
+    /// The floors beside it: to +x, +z, −x, −z.
+    pub(crate) steps: [u32; 4],
+}
+
+/// A step from one cell to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Crossing {
+    pub(crate) from: u32,
+    pub(crate) direction: u32,
+    pub(crate) portal: PortalId,
+}
+
+/// A floor before all is known of it.
+struct Ground {
+    square: u32,
+    y: f32,
+    ceiling: f32,
+    steps: [u32; 4],
+}
+
+impl Floors {
+    /// Of the structure of a world, without its objects, outdoors included as far as there is ground. Squares are a quarter of the walker's radius
+    /// wide, but wider where there would be more than 8 million; the ground is laid out to 30 m around the rooms.
+    #[must_use]
+    pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
+        let triangles = || {
+            world
+                .batches
+                .iter()
+                .flat_map(|b| triangles_of(&b.primitive))
+        };
+        let bounds = bounds_of(layout, triangles().flatten());
+        let squares = squares_of(&bounds, walker.radius / 4.0);
+        let spans = spans(&squares, triangles(), walker.slope);
+        let mut grounds = grounds(&spans, walker.height as f32);
+        drop(spans);
+        let first = first_of(&squares, grounds.iter().map(|g| g.square));
+        step_from_each(&squares, &first, &mut grounds, &walker);
+        // A square's side is as exact as distances are.
+        let is_clear = clear(&squares, &grounds, walker.radius - 0.5 * squares.side);
+        let mut floors = Self {
+            squares,
+            first: Vec::new(),
+            floors: Vec::new(),
+            crossings: Vec::new(),
+            walker,
+        };
+        floors.keep(layout, &grounds, &is_clear);
+        // What bakes call a window may be an opening with a sill on one side only: there the floor tells. Behind glass, none does.
+        let is_open = |p: PortalId| match layout.opening(p).kind() {
+            PortalKind::Open | PortalKind::Door => true,
+            PortalKind::Window => world.graph[p].fittings.is_empty(),
+            PortalKind::Crack => false,
+        };
+        floors.find_crossings(layout, is_open);
+        floors
+    }
+
+    /// Keeps the floors that are clear and in a cell.
+    fn keep(&mut self, layout: &Layout, grounds: &[Ground], is_clear: &[bool]) {
+        let mut number = vec![NONE; grounds.len()];
+        for (i, ground) in grounds.iter().enumerate().filter(|g| is_clear[g.0]) {
+            let at = self.center(ground.square, f64::from(ground.y));
+            // Doors are as high as walkers; what is at the feet may be the matter of a step.
+            let heights = [0.5, 0.25, 0.75].map(|share| DVec3::Y * share * self.walker.height);
+            if let Some(cell) = heights.into_iter().find_map(|up| layout.locate(at + up)) {
+                number[i] = self.floors.len() as u32;
+                self.floors.push(Floor {
+                    square: ground.square,
+                    y: ground.y,
+                    cell,
+                    steps: ground.steps,
+                });
+            }
+        }
+        for floor in &mut self.floors {
+            let to = |s: u32| number.get(s as usize).copied().unwrap_or(NONE);
+            floor.steps = floor.steps.map(to);
+        }
+        self.first = first_of(&self.squares, self.floors.iter().map(|f| f.square));
+    }
+
+    /// Finds the portals of steps from cell to cell; takes away those through none.
+    fn find_crossings(&mut self, layout: &Layout, is_open: impl Fn(PortalId) -> bool) {
+        for i in 0..self.floors.len() as u32 {
+            for direction in 0..2 {
+                let floor = self.floors[i as usize];
+                let to = floor.steps[direction as usize];
+                if to == NONE || self.floors[to as usize].cell == floor.cell {
+                    continue;
+                }
+                let other = self.floors[to as usize];
+                let middle =
+                    (self.point(i) + self.point(to)) * 0.5 + DVec3::Y * 0.5 * self.walker.height;
+                let near = |p: &PortalId| layout.opening(*p).bounds().distance_squared(middle);
+                let between = layout.exits(floor.cell).iter();
+                let open = between.filter(|e| e.to == other.cell && is_open(e.portal));
+                let nearest = open.min_by(|a, b| near(&a.portal).total_cmp(&near(&b.portal)));
+                let is_there = |p: &PortalId| near(p) <= self.walker.radius.powi(2);
+                let portal = nearest.map(|e| e.portal).filter(is_there);
+                match portal {
+                    Some(portal) => {
+                        let back = direction + 2;
+                        self.crossings.push(Crossing {
+                            from: i,
+                            direction,
+                            portal,
+                        });
+                        self.crossings.push(Crossing {
+                            from: to,
+                            direction: back,
+                            portal,
+                        });
+                    }
+                    None => {
+                        self.floors[i as usize].steps[direction as usize] = NONE;
+                        self.floors[to as usize].steps[direction as usize + 2] = NONE;
+                    }
+                }
+            }
+        }
+        self.crossings.sort_unstable();
+    }
+
+    /// How many there are: squares, some above one another.
+    #[must_use]
+    pub fn n_floors(&self) -> usize {
+        self.floors.len()
+    }
+
+    /// For whom they are.
+    #[must_use]
+    pub fn walker(&self) -> &Agent {
+        &self.walker
+    }
+
+    pub(crate) fn squares(&self) -> &Squares {
+        &self.squares
+    }
+
+    pub(crate) fn floor(&self, floor: u32) -> &Floor {
+        &self.floors[floor as usize]
+    }
+
+    pub(crate) fn crossings(&self) -> &[Crossing] {
+        &self.crossings
+    }
+
+    /// The middle of a floor. [Units: wu]
+    pub(crate) fn point(&self, floor: u32) -> DVec3 {
+        let floor = self.floor(floor);
+        self.center(floor.square, f64::from(floor.y))
+    }
+
+    fn center(&self, square: u32, y: f64) -> DVec3 {
+        let Squares { origin, side, n } = self.squares;
+        let at = [square as usize % n[0], square as usize / n[0]];
+        let [x, z] = [0, 1].map(|k| origin[k] + (at[k] as f64 + 0.5) * side);
+        DVec3::new(x, y, z)
+    }
+
+    /// The floor that someone stands on whose feet, or any part up to the head, are at a point; the nearest one within the walker's
+    /// diameter in plan, where the point is nearer to a wall than walkers get. `None` where there is none. [Units: wu]
+    pub(crate) fn below(&self, p: DVec3) -> Option<u32> {
+        let reach = (2.0 * self.walker.radius / self.squares.side).ceil() as isize;
+        let is_near = |k: usize| {
+            let x = self.squares.along(p)[k];
+            x > -(reach as f64) && x < self.squares.n[k] as f64 + reach as f64
+        };
+        if !(is_near(0) && is_near(1) && p.y.is_finite()) {
+            return None;
+        }
+        let [x, z] = self.squares.along(p).map(|x| x.floor() as isize);
+        let mut best: Option<(f64, u32)> = None;
+        for dz in -reach..=reach {
+            for dx in -reach..=reach {
+                let at = [x + dx, z + dz];
+                let is_in = |k: usize| at[k] >= 0 && (at[k] as usize) < self.squares.n[k];
+                if !(is_in(0) && is_in(1)) {
+                    continue;
+                }
+                let square = self.squares.number(at.map(|x| x as usize));
+                for floor in self.first[square]..self.first[square + 1] {
+                    let q = self.point(floor);
+                    let down = p.y - q.y;
+                    if down < -self.walker.step || down > self.walker.height {
+                        continue;
+                    }
+                    // Anywhere in its own square it is on the floor.
+                    let beside = (q - p).with_y(0.0).length() * f64::from(dx != 0 || dz != 0);
+                    let away = beside + down.abs() * 0.5;
+                    if best.is_none_or(|b| away < b.0) {
+                        best = Some((away, floor));
+                    }
+                }
+            }
+        }
+        best.map(|b| b.1)
+    }
+
+    /// The portal of a step from cell to cell.
+    pub(crate) fn portal_of(&self, from: u32, direction: usize) -> Option<PortalId> {
+        let key = (from, direction as u32);
+        let i = self
+            .crossings
+            .partition_point(|c| (c.from, c.direction) < key);
+        let crossing = self.crossings.get(i)?;
+        ((crossing.from, crossing.direction) == key).then_some(crossing.portal)
+    }
+
+    /// The floor beside one, if a step leads there that `may_pass` lets through: it is asked where cells change.
+    #[inline]
+    pub(crate) fn step(
+        &self,
+        from: u32,
+        direction: usize,
+        may_pass: &mut impl FnMut(PortalId) -> bool,
+    ) -> Option<u32> {
+        let floor = self.floor(from);
+        let to = floor.steps[direction];
+        if to == NONE {
+            return None;
+        }
+        let is_open = self.floor(to).cell == floor.cell
+            || self.portal_of(from, direction).is_some_and(may_pass);
+        is_open.then_some(to)
+    }
+}
+
+fn triangles_of(primitive: &enfilade_geom::scene::Primitive) -> impl Iterator<Item = Triangle> {
+    let corner = |i: u32| {
+        let p = primitive.positions[i as usize];
+        DVec3::from_array(p.map(f64::from))
+    };
+    (primitive.indices.chunks_exact(3)).map(move |t| [corner(t[0]), corner(t[1]), corner(t[2])])
+}
+
+/// Around all corners, but not far from the rooms: there may be a sky.
+fn bounds_of(layout: &Layout, corners: impl Iterator<Item = DVec3>) -> Aabb {
+    let finite = corners.filter(|p| p.is_finite());
+    let all = finite.fold(Aabb::EMPTY, Aabb::including);
+    let cells = (0..layout.n_cells() as u32).map(|c| layout.cell(CellId(c)));
+    let rooms = cells.filter(|c| !c.is_outdoor);
+    let rooms = rooms.fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
+    if rooms.is_empty() {
+        all
+    } else {
+        all.intersection(rooms.expanded(GROUND))
+    }
+}
+
+fn squares_of(bounds: &Aabb, side: f64) -> Squares {
+    let size = bounds.size().max(DVec3::ZERO);
+    let least = (size.x * size.z / MAX_SQUARES).sqrt();
+    let side = side.max(least).max(1e-3);
+    let n = |size: f64| (size / side).floor() as usize + 1;
+    let origin = if bounds.is_empty() {
+        [0.0; 2]
+    } else {
+        [bounds.min.x, bounds.min.z]
+    };
+    Squares {
+        origin,
+        side,
+        n: [n(size.x), n(size.z)],
+    }
+}
+
+fn grounds(spans: &[Span], height: f32) -> Vec<Ground> {
+    let above = spans.iter().skip(1).map(Some).chain([None]);
+    let all = spans.iter().zip(above).filter(|(s, _)| s.is_floor);
+    all.filter_map(|(span, above)| {
+        let above = above.filter(|a| a.square == span.square);
+        let ceiling = above.map_or(f32::INFINITY, |a| a.low);
+        (ceiling - span.high >= height).then_some(Ground {
+            square: span.square,
+            y: span.high,
+            ceiling,
+            steps: [NONE; 4],
+        })
+    })
+    .collect()
+}
+
+fn first_of(squares: &Squares, floors: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut first = vec![0; squares.n[0] * squares.n[1] + 1];
+    for square in floors {
+        first[square as usize + 1] += 1;
+    }
+    for i in 1..first.len() {
+        first[i] += first[i - 1];
+    }
+    first
+}
+
+/// Links each floor with the nearest in height beside it.
+fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walker: &Agent) {
+    for i in 0..grounds.len() {
+        let Ground {
+            square, y, ceiling, ..
+        } = grounds[i];
+        let at = [
+            square as usize % squares.n[0],
+            square as usize / squares.n[0],
+        ];
+        for (direction, axis) in [(0, 0), (1, 1)] {
+            let mut to = at;
+            to[axis] += 1;
+            if to[axis] == squares.n[axis] {
+                continue;
+            }
+            let to = squares.number(to);
+            let beside = (first[to]..first[to + 1]).filter(|&j| {
+                let other = &grounds[j as usize];
+                let room = ceiling.min(other.ceiling) - y.max(other.y);
+                (other.y - y).abs() <= walker.step as f32 && room >= walker.height as f32
+            });
+            let rise = |j: &u32| (grounds[*j as usize].y - y).abs();
+            if let Some(j) = beside.min_by(|a, b| rise(a).total_cmp(&rise(b))) {
+                // One that two lead to is beside the nearer one.
+                let other = grounds[j as usize].steps[direction + 2];
+                if other != NONE {
+                    if rise(&other) <= rise(&j) {
+                        continue;
+                    }
+                    grounds[other as usize].steps[direction] = NONE;
+                }
+                grounds[i].steps[direction] = j;
+                grounds[j as usize].steps[direction + 2] = i as u32;
+            }
+        }
+    }
+}
+
+/// Which floors are at least `radius` from where no step leads on.
+fn clear(squares: &Squares, grounds: &[Ground], radius: f64) -> Vec<bool> {
+    // From each floor to the nearest border, in half squares.
+    let mut offset = vec![[i16::MAX / 4; 2]; grounds.len()];
+    let length = |v: [i16; 2]| i32::from(v[0]).pow(2) + i32::from(v[1]).pow(2);
+    let directions: [[i16; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
+    let mut heap = BinaryHeap::new();
+    for (i, ground) in grounds.iter().enumerate() {
+        if let Some(d) = ground.steps.iter().position(|&s| s == NONE) {
+            offset[i] = directions[d];
+            heap.push(Reverse((1, i as u32)));
+        }
+    }
+    let reach = (2.0 * radius / squares.side).max(0.0);
+    while let Some(Reverse((far, i))) = heap.pop() {
+        let own = offset[i as usize];
+        if far > length(own) || f64::from(far).sqrt() >= reach {
+            continue;
+        }
+        let steps = grounds[i as usize].steps;
+        for (direction, &to) in steps.iter().enumerate() {
+            if to == NONE {
+                continue;
+            }
+            // Along the diagonal, too, or distances would be those of streets and blocks.
+            let turn = grounds[to as usize].steps[(direction + 1) % 4];
+            let [a, b] = [direction, (direction + 1) % 4].map(|d| directions[d]);
+            let straight = [own[0] - 2 * a[0], own[1] - 2 * a[1]];
+            let slanted = [straight[0] - 2 * b[0], straight[1] - 2 * b[1]];
+            for (to, v) in [(to, straight), (turn, slanted)] {
+                if to != NONE && length(v) < length(offset[to as usize]) {
+                    offset[to as usize] = v;
+                    heap.push(Reverse((length(v), to)));
+                }
+            }
+        }
+    }
+    (offset.iter())
+        .map(|&v| f64::from(length(v)).sqrt() >= reach)
+        .collect()
+}

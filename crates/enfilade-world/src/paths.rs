@@ -1,0 +1,423 @@
+//! Paths for walkers: from point to point, any angle, and what is near along ways one can walk.
+//!
+//! Two levels, as in Botea, Müller & Schaeffer ("Near optimal hierarchical path-finding", 2004), but with cells and portals for
+//! clusters and entrances: lengths between the portals of each cell are found once, over its [floors](Floors), so that a wall within
+//! a cell is walked around; a path asks the [length search](LengthSearch) for the best sequences of portals, finds the way over the
+//! floors of their cells only, and pulls it taut: each bend moves straight towards the line between its neighbors as far as the
+//! floors allow, until none moves. Of the best few sequences the shortest is taken.
+//!
+//! The path keeps the walker's radius from walls as [floors](Floors) do, and is never shorter than the shortest such path. It may be
+//! longer where it is caught on the other side of something that stands free in a cell, or where two sequences are nearly as short.
+//! O(floors of the cells passed), then milliseconds at most for a storey.
+
+use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_geom::DVec3;
+
+use crate::floors::{Agent, Floors};
+use crate::layout::{Exit, Layout};
+use crate::pull::{Bend, pull_taut};
+use crate::search::{Arrival, LengthSearch, Ways};
+use crate::strides::{Strides, walk_straight};
+
+/// Where one walker can go in a world. Made once, read by all searches.
+#[derive(Clone, Debug)]
+pub struct WalkMap {
+    floors: Floors,
+    ways: Ways,
+    /// By point of the ways, the floors on either side of the portal: in its first cell, in its second.
+    sides: Vec<[u32; 2]>,
+}
+
+/// Points of a portal that walkers cross it at are so far from each other. [Units: wu]
+///
+/// In doorways there are two or three; taut paths through a gate of 10 m bend by less than a hundredth more for it.
+const SPACING: f64 = 1.0;
+
+impl WalkMap {
+    /// Of the structure of a world, without its objects. Seconds for a large building: the floors are laid out in squares of a
+    /// quarter of the walker's radius, and each cell's walked from each of its portals.
+    #[must_use]
+    pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
+        let floors = Floors::new(layout, world, walker);
+        let mut chosen: Vec<(PortalId, [u32; 2])> = Vec::new();
+        let mut by_portal: Vec<(PortalId, u32, u32)> = Vec::new();
+        for c in floors.crossings().iter().filter(|c| c.direction < 2) {
+            let to = floors.floor(c.from).steps[c.direction as usize];
+            by_portal.push((c.portal, c.from, to));
+        }
+        by_portal.sort_unstable();
+        for all in by_portal.chunk_by(|a, b| a.0 == b.0) {
+            choose_points(&floors, all, |from, to| {
+                let first = layout.opening(all[0].0).cells()[0];
+                let is_turned = floors.floor(from).cell != first;
+                let pair = if is_turned { [to, from] } else { [from, to] };
+                chosen.push((all[0].0, pair));
+            });
+        }
+        let mut ways = Ways::with_points(layout, |portal, points| {
+            let first = chosen.partition_point(|c| c.0 < portal);
+            let own = chosen[first..].iter().take_while(|c| c.0 == portal);
+            points.extend(own.map(|(_, [a, b])| (floors.point(*a) + floors.point(*b)) * 0.5));
+        });
+        let sides = chosen.iter().map(|c| c.1).collect();
+        let mut map = Self {
+            floors,
+            ways: ways.clone(),
+            sides,
+        };
+        let mut strides = Strides::default();
+        for cell in (0..layout.n_cells() as u32).map(CellId) {
+            let mut lengths = Vec::new();
+            map.each_point(layout, cell, |from| {
+                strides.spread(&map.floors, from, None);
+                map.each_point(layout, cell, |to| {
+                    lengths.push(strides.length(to) + map.floors.squares().side);
+                });
+            });
+            ways.set_lengths(cell, lengths);
+        }
+        map.ways = ways;
+        map
+    }
+
+    /// Calls `visit` with the points of a cell, in the order of its ways: the floors on its side.
+    fn each_point(&self, layout: &Layout, cell: CellId, mut visit: impl FnMut(u32)) {
+        for exit in layout.exits(cell) {
+            let side = usize::from(layout.opening(exit.portal).cells()[1] == cell);
+            for k in self.ways.range(exit.portal) {
+                visit(self.sides[k as usize][side]);
+            }
+        }
+    }
+
+    /// The floors that it is made of.
+    #[must_use]
+    pub fn floors(&self) -> &Floors {
+        &self.floors
+    }
+
+    /// Its points and lengths, for searches of one's own.
+    #[must_use]
+    pub fn ways(&self) -> &Ways {
+        &self.ways
+    }
+
+    /// Whether the walker fits through a portal: wide and high enough, no window or crack, with floors on both sides.
+    #[must_use]
+    pub fn is_walkable(&self, portal: PortalId) -> bool {
+        !self.ways.points(portal).is_empty()
+    }
+}
+
+/// Of all steps through a portal, calls `choose` with some.
+fn choose_points(floors: &Floors, all: &[(PortalId, u32, u32)], mut choose: impl FnMut(u32, u32)) {
+    let mut points: Vec<(DVec3, u32, u32)> = (all.iter())
+        .map(|&(_, a, b)| ((floors.point(a) + floors.point(b)) * 0.5, a, b))
+        .collect();
+    let low = points.iter().fold(DVec3::INFINITY, |m, p| m.min(p.0));
+    let high = points.iter().fold(DVec3::NEG_INFINITY, |m, p| m.max(p.0));
+    let axis = if (high - low).x > (high - low).z {
+        0
+    } else {
+        2
+    };
+    // Storey by storey, along the portal.
+    let key = |p: &(DVec3, u32, u32)| ((p.0.y / floors.walker().height).round(), p.0[axis]);
+    points.sort_by(|a, b| {
+        key(a)
+            .partial_cmp(&key(b))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let gap = 4.0 * floors.squares().side + floors.walker().step;
+    for group in points.chunk_by(|a, b| a.0.distance(b.0) < gap) {
+        let length = group[0].0.distance(group[group.len() - 1].0);
+        let n = ((length / SPACING).ceil() as usize).clamp(1, group.len());
+        // At the middle of each part, and at both ends.
+        for i in 0..=2 * n {
+            let is_wanted = i % 2 == 1 || (length > 0.2 && (i == 0 || i == 2 * n));
+            if is_wanted {
+                let (_, a, b) = group[i * (group.len() - 1) / (2 * n)];
+                choose(a, b);
+            }
+        }
+    }
+}
+
+/// A path that was found. Kept to be used again, so that a search need not allocate.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    /// Where it bends, in plan or in height: on the floor, from the start to the end. [Units: wu]
+    pub points: Vec<DVec3>,
+    /// The portals that it passes, each with the cell entered.
+    pub portals: Vec<Exit>,
+    /// Of the line through the points. [Units: wu]
+    pub length: f64,
+    /// The same in plan. [Units: wu]
+    pub length_in_plan: f64,
+}
+
+/// Why there is no path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoPath {
+    /// The walker cannot stand there.
+    #[error("no floor for a walker within its height and diameter of the start")]
+    NoFloorAtStart,
+    /// The walker cannot stand there.
+    #[error("no floor for a walker within its height and diameter of the end")]
+    NoFloorAtEnd,
+    /// Walls, steps, gaps or closed portals are between them.
+    #[error("no way that a walker can go")]
+    NoWay,
+}
+
+/// Searches for paths, with buffers that are used again: it allocates nothing once they have grown.
+#[derive(Clone, Debug, Default)]
+pub struct PathSearch {
+    search: LengthSearch,
+    strides: Strides,
+    arrivals: Vec<Arrival>,
+    /// By point of a cell.
+    lengths: Vec<f64>,
+    legs: Vec<(u32, u32)>,
+    floors: Vec<u32>,
+    bends: Vec<Bend>,
+    best: Vec<Bend>,
+    profile: Vec<DVec3>,
+    kept: Vec<(usize, usize)>,
+}
+
+/// Sequences of portals that are pulled taut, at most.
+const N_SEQUENCES: usize = 4;
+/// No longer than the best by this factor, as found square by square.
+const MOST: f64 = 1.06;
+
+impl PathSearch {
+    /// Without buffers yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Finds the path from one point to another through the portals that `may_pass` lets through: doors that are open, say. Points are at
+    /// the walker's feet, or any height up to its head. [Units: wu]
+    ///
+    /// # Errors
+    ///
+    /// When the walker cannot stand at an end, or there is no way; `path` is then empty.
+    pub fn find(
+        &mut self,
+        map: &WalkMap,
+        layout: &Layout,
+        [from, to]: [DVec3; 2],
+        mut may_pass: impl FnMut(PortalId) -> bool,
+        path: &mut Path,
+    ) -> Result<(), NoPath> {
+        path.points.clear();
+        path.portals.clear();
+        (path.length, path.length_in_plan) = (0.0, 0.0);
+        let floors = &map.floors;
+        let start = self.within(map, layout, from, f64::INFINITY, &mut may_pass)?;
+        let goal = floors.below(to).ok_or(NoPath::NoFloorAtEnd)?;
+        self.arrive(map, layout, start, goal);
+        let mut least = f64::INFINITY;
+        for i in 0..self.arrivals.len() {
+            let arrival = self.arrivals[i];
+            self.lay_out(map, layout, start, goal, &arrival);
+            self.set_bends(floors, [(from, start), (to, goal)]);
+            pull_taut(floors, &mut self.bends, &mut may_pass);
+            let legs = self.bends.windows(2);
+            let length: f64 = legs.map(|w| w[0].0.distance(w[1].0)).sum();
+            if length < least {
+                least = length;
+                std::mem::swap(&mut self.best, &mut self.bends);
+            }
+        }
+        if least == f64::INFINITY {
+            return Err(NoPath::NoWay);
+        }
+        self.write(floors, &mut may_pass, path);
+        Ok(())
+    }
+
+    /// Searches from a point as far as `radius`; the floor that it is on.
+    fn within(
+        &mut self,
+        map: &WalkMap,
+        layout: &Layout,
+        from: DVec3,
+        radius: f64,
+        may_pass: &mut impl FnMut(PortalId) -> bool,
+    ) -> Result<u32, NoPath> {
+        let start = map.floors.below(from).ok_or(NoPath::NoFloorAtStart)?;
+        let cell = map.floors.floor(start).cell;
+        self.measure(map, layout, start);
+        let lengths = &self.lengths;
+        self.search.run_from(
+            &map.ways,
+            cell,
+            map.floors.point(start),
+            |place, _| lengths[place],
+            radius,
+            |exit| may_pass(exit.portal).then_some(0.0),
+        );
+        Ok(start)
+    }
+
+    /// Finds what is within `radius` of a point along ways one can walk, for maps and radars: the cells, ascending by the length to
+    /// the nearest portal that leads in, the point's own first. Then ask for the [distances](Self::distance) of things. [Units: wu]
+    ///
+    /// # Errors
+    ///
+    /// When the walker cannot stand there.
+    pub fn cells_within(
+        &mut self,
+        map: &WalkMap,
+        layout: &Layout,
+        from: DVec3,
+        radius: f64,
+        mut may_pass: impl FnMut(PortalId) -> bool,
+    ) -> Result<&[(CellId, f64)], NoPath> {
+        self.within(map, layout, from, radius, &mut may_pass)?;
+        Ok(self.search.cells())
+    }
+
+    /// How far it is to a point from where [`PathSearch::cells_within`] started, along ways that it reached; `None` where the walker
+    /// cannot stand or was not led to. Square by square, so up to 3 % too long. [Units: wu]
+    pub fn distance(&mut self, map: &WalkMap, layout: &Layout, to: DVec3) -> Option<f64> {
+        let goal = map.floors.below(to)?;
+        let (cell, from) = self.search.start()?;
+        let start = map
+            .floors
+            .below(from)
+            .filter(|_| cell == map.floors.floor(goal).cell);
+        self.arrive(map, layout, start.unwrap_or(goal), goal);
+        self.arrivals.first().map(|a| a.length)
+    }
+
+    /// Lengths from a floor to the points of its cell.
+    fn measure(&mut self, map: &WalkMap, layout: &Layout, from: u32) {
+        let half = 0.5 * map.floors.squares().side;
+        self.strides.spread(&map.floors, from, None);
+        self.lengths.clear();
+        map.each_point(layout, map.floors.floor(from).cell, |floor| {
+            self.lengths.push(self.strides.length(floor) + half);
+        });
+    }
+
+    /// The best sequences to a floor.
+    fn arrive(&mut self, map: &WalkMap, layout: &Layout, start: u32, goal: u32) {
+        self.measure(map, layout, goal);
+        let cell = map.floors.floor(goal).cell;
+        // For the start, where that is in the same cell.
+        self.lengths.push(self.strides.length(start));
+        let lengths = &self.lengths;
+        self.search.arrivals_by(
+            &map.ways,
+            cell,
+            map.floors.point(goal),
+            |place, _| lengths[place],
+            MOST,
+            N_SEQUENCES,
+            &mut self.arrivals,
+        );
+    }
+
+    /// The floors of a way, square by square.
+    fn lay_out(
+        &mut self,
+        map: &WalkMap,
+        layout: &Layout,
+        start: u32,
+        goal: u32,
+        arrival: &Arrival,
+    ) {
+        self.legs.clear();
+        for (exit, k) in self.search.back(&map.ways, arrival) {
+            let into = usize::from(layout.opening(exit.portal).cells()[1] == exit.to);
+            let sides = map.sides[k as usize];
+            self.legs.push((sides[1 - into], sides[into]));
+        }
+        self.legs.reverse();
+        self.floors.clear();
+        self.floors.push(start);
+        let mut at = start;
+        for i in 0..=self.legs.len() {
+            let (end, next) = self.legs.get(i).copied().unwrap_or((goal, goal));
+            self.strides.spread(&map.floors, at, Some(end));
+            let first = self.floors.len();
+            self.floors.extend(self.strides.back(end));
+            self.floors[first..].reverse();
+            if next != end {
+                self.floors.push(next);
+            }
+            at = next;
+        }
+    }
+
+    /// The bends of the way: all of its floors, less those that straight lines pass over.
+    fn set_bends(&mut self, floors: &Floors, [first, last]: [Bend; 2]) {
+        self.bends.clear();
+        let point = |i: usize| (floors.point(self.floors[i]), self.floors[i]);
+        self.bends.extend((0..self.floors.len()).map(point));
+        // The ends are where they were asked for, if that is on the floor at all.
+        for (bend, wanted) in [(0, first), (self.bends.len() - 1, last)] {
+            let at = floors.squares().at(wanted.0);
+            let is_on = at.is_some_and(|at| {
+                floors.squares().number(at) == floors.floor(wanted.1).square as usize
+            });
+            if is_on {
+                self.bends[bend].0 = wanted.0.with_y(self.bends[bend].0.y);
+            }
+        }
+    }
+
+    /// Writes the best path with its portals, and with bends where the floor rises or falls.
+    fn write(
+        &mut self,
+        floors: &Floors,
+        may_pass: &mut impl FnMut(PortalId) -> bool,
+        path: &mut Path,
+    ) {
+        let up = |p: DVec3, floor: u32| p.with_y(f64::from(floors.floor(floor).y));
+        path.points.push(self.best[0].0);
+        for i in 1..self.best.len() {
+            let [start, (b, _)] = [self.best[i - 1], self.best[i]];
+            let a = start.0;
+            let along = (b - a).with_y(0.0);
+            self.profile.clear();
+            self.profile.push(a);
+            walk_straight(floors, start, b, may_pass, |from, direction, to| {
+                let middle = (floors.point(from) + floors.point(to)) * 0.5 - a;
+                let t = middle.with_y(0.0).dot(along) / along.length_squared();
+                self.profile.push(up(a + along * t.clamp(0.0, 1.0), to));
+                let (portal, cell) = (floors.portal_of(from, direction), floors.floor(to).cell);
+                path.portals
+                    .extend(portal.map(|portal| Exit { portal, to: cell }));
+            });
+            self.profile.push(b);
+            self.keep_profile(0.5 * floors.walker().step, &mut path.points);
+        }
+        let legs = || path.points.windows(2).map(|w| w[1] - w[0]);
+        path.length = legs().map(DVec3::length).sum();
+        path.length_in_plan = legs().map(|v| v.with_y(0.0).length()).sum();
+    }
+
+    /// Adds the points of the profile, but for the first, that are needed for heights exact to `most` (Douglas & Peucker 1973).
+    fn keep_profile(&mut self, most: f64, points: &mut Vec<DVec3>) {
+        self.kept.clear();
+        self.kept.push((0, self.profile.len() - 1));
+        while let Some((a, b)) = self.kept.pop() {
+            let (p, q) = (self.profile[a], self.profile[b]);
+            let length = (q - p).with_y(0.0).length();
+            let off = |i: usize| {
+                let t = (self.profile[i] - p).with_y(0.0).length() / length.max(1e-9);
+                (self.profile[i].y - (p.y + (q.y - p.y) * t)).abs()
+            };
+            let worst = (a + 1..b).max_by(|&i, &j| off(i).total_cmp(&off(j)));
+            match worst.filter(|&i| off(i) > most) {
+                Some(i) => self.kept.extend([(i, b), (a, i)]),
+                None => points.push(q),
+            }
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Ways over floors, pulled taut.
+//!
+//! A way that a search found square by square bends where squares do. Each bend is moved straight towards the line between its
+//! neighbors, as far as floors allow, by halving; where a line is caught on the way, as a string is at a corner, it gets a bend more; what
+//! a straight line passes is taken away. No step makes the way longer, so that it ends; it ends at a way that is the shortest of those
+//! it can be pulled to without leaving the floors. O(rounds · bends · squares along them).
+
+use enfilade_cpg::PortalId;
+use enfilade_geom::DVec3;
+
+use crate::floors::Floors;
+use crate::strides::walk_straight;
+
+/// A point of a way, and the floor that it is on.
+pub(crate) type Bend = (DVec3, u32);
+
+/// Rounds of moving bends, at most; most ways are taut after three.
+const ROUNDS: usize = 10;
+/// Bends of a way, at most, while it is pulled.
+const MAX_BENDS: usize = 256;
+
+/// Pulls a way taut: takes away bends that straight lines pass, and moves the others towards the line between their neighbors. What
+/// a line is caught at on the way becomes a bend.
+pub(crate) fn pull_taut(
+    floors: &Floors,
+    bends: &mut Vec<Bend>,
+    may_pass: &mut impl FnMut(PortalId) -> bool,
+) {
+    drop_bends(floors, bends, may_pass);
+    for _ in 0..ROUNDS {
+        let mut shorter = 0.0;
+        let mut i = 1;
+        while i + 1 < bends.len() {
+            shorter += move_bend(floors, bends, i, may_pass);
+            i += 1 + catch(floors, bends, i, may_pass);
+        }
+        // Between what they are caught at, bends come free.
+        for i in 1..bends.len().saturating_sub(1) {
+            shorter += move_bend(floors, bends, i, may_pass);
+        }
+        drop_bends(floors, bends, may_pass);
+        if shorter < 1e-4 {
+            break;
+        }
+    }
+}
+
+/// Adds bends where the lines to a bend's neighbors are caught if it moves a little on; how many.
+fn catch(
+    floors: &Floors,
+    bends: &mut Vec<Bend>,
+    i: usize,
+    may_pass: &mut impl FnMut(PortalId) -> bool,
+) -> usize {
+    let [a, b, c] = [bends[i - 1], bends[i], bends[i + 1]];
+    let target = toward(a.0, b.0, c.0);
+    let side = floors.squares().side;
+    let far = (target - b.0).with_y(0.0).length();
+    if far < side || bends.len() + 2 > MAX_BENDS {
+        return 0;
+    }
+    let p = b.0.lerp(target, (side / far).min(1.0));
+    let mut n = 0;
+    // From either neighbor: the last floor before what is in the way, and the line that is clear of it.
+    for (from, at) in [(c, i + 1), (a, i)] {
+        let mut last = from.1;
+        let end = walk_straight(floors, from, p, may_pass, |_, _, to| last = to);
+        if end.is_some() {
+            continue;
+        }
+        let line = (b.0 - from.0).with_y(0.0);
+        // A little beyond, or it would be caught there itself.
+        let t = (floors.point(last) - from.0).with_y(0.0).dot(line) / line.length_squared()
+            + 1.5 * side / line.length();
+        let caught = from.0 + line * t;
+        let is_between =
+            t > 0.0 && t < 1.0 && caught.distance(from.0).min(caught.distance(b.0)) > side;
+        if is_between && let Some(floor) = straight(floors, from, caught, may_pass) {
+            bends.insert(at, (caught.with_y(floors.point(floor).y), floor));
+            n += 1;
+        }
+    }
+    n
+}
+
+/// The point of the line between two, in plan, that is nearest to a third.
+fn toward(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
+    let line = (c - a).with_y(0.0);
+    let t = (b - a).with_y(0.0).dot(line) / line.length_squared().max(1e-12);
+    a + line * t.clamp(0.0, 1.0)
+}
+
+fn straight(
+    floors: &Floors,
+    from: Bend,
+    to: DVec3,
+    may_pass: &mut impl FnMut(PortalId) -> bool,
+) -> Option<u32> {
+    walk_straight(floors, from, to, may_pass, |_, _, _| {})
+}
+
+/// Takes away all bends that a straight line passes, from the start on.
+fn drop_bends(floors: &Floors, bends: &mut Vec<Bend>, may_pass: &mut impl FnMut(PortalId) -> bool) {
+    let mut n_kept = 1;
+    for i in 1..bends.len() {
+        let next = bends.get(i + 1).copied();
+        let can_skip = next.is_some_and(|next| {
+            straight(floors, bends[n_kept - 1], next.0, may_pass) == Some(next.1)
+        });
+        if !can_skip {
+            bends[n_kept] = bends[i];
+            n_kept += 1;
+        }
+    }
+    bends.truncate(n_kept);
+}
+
+/// Moves a bend as far towards the line between its neighbors as the floors allow; how much shorter the way is then.
+fn move_bend(
+    floors: &Floors,
+    bends: &mut [Bend],
+    i: usize,
+    may_pass: &mut impl FnMut(PortalId) -> bool,
+) -> f64 {
+    let [a, b, c] = [bends[i - 1], bends[i], bends[i + 1]];
+    let target = toward(a.0, b.0, c.0);
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut best = b;
+    let mut share = 1.0;
+    for _ in 0..8 {
+        let p = b.0.lerp(target, share);
+        let floor = straight(floors, a, p, may_pass);
+        let fits = floor.filter(|&f| straight(floors, (p, f), c.0, may_pass) == Some(c.1));
+        match fits {
+            Some(floor) => {
+                best = (p.with_y(floors.point(floor).y), floor);
+                low = share;
+            }
+            None => high = share,
+        }
+        if low == 1.0 {
+            break;
+        }
+        share = 0.5 * (low + high);
+    }
+    bends[i] = best;
+    let plan = |p: DVec3, q: DVec3| (p - q).with_y(0.0).length();
+    plan(a.0, b.0) + plan(b.0, c.0) - plan(a.0, best.0) - plan(best.0, c.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::floors::Agent;
+    use crate::layout::Layout;
+    use enfilade_cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, World};
+    use enfilade_geom::Aabb;
+    use enfilade_geom::scene::Primitive;
+
+    #[test]
+    fn a_slack_way_is_pulled_to_the_corner() {
+        let [low, high] = [DVec3::new(0.0, -1.0, 0.0), DVec3::new(10.0, 3.0, 10.0)];
+        let floor = Aabb::new(low, high.with_y(0.0));
+        let block = Aabb::new(DVec3::new(4.0, 0.0, 0.0), DVec3::new(6.0, 3.0, 4.0));
+        let corners = [floor, block].map(|b| b.triangles()).concat().concat();
+        let positions: Vec<[f32; 3]> = corners.iter().map(|p| p.as_vec3().to_array()).collect();
+        let mut world = World::default();
+        world.batches.push(Batch {
+            cells: vec![CellId(0)],
+            primitive: Primitive {
+                indices: (0..positions.len() as u32).collect(),
+                positions,
+                ..Primitive::default()
+            },
+            ..Batch::default()
+        });
+        world.graph = CellPortalGraph {
+            cells: vec![Cell::default()],
+            locator: Locator {
+                bounds: Aabb::new(low, high),
+                root: Locator::leaf(Some(CellId(0))),
+                ..Locator::default()
+            },
+            ..CellPortalGraph::default()
+        };
+        let floors = Floors::new(&Layout::new(&world), &world, Agent::default());
+        let on = |x: f64, z: f64| {
+            let p = DVec3::new(x, 0.0, z);
+            (p, floors.below(p).unwrap())
+        };
+        let mut bends = vec![on(2.0, 2.0), on(5.0, 8.0), on(8.0, 2.0)];
+        pull_taut(&floors, &mut bends, &mut |_| true);
+        let length: f64 = bends.windows(2).map(|w| w[0].0.distance(w[1].0)).sum();
+        // Tangents to circles about both corners, short arcs, and the side between.
+        let least =
+            2.0 * (8.0_f64 - 0.09).sqrt() + 2.0 + 2.0 * 0.3 * (45.0_f64.to_radians() + 0.106);
+        assert!(
+            length > least - 0.06 && length < least + 0.1,
+            "{length} {least}"
+        );
+    }
+}

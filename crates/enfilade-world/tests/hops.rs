@@ -1,0 +1,150 @@
+//! Distances and next portals against Dijkstra's algorithm on all cells (W10).
+//!
+//! Covers W10.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use enfilade_cpg::{Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, World};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_world::{Exit, Hops, Layout};
+
+/// Cells joined by chance: trees, rings, chains, cells joined twice, cells on their own.
+fn graph_by_chance(n: usize, n_links: usize, seed: u64) -> Layout {
+    let mut rng = Rng::new(seed);
+    let mut cells: Vec<Cell> = (0..n).map(|_| Cell::default()).collect();
+    let mut portals = Vec::new();
+    for i in 0..n_links {
+        let a = rng.below(n);
+        // Mostly near ones, so that there are chains.
+        let reach = if rng.chance(0.7) { 3 } else { n - 1 };
+        let b = (a + 1 + rng.below(reach)) % n;
+        let z = i as f32;
+        let outline = vec![[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
+        portals.push(Portal {
+            cells: [a, b].map(|c| CellId(c as u32)),
+            kind: PortalKind::Open,
+            normal: [0.0, 0.0, 1.0],
+            pieces: vec![outline.clone()],
+            outline,
+            area: 0.5,
+            fittings: Vec::new(),
+        });
+        for c in [a, b] {
+            cells[c].portals.push(PortalId(i as u32));
+        }
+    }
+    Layout::new(&World {
+        graph: CellPortalGraph {
+            cells,
+            portals,
+            ..CellPortalGraph::default()
+        },
+        ..World::default()
+    })
+}
+
+/// Least lengths from a cell, in tenths of a millimeter.
+fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -> Vec<Option<u64>> {
+    let mut lengths = vec![None; layout.n_cells()];
+    let mut heap = BinaryHeap::from([Reverse((0, from.0))]);
+    while let Some(Reverse((length, cell))) = heap.pop() {
+        if lengths[cell as usize].is_some() {
+            continue;
+        }
+        lengths[cell as usize] = Some(length);
+        for &e in layout.exits(CellId(cell)) {
+            heap.extend(step(e).map(|s| Reverse((length + s, e.to.0))));
+        }
+    }
+    lengths
+}
+
+/// Flips portals by chance and compares all pairs.
+fn check(layout: &Layout, seed: u64, n_flips: usize) -> Hops {
+    let mut rng = Rng::new(seed);
+    let steps: Vec<Option<f64>> = (0..layout.n_portals())
+        .map(|_| rng.chance(0.9).then(|| rng.range(0.0, 20.0)))
+        .collect();
+    let mut hops = Hops::new(layout, |p| steps[p.idx()]);
+    let mut is_open = vec![true; layout.n_portals()];
+    for flip in 0..=n_flips {
+        let step = |e: Exit| {
+            let length = steps[e.portal.idx()].filter(|_| is_open[e.portal.idx()])?;
+            Some((length * 1e4).round() as u64)
+        };
+        for from in (0..layout.n_cells() as u32).map(CellId) {
+            let expected = dijkstra(layout, from, step);
+            for to in (0..layout.n_cells() as u32).map(CellId) {
+                let least = expected[to.idx()];
+                let own = hops.distance(from, to).map(|d| (d * 1e4).round() as u64);
+                assert_eq!(own, least, "seed {seed} flip {flip}: {from} to {to}");
+                let next = hops.next(from, to);
+                assert_eq!(next.is_some(), from != to && least.is_some());
+                // The rest of the way is what is left: so following ends at the cell.
+                if let Some(exit) = next {
+                    assert!(layout.exits(from).contains(&exit));
+                    let left = hops.distance(exit.to, to).map(|d| (d * 1e4).round() as u64);
+                    assert_eq!(left.zip(step(exit)).map(|(a, b)| a + b), least);
+                }
+            }
+        }
+        let p = PortalId(rng.below(layout.n_portals()) as u32);
+        is_open[p.idx()] ^= true;
+        hops.set_open(p, is_open[p.idx()]);
+        assert_eq!(hops.is_open(p), is_open[p.idx()]);
+    }
+    hops
+}
+
+/// W10: on graphs by chance, with doors flipped by chance, every distance and next portal is that of a search of all cells.
+#[test]
+fn distances_are_those_of_a_search_of_all_cells() {
+    for seed in 0..60 {
+        let n = 3 + seed as usize % 20;
+        let layout = graph_by_chance(n, n * (1 + seed as usize % 3) / 2 + 1, seed);
+        check(&layout, seed, 25);
+    }
+}
+
+/// W10: the same of rooms on a grid.
+#[test]
+fn distances_in_rooms_are_those_of_a_search_of_all_cells() {
+    let layout = Layout::new(&room_grid(&GridParams::offices(60, 5)));
+    check(&layout, 5, 10);
+}
+
+/// W10: chains and dead ends leave the table; a ring keeps one cell.
+#[test]
+fn two_portal_cells_and_dead_ends_leave_the_table() {
+    let ring = GridParams {
+        size: [2, 1, 2],
+        doors: 1.0,
+        ..GridParams::two_rooms()
+    };
+    let row = GridParams {
+        size: [30, 1, 1],
+        ..GridParams::two_rooms()
+    };
+    for params in [ring, row] {
+        let layout = Layout::new(&room_grid(&params));
+        assert_eq!(Hops::new(&layout, |_| Some(1.0)).n_junctions(), 1);
+    }
+}
+
+/// W10: a flip and an answer allocate nothing once the buffers have grown.
+#[test]
+fn a_flip_allocates_nothing() {
+    let layout = Layout::new(&room_grid(&GridParams::offices(100, 2)));
+    let mut hops = Hops::new(&layout, |_| Some(1.0));
+    let mut flip_all = || {
+        for is_open in [false, true] {
+            for p in (0..layout.n_portals() as u32).map(PortalId) {
+                hops.set_open(p, is_open);
+                let _ = hops.next(CellId(0), CellId(99));
+            }
+        }
+    };
+    flip_all();
+    assert_eq!(allocation_counter::measure(flip_all).count_total, 0);
+}

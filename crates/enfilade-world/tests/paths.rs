@@ -1,0 +1,468 @@
+//! Paths of walkers against plain geometry (W10).
+//!
+//! Covers W10.
+
+use std::collections::BTreeSet;
+
+use enfilade_cpg::{
+    Batch, Cell, CellId, CellPortalGraph, Fitting, FittingPart, Locator, PortalId, PortalKind,
+    World,
+};
+use enfilade_geom::scene::Primitive;
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_world::{Agent, Layout, NoPath, Path, PathSearch, WalkMap};
+
+/// One storey of rooms, some of them concave, with doorways and no windows.
+fn rooms(seed: u64) -> (World, Layout, WalkMap) {
+    let world = room_grid(&GridParams {
+        size: [4, 1, 3],
+        seed,
+        doors: 0.8,
+        windows: 0.0,
+        merges: 0.3,
+        furniture: 0,
+        outdoors: false,
+        ..GridParams::offices(12, seed)
+    });
+    let layout = Layout::new(&world);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    (world, layout, map)
+}
+
+fn triangles(world: &World) -> Vec<Triangle> {
+    let mut all = Vec::new();
+    for b in &world.batches {
+        let at = |i: u32| DVec3::from_array(b.primitive.positions[i as usize].map(f64::from));
+        let corners = b.primitive.indices.chunks_exact(3);
+        all.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
+    }
+    all
+}
+
+fn point_on_floor(layout: &Layout, rng: &mut Rng) -> DVec3 {
+    loop {
+        let bounds = layout
+            .cell(CellId(rng.below(layout.n_cells()) as u32))
+            .bounds;
+        let share = DVec3::new(rng.unit(), 0.0, rng.unit());
+        let p = bounds.min + bounds.size() * share;
+        if layout.locate(p + DVec3::Y).is_some() {
+            return p;
+        }
+    }
+}
+
+/// W10: a path stays clear of walls by the radius, on the floor, and passes open portals of the cells it is in.
+#[test]
+fn a_path_keeps_clear_of_walls_and_passes_open_portals_only() {
+    let (mut path, mut search) = (Path::default(), PathSearch::new());
+    let (mut n_found, mut n_turned) = (0, 0);
+    for seed in 0..3 {
+        let (world, layout, map) = rooms(seed);
+        let walls: Vec<Triangle> = (triangles(&world).into_iter())
+            .filter(|t| (t[1] - t[0]).cross(t[2] - t[0]).normalize().y.abs() < 0.5)
+            .collect();
+        let (bvh, mut rng) = (Bvh::build(&walls), Rng::new(seed));
+        for _ in 0..30 {
+            let ends = [(); 2].map(|()| point_on_floor(&layout, &mut rng));
+            let closed: BTreeSet<u32> = (0..2)
+                .map(|_| rng.below(layout.n_portals()) as u32)
+                .collect();
+            let is_open = |p: PortalId| !closed.contains(&p.0);
+            if search
+                .find(&map, &layout, ends, is_open, &mut path)
+                .is_err()
+            {
+                assert!(path.points.is_empty() && path.portals.is_empty());
+                continue;
+            }
+            n_found += 1;
+            n_turned += usize::from(path.points.len() > 2);
+            let mut cell = layout.locate(path.points[0] + DVec3::Y);
+            for exit in &path.portals {
+                assert!(layout.exits(cell.unwrap()).contains(exit) && is_open(exit.portal));
+                cell = Some(exit.to);
+            }
+            assert_eq!(
+                cell,
+                layout.locate(path.points[path.points.len() - 1] + DVec3::Y)
+            );
+            let mut length = 0.0;
+            for w in path.points.windows(2) {
+                length += w[0].distance(w[1]);
+                for i in 0..=20 {
+                    let p = w[0].lerp(w[1], f64::from(i) / 20.0);
+                    assert!(p.y.abs() < 1e-6, "on the floor");
+                    let near = bvh.nearest(p + DVec3::Y, 1.0).map_or(1.0, |n| n.distance);
+                    // A square is 0.075 m wide; the ends may be nearer.
+                    let is_end = ends.iter().any(|e| e.with_y(0.0).distance(p) < 1.0);
+                    assert!(near > 0.3 - 0.09 || is_end, "{near} at {p}, seed {seed}");
+                }
+            }
+            assert!((length - path.length).abs() < 1e-9);
+        }
+    }
+    assert!(n_found > 40 && n_turned > 20, "{n_found} {n_turned}");
+}
+
+/// Least distance of two segments in plan.
+fn distance(a: [DVec3; 2], b: [DVec3; 2]) -> f64 {
+    let cross = |u: DVec3, v: DVec3| u.x * v.z - u.z * v.x;
+    let side = |s: [DVec3; 2], p: DVec3| cross(s[1] - s[0], p - s[0]);
+    if side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0 {
+        return 0.0;
+    }
+    let to = |s: [DVec3; 2], p: DVec3| {
+        let d = s[1] - s[0];
+        let t = (p - s[0]).dot(d) / d.length_squared().max(1e-12);
+        p.distance(s[0] + d * t.clamp(0.0, 1.0))
+    };
+    [to(a, b[0]), to(a, b[1]), to(b, a[0]), to(b, a[1])]
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Walls in plan, at a height where doorways are open.
+fn walls_in_plan(world: &World) -> Vec<[DVec3; 2]> {
+    let mut walls = Vec::new();
+    for t in triangles(world) {
+        let mut cut: Vec<DVec3> = Vec::new();
+        for i in 0..3 {
+            let [a, b] = [t[i], t[(i + 1) % 3]];
+            if (a.y < 1.0) != (b.y < 1.0) {
+                cut.push(a.lerp(b, (1.0 - a.y) / (b.y - a.y)).with_y(0.0));
+            }
+        }
+        if let [a, b] = cut[..] {
+            walls.push([a, b]);
+        }
+    }
+    walls
+}
+
+/// The shortest way by a graph of all points around ends of walls that see each other with room for the walker.
+fn by_visibility(walls: &[[DVec3; 2]], ends: [DVec3; 2], radius: f64) -> Option<f64> {
+    let clear = |a: DVec3, b: DVec3| walls.iter().all(|&w| distance(w, [a, b]) >= radius);
+    let mut points = ends.to_vec();
+    for end in walls.iter().flatten() {
+        for k in 0..16 {
+            let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 16.0).sin_cos();
+            let p = *end + DVec3::new(cos, 0.0, sin) * radius * 1.03;
+            if clear(p, p) && points.iter().all(|q| q.distance(p) > 1e-6) {
+                points.push(p);
+            }
+        }
+    }
+    let mut least = vec![f64::INFINITY; points.len()];
+    let mut is_done = vec![false; points.len()];
+    least[0] = 0.0;
+    loop {
+        let open = (0..points.len()).filter(|&i| !is_done[i] && least[i] < f64::INFINITY);
+        let at = open.min_by(|&a, &b| least[a].total_cmp(&least[b]))?;
+        if at == 1 {
+            return Some(least[1]);
+        }
+        is_done[at] = true;
+        for to in 0..points.len() {
+            let through = least[at] + points[at].distance(points[to]);
+            if through < least[to] && clear(points[at], points[to]) {
+                least[to] = through;
+            }
+        }
+    }
+}
+
+/// W10: paths are within a hundredth or two of the shortest, which a graph of visible points gives, also around corners in a cell.
+#[test]
+fn paths_are_hardly_longer_than_the_shortest() {
+    let (mut path, mut search) = (Path::default(), PathSearch::new());
+    let (mut ours, mut shortest, mut n) = (0.0, 0.0, 0);
+    for seed in 0..3 {
+        let (world, layout, map) = rooms(seed);
+        let (walls, mut rng) = (walls_in_plan(&world), Rng::new(seed + 10));
+        for _ in 0..8 {
+            let ends = [(); 2].map(|()| point_on_floor(&layout, &mut rng).with_y(0.0));
+            let Some(least) = by_visibility(&walls, ends, 0.3) else {
+                continue;
+            };
+            search
+                .find(&map, &layout, ends, |_| true, &mut path)
+                .unwrap();
+            assert!(
+                path.length <= 1.03 * least + 0.05,
+                "{} {least} {ends:?}",
+                path.length
+            );
+            assert!(
+                path.length >= 0.98 * least - 0.05,
+                "{} {least} {ends:?}",
+                path.length
+            );
+            (ours, shortest, n) = (ours + path.length, shortest + least, n + 1);
+        }
+    }
+    assert!(n > 10);
+    assert!(ours <= 1.01 * shortest, "{ours} {shortest}");
+}
+
+/// W10: cells within a length come in ascending order, and things are as far as paths are long, also in concave cells.
+#[test]
+fn what_is_near_is_as_far_as_one_walks() {
+    let (mut path, mut search, mut paths) = (Path::default(), PathSearch::new(), PathSearch::new());
+    let (mut n_near, mut n_far) = (0, 0);
+    for seed in 0..6 {
+        let (_, layout, map) = rooms(seed);
+        let mut rng = Rng::new(seed);
+        let from = point_on_floor(&layout, &mut rng);
+        let cells = search
+            .cells_within(&map, &layout, from, 8.0, |_| true)
+            .unwrap();
+        n_far += layout.n_cells() - cells.len();
+        assert!(cells.is_sorted_by(|a, b| a.1 <= b.1) && cells.iter().all(|c| c.1 <= 8.0));
+        for _ in 0..40 {
+            let to = point_on_floor(&layout, &mut rng);
+            let found = paths.find(&map, &layout, [from, to], |_| true, &mut path);
+            if let Some(far) = search.distance(&map, &layout, to) {
+                n_near += 1;
+                assert!(
+                    found.is_ok() && far > 0.97 * path.length - 0.2,
+                    "{far} {}",
+                    path.length
+                );
+                // A way that leaves the radius and comes back is not known.
+                assert!(
+                    far < 1.05 * path.length + 0.3 || path.length > 8.0,
+                    "{far} {path:?}"
+                );
+            } else {
+                assert!(found.is_err() || path.length > 7.9);
+            }
+        }
+    }
+    assert!(n_near > 50 && n_far > 10);
+}
+
+/// W10: no walker passes a crack or a window that holds something; an opening above a parapet on one side only is passed.
+#[test]
+fn cracks_and_panes_are_not_passed() {
+    let world = room_grid(&GridParams {
+        furniture: 1,
+        ..GridParams::two_rooms()
+    });
+    let pane = Fitting {
+        detail: 0,
+        part: FittingPart::Pane,
+        motion: None,
+    };
+    for (kind, fittings, is_walked) in [
+        (PortalKind::Open, vec![], true),
+        (PortalKind::Door, vec![pane.clone()], true),
+        (PortalKind::Window, vec![], true),
+        (PortalKind::Window, vec![pane], false),
+        (PortalKind::Crack, vec![], false),
+    ] {
+        let mut world = world.clone();
+        let portal = &mut world.graph.portals[0];
+        (portal.kind, portal.fittings) = (kind, fittings);
+        let map = WalkMap::new(&Layout::new(&world), &world, Agent::default());
+        assert_eq!(map.is_walkable(PortalId(0)), is_walked, "{kind:?}");
+    }
+}
+
+/// W10: lengths between a concave cell's portals go around its walls.
+#[test]
+fn lengths_between_portals_go_around_walls() {
+    let mut n_bent = 0;
+    for seed in 0..6 {
+        let (world, layout, map) = rooms(seed);
+        let walls = walls_in_plan(&world);
+        for cell in (0..layout.n_cells() as u32).map(CellId) {
+            let points: Vec<DVec3> = map.ways().points_of(cell).map(|p| p.1).collect();
+            for (i, &from) in points.iter().enumerate() {
+                for (j, (portal, to)) in map.ways().points_of(cell).enumerate() {
+                    let sees = walls.iter().all(|&w| distance(w, [from, to]) > 0.0);
+                    let length = map.ways().length(cell, i, j);
+                    n_bent += usize::from(!sees);
+                    let straight = from.distance(to);
+                    assert!(length > straight - 1e-6, "{portal}");
+                    if !sees {
+                        assert!(
+                            length > straight + 0.01,
+                            "{cell} {portal}: {length} {straight}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+    assert!(n_bent > 10, "{n_bent}");
+}
+
+/// W10: nothing is allocated once the buffers have grown.
+#[test]
+fn a_second_path_allocates_nothing() {
+    let (_, layout, map) = rooms(2);
+    let (mut path, mut search, mut rng) = (Path::default(), PathSearch::new(), Rng::new(1));
+    let ends = [(); 2].map(|()| point_on_floor(&layout, &mut rng));
+    let mut ask = || {
+        let _ = search.find(&map, &layout, ends, |_| true, &mut path);
+        let _ = search.cells_within(&map, &layout, ends[0], 20.0, |_| true);
+        let _ = search.distance(&map, &layout, ends[1]);
+    };
+    // Buffers change places, so that it takes a few to grow all.
+    (0..4).for_each(|_| ask());
+    assert_eq!(allocation_counter::measure(ask).count_total, 0);
+}
+
+/// One cell with these boxes in it, and a floor of 10 m by 4 m.
+fn hall(boxes: &[Aabb]) -> (World, Layout) {
+    let bounds = Aabb::new(DVec3::new(0.0, -0.5, 0.0), DVec3::new(10.0, 6.0, 4.0));
+    let floor = Aabb::new(bounds.min, bounds.max.with_y(0.0));
+    let corners: Vec<DVec3> = (boxes.iter().chain([&floor]))
+        .flat_map(Aabb::triangles)
+        .flatten()
+        .collect();
+    let positions: Vec<[f32; 3]> = corners.iter().map(|p| p.as_vec3().to_array()).collect();
+    let world = World {
+        graph: CellPortalGraph {
+            cells: vec![Cell {
+                aabb: [bounds.min, bounds.max].map(|p| p.as_vec3().to_array()),
+                ..Cell::default()
+            }],
+            locator: Locator {
+                bounds,
+                root: Locator::leaf(Some(CellId(0))),
+                ..Locator::default()
+            },
+            ..CellPortalGraph::default()
+        },
+        batches: vec![Batch {
+            cells: vec![CellId(0)],
+            primitive: Primitive {
+                indices: (0..positions.len() as u32).collect(),
+                positions,
+                ..Primitive::default()
+            },
+            ..Batch::default()
+        }],
+        ..World::default()
+    };
+    let layout = Layout::new(&world);
+    (world, layout)
+}
+
+fn walk(boxes: &[Aabb], to_y: f64) -> Result<Path, NoPath> {
+    let (world, layout) = hall(boxes);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    let mut path = Path::default();
+    let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, to_y, 2.0)];
+    PathSearch::new().find(&map, &layout, ends, |_| true, &mut path)?;
+    Ok(path)
+}
+
+fn block(low: [f64; 3], high: [f64; 3]) -> Aabb {
+    Aabb::new(DVec3::from_array(low), DVec3::from_array(high))
+}
+
+/// W10: stairs are walked up, at the height of their steps; a step that is too high is not.
+#[test]
+fn stairs_are_walked_and_ledges_are_not() {
+    let stairs = |rise: f64| -> Vec<Aabb> {
+        (0..20)
+            .map(|i| {
+                let x = 3.0 + 0.3 * f64::from(i.min(9));
+                block([x, 0.0, 0.0], [10.0, rise * f64::from(i.min(9) + 1), 4.0])
+            })
+            .collect()
+    };
+    let path = walk(&stairs(0.17), 1.7).unwrap();
+    assert!((path.length_in_plan - 8.0).abs() < 0.05);
+    assert!(path.length > 8.2 && path.length < 8.7, "{}", path.length);
+    // At each place the line is as high as the floor, to half a step of a walker.
+    for p in &path.points {
+        let n = ((p.x - 3.0) / 0.3).floor().clamp(-1.0, 9.0) + 1.0;
+        assert!((p.y - 0.17 * n).abs() < 0.21, "{p}");
+    }
+    assert_eq!(walk(&stairs(0.5), 5.0).unwrap_err(), NoPath::NoWay);
+}
+
+/// W10: what is too low or too narrow is not passed, what stands free is walked around.
+#[test]
+fn a_walker_needs_its_room() {
+    let straight = walk(&[], 0.0).unwrap();
+    assert!((straight.length - 8.0).abs() < 1e-6 && straight.points.len() == 2);
+    let pillar = walk(&[block([4.0, 0.0, 1.0], [5.0, 3.0, 3.2])], 0.0).unwrap();
+    // By the side of z = 1, which is nearer, at 0.3 m from it: tangents, arcs about both corners, and the meter between.
+    let corner = |far: f64| {
+        let d = far.hypot(1.0);
+        (d * d - 0.09).sqrt() + 0.3 * ((1.0 / far).atan() + (0.3 / d).asin())
+    };
+    let around = corner(3.0) + 1.0 + corner(4.0);
+    let off = pillar.length - around;
+    assert!(off > -0.04 && off < 0.08, "{} {around}", pillar.length);
+    assert!(pillar.points.iter().all(|p| p.z < 2.1));
+    let wall_with_gap = |gap: f64, lintel: f64| {
+        [
+            block([4.0, 0.0, 0.0], [4.2, 3.0, 2.0]),
+            block([4.0, 0.0, 2.0 + gap], [4.2, 3.0, 4.0]),
+            block([4.0, lintel, 2.0], [4.2, 3.0, 2.0 + gap]),
+        ]
+    };
+    assert!(walk(&wall_with_gap(0.9, 2.1), 0.0).is_ok());
+    assert_eq!(
+        walk(&wall_with_gap(0.5, 2.1), 0.0).unwrap_err(),
+        NoPath::NoWay
+    );
+    assert_eq!(
+        walk(&wall_with_gap(0.9, 1.7), 0.0).unwrap_err(),
+        NoPath::NoWay
+    );
+    assert_eq!(walk(&[], 3.0).unwrap_err(), NoPath::NoFloorAtEnd);
+}
+
+/// W10: what is no point, or far from everything, has no floor; a world of nothing neither. Nothing panics.
+#[test]
+fn points_from_nowhere_have_no_floor() {
+    let (world, layout) = hall(&[]);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    let (mut search, mut path) = (PathSearch::new(), Path::default());
+    let inside = DVec3::new(5.0, 0.0, 2.0);
+    for x in [
+        f64::NAN,
+        f64::INFINITY,
+        -f64::INFINITY,
+        1e300,
+        -1e300,
+        1e9,
+        11.0,
+    ] {
+        for axis in 0..3 {
+            let mut p = inside;
+            p[axis] = x;
+            let found = search.find(&map, &layout, [p, inside], |_| true, &mut path);
+            assert_eq!(found, Err(NoPath::NoFloorAtStart), "{p}");
+            let found = search.find(&map, &layout, [inside, p], |_| true, &mut path);
+            assert_eq!(found, Err(NoPath::NoFloorAtEnd), "{p}");
+        }
+    }
+    let nothing = World::default();
+    let layout = Layout::new(&nothing);
+    let map = WalkMap::new(&layout, &nothing, Agent::default());
+    let found = search.find(&map, &layout, [inside; 2], |_| true, &mut path);
+    assert_eq!(found, Err(NoPath::NoFloorAtStart));
+    assert_eq!(search.distance(&map, &layout, inside), None);
+}
+
+/// W10: a path to where one stands has no length.
+#[test]
+fn a_path_to_where_one_stands_has_no_length() {
+    let (world, layout) = hall(&[]);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    let (mut search, mut path) = (PathSearch::new(), Path::default());
+    let p = DVec3::new(5.0, 0.0, 2.0);
+    search
+        .find(&map, &layout, [p; 2], |_| true, &mut path)
+        .unwrap();
+    assert!(path.length < 1e-9 && path.portals.is_empty() && !path.points.is_empty());
+}
