@@ -184,8 +184,8 @@ impl Flood {
         let opening = layout.opening(portal);
         let posed = self.posed_in(space, posted, id);
         let margin = layout.tolerance();
-        let distance = opening.center().distance(posed.origin);
-        let clearance = distance - opening.radius() - posted.reach - margin;
+        let distance = opening.bounds().distance_squared(posed.origin).sqrt();
+        let clearance = distance - posted.reach - margin;
         let is_met = clearance <= 0.0 && {
             let points = &posed.points;
             let radius = posted.shape.radius() + margin;

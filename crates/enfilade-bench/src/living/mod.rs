@@ -6,6 +6,8 @@ mod actors;
 mod bodies;
 mod graphs;
 mod paths;
+mod rooms;
+mod things;
 
 use enfilade::cpg::World;
 
@@ -17,6 +19,16 @@ const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
 const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
 pub(crate) const ROWS: &[Row] = &[
+    made("cells of things", &["offices-1000"], things::cells),
+    made("moving", &["offices-1000"], things::moved),
+    made("moving: stays", &["offices-1000"], things::stays),
+    made("moving: crosses", &["offices-1000"], things::crosses),
+    made("moving portals", &["cabin"], rooms::passings),
+    made("moving rooms", &["cabins"], rooms::poses),
+    made("moving rooms: far", &["cabins"], rooms::far),
+    made("maze with movers", &["maze"], things::maze),
+    made("lights", &["offices-1000"], rooms::lamps),
+    made("cost", &["offices-10000"], rooms::cost),
     made("bodies: missed", &["offices-1000"], bodies::missed_in),
     baked("bodies: missed", &["institute"], bodies::missed),
     made(
