@@ -173,6 +173,27 @@ impl Locator {
         }
     }
 
+    /// The cell that `p` lies in, as [`Locator::locate`], and how far from `p` it surely is the same: the distance to the
+    /// nearest plane on the way down the tree. 0 outside the box. [Units: wu]
+    #[must_use]
+    pub fn locate_with_room(&self, p: DVec3) -> (Option<CellId>, f64) {
+        if !p.is_finite() || !self.bounds.contains(p) {
+            return (self.locate(p), 0.0);
+        }
+        let walls = (p - self.bounds.min).min(self.bounds.max - p);
+        let mut room = walls.min_element();
+        let mut at = self.root;
+        while at >= 0 {
+            let node = &self.nodes[at as usize];
+            let [x, y, z, d] = self.planes[node.plane as usize];
+            let side = x * p.x + y * p.y + z * p.z + d;
+            // Normals are of unit length, but for rounding.
+            room = room.min(side.abs() * (1.0 - 1e-6));
+            at = node.children[usize::from(side < 0.0)];
+        }
+        ((at <= -2).then(|| CellId((-2 - at) as u32)), room)
+    }
+
     /// The cell that `p` lies in; `None` inside solid matter and for points that are not finite.
     #[must_use]
     pub fn locate(&self, p: DVec3) -> Option<CellId> {

@@ -13,6 +13,8 @@ pub struct Layout {
     /// By cell its first exit, and the number of all.
     first_exit: Vec<u32>,
     exits: Vec<Exit>,
+    /// By exit, around its opening: side by side, for who only wants to know how far off all are.
+    exit_bounds: Vec<Aabb>,
     openings: Vec<OpeningShape>,
     /// By piece its first corner, and the number of all.
     first_corner: Vec<u32>,
@@ -94,6 +96,7 @@ impl Layout {
             cells,
             first_exit,
             exits,
+            exit_bounds: Vec::new(),
             openings: Vec::new(),
             first_corner: vec![0],
             corners: Vec::new(),
@@ -103,6 +106,8 @@ impl Layout {
         for portal in &graph.portals {
             layout.add_opening(portal);
         }
+        let bounds = |e: &Exit| layout.openings[e.portal.idx()].bounds;
+        layout.exit_bounds = layout.exits.iter().map(bounds).collect();
         layout
     }
 
@@ -188,6 +193,20 @@ impl Layout {
         &self.exits[first[0] as usize..first[1] as usize]
     }
 
+    /// How far a point is from the nearest box around an opening of a cell; infinite where the cell has none. O(its openings).
+    /// [Units: wu]
+    ///
+    /// # Panics
+    ///
+    /// When there is no such cell.
+    #[must_use]
+    pub fn distance_to_exits(&self, cell: CellId, p: DVec3) -> f64 {
+        let first = &self.first_exit[cell.idx()..];
+        let bounds = &self.exit_bounds[first[0] as usize..first[1] as usize];
+        let squares = bounds.iter().map(|b| b.distance_squared(p));
+        squares.fold(f64::INFINITY, f64::min).sqrt()
+    }
+
     /// A portal's opening.
     ///
     /// # Panics
@@ -205,6 +224,12 @@ impl Layout {
     #[must_use]
     pub fn locate(&self, p: DVec3) -> Option<CellId> {
         self.locator.locate(p)
+    }
+
+    /// The same, and how far from the point it surely is the same cell. [Units: wu]
+    #[must_use]
+    pub fn locate_with_room(&self, p: DVec3) -> (Option<CellId>, f64) {
+        self.locator.locate_with_room(p)
     }
 
     /// Adds the cells that the hull of `points` may touch, grown by `margin`, to `cells`, which stays ascending and without

@@ -83,6 +83,9 @@ struct Thing {
     /// Where its origin was when its cells were last looked for, and how far it may go until they are again.
     settled_at: DVec3,
     clearance: f64,
+    /// Where it was when its place was last looked for, and how far it may go until it is again.
+    located_at: DVec3,
+    room: f64,
     first_link: u32,
     n_links: u32,
     first_child: u32,
@@ -168,6 +171,8 @@ impl Things {
             place: None,
             settled_at: pose.at,
             clearance: 0.0,
+            located_at: pose.at,
+            room: 0.0,
             first_link: NONE,
             n_links: 0,
             first_child: NONE,
@@ -269,7 +274,8 @@ impl Things {
         affected.sort_unstable();
         affected.dedup();
         for &thing in &affected {
-            self.at_mut(thing).clearance = 0.0;
+            let own = self.at_mut(thing);
+            (own.clearance, own.room) = (0.0, 0.0);
             self.settle(space, thing);
         }
         for child in own.children.iter().copied() {
@@ -477,11 +483,12 @@ impl Things {
             return;
         }
         let (frame, placed) = (thing.frame, thing.placed);
-        let found = space.locate(frame, placed.at);
+        let (found, located_at, room) = locate(space, thing);
         let is_near = found == thing.place
             && thing.n_links == 1
             && placed.at.distance(thing.settled_at) < thing.clearance;
         let thing = self.at_mut(index);
+        (thing.located_at, thing.room) = (located_at, room);
         let Some(place) = found else {
             thing.place = None;
             return;
@@ -500,6 +507,12 @@ impl Things {
         if is_near {
             return;
         }
+        let clearance = clearance_in(space, place, self.at(index));
+        if clearance > 0.0 {
+            self.relink(space, index, &[place]);
+            self.set_clearance(index, clearance);
+            return;
+        }
         let mut flood = std::mem::take(&mut self.flood);
         let thing = self.at(index);
         let posted = Posted {
@@ -514,6 +527,10 @@ impl Things {
         self.relink(space, index, places);
         let clearance = flood.clearance();
         self.flood = flood;
+        self.set_clearance(index, clearance);
+    }
+
+    fn set_clearance(&mut self, index: u32, clearance: f64) {
         let thing = self.at_mut(index);
         thing.settled_at = thing.placed.at;
         thing.clearance = clearance;
@@ -585,6 +602,39 @@ impl Things {
             at = link.next_of_thing;
         }
     }
+}
+
+/// Where a thing is, where that was looked for, and how far from there it is the same.
+fn locate(space: &Space, thing: &Thing) -> (Option<Place>, DVec3, f64) {
+    let at = thing.placed.at;
+    if let Some(place) = thing.place
+        && place.part == thing.frame
+        && at.distance(thing.located_at) < thing.room
+        && !space.parts[place.part.idx()].has_guests[place.cell.idx()]
+    {
+        return (thing.place, thing.located_at, thing.room);
+    }
+    // In the root alone, so that what is found is what `Space::locate` finds.
+    if thing.frame == PartId::ROOT {
+        let root = &space.parts[0];
+        let (cell, room) = root.layout.locate_with_room(at);
+        if let Some(cell) = cell.filter(|c| !root.has_guests[c.idx()]) {
+            let part = PartId::ROOT;
+            return (Some(Place { part, cell }), at, room);
+        }
+    }
+    (space.locate(thing.frame, at), at, 0.0)
+}
+
+/// How far a thing in a place may move without meeting an opening of its cell; not above 0 where it may meet one now, where
+/// other rooms stand in the cell, and where the thing is in the frame of another part. [Units: wu]
+fn clearance_in(space: &Space, place: Place, thing: &Thing) -> f64 {
+    let part = &space.parts[place.part.idx()];
+    if place.part != thing.frame || part.has_guests[place.cell.idx()] {
+        return 0.0;
+    }
+    let distance = part.layout.distance_to_exits(place.cell, thing.placed.at);
+    distance - thing.reach - part.layout.tolerance()
 }
 
 /// The place of a cell among those of all parts. O(log parts).

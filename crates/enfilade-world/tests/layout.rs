@@ -2,7 +2,7 @@
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
-use enfilade_testkit::{GridParams, room_grid};
+use enfilade_testkit::{GridParams, Rng, room_grid};
 use enfilade_world::Layout;
 
 fn layout_and_graph() -> (Layout, enfilade_cpg::World) {
@@ -67,4 +67,24 @@ fn a_portal_whose_pieces_and_outline_have_no_area_has_no_opening() {
         assert_eq!(none.opening(id).pieces().len(), 0);
         assert_eq!(none.opening(id).area(), 0.0);
     }
+}
+
+#[test]
+fn within_the_room_that_a_point_has_the_cell_is_the_same() {
+    let (layout, world) = layout_and_graph();
+    let mut rng = Rng::new(9);
+    let bounds = world.graph.locator.bounds;
+    let mut n_wide = 0;
+    for _ in 0..20_000 {
+        let mut random = |low: DVec3, high: DVec3| {
+            DVec3::from_array([0, 1, 2].map(|k| rng.range(low[k], high[k])))
+        };
+        let p = random(bounds.min - 1.0, bounds.max + 1.0);
+        let (cell, room) = layout.locate_with_room(p);
+        assert_eq!(cell, layout.locate(p));
+        n_wide += usize::from(room > 0.1);
+        let step = random(DVec3::NEG_ONE, DVec3::ONE).normalize_or(DVec3::X);
+        assert_eq!(layout.locate(p + step * room * 0.999), cell, "{p} {room}");
+    }
+    assert!(n_wide > 5000, "{n_wide}");
 }

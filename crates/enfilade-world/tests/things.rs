@@ -229,8 +229,9 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
     let buoy = things
         .add(&space, ball(), PartId::ROOT, still, Tie::Carried)
         .unwrap();
-    let inside = Some(place(ship, CellId(0)));
-    let sea = Some(place(PartId::ROOT, root.graph.outdoors().unwrap()));
+    let cabin_place = place(ship, CellId(0));
+    let sea_place = place(PartId::ROOT, root.graph.outdoors().unwrap());
+    let (inside, sea) = (Some(cabin_place), Some(sea_place));
     let places = |things: &Things| [man, bird, hat, buoy].map(|id| things.place(id).unwrap());
     assert_eq!(places(&things), [inside, inside, inside, sea]);
     // Who leans out of a window is at sea, too.
@@ -242,7 +243,7 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
         Pose::from_translation(window),
         Tie::Carried,
     );
-    let both = BTreeSet::from([inside.unwrap(), sea.unwrap()]);
+    let both = BTreeSet::from([cabin_place, sea_place]);
     assert_eq!(
         things
             .places(&space, lean.unwrap())
