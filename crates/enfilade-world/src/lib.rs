@@ -10,6 +10,7 @@
 //! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
 
 mod all_pairs;
+mod blocks;
 mod columns;
 mod edges;
 mod floors;
@@ -19,6 +20,7 @@ mod layout;
 mod paths;
 mod search;
 mod strides;
+mod taut;
 
 pub use edges::Corner;
 pub use floors::{Agent, Floors};
@@ -27,3 +29,4 @@ pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use paths::{NoPath, Path, PathSearch, WalkMap};
 pub use search::{Arrival, LengthSearch, PassedPortal, Sampling, Ways};
+pub use taut::TautString;
