@@ -12,21 +12,27 @@
 mod all_pairs;
 mod blocks;
 mod columns;
+mod ears;
 mod edges;
 mod floors;
 mod geodesics;
 mod hops;
 mod layout;
 mod paths;
+mod reverb;
 mod search;
+mod sound;
 mod strides;
 mod taut;
 
+pub use ears::at_ears;
 pub use edges::Corner;
 pub use floors::{Agent, Floors};
 pub use geodesics::Geodesics;
 pub use hops::Hops;
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use paths::{NoPath, Path, PathSearch, WalkMap};
+pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND, absorption_of_name};
 pub use search::{Arrival, LengthSearch, PassedPortal, Sampling, Ways};
+pub use sound::{Acoustics, Heard, Listener, Transmission};
 pub use taut::TautString;

@@ -424,7 +424,7 @@ fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
 }
 
 /// The same on an edge: the triangles that `a` and `b` make with its line are unfolded into one plane.
-fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
+pub(crate) fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
     let length = from.distance(to);
     if length == 0.0 {
         return (from, DVec3::ZERO);
