@@ -9,7 +9,8 @@
 //! - what a leaf or pane holds back, by [kind](Transmission), where it is shut, and by the share that is open where it is not.
 //!
 //! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, so that none
-//! comes or goes at once. All of it is for one wavelength, that of 500 Hz. O(portals of a sequence) a source.
+//! comes or goes at once; and as a search may still give up one sequence for another that is as long, and louder or not, levels follow
+//! by 0.4 dB at most for each centimeter walked. All of it is for one wavelength, that of 500 Hz. O(portals of a sequence) a source.
 //!
 //! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.7 m. Within a concave cell strings are
 //! straight, too short where a wall of the cell is between.
@@ -65,6 +66,10 @@ const LONGEST: f64 = 1.5;
 const KEPT: f64 = 0.25;
 /// The most that one edge takes. [Units: dB]
 const MOST_LOSS: f64 = 24.0;
+/// Levels follow what is found by so much for each meter that listener and source move. [Units: dB]
+const SLEW: f64 = 40.0;
+/// Who moves farther at once was put there, and levels follow at once. [Units: wu]
+const TELEPORT: f64 = 0.5;
 
 impl Acoustics {
     /// Of a world. O(portals).
@@ -180,6 +185,15 @@ struct Source {
     portals: Vec<PortalId>,
     /// Where strings crossed when last pulled.
     points: Vec<DVec3>,
+    last: Option<LastHeard>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct LastHeard {
+    listener: DVec3,
+    source: DVec3,
+    doors: u64,
+    gain: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -200,6 +214,8 @@ struct Route {
 pub struct Listener {
     search: LengthSearch,
     n_searches: u64,
+    /// How often doors have moved.
+    doors: u64,
     place: Option<(CellId, DVec3)>,
     at: DVec3,
     transmitted: Vec<f64>,
@@ -235,6 +251,7 @@ impl Listener {
             self.transmitted[i] = transmitted;
             self.open[i] = acoustics.open_share(state, portal);
         }
+        self.doors += u64::from(!is_same);
         let is_near = |(c, p): (CellId, DVec3)| c == cell && p.distance(at) < KEPT;
         if is_same && self.place.is_some_and(is_near) {
             return;
@@ -282,7 +299,22 @@ impl Listener {
         for k in 0..self.sources[id].routes.len() {
             self.pull(layout, id, k, at);
         }
-        self.sum_up(acoustics, layout, id, at)
+        let mut heard = self.sum_up(acoustics, layout, id, at)?;
+        let last = &mut self.sources[id].last;
+        if let Some(last) = last.filter(|l| l.doors == self.doors) {
+            let moved = last.listener.distance(self.at) + last.source.distance(at);
+            let most = 10f64.powf(0.05 * SLEW * moved);
+            if moved < TELEPORT {
+                heard.gain = heard.gain.clamp(last.gain / most, last.gain * most);
+            }
+        }
+        *last = Some(LastHeard {
+            listener: self.at,
+            source: at,
+            doors: self.doors,
+            gain: heard.gain,
+        });
+        Some(heard)
     }
 
     fn choose_routes(&mut self, acoustics: &Acoustics, id: usize, cell: CellId, at: DVec3) {

@@ -4,6 +4,7 @@
 
 mod graphs;
 mod paths;
+mod sound;
 
 use crate::rows::Measure::{Baked, Made};
 use crate::rows::Row;
@@ -46,5 +47,35 @@ pub(crate) const ROWS: &[Row] = &[
         name: "paths: length",
         scenes: &["recast-dungeon"],
         measure: Baked(paths::dungeon),
+    },
+    Row {
+        name: "sound: length",
+        scenes: &["offices-16"],
+        measure: Made(sound::length),
+    },
+    Row {
+        name: "sound: direction",
+        scenes: &["offices-16"],
+        measure: Made(sound::direction),
+    },
+    Row {
+        name: "sound: doorway",
+        scenes: &["offices-100"],
+        measure: Made(sound::doorway),
+    },
+    Row {
+        name: "sound: doorway",
+        scenes: &["institute"],
+        measure: Baked(sound::doorway_baked),
+    },
+    Row {
+        name: "sound: reverb",
+        scenes: &["coupled-rooms"],
+        measure: Made(sound::reverb),
+    },
+    Row {
+        name: "sound: cost",
+        scenes: &["offices-1000"],
+        measure: Made(sound::cost),
     },
 ];
