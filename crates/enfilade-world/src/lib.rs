@@ -11,8 +11,11 @@
 
 mod actors;
 mod all_pairs;
+mod blocks;
 mod columns;
 mod contacts;
+mod ears;
+
 mod edges;
 mod flood;
 mod floors;
@@ -24,12 +27,15 @@ mod look;
 mod paths;
 mod pose;
 mod pull;
+mod reverb;
 mod sampling;
 mod search;
 mod shape;
+mod sound;
 mod space;
 mod strides;
 mod sweep;
+mod taut;
 mod things;
 mod trees;
 mod walker;
@@ -39,6 +45,7 @@ pub use actors::{
     WayPoint,
 };
 pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
+pub use ears::at_ears;
 pub use edges::Corner;
 pub use flood::{Flood, Posted};
 pub use floors::{Agent, Floors};
@@ -48,11 +55,15 @@ pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use look::{SpaceSeen, SpaceViewer};
 pub use paths::{NoPath, Path, PathSearch, WalkMap};
+
 pub use pose::Pose;
+pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND, absorption_of_name};
 pub use sampling::Sampling;
 pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
 pub use shape::{Shape, ShapeError};
+pub use sound::{Acoustics, Heard, Listener, Transmission};
 pub use space::{PartId, Place, Space, SpaceError};
 pub use sweep::Passing;
+pub use taut::TautString;
 pub use things::{Moved, ThingError, ThingId, Things, Tie};
 pub use walker::{Build, Walker};

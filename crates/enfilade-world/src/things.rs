@@ -7,6 +7,8 @@
 //! References are links in two lists at once, of a thing and of a cell, taken from one pool: a move is O(cells reached), and
 //! allocates nothing once the pool has grown.
 
+mod links;
+
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 use enfilade_runtime::Visit;
@@ -16,8 +18,7 @@ use crate::look::SpaceSeen;
 use crate::pose::Pose;
 use crate::shape::Shape;
 use crate::space::{PartId, Place, Space};
-
-const NONE: u32 = u32::MAX;
+use links::{Links, NONE};
 
 /// Which thing. Never that of another, even after the thing is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -92,32 +93,19 @@ struct Thing {
     next_sibling: u32,
 }
 
-/// A thing in a cell.
-#[derive(Clone, Copy, Debug)]
-struct Link {
-    thing: u32,
-    /// Of all parts' cells.
-    cell: u32,
-    next_in_cell: u32,
-    previous_in_cell: u32,
-    next_of_thing: u32,
-}
-
 /// The things of a [`Space`].
 #[derive(Clone, Debug, Default)]
 pub struct Things {
     slots: Vec<Slot>,
     free_slots: Vec<u32>,
-    links: Vec<Link>,
-    free_link: u32,
-    /// By cell of all parts.
-    first_in_cell: Vec<u32>,
+    links: Links,
     globals: Vec<ThingId>,
     flood: Flood,
     stamps: Vec<u32>,
     stamp: u32,
     seen: Vec<ThingId>,
     affected: Vec<u32>,
+    in_cell: Vec<u32>,
     points: Vec<DVec3>,
 }
 
@@ -125,10 +113,7 @@ impl Things {
     /// No things.
     #[must_use]
     pub fn new() -> Self {
-        Self {
-            free_link: NONE,
-            ..Self::default()
-        }
+        Self::default()
     }
 
     /// Adds a thing at a pose in the frame of a part; that of a [child](Tie::Child) is relative to the thing that it is a child
@@ -309,12 +294,9 @@ impl Things {
         space: &'a Space,
         id: ThingId,
     ) -> impl Iterator<Item = Place> + use<'a> {
-        let mut at = self.thing(id).map_or(NONE, |t| t.first_link);
-        std::iter::from_fn(move || {
-            let link = self.links.get(at as usize)?;
-            at = link.next_of_thing;
-            Some(place_of(space, link.cell))
-        })
+        let first = self.thing(id).map_or(NONE, |t| t.first_link);
+        let cells = self.links.of_thing(first);
+        cells.map(|cell| place_of(space, cell))
     }
 
     /// The things that reach into a cell, in no order.
@@ -351,11 +333,11 @@ impl Things {
             part,
             cell: visit.cell,
         };
-        let cell = Self::cell_index(space, place) as usize;
-        let mut at = self.first_in_cell.get(cell).copied().unwrap_or(NONE);
-        while let Some(link) = self.links.get(at as usize) {
-            let index = link.thing;
-            at = link.next_in_cell;
+        let cell = Self::cell_index(space, place);
+        let mut in_cell = std::mem::take(&mut self.in_cell);
+        in_cell.clear();
+        in_cell.extend(self.links.in_cell(cell));
+        for &index in &in_cell {
             if self.stamps[index as usize] == self.stamp {
                 continue;
             }
@@ -381,6 +363,7 @@ impl Things {
                 self.seen.push(ThingId { index, generation });
             }
         }
+        self.in_cell = in_cell;
     }
 
     fn check(space: &Space, frame: PartId, pose: &Pose) -> Result<(), ThingError> {
@@ -417,17 +400,9 @@ impl Things {
     }
 
     fn in_cell(&self, cell: u32) -> impl Iterator<Item = ThingId> + use<'_> {
-        let mut at = self
-            .first_in_cell
-            .get(cell as usize)
-            .copied()
-            .unwrap_or(NONE);
-        std::iter::from_fn(move || {
-            let link = self.links.get(at as usize)?;
-            at = link.next_in_cell;
-            let index = link.thing;
-            let generation = self.slots[index as usize].generation;
-            Some(ThingId { index, generation })
+        self.links.in_cell(cell).map(|index| ThingId {
+            index,
+            generation: self.slots[index as usize].generation,
         })
     }
 
@@ -538,69 +513,28 @@ impl Things {
 
     /// Makes the cells that refer to a thing those that it reaches.
     fn relink(&mut self, space: &Space, index: u32, places: &[Place]) {
-        if self.first_in_cell.len() < space.n_cells() {
-            self.first_in_cell.resize(space.n_cells(), NONE);
-        }
-        let mut cells = places.iter().map(|p| Self::cell_index(space, *p));
-        let mut at = self.at(index).first_link;
-        let is_same = self.at(index).n_links as usize == places.len()
-            && cells.all(|cell| {
-                let link = self.links.get(at as usize);
-                at = link.map_or(NONE, |l| l.next_of_thing);
-                link.is_some_and(|l| l.cell == cell)
-            });
+        self.links.grow(space.n_cells());
+        let cells = places.iter().map(|p| Self::cell_index(space, *p));
+        let is_same = cells.eq(self.links.of_thing(self.at(index).first_link));
         if is_same {
             return;
         }
         self.drop_links(index);
+        let mut first = NONE;
         for place in places.iter().rev() {
-            self.add_link(index, Self::cell_index(space, *place));
+            first = self
+                .links
+                .add(index, Self::cell_index(space, *place), first);
         }
-    }
-
-    fn add_link(&mut self, index: u32, cell: u32) {
-        let next_in_cell = self.first_in_cell[cell as usize];
         let thing = self.at_mut(index);
-        let link = Link {
-            thing: index,
-            cell,
-            next_in_cell,
-            previous_in_cell: NONE,
-            next_of_thing: thing.first_link,
-        };
-        thing.n_links += 1;
-        let at = if self.free_link == NONE {
-            self.links.push(link);
-            self.links.len() as u32 - 1
-        } else {
-            let at = self.free_link;
-            self.free_link = self.links[at as usize].next_of_thing;
-            self.links[at as usize] = link;
-            at
-        };
-        self.at_mut(index).first_link = at;
-        if let Some(next) = self.links.get_mut(next_in_cell as usize) {
-            next.previous_in_cell = at;
-        }
-        self.first_in_cell[cell as usize] = at;
+        (thing.first_link, thing.n_links) = (first, places.len() as u32);
     }
 
     fn drop_links(&mut self, index: u32) {
         let thing = self.at_mut(index);
         thing.n_links = 0;
-        let mut at = std::mem::replace(&mut thing.first_link, NONE);
-        while let Some(&link) = self.links.get(at as usize) {
-            match self.links.get_mut(link.previous_in_cell as usize) {
-                Some(previous) => previous.next_in_cell = link.next_in_cell,
-                None => self.first_in_cell[link.cell as usize] = link.next_in_cell,
-            }
-            if let Some(next) = self.links.get_mut(link.next_in_cell as usize) {
-                next.previous_in_cell = link.previous_in_cell;
-            }
-            self.links[at as usize].next_of_thing = self.free_link;
-            self.free_link = at;
-            at = link.next_of_thing;
-        }
+        let first = std::mem::replace(&mut thing.first_link, NONE);
+        self.links.drop_all(first);
     }
 }
 

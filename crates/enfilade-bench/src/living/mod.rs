@@ -7,6 +7,7 @@ mod bodies;
 mod graphs;
 mod paths;
 mod rooms;
+mod sound;
 mod things;
 
 use enfilade::cpg::World;
@@ -49,6 +50,12 @@ pub(crate) const ROWS: &[Row] = &[
     made("paths: search", &["offices-1000"], paths::search),
     baked("paths: length", &["institute"], paths::institute),
     baked("paths: length", &["recast-dungeon"], paths::dungeon),
+    made("sound: length", &["offices-16"], sound::length),
+    made("sound: direction", &["offices-16"], sound::direction),
+    made("sound: doorway", &["offices-100"], sound::doorway),
+    baked("sound: doorway", &["institute"], sound::doorway_baked),
+    made("sound: reverb", &["coupled-rooms"], sound::reverb),
+    made("sound: cost", &["offices-1000"], sound::cost),
 ];
 
 const fn made(

@@ -1,0 +1,265 @@
+//! What is heard through portals: lengths, directions, doorways, cost.
+
+use std::time::Instant;
+
+use anyhow::Context;
+use enfilade::geom::DVec3;
+use enfilade::world::{
+    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, Reverb, TautString, Transmission,
+};
+use enfilade::{CellId, PortalId, Sight, SightState, World};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+
+use crate::rows::Figure;
+
+struct Office {
+    layout: Layout,
+    acoustics: Acoustics,
+    state: SightState,
+}
+
+impl Office {
+    fn new(world: &World) -> anyhow::Result<Self> {
+        let layout = Layout::new(world);
+        let acoustics = Acoustics::new(&layout, world, &Transmission::default());
+        let state = SightState::new(&Sight::build(world)?);
+        Ok(Self {
+            layout,
+            acoustics,
+            state,
+        })
+    }
+
+    fn offices(n: usize, seed: u64) -> anyhow::Result<Self> {
+        let params = GridParams {
+            outdoors: false,
+            windows: 0.0,
+            furniture: 0,
+            doors: 0.7,
+            ..GridParams::offices(n, seed)
+        };
+        Self::new(&room_grid(&params))
+    }
+
+    fn place(&self, rng: &mut Rng) -> Option<(CellId, DVec3)> {
+        let indoors = |c: &CellId| !self.layout.cell(*c).is_outdoor;
+        (0..10_000).find_map(|_| {
+            let cell = CellId(rng.below(self.layout.n_cells()) as u32);
+            let bounds = self.layout.cell(cell).bounds;
+            let share = DVec3::from([0; 3].map(|_| rng.range(0.05, 0.95)));
+            let at = bounds.min + (bounds.max - bounds.min) * share;
+            Some((cell, at)).filter(|_| indoors(&cell) && self.layout.locate(at) == Some(cell))
+        })
+    }
+}
+
+/// Worst length by the least over all sequences of at most 8 portals, and worst angle of its arrival.
+fn worst(name: &str) -> anyhow::Result<(f64, f64, usize)> {
+    let n_seeds = if name == "offices-16" { 20 } else { 5 };
+    let (mut length, mut angle, mut n): (f64, f64, usize) = (0.0, 0.0, 0);
+    let mut rng = Rng::new(4);
+    for seed in 0..n_seeds {
+        let site = Office::offices(16, seed)?;
+        for _ in 0..25 {
+            let from = site.place(&mut rng).context("no place")?;
+            let to = site.place(&mut rng).context("no place")?;
+            let mut ears = Listener::new();
+            ears.listen(&site.acoustics, &site.state, from.0, from.1);
+            let Some(heard) = ears.hear(&site.acoustics, &site.layout, 0, to.0, to.1) else {
+                continue;
+            };
+            let mut best = (f64::INFINITY, DVec3::ZERO);
+            let mut string = TautString::new();
+            least(
+                &site.layout,
+                from,
+                to,
+                &mut Vec::new(),
+                &mut string,
+                &mut best,
+            );
+            if best.0 < f64::INFINITY {
+                n += 1;
+                length = length.max(heard.length / best.0);
+                angle = angle.max(heard.nearest.angle_between(best.1).to_degrees());
+            }
+        }
+    }
+    Ok((length, angle, n))
+}
+
+/// All sequences, cut off by the bound of the string through the portals so far, which the tests hold against `clarabel`.
+fn least(
+    layout: &Layout,
+    (cell, from): (CellId, DVec3),
+    to: (CellId, DVec3),
+    chain: &mut Vec<PortalId>,
+    string: &mut TautString,
+    best: &mut (f64, DVec3),
+) {
+    let length = string.pull(from, to.1, chain.len(), |i| {
+        layout.opening(chain[i]).pieces()
+    });
+    if string.bound() >= best.0 {
+        return;
+    }
+    if cell == to.0 && length < best.0 {
+        *best = (length, string.departure());
+    }
+    if chain.len() == 8 {
+        return;
+    }
+    for exit in layout.exits(cell) {
+        if !chain.contains(&exit.portal) {
+            chain.push(exit.portal);
+            least(layout, (exit.to, from), to, chain, string, best);
+            chain.pop();
+        }
+    }
+}
+
+pub(super) fn length(name: &str) -> anyhow::Result<Figure> {
+    let (value, _, n) = worst(name)?;
+    Ok(Figure {
+        value,
+        most: 1.001,
+        note: format!("the worst of {n} pairs, by the least over all sequences of up to 8 portals"),
+    })
+}
+
+pub(super) fn direction(name: &str) -> anyhow::Result<Figure> {
+    let (_, value, n) = worst(name)?;
+    Ok(Figure {
+        value,
+        most: 1.0,
+        note: format!("degrees, the worst of {n} pairs"),
+    })
+}
+
+/// Decibels a centimeter, at most, on walks straight through each doorway.
+fn steepest(site: &Office, note: &str) -> anyhow::Result<Figure> {
+    let mut rng = Rng::new(9);
+    let (mut value, mut n): (f64, usize) = (0.0, 0);
+    let mut ears = Listener::new();
+    for p in (0..site.layout.n_portals() as u32).map(PortalId) {
+        let opening = site.layout.opening(p);
+        for _ in 0..4 {
+            let source = site.place(&mut rng).context("no place")?;
+            let mut before: Option<f64> = None;
+            n += 1;
+            for k in -150..150 {
+                let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.01;
+                let Some(cell) = site.layout.locate(at) else {
+                    before = None;
+                    continue;
+                };
+                ears.listen(&site.acoustics, &site.state, cell, at);
+                let Some(heard) = ears.hear(&site.acoustics, &site.layout, 0, source.0, source.1)
+                else {
+                    break;
+                };
+                let level = 20.0 * heard.gain.max(1e-12).log10();
+                value = value.max(before.map_or(0.0, |b| (level - b).abs()));
+                before = Some(level);
+            }
+        }
+    }
+    Ok(Figure {
+        value,
+        most: 0.5,
+        note: format!("dB a centimeter, the most on {n} walks through {note}"),
+    })
+}
+
+pub(super) fn doorway(_: &str) -> anyhow::Result<Figure> {
+    steepest(&Office::offices(100, 5)?, "doorways of offices")
+}
+
+pub(super) fn doorway_baked(world: &World) -> anyhow::Result<Figure> {
+    steepest(&Office::new(world)?, "portals of all kinds")
+}
+
+/// Coupled rooms against the balance of energy in closed form, and a room alone against Sabine's formula: the worst share off.
+pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
+    let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
+    let door = layout.opening(PortalId(0)).area();
+    let mut rng = Rng::new(2);
+    let mut fields = DiffuseFields::new();
+    let mut value: f64 = 0.0;
+    for _ in 0..1000 {
+        let room = [0; 2].map(|_| {
+            (
+                rng.range(20.0, 400.0),
+                rng.range(60.0, 400.0),
+                rng.range(0.02, 0.5),
+            )
+        });
+        let reverb = Reverb::of_rooms(&layout, DecayLaw::Sabine, &room);
+        let share = rng.unit();
+        fields.solve(&reverb, CellId(0), |_| share);
+        let s = door * share;
+        let [m, n] = room.map(|r| r.1 * r.2 + s);
+        let det = m * n - s * s;
+        let w = [n / det, s / det];
+        let left = (n * room[0].0 * w[0] + s * room[1].0 * w[1]) / det;
+        let time = 24.0 * std::f64::consts::LN_10 / enfilade::world::SPEED_OF_SOUND * left / w[0];
+        let off = [
+            fields.rt60(CellId(0)) / time,
+            fields.density(CellId(1)) / w[1],
+        ];
+        value = off.iter().fold(value, |most, x| most.max((x - 1.0).abs()));
+    }
+    Ok(Figure {
+        value,
+        most: 0.1,
+        note: "1,000 pairs of rooms, decay and level, against the balance of energy in closed form"
+            .into(),
+    })
+}
+
+/// Microseconds a source on a walk of steps of 2 cm, searches included, by the bar.
+pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
+    let site = Office::offices(1000, 7)?;
+    let mut rng = Rng::new(3);
+    let sources: Vec<_> = (0..64).filter_map(|_| site.place(&mut rng)).collect();
+    let opening = site
+        .layout
+        .opening(PortalId((site.layout.n_portals() / 2) as u32));
+    let mut ears = Listener::new();
+    let (mut kept, mut searched, mut total, mut n) = (Vec::new(), Vec::new(), 0.0, 0);
+    for k in -100..100 {
+        let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.02;
+        let Some(cell) = site.layout.locate(at) else {
+            continue;
+        };
+        let before = ears.n_searches();
+        let start = Instant::now();
+        ears.listen(&site.acoustics, &site.state, cell, at);
+        for (id, source) in sources.iter().enumerate() {
+            std::hint::black_box(ears.hear(&site.acoustics, &site.layout, id, source.0, source.1));
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        let list = if ears.n_searches() == before {
+            &mut kept
+        } else {
+            &mut searched
+        };
+        list.push(seconds);
+        total += seconds;
+        n += 1;
+    }
+    let median = |list: &mut Vec<f64>| {
+        list.sort_by(f64::total_cmp);
+        list.get(list.len() / 2).copied().unwrap_or_default() * 1e6 / sources.len() as f64
+    };
+    Ok(Figure {
+        value: median(&mut kept),
+        most: 5.0,
+        note: format!(
+            "µs a source, median of frames without a search; {:.1} with one ({} of {n} frames), {:.1} on the mean of all",
+            median(&mut searched),
+            searched.len(),
+            total * 1e6 / (n * sources.len()) as f64
+        ),
+    })
+}

@@ -1,0 +1,26 @@
+//! What reaches the two ears of a head.
+
+use enfilade_geom::DVec3;
+
+use crate::reverb::SPEED_OF_SOUND;
+
+/// From the direction that sound comes from to the ears: how loud and how late at the left and the right one.
+///
+/// A head of radius 8.75 cm: times by Woodworth's formula (Blauert, "Spatial Hearing", §2.4), levels by equal power. Seconds from the
+/// nearer ear's. `ahead` and `up` are the listener's.
+#[must_use]
+pub fn at_ears(toward: DVec3, ahead: DVec3, up: DVec3) -> [(f64, f64); 2] {
+    const HEAD: f64 = 0.0875;
+    let right = ahead.cross(up).normalize_or_zero();
+    let side = right.dot(toward).clamp(-1.0, 1.0);
+    let angle = side.abs().asin();
+    let late = HEAD / SPEED_OF_SOUND * (angle + angle.sin());
+    // Between full left and full right, as a share of a quarter turn; the far ear still hears.
+    let pan = std::f64::consts::FRAC_PI_4 * (1.0 + 0.7 * side);
+    let (left, right) = (pan.cos(), pan.sin());
+    if side > 0.0 {
+        [(left, late), (right, 0.0)]
+    } else {
+        [(left, 0.0), (right, late)]
+    }
+}

@@ -1,0 +1,567 @@
+//! The shortest string from a point through a sequence of openings to a point.
+//!
+//! Minimize `Σ |xᵢ₊₁ − xᵢ|` with each `xᵢ` in its opening: a convex problem where openings are convex (a second-order cone programme;
+//! Lobo, Vandenberghe, Boyd & Lebret, "Applications of second-order cone programming", 1998, §2). Three steps take turns:
+//!
+//! 1. *Sweeps*: each point moves to its best place between its neighbors, which has a closed form: reflection at the plane, then
+//!    unfolding about an edge. They find which points hang at which edges and corners.
+//! 2. *Newton's method* on the faces found, a block tridiagonal system of 2 × 2 blocks: a few steps where sweeps would need hundreds.
+//! 3. Where points of neighboring openings fall on one another, and both stall, an *interior-point method* with logarithmic barriers
+//!    (Boyd & Vandenberghe, "Convex Optimization", 2004, §11.3) and lengths rounded off at nil: its gap shrinks by a constant factor a
+//!    step, whatever the openings.
+//!
+//! Each ends by the same test. For any vectors `uᵢ` of length 1 or less, one a leg, `uₙ·b − u₀·a + Σᵢ min over opening i of
+//! (uᵢ₋₁ − uᵢ)·x` is no longer than any string (the dual problem): with the legs' directions for `u` it is the string's own length
+//! at the optimum, and its distance from that length bounds the error everywhere else. O(corners) a step.
+//!
+//! Numerically: legs of no length have no direction, so these end with step 3; slivers of openings have barriers of great condition,
+//! so a step that does not shorten is not taken.
+
+use enfilade_geom::DVec3;
+
+use crate::blocks::{Block, solve};
+
+/// How far a string may be from the shortest, by its length: the gap that ends the search.
+const GAP: f64 = 1e-6;
+/// Rounds of sweeps and Newton before the interior-point method.
+const ROUNDS: usize = 12;
+/// Steps of the interior-point method, at most.
+const STEPS: usize = 200;
+
+/// A string pulled taut, with buffers that are used again: nothing is allocated once they have grown.
+#[derive(Clone, Debug, Default)]
+pub struct TautString {
+    /// Both ends, and a point in each opening between.
+    points: Vec<DVec3>,
+    next: Vec<DVec3>,
+    /// By inner point, what it may move along: nil vectors where it may not.
+    axes: Vec<[DVec3; 2]>,
+    blocks: Vec<Block>,
+    pieces: Vec<u32>,
+    directions: Vec<DVec3>,
+    length: f64,
+    bound: f64,
+}
+
+impl TautString {
+    /// Without buffers yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Pulls the string taut from `from` through `n` openings to `to`; `pieces(i)` has the convex planar polygons of opening `i`,
+    /// at least one, each with an area. Its length. [Units: wu]
+    ///
+    /// Starts at the openings' middles; O(corners) a step, about ten steps, rarely a hundred. An opening whose pieces together are
+    /// not convex has the best place near the one that was found, and [`TautString::bound`] is that of its hull.
+    pub fn pull<'a, I>(
+        &mut self,
+        from: DVec3,
+        to: DVec3,
+        n: usize,
+        pieces: impl Fn(usize) -> I,
+    ) -> f64
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        self.points.clear();
+        self.points.push(from);
+        for i in 0..n {
+            let first = pieces(i).next().unwrap_or_default();
+            self.points.push(middle(first));
+        }
+        self.points.push(to);
+        self.tighten(pieces)
+    }
+
+    /// The same from a string near the shortest: `start(i)` is a point near opening `i`.
+    pub fn pull_from<'a, I>(
+        &mut self,
+        from: DVec3,
+        to: DVec3,
+        start: impl ExactSizeIterator<Item = DVec3>,
+        pieces: impl Fn(usize) -> I,
+    ) -> f64
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        self.points.clear();
+        self.points.push(from);
+        self.points.extend(start);
+        self.points.push(to);
+        self.tighten(pieces)
+    }
+
+    /// Both ends, and a point in each opening between them. [Units: wu]
+    #[must_use]
+    pub fn points(&self) -> &[DVec3] {
+        &self.points
+    }
+
+    /// Of the string. [Units: wu]
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// No string through these openings is shorter than this. [Units: wu]
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        self.bound
+    }
+
+    /// Unit vector in which the string leaves its start: to the first point that lies apart from it; nil if none does.
+    #[must_use]
+    pub fn departure(&self) -> DVec3 {
+        let from = self.points.first().copied().unwrap_or_default();
+        away(from, self.points.iter().copied(), self.length)
+    }
+
+    /// Unit vector from the end to where the string comes from: to the last point that lies apart from it; nil if none does.
+    #[must_use]
+    pub fn arrival(&self) -> DVec3 {
+        let to = self.points.last().copied().unwrap_or_default();
+        away(to, self.points.iter().rev().copied(), self.length)
+    }
+
+    fn tighten<'a, I>(&mut self, pieces: impl Fn(usize) -> I) -> f64
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        let n = self.points.len() - 2;
+        self.axes.clear();
+        self.axes.resize(n, [DVec3::ZERO; 2]);
+        self.blocks.clear();
+        self.blocks.resize(n, Block::default());
+        self.pieces.clear();
+        self.pieces.resize(n, 0);
+        self.next.clear();
+        self.next.reserve(n + 2);
+        self.directions.clear();
+        self.directions.reserve(n + 1);
+        self.bound = 0.0;
+        // From the first round on, points are in their openings.
+        self.sweep(n, &pieces, true);
+        for _ in 0..ROUNDS {
+            self.sweep(n, &pieces, false);
+            if self.is_short(&pieces) {
+                return self.length;
+            }
+            self.newton(&pieces);
+        }
+        self.interior(&pieces);
+        for _ in 0..2 {
+            self.sweep(n, &pieces, true);
+        }
+        self.is_short(&pieces);
+        self.length
+    }
+
+    /// Moves each point to its best place between its neighbors; back as well as forth if asked.
+    fn sweep<'a, I>(&mut self, n: usize, pieces: &impl Fn(usize) -> I, both: bool)
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        let back = (0..n.saturating_sub(1))
+            .rev()
+            .take(if both { n } else { 0 });
+        for i in (0..n).chain(back) {
+            let (a, b) = (self.points[i], self.points[i + 2]);
+            let mut least = f64::INFINITY;
+            for (k, piece) in pieces(i).enumerate() {
+                let (place, axes) = best_place(a, b, piece);
+                let length = place.distance(a) + place.distance(b);
+                if length < least {
+                    least = length;
+                    self.points[i + 1] = place;
+                    self.axes[i] = axes;
+                    self.pieces[i] = k as u32;
+                }
+            }
+        }
+    }
+
+    /// Whether the string is the shortest but for the gap; sets length and bound.
+    fn is_short<'a, I>(&mut self, pieces: &impl Fn(usize) -> I) -> bool
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        self.length = length_of(&self.points);
+        self.directions.clear();
+        let legs = self.points.windows(2);
+        self.directions
+            .extend(legs.map(|p| (p[1] - p[0]).normalize_or_zero()));
+        self.lift_bound(pieces);
+        self.length - self.bound <= GAP * self.length
+    }
+
+    /// Raises the bound to that of the directions.
+    fn lift_bound<'a, I>(&mut self, pieces: &impl Fn(usize) -> I)
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        let n = self.points.len() - 2;
+        // Measured from the start, for the sake of digits.
+        let from = self.points[0];
+        let mut bound = self.directions[n].dot(self.points[n + 1] - from);
+        for i in 0..n {
+            let turn = self.directions[i] - self.directions[i + 1];
+            let corners = pieces(i).flatten().map(|p| turn.dot(*p - from));
+            bound += corners.fold(f64::INFINITY, f64::min);
+        }
+        self.bound = self.bound.max(bound);
+    }
+
+    /// A step of Newton's method along the faces that points hang at, as far as it shortens.
+    fn newton<'a, I>(&mut self, pieces: &impl Fn(usize) -> I)
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        let n = self.axes.len();
+        assemble(&self.points, &self.axes, 1e-9, &mut self.blocks);
+        if !solve(&mut self.blocks) {
+            return;
+        }
+        let mut share: f64 = 1.0;
+        for i in 0..n {
+            let step = self.step(i);
+            let piece = pieces(i).nth(self.pieces[i] as usize).unwrap_or_default();
+            share = share.min(room(self.points[i + 1], step, piece));
+        }
+        let before = length_of(&self.points);
+        for _ in 0..6 {
+            self.try_step(share);
+            if length_of(&self.next) < before {
+                std::mem::swap(&mut self.points, &mut self.next);
+                return;
+            }
+            share *= 0.25;
+        }
+    }
+
+    fn step(&self, i: usize) -> DVec3 {
+        let [u, v] = self.blocks[i].right;
+        self.axes[i][0] * u + self.axes[i][1] * v
+    }
+
+    fn try_step(&mut self, share: f64) {
+        self.next.clear();
+        self.next.push(self.points[0]);
+        for i in 0..self.axes.len() {
+            let p = self.points[i + 1] + self.step(i) * share;
+            self.next.push(p);
+        }
+        self.next.push(self.points[self.axes.len() + 1]);
+    }
+
+    /// The interior-point method, through the pieces that points are in, from their middles.
+    fn interior<'a, I>(&mut self, pieces: &impl Fn(usize) -> I)
+    where
+        I: Iterator<Item = &'a [DVec3]>,
+    {
+        let n = self.axes.len();
+        let piece =
+            |chosen: &[u32], i: usize| pieces(i).nth(chosen[i] as usize).unwrap_or_default();
+        for i in 0..n {
+            let corners = piece(&self.pieces, i);
+            self.axes[i] = plane_axes(corners);
+            self.points[i + 1] = middle(corners);
+        }
+        let n_edges: usize = (0..n).map(|i| piece(&self.pieces, i).len()).sum();
+        let (mut weight, least) = (0.1 * self.length, 0.02 * GAP * self.length);
+        let least = least / (n + n_edges + 1) as f64;
+        for _ in 0..STEPS {
+            assemble(&self.points, &self.axes, weight, &mut self.blocks);
+            for i in 0..n {
+                add_barrier(
+                    self.points[i + 1],
+                    piece(&self.pieces, i),
+                    weight,
+                    &self.axes[i],
+                    &mut self.blocks[i],
+                );
+            }
+            if !solve(&mut self.blocks) {
+                break;
+            }
+            self.set_newton_directions(weight);
+            self.lift_bound(pieces);
+            let mut share: f64 = 1.0;
+            for i in 0..n {
+                let room = room(self.points[i + 1], self.step(i), piece(&self.pieces, i));
+                // Not onto an edge.
+                share = share.min(if room < 1.0 { 0.95 * room } else { 1.0 });
+            }
+            let value = |points: &[DVec3], chosen: &[u32]| {
+                let legs = points
+                    .windows(2)
+                    .map(|p| rounded(p[0].distance(p[1]), weight));
+                let barriers = (0..n).map(|i| barrier(points[i + 1], piece(chosen, i)));
+                legs.sum::<f64>() + weight * barriers.sum::<f64>()
+            };
+            let before = value(&self.points, &self.pieces);
+            let mut gain = 0.0;
+            for _ in 0..30 {
+                self.try_step(share);
+                gain = before - value(&self.next, &self.pieces);
+                if gain > 0.0 {
+                    std::mem::swap(&mut self.points, &mut self.next);
+                    break;
+                }
+                share *= 0.5;
+            }
+            let gap = length_of(&self.points) - self.bound;
+            if weight < least || gap <= 0.5 * GAP * self.length {
+                break;
+            }
+            if gain < 0.1 * weight {
+                weight *= 0.2;
+            }
+        }
+    }
+
+    /// The legs' directions after the step that was solved for, by their derivatives: with these the dual problem's constraints hold
+    /// exactly, while directions of legs of hardly any length are off by much.
+    fn set_newton_directions(&mut self, round: f64) {
+        self.directions.clear();
+        let n = self.axes.len();
+        for leg in 0..=n {
+            let d = self.points[leg + 1] - self.points[leg];
+            let root = d.length().hypot(round);
+            let u = d / (root + round);
+            let start = leg.checked_sub(1).map_or(DVec3::ZERO, |i| self.step(i));
+            let end = if leg < n { self.step(leg) } else { DVec3::ZERO };
+            let step = end - start;
+            let moved = u + step / (root + round) - u * (u.dot(step) / root);
+            self.directions.push(moved / moved.length().max(1.0));
+        }
+    }
+}
+
+/// A length with the barrier of its cone: the least over `t` of `t − round · log(t² − length²)`.
+///
+/// Self-concordant as the barrier is, so that Newton's method needs no more steps where lengths vanish.
+fn rounded(length: f64, round: f64) -> f64 {
+    let t = round + length.hypot(round);
+    t - round * (2.0 * round * t).ln()
+}
+
+fn length_of(points: &[DVec3]) -> f64 {
+    points.windows(2).map(|p| p[0].distance(p[1])).sum()
+}
+
+fn away(from: DVec3, mut points: impl Iterator<Item = DVec3>, length: f64) -> DVec3 {
+    let apart = points.find(|p| p.distance(from) > 1e-9 * length);
+    apart.map_or(DVec3::ZERO, |p| (p - from).normalize_or_zero())
+}
+
+fn middle(corners: &[DVec3]) -> DVec3 {
+    corners.iter().sum::<DVec3>() / corners.len().max(1) as f64
+}
+
+/// Twice the area, along the normal.
+fn area_normal(corners: &[DVec3]) -> DVec3 {
+    let Some((&first, rest)) = corners.split_first() else {
+        return DVec3::ZERO;
+    };
+    let fan = rest.windows(2).map(|p| (p[0] - first).cross(p[1] - first));
+    fan.sum()
+}
+
+fn plane_axes(corners: &[DVec3]) -> [DVec3; 2] {
+    let normal = area_normal(corners).normalize_or_zero();
+    if normal == DVec3::ZERO {
+        return [DVec3::ZERO; 2];
+    }
+    let (u, v) = normal.any_orthonormal_pair();
+    [u, v]
+}
+
+fn edges(corners: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
+    let nexts = corners.iter().cycle().skip(1);
+    corners.iter().zip(nexts).map(|(a, b)| (*a, *b))
+}
+
+/// The point of a polygon whose distances from `a` and `b` have the least sum, and what it may move along.
+fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
+    let normal = area_normal(corners).normalize_or_zero();
+    let Some(&first) = corners.first() else {
+        return (a, [DVec3::ZERO; 2]);
+    };
+    // As if `b` were on the other side: distances to points of the plane are the same.
+    let (h_a, h_b) = (normal.dot(a - first), normal.dot(b - first));
+    let (p, q) = (a - normal * h_a, b - normal * h_b);
+    let (h_a, h_b) = (h_a.abs(), h_b.abs());
+    let through = if h_a + h_b > 0.0 {
+        p.lerp(q, h_a / (h_a + h_b))
+    } else {
+        p
+    };
+    let is_out = |from: DVec3, to: DVec3| normal.dot((to - from).cross(through - from)) < 0.0;
+    let mut best = (through, [DVec3::ZERO; 2]);
+    let mut least = f64::INFINITY;
+    let mut is_inside = true;
+    for (from, to) in edges(corners) {
+        // Both ends in the plane: any edge may be the nearest.
+        let is_flat = h_a + h_b == 0.0;
+        if !is_flat && !is_out(from, to) {
+            continue;
+        }
+        is_inside &= is_flat && !is_out(from, to);
+        let (place, axis) = best_on_edge(a, b, from, to);
+        let length = place.distance(a) + place.distance(b);
+        if length < least {
+            least = length;
+            best = (place, [axis, DVec3::ZERO]);
+        }
+    }
+    if is_inside {
+        let (u, v) = normal.any_orthonormal_pair();
+        return (through, [u, v]);
+    }
+    best
+}
+
+/// The same on an edge: the triangles that `a` and `b` make with its line are unfolded into one plane.
+pub(crate) fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
+    let length = from.distance(to);
+    if length == 0.0 {
+        return (from, DVec3::ZERO);
+    }
+    let along = (to - from) / length;
+    let (t_a, t_b) = (along.dot(a - from), along.dot(b - from));
+    let r_a = (a - from - along * t_a).length();
+    let r_b = (b - from - along * t_b).length();
+    let t = if r_a + r_b > 0.0 {
+        (t_a * r_b + t_b * r_a) / (r_a + r_b)
+    } else {
+        t_a
+    };
+    if t <= 0.0 {
+        (from, DVec3::ZERO)
+    } else if t >= length {
+        (to, DVec3::ZERO)
+    } else {
+        (from + along * t, along)
+    }
+}
+
+/// The share of a step, at most 1, that a point of a polygon can take within it.
+fn room(at: DVec3, step: DVec3, corners: &[DVec3]) -> f64 {
+    let normal = area_normal(corners).normalize_or_zero();
+    let mut share: f64 = 1.0;
+    for (from, to) in edges(corners) {
+        let inward = normal.cross(to - from).normalize_or_zero();
+        let (depth, toward) = (inward.dot(at - from), -inward.dot(step));
+        // Along the edge that it hangs at, rounding is no motion.
+        if toward > 1e-12 * step.length() && toward * share > depth {
+            share = (depth / toward).max(0.0);
+        }
+    }
+    share
+}
+
+/// The system of Newton's method for the sum of lengths, each [rounded off](rounded) at `round`.
+fn assemble(points: &[DVec3], axes: &[[DVec3; 2]], round: f64, blocks: &mut [Block]) {
+    for (block, axes) in blocks.iter_mut().zip(axes) {
+        *block = Block::default();
+        for (k, axis) in axes.iter().enumerate() {
+            // A place that cannot move is a row of its own.
+            block.diagonal[k][k] = if *axis == DVec3::ZERO { 1.0 } else { 0.0 };
+        }
+    }
+    for (leg, ends) in points.windows(2).enumerate() {
+        let d = ends[1] - ends[0];
+        let root = (d.length_squared() + round * round).sqrt();
+        let length = root + round;
+        let u = d / length;
+        // The second derivative along two axes.
+        let curve = |x: DVec3, y: DVec3| x.dot(y) / length - x.dot(u) * y.dot(u) / root;
+        for (at, sign) in [(leg.wrapping_sub(1), -1.0), (leg, 1.0)] {
+            let (Some(block), Some(axes)) = (blocks.get_mut(at), axes.get(at)) else {
+                continue;
+            };
+            for k in 0..2 {
+                block.right[k] -= sign * u.dot(axes[k]);
+                for l in 0..2 {
+                    block.diagonal[k][l] += curve(axes[k], axes[l]);
+                }
+            }
+        }
+        if leg > 0 && leg < blocks.len() {
+            let (before, after) = (axes[leg - 1], axes[leg]);
+            blocks[leg - 1].above = before.map(|x| after.map(|y| -curve(x, y)));
+        }
+    }
+}
+
+/// Minus the logarithms of the distances from a polygon's edges; infinite on them and outside.
+fn barrier(at: DVec3, corners: &[DVec3]) -> f64 {
+    let normal = area_normal(corners).normalize_or_zero();
+    let depths = edges(corners).map(|(a, b)| normal.cross(b - a).normalize_or_zero().dot(at - a));
+    depths
+        .map(|depth| {
+            if depth > 0.0 {
+                -depth.ln()
+            } else {
+                f64::INFINITY
+            }
+        })
+        .sum()
+}
+
+fn add_barrier(at: DVec3, corners: &[DVec3], weight: f64, axes: &[DVec3; 2], block: &mut Block) {
+    let normal = area_normal(corners).normalize_or_zero();
+    for (a, b) in edges(corners) {
+        let inward = normal.cross(b - a).normalize_or_zero();
+        let slope = axes.map(|axis| inward.dot(axis) / inward.dot(at - a));
+        for k in 0..2 {
+            block.right[k] += weight * slope[k];
+            for l in 0..2 {
+                block.diagonal[k][l] += weight * slope[k] * slope[l];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn doorway(x: f64, z: f64) -> Vec<DVec3> {
+        let corner = |y: f64, z: f64| DVec3::new(x, y, z);
+        vec![
+            corner(0.0, z),
+            corner(2.0, z),
+            corner(2.0, z + 1.0),
+            corner(0.0, z + 1.0),
+        ]
+    }
+
+    /// W11.
+    #[test]
+    fn a_string_through_a_doorway_aside_bends_at_its_jamb() {
+        let door = doorway(0.0, 2.0);
+        let (a, b) = (DVec3::new(-3.0, 1.0, 0.0), DVec3::new(3.0, 1.0, 0.0));
+        let mut string = TautString::new();
+        let length = string.pull(a, b, 1, |_| [door.as_slice()].into_iter());
+        assert!((length - 2.0 * 13f64.sqrt()).abs() < 1e-9, "{length}");
+        assert!(string.bound() <= length + 1e-12 && string.bound() > length * (1.0 - 1e-6));
+        assert!(string.points()[1].distance(DVec3::new(0.0, 1.0, 2.0)) < 1e-6);
+        assert!((string.departure() - DVec3::new(3.0, 0.0, 2.0).normalize()).length() < 1e-6);
+        assert!((string.arrival() - DVec3::new(-3.0, 0.0, 2.0).normalize()).length() < 1e-6);
+    }
+
+    /// W11.
+    #[test]
+    fn a_string_through_nothing_is_straight() {
+        let mut string = TautString::new();
+        let none: [&[DVec3]; 0] = [];
+        let to = DVec3::new(0.0, 3.0, 4.0);
+        assert_eq!(string.pull(DVec3::ZERO, to, 0, |_| none.into_iter()), 5.0);
+        assert_eq!(string.bound(), 5.0);
+        assert_eq!(string.pull(to, to, 0, |_| none.into_iter()), 0.0);
+        assert_eq!(string.departure(), DVec3::ZERO);
+    }
+}
