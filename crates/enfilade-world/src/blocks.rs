@@ -23,8 +23,8 @@ pub(crate) fn solve(blocks: &mut [Block]) -> bool {
             let less = product(down, before.above);
             let block = &mut blocks[i];
             for k in 0..2 {
-                for l in 0..2 {
-                    block.diagonal[k][l] -= less[k][l];
+                for (x, y) in block.diagonal[k].iter_mut().zip(less[k]) {
+                    *x -= y;
                 }
                 block.right[k] -= down[k][0] * before.right[0] + down[k][1] * before.right[1];
             }
