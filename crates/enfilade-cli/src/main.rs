@@ -5,6 +5,7 @@
 //! Exit code 0: done;
 //! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
+mod auralize;
 mod bake;
 mod decimate;
 mod demo;
@@ -24,6 +25,7 @@ mod render;
 mod report;
 mod see;
 mod simplify;
+mod sound;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
@@ -64,6 +66,7 @@ enum Command {
     Report(report::Report),
     See(see::See),
     Simplify(simplify::Simplify),
+    Sound(sound::Sound),
     Verify(verify::Verify),
     #[cfg(feature = "view")]
     View(view::View),
@@ -89,6 +92,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
         Command::Simplify(args) => simplify::run(&args),
+        Command::Sound(args) => sound::run(&args),
         Command::Verify(args) => verify::run(&args),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),

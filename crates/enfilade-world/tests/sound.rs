@@ -1,4 +1,4 @@
-//! What listeners hear.
+//! What listeners hear. Covers W11.
 
 mod cone;
 

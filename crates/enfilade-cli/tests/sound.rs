@@ -1,0 +1,109 @@
+//! Runs `sound` on a world made in code.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use enfilade_cpg::wire::encode_glb;
+use enfilade_testkit::{GridParams, room_grid};
+use serde_json::Value;
+
+fn enfilade(args: &[&str]) -> Output {
+    let out = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+        .args(args)
+        .output()
+        .unwrap();
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    out
+}
+
+fn file(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    path.to_str().unwrap().to_owned()
+}
+
+/// A world of two rooms, and three points: in the first, in the doorway, in the second.
+fn two_rooms(name: &str) -> (String, [String; 3]) {
+    let world = room_grid(&GridParams::two_rooms());
+    let path = file(name);
+    fs::write(&path, encode_glb(&world).unwrap()).unwrap();
+    let outline = &world.graph.portals[0].outline;
+    let middle = [0, 1, 2].map(|k| outline.iter().map(|p| p[k]).sum::<f32>() / 4.0);
+    let places =
+        [-1.5, 0.01, 1.5].map(|x| format!("{},{},{}", middle[0] + x, middle[1], middle[2]));
+    (path, places)
+}
+
+fn samples(path: &str) -> Vec<f64> {
+    let mut reader = hound::WavReader::open(path).unwrap();
+    assert_eq!(reader.spec().channels, 2);
+    reader
+        .samples::<i16>()
+        .map(|s| f64::from(s.unwrap()) / 32767.0)
+        .collect()
+}
+
+fn energy(samples: &[f64]) -> f64 {
+    samples.iter().map(|s| s * s).sum()
+}
+
+/// W11: a closed door takes 20 dB and more; equal questions have equal bytes.
+#[test]
+fn a_closed_door_is_heard() {
+    let (world, [a, _, b]) = two_rooms("sound-closed.glb");
+    let [open, again, shut] = ["open.wav", "again.wav", "shut.wav"].map(file);
+    let ask = |more: &[&str]| {
+        let mut args = vec!["sound", &world, "--listener", &a, "--source", &b];
+        args.extend(more);
+        enfilade(&args);
+    };
+    ask(&["-o", &open]);
+    ask(&["-o", &again]);
+    ask(&["-o", &shut, "--closed", "0"]);
+    assert_eq!(fs::read(&open).unwrap(), fs::read(&again).unwrap());
+    let fallen = 10.0 * (energy(&samples(&open)) / energy(&samples(&shut))).log10();
+    assert!(fallen > 20.0, "{fallen} dB");
+}
+
+/// W11: on a walk through the doorway no sample jumps by more than the source's own do.
+#[test]
+fn a_walk_has_no_clicks_and_a_table() {
+    let (world, [a, door, b]) = two_rooms("sound-walk.glb");
+    let wav = file("walk.wav");
+    let walk = format!("{a};{door};{b}");
+    let source = b.clone();
+    let out = enfilade(&[
+        "sound",
+        &world,
+        "--listener",
+        &walk,
+        "--source",
+        &source,
+        "-o",
+        &wav,
+        "--json",
+    ]);
+    let rows: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let rows = rows.as_array().unwrap();
+    assert!(rows.len() >= 20);
+    let of = |i: usize, key: &str| rows[i][key].as_f64().unwrap();
+    assert!((of(0, "length") - 3.0).abs() < 0.05);
+    assert!(of(rows.len() - 1, "gain_db") > of(0, "gain_db"));
+    assert!(rows.iter().all(|r| r["rt60"].as_f64().unwrap() > 0.1));
+    assert_ne!(rows[0]["cell"], rows[rows.len() - 1]["cell"]);
+    let samples = samples(&wav);
+    // The test sound: slopes of 0.5 * (440 + 0.5 * 660) Hz at 44.1 kHz; at a quarter, and at most 3 times for direct sound and room.
+    let most = 3.0 * 0.25 * 0.5 * (440.0 + 330.0) * std::f64::consts::TAU / 44100.0;
+    for k in 0..2 {
+        let channel: Vec<f64> = samples.iter().skip(k).step_by(2).copied().collect();
+        let jump = channel
+            .windows(2)
+            .map(|w| (w[1] - w[0]).abs())
+            .fold(0.0, f64::max);
+        assert!(jump > 1e-4 && jump <= most, "{jump} {most}");
+    }
+}
