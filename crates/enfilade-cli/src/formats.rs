@@ -21,6 +21,7 @@ pub(crate) enum Format {
     Evidence,
     Search,
     Manual,
+    Sound,
 }
 
 struct Row {
@@ -44,7 +45,7 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 14] = [
+const TABLE: [Row; 15] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(
@@ -54,6 +55,7 @@ const TABLE: [Row; 14] = [
     ),
     row(Format::Page, "a page of HTML", &["html", "htm"]),
     row(Format::Picture, "a picture as PNG", &["png"]),
+    row(Format::Sound, "a sound as WAV", &["wav"]),
     row(Format::Cameras, "cameras as text", &["txt", "path"]),
     row(Format::Choices, "decisions as TOML", &["toml"]),
     row(

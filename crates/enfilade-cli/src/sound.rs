@@ -1,6 +1,6 @@
 //! `enfilade sound`: what a walking listener hears of a source.
 
-use std::io::{self, BufWriter, Cursor, Write};
+use std::io::{BufWriter, Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -13,7 +13,8 @@ use enfilade::world::{
 };
 
 use crate::auralize::{BLOCK, Block, render, test_sound};
-use crate::output::{print_json, write_whole};
+use crate::formats::Format;
+use crate::output::{Outputs, print_json, write_whole};
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
@@ -64,6 +65,10 @@ struct HeardLine {
 }
 
 pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
+    let mut outputs = Outputs::reading(std::iter::once(&args.world).chain(&args.wav))?;
+    if let Some(path) = &args.output {
+        outputs.write("-o", Format::Sound, path)?;
+    }
     let world = read_world(&args.world)?;
     let n = world.graph.portals.len();
     if let Some(p) = args.closed.iter().find(|p| **p as usize >= n) {
@@ -80,14 +85,14 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         write_whole(path, &wav_of(&render(&source, rate, &blocks), rate)?)?;
     }
-    let out = BufWriter::new(io::stdout().lock());
+    let out = BufWriter::new(outputs.printed());
     if args.json {
-        return print_json(out, &rows);
+        return print_json(
+            out,
+            &serde_json::json!({ "file": args.output, "heard": rows }),
+        );
     }
-    if args.output.as_deref() != Some(Path::new("-")) {
-        print_table(out, &rows)?;
-    }
-    Ok(())
+    print_table(out, &rows)
 }
 
 /// What is heard block by block, and lines for the reader.

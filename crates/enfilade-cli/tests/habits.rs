@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// What `--json` of each command has in it, among other things; files are those that the rows before left.
-const COMMANDS: [(&str, &[&str]); 17] = [
+const COMMANDS: [(&str, &[&str]); 18] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -51,6 +51,10 @@ const COMMANDS: [(&str, &[&str]); 17] = [
     (
         "simplify world.glb --max-cells 6 -o s.glb",
         &["file", "cells", "portals", "warning"],
+    ),
+    (
+        "sound world.glb --listener 2,1,2 --source 3,1,2 -o s.wav",
+        &["file", "heard"],
     ),
     (
         "verify world.glb --rays 100 --sight 10",
@@ -128,6 +132,17 @@ fn every_command_that_prints_answers_in_one_json_object_and_quietly_if_asked() {
     let cells = located["cells"].as_array().unwrap();
     assert!(cells.len() == 2 && cells[0].is_u64() && cells[1].is_null());
     // Where a file goes to standard output, what is printed goes aside.
+    let done = run(
+        &dir,
+        "sound world.glb --listener 2,1,2 --source 3,1,2 --json -o -",
+    );
+    assert!(done.stdout.starts_with(b"RIFF"));
+    let _: Value = serde_json::from_slice(&done.stderr).unwrap();
+    let done = run(
+        &dir,
+        "sound world.glb --listener 2,1,2 --source 3,1,2 -o world.glb",
+    );
+    assert!(text(&done.stderr).contains("world.glb is the input"));
     let done = run(&dir, "plan world.glb --json -o -");
     assert!(text(&done.stdout).contains("<svg"));
     let _: Value = serde_json::from_slice(&done.stderr).unwrap();

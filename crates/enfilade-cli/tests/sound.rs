@@ -87,7 +87,8 @@ fn a_walk_has_no_clicks_and_a_table() {
         &wav,
         "--json",
     ]);
-    let rows: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let printed: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let rows = &printed["heard"];
     let rows = rows.as_array().unwrap();
     assert!(rows.len() >= 20);
     let of = |i: usize, key: &str| rows[i][key].as_f64().unwrap();
