@@ -25,7 +25,7 @@ pub struct StepQuestion<'a> {
     pub face: usize,
     /// The cell that is no place but all that is around the world: a view that reaches it through a portal leaves the world.
     pub border: Option<CellId>,
-    /// By cell, whether visits of it are [told](Viewer::take_crossings).
+    /// By cell, whether visits of it are [told](crate::Viewer::take_crossings).
     pub is_watched: &'a [bool],
 }
 

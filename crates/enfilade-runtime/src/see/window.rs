@@ -29,7 +29,7 @@ impl Window {
         }
     }
 
-    /// The same for a view [in another frame](View::in_frame): `turn` takes that frame's directions to those of this one.
+    /// The same for a view [in another frame](crate::View::in_frame): `turn` takes that frame's directions to those of this one.
     #[must_use]
     pub fn in_frame(&self, turn: &DMat3) -> Self {
         let turned = |(n, h): (DVec3, f64)| (turn.transpose() * n, h);
