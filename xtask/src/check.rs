@@ -109,7 +109,8 @@ fn tools_dir() -> PathBuf {
     target_dir().join("tools")
 }
 
-fn node_path() -> PathBuf {
+/// The folder of packages for node that tests need.
+pub(crate) fn node_path() -> PathBuf {
     tools_dir().join("node_modules")
 }
 

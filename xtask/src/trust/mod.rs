@@ -4,6 +4,7 @@
 //! something that it needs is not there, and `note` then says what.
 
 mod budgets;
+mod gate;
 mod inputs;
 mod mutate;
 mod mutated;
@@ -29,13 +30,13 @@ pub(crate) struct TrustOptions {
     pub(crate) runs: Range<usize>,
 }
 
-/// What the rows of a part begin with, and what measures them. Further parts (tampered worlds, adapters)
-/// are further modules with a line here.
-const PARTS: [(&str, Part); 4] = [
+/// The parts by the first word of their rows: a module and a line here for each.
+const PARTS: &[(&str, Part)] = &[
     ("case", budgets::cases),
-    ("nasty", budgets::nasty),
+    ("gate", gate::run),
     ("large", budgets::large),
     ("mutated", mutated::run),
+    ("nasty", budgets::nasty),
 ];
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;
@@ -56,7 +57,7 @@ pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
         runs: options.runs.clone(),
         n: [0; 3],
     };
-    for (name, part) in PARTS {
+    for (name, part) in PARTS.iter().copied() {
         let is_asked = |row: &String| name.starts_with(row.as_str());
         if options.rows.is_empty() || options.rows.iter().any(is_asked) {
             part(&mut rows)?;
@@ -97,6 +98,11 @@ impl Figures {
     fn at_most(&mut self, row: &str, scene: &str, value: f64, most: f64) {
         let bar = format!("<= {most}");
         self.print(row, scene, Some(value), &bar, Some(value <= most));
+    }
+
+    fn at_least(&mut self, row: &str, scene: &str, value: f64, least: f64) {
+        let bar = format!(">= {least}");
+        self.print(row, scene, Some(value), &bar, Some(value >= least));
     }
 
     fn is(&mut self, row: &str, scene: &str, ok: bool) {

@@ -145,11 +145,16 @@ impl ApplicationHandler for App<'_> {
         match event {
             WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => open.resize(size),
-            // The panel has nothing that Tab could go to.
-            WindowEvent::KeyboardInput { event, .. }
-                if !is_taken || event.physical_key == KeyCode::Tab =>
+            // The panel has nothing that Tab could go to, and a key that it took may be released all the same.
+            WindowEvent::KeyboardInput {
+                event,
+                is_synthetic,
+                ..
+            } if !is_taken
+                || event.physical_key == KeyCode::Tab
+                || event.state == ElementState::Released =>
             {
-                if let Err(why) = self.on_key(events, &event) {
+                if let Err(why) = self.on_key(events, &event, is_synthetic) {
                     self.fail(events, why);
                 }
             }
@@ -280,7 +285,13 @@ impl App<'_> {
         })
     }
 
-    fn on_key(&mut self, events: &ActiveEventLoop, event: &KeyEvent) -> anyhow::Result<()> {
+    /// Acts on a key that goes down, once. Synthetic events report keys that were down already when the window got the focus.
+    fn on_key(
+        &mut self,
+        events: &ActiveEventLoop,
+        event: &KeyEvent,
+        is_synthetic: bool,
+    ) -> anyhow::Result<()> {
         let asked = self.sparing();
         let (Some(open), PhysicalKey::Code(key)) = (&mut self.open, event.physical_key) else {
             return Ok(());
@@ -289,8 +300,8 @@ impl App<'_> {
             open.keys.remove(&key);
             return Ok(());
         }
-        open.keys.insert(key);
-        if event.repeat {
+        let is_held = !open.keys.insert(key);
+        if is_held || is_synthetic {
             return Ok(());
         }
         let shown = &mut open.shown;

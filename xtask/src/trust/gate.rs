@@ -1,0 +1,83 @@
+//! Tests that drive a window, a browser, pipes or a clock, on a busy machine: load must not decide whether they pass.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use serde_json::Value;
+
+use super::Figures;
+use crate::check::node_path;
+use crate::{GATE, output_of, root};
+
+/// Runs of each.
+const RUNS: u32 = 10;
+
+/// Busy loops beside.
+const LOOPS: usize = 4;
+
+/// A crate, and its tests that wait for something outside of them.
+const WAITING: [(&str, &[&str]); 2] = [
+    (
+        "enfilade-cli",
+        &["window", "report_page", "streams", "budgets", "enfilade"],
+    ),
+    ("enfilade-geom", &["enfilade_geom"]),
+];
+
+/// Runs that pass of ten, for each test, beside four busy loops.
+pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
+    for (package, targets) in WAITING {
+        let built = test_binaries(package)?;
+        for target in targets {
+            let binary = built.iter().find(|(name, _)| name == target);
+            let (_, binary) = binary.with_context(|| format!("{package} has no test {target}"))?;
+            let passed = beside_load(|| (0..RUNS).filter(|_| passes(package, binary)).count());
+            rows.at_least("gate", target, passed as f64, f64::from(RUNS));
+        }
+    }
+    Ok(())
+}
+
+/// The names and paths of the test binaries of a crate, built as the gate builds them.
+fn test_binaries(package: &str) -> anyhow::Result<Vec<(String, PathBuf)>> {
+    let args = ["-p", package, "--no-run", "--message-format=json"];
+    let told = output_of(&mut GATE.cargo("test", &args), None)?;
+    let messages = told.lines().filter_map(|l| serde_json::from_str(l).ok());
+    let binary = |message: Value| {
+        let name = message["target"]["name"].as_str()?.to_owned();
+        let is_test = message["profile"]["test"] == true;
+        let path = message["executable"].as_str().filter(|_| is_test)?;
+        Some((name, path.into()))
+    };
+    Ok(messages.filter_map(binary).collect())
+}
+
+fn passes(package: &str, binary: &Path) -> bool {
+    let done = Command::new(binary)
+        .current_dir(root().join("crates").join(package))
+        .env("NODE_PATH", node_path())
+        .env("ENFILADE_NEEDS_WINDOW", "1")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    done.is_ok_and(|status| status.success())
+}
+
+/// Does `work` while other threads keep all processors busy.
+fn beside_load<T>(work: impl FnOnce() -> T) -> T {
+    let is_done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..LOOPS {
+            scope.spawn(|| {
+                while !is_done.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
+        let result = work();
+        is_done.store(true, Ordering::Relaxed);
+        result
+    })
+}
