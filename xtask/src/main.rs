@@ -16,6 +16,7 @@ mod names;
 mod score;
 mod tidy;
 mod trust;
+mod words;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};

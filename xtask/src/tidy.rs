@@ -1,5 +1,5 @@
-//! What no lint checks: who may use whom, files that import each other, lengths of files and functions, types of one name, strings
-//! that must not be there, links.
+//! What no lint checks: who may use whom, files that import each other, lengths of files and functions, types of one name, wording
+//! of comments, strings that must not be there, links.
 //!
 //! The table here is the "may not" column of ARCHITECTURE.md; change both together.
 
@@ -10,7 +10,7 @@ use std::process::Command;
 use anyhow::bail;
 use serde_json::Value;
 
-use crate::{cargo, lengths, mutual, names, output_of, root};
+use crate::{cargo, lengths, mutual, names, output_of, root, words};
 
 /// What one crate may use. Dependencies for its tests alone are free.
 struct Fence {
@@ -200,6 +200,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     problems.extend(mutual::problems(&sources));
     problems.extend(lengths::problems(&sources));
     problems.extend(names::problems(&sources));
+    problems.extend(words::problems(&sources));
     if !problems.is_empty() {
         bail!("{}", problems.join("\n"));
     }

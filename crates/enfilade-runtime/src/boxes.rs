@@ -1,21 +1,21 @@
-//! Trees of boxes, and which boxes a set of planes lets through.
+//! Trees of boxes, culled against sets of planes.
 //!
-//! Four boxes are tested at a time (after Assarsson & Möller, "Optimized View Frustum Culling
-//! Algorithms for Bounding Boxes", 2000: only the corner farthest along a plane's normal is looked
-//! at). Errs to "inside".
+//! Four boxes are tested at a time. After Assarsson & Möller, "Optimized View Frustum Culling Algorithms
+//! for Bounding Boxes" (2000): only the vertex farthest along a plane's normal is tested. Errs to
+//! "inside".
 
 use glam::{DVec3, Vec3, Vec4};
 
 use enfilade_geom::Aabb;
 
-/// A child that is not there.
+/// An absent child.
 const NONE: u32 = u32::MAX;
 /// Marks a child that is an item, not a node.
 const ITEM: u32 = 1 << 31;
-/// Levels of a tree of 2³¹ items, three siblings waiting at each, and room to spare.
+/// Stack depth: levels of a tree of 2³¹ items, three siblings waiting at each, and a margin.
 const STACK: usize = 64;
 
-/// Four children: their boxes as `[min, max][axis]`, and what they are.
+/// Four children: their boxes as `[min, max][axis]`, and their references.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 struct Node {
@@ -44,9 +44,9 @@ pub(crate) struct Boxed {
 }
 
 impl BoxTrees {
-    /// Adds a tree over `items`, which it sorts. O(n log² n).
+    /// Adds a tree over `items` and returns its root. Sorts `items`. O(n log² n).
     ///
-    /// Boxes are rounded outwards and grown by `margin`.
+    /// Boxes are grown by `margin` and rounded outwards.
     pub(crate) fn add(&mut self, items: &mut [Boxed], margin: f64) -> Root {
         if items.is_empty() {
             return Root::EMPTY;
@@ -88,7 +88,7 @@ impl BoxTrees {
         Root(at)
     }
 
-    /// Calls `visit` with every item of a tree whose box no plane leaves out altogether.
+    /// Calls `visit` for each item of a tree whose box is not entirely outside one of the planes.
     #[inline]
     pub(crate) fn for_each_inside(
         &self,
@@ -128,7 +128,7 @@ impl BoxTrees {
     }
 }
 
-/// A ray made ready for boxes; its length counts in `t` as the caller's does.
+/// A ray prepared for box tests. Its parameter `t` is the caller's.
 pub(crate) struct BoxRay {
     origin: [Vec4; 3],
     inverse: [Vec4; 3],
@@ -137,7 +137,7 @@ pub(crate) struct BoxRay {
 
 impl BoxRay {
     pub(crate) fn new(origin: DVec3, direction: DVec3) -> Self {
-        // A component that vanishes is raised to what moves by nothing over the ray's length.
+        // Raise a vanishing component to one that moves the ray by a negligible distance.
         let least = direction.abs().max_element() * 1e-12;
         let direction = direction
             .abs()
@@ -155,8 +155,8 @@ impl BoxRay {
 }
 
 impl BoxTrees {
-    /// Calls `visit` with every item of a tree whose box the ray meets at `t` from 0 to `limit`, which
-    /// `visit` returns anew; roughly near to far. Boxes must be grown by what `f32` rounds off.
+    /// Calls `visit` for each item of a tree whose box the ray meets at `t` from 0 to `limit`, roughly near
+    /// to far; `visit` returns the new limit. Boxes must already be grown by the rounding of `f32`.
     #[inline]
     pub(crate) fn for_each_on_ray(
         &self,
@@ -198,7 +198,7 @@ impl BoxTrees {
                 if node.children[k] == NONE {
                     continue;
                 }
-                // The nearest last, to be taken first.
+                // The nearest last: it is popped first.
                 let mut i = len;
                 while i > base && stack[i - 1].1 < near[k] {
                     stack[i] = stack[i - 1];
@@ -223,28 +223,28 @@ fn sort_longest(items: &mut [Boxed]) {
     } else {
         2
     };
-    // By item where equal, so that the same world gives the same tree.
+    // Ties by item, so that the same world gives the same tree.
     items.sort_unstable_by(|a, b| {
         let (x, y) = (a.bounds.center()[axis], b.bounds.center()[axis]);
         x.total_cmp(&y).then(a.item.cmp(&b.item))
     });
 }
 
-/// Planes a region may have: its edges, four sides, entry, far.
+/// Maximum number of planes of a region: its edges, four sides, entry, far.
 const MAX_PLANES: usize = crate::region::MAX_EDGES + 6;
 
-/// Half-spaces `n · p + d >= 0` in world space, wide enough that rounding leaves nothing out.
+/// Half-spaces `n · p + d >= 0` in world space, widened so that rounding excludes nothing.
 #[derive(Clone, Debug)]
 pub(crate) struct Planes {
     planes: [Vec4; MAX_PLANES],
     len: usize,
     eye: DVec3,
-    /// How far planes are moved outwards. [Units: wu]
+    /// Outward shift of each plane. [Units: wu]
     margin: f64,
 }
 
 impl Planes {
-    /// No planes, for boxes of coordinates up to `extent` seen from `eye`.
+    /// An empty set of planes, for boxes with coordinates up to `extent` seen from `eye`.
     pub(crate) fn new(eye: DVec3, extent: f64) -> Self {
         // Three products and sums of up to twice the reach in `f32`, doubled.
         let reach = extent.max(eye.abs().max_element());
@@ -256,7 +256,7 @@ impl Planes {
         }
     }
 
-    /// What rounding may move a plane by. [Units: wu]
+    /// Largest shift of a plane by rounding. [Units: wu]
     pub(crate) fn margin(&self) -> f64 {
         self.margin
     }
@@ -265,7 +265,7 @@ impl Planes {
         self.len = 0;
     }
 
-    /// Adds `normal · (p - eye) >= least`; `normal` of any length.
+    /// Adds the half-space `normal · (p - eye) >= least`; `normal` may have any length.
     pub(crate) fn add(&mut self, normal: DVec3, least: f64) {
         let scale = 1.0 / normal.length();
         if !scale.is_finite() || self.len == MAX_PLANES {
@@ -281,7 +281,7 @@ impl Planes {
         &self.planes[..self.len]
     }
 
-    /// Whether a box is outside one of the planes.
+    /// Returns `true` if a box is entirely outside one of the planes.
     #[inline]
     pub(crate) fn leave_out(&self, min: Vec3, max: Vec3) -> bool {
         self.as_slice().iter().any(|plane| {
@@ -291,14 +291,14 @@ impl Planes {
         })
     }
 
-    /// Bit `k` is set where box `k` of four is not outside any plane. Empty boxes are outside.
+    /// Bit `k` is set if box `k` of four is not outside any plane. Empty boxes are outside.
     #[inline]
     fn boxes_inside(&self, bounds: &[[Vec4; 3]; 2]) -> u32 {
         let mut inside = bounds[0][0].cmple(bounds[1][0]);
         for plane in self.as_slice() {
             let far = |axis: usize| bounds[usize::from(plane[axis] >= 0.0)][axis];
             let reach = far(0) * plane.x + far(1) * plane.y + far(2) * plane.z + plane.w;
-            // What is no number (an infinite box) stays in.
+            // NaN, from an infinite box, counts as inside.
             inside &= !reach.cmplt(Vec4::ZERO);
             if !inside.any() {
                 return 0;
@@ -316,7 +316,7 @@ mod tests {
     proptest! {
         // Covers R5.
         #[test]
-        fn a_tree_finds_what_looking_at_every_box_finds(
+        fn a_tree_visits_the_same_boxes_as_brute_force(
             corners in prop::collection::vec((prop::array::uniform3(-9.0f64..9.0),
                 prop::array::uniform3(0.0f64..3.0)), 0..70),
             planes in prop::collection::vec((prop::array::uniform3(-1.0f64..1.0), -4.0f64..4.0), 0..6),
@@ -340,7 +340,7 @@ mod tests {
             found.sort_unstable();
             prop_assert!(found.windows(2).all(|w| w[0] < w[1]), "twice");
             for (i, b) in boxes.iter().enumerate() {
-                // The best corner for each plane, in f64, without margin.
+                // The best vertex for each plane, in f64, without margin.
                 let is_inside = |slack: f64| planes.iter().all(|(n, d)| {
                     let n = DVec3::from(*n);
                     n.length() < 1e-300 || (0..8).any(|c| {

@@ -5,21 +5,21 @@ use enfilade_geom::{Aabb, DVec3};
 
 use crate::point::point;
 
-/// A group of triangles of one batch that is culled, and drawn, as one.
+/// A group of triangles of one batch, culled and drawn as a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chunk {
     /// Index into `World::batches`.
     pub batch: u32,
-    /// First index (three a triangle) in [`Sight::indices`](crate::Sight::indices) of the batch.
+    /// First index (three per triangle) in [`Sight::indices`](crate::Sight::indices) of the batch.
     pub first_index: u32,
-    /// How many indices.
+    /// Number of indices.
     pub n_indices: u32,
-    /// Least and greatest corner. [Units: wu]
+    /// Minimum and maximum of the bounding box. [Units: wu]
     pub aabb: [[f32; 3]; 2],
 }
 
 impl Chunk {
-    /// Its triangles.
+    /// Number of triangles.
     #[must_use]
     pub fn n_triangles(&self) -> u32 {
         self.n_indices / 3
@@ -33,10 +33,10 @@ impl Chunk {
 /// A triangle to be grouped.
 struct Entry {
     corners: [u32; 3],
-    /// Its number in the batch.
+    /// Index in the batch.
     number: u32,
     center: DVec3,
-    /// Which way it faces, in eighths of the sphere and by its main axis.
+    /// Direction that it faces: octant of the sphere and main axis.
     facing: u8,
 }
 
@@ -45,13 +45,13 @@ struct Entry {
 pub(crate) struct Sorted {
     /// Index triples.
     pub(crate) indices: Vec<u32>,
-    /// By place, the triangle's number in the batch.
+    /// Index of each triangle in the batch, in sorted order.
     pub(crate) numbers: Vec<u32>,
 }
 
-/// Adds the chunks of one batch to `chunks`; returns its triangles in their order.
+/// Adds the chunks of one batch to `chunks`; returns the sorted triangles of the batch.
 ///
-/// Splits at the median of the longest axis until groups are small. Same input, same chunks.
+/// Splits at the median of the longest axis until groups are small. Deterministic.
 pub(crate) fn chunks_of(
     batch: u32,
     primitive: &Primitive,
@@ -112,7 +112,7 @@ fn split(
         } else {
             2
         };
-        // Few triangles are the walls of a room, which boxes tell apart best by the way they face.
+        // A few triangles are the walls of a room; facing separates their boxes best.
         let by_facing =
             entries.len() <= 4 * size && entries.iter().any(|e| e.facing != entries[0].facing);
         entries.sort_by(|a, b| {
@@ -124,7 +124,7 @@ fn split(
             side.then(a.center[axis].total_cmp(&b.center[axis]))
         });
         let middle = entries.len() / 2;
-        // Not within a wall, where another place is near the middle.
+        // Do not split within a wall if another split lies near the middle.
         let at = if by_facing {
             (1..entries.len())
                 .filter(|&i| entries[i].facing != entries[i - 1].facing)

@@ -1,7 +1,7 @@
-//! Detail objects for lines of sight: a tree a mesh, and one over the boxes of the objects.
+//! Detail objects for lines of sight: one tree per mesh, and one over the boxes of the objects.
 //!
-//! The segment is taken into the space of each mesh whose object's box it meets; `t` is the same there. So objects that share
-//! a mesh share its tree, and triangles of a mesh that share corners let no line pass between them.
+//! The segment is transformed into the space of each mesh whose object's box it meets; `t` is the same there. So objects
+//! that share a mesh share its tree, and no line passes between triangles of a mesh that share vertices.
 
 use enfilade_cpg::World;
 use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Ray, Triangle};
@@ -12,12 +12,12 @@ use crate::point::point;
 use crate::seen::DetailId;
 use crate::state::SightState;
 
-/// The triangles of a mesh, in its own space or, for an object that is flattened, in the world's.
+/// The triangles of a mesh, in its own space or, for a flattened object, in world space.
 #[derive(Clone, Debug)]
 struct Shape {
     bvh: Bvh,
     triangles: Vec<Triangle>,
-    /// By primitive: its first triangle.
+    /// Index of the first triangle of each primitive.
     first: Vec<u32>,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct Details {
     bounds: Aabb,
 }
 
-/// Where a segment meets a detail object.
+/// Intersection of a segment with a detail object.
 pub(crate) struct DetailHit {
     pub(crate) t: f64,
     pub(crate) detail: DetailId,
@@ -50,9 +50,9 @@ pub(crate) struct DetailHit {
 }
 
 impl Details {
-    /// O(n log n) in the triangles of the meshes and in the objects.
+    /// Builds the trees. O(n log n) in the triangles of the meshes and in the objects.
     pub(crate) fn build(world: &World) -> Self {
-        // A world whose fittings are none has no answers about doors; all else is as it is.
+        // A world with invalid fittings has no answers about doors; the rest is unaffected.
         let doors = Doors::of(world).unwrap_or_default();
         let mut shapes: Vec<Shape> = (0..world.detail_meshes.len())
             .map(|mesh| Shape::of_mesh(world, mesh as u32, &DMat4::IDENTITY))
@@ -93,7 +93,7 @@ impl Details {
             bounds.min.abs().max(bounds.max.abs()).max_element()
         };
         let mut trees = BoxTrees::default();
-        // What `f32` rounds off a segment that is clipped to the bounds.
+        // Rounding of `f32` in a segment clipped to the bounds.
         let margin = 1e-4_f64.max(extent * (1.0 / 1_048_576.0));
         let root = trees.add(&mut boxes, margin);
         Self {
@@ -109,8 +109,8 @@ impl Details {
         }
     }
 
-    /// The first hit on the segment `origin + t · direction`, `t` from 0 to `t_max`, of objects for which `counts`; leaves of
-    /// doors as `state` has them.
+    /// Returns the first hit on the segment `origin + t · direction`, `t` from 0 to `t_max`, among objects for which `counts`
+    /// returns `true`. Leaves of doors are where `state` puts them.
     pub(crate) fn first_hit(
         &self,
         state: &SightState,
@@ -119,7 +119,7 @@ impl Details {
     ) -> Option<DetailHit> {
         let (enter, leave) = overlap(ray, &self.bounds)?;
         let part = BoxRay::new(ray.at(enter), ray.direction);
-        // Boxes are grown, so that a limit in `f32` leaves none out.
+        // Boxes are grown, so that a limit in `f32` excludes none.
         let limit = |t: f64| ((t - enter) * (1.0 + 1e-6)) as f32 + 1e-6;
         let mut t_max = leave;
         let mut best: Option<DetailHit> = None;
@@ -192,7 +192,7 @@ impl Shape {
     }
 }
 
-/// The part of a segment within a box, from and to which `t`; `None` where it misses it.
+/// Returns the first and last `t` of a segment within a box; `None` if it misses the box.
 fn overlap(ray: &Ray, bounds: &Aabb) -> Option<(f64, f64)> {
     let (mut enter, mut leave) = (0.0_f64, ray.t_max);
     let DVec3 { x, y, z } = ray.direction;

@@ -1,4 +1,4 @@
-//! Leaves of doors: which portals each shuts, and the room that it takes on its way.
+//! Leaves of doors: the portals that each shuts, and the space that it sweeps.
 
 use enfilade_cpg::{CellId, FittingPart, Motion, Portal, PortalId, World};
 use enfilade_geom::{Aabb, DVec3};
@@ -7,29 +7,29 @@ use crate::point::point;
 use crate::seen::DetailId;
 use crate::sight_error::SightError;
 
-/// Poses of a leaf between shut and open that its way is measured at.
+/// Poses between shut and open at which a leaf's sweep is measured.
 const POSES: u32 = 16;
-/// Strips that a leaf is divided into there, each with a way of its own.
+/// Strips that a leaf is divided into there, each swept by itself.
 const STRIPS: u32 = 4;
 
-/// A leaf of a door: an object, and how it moves.
+/// A leaf of a door: an object and its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leaf {
     /// The object.
     pub detail: DetailId,
-    /// Between shut and open.
+    /// Motion between shut and open.
     pub motion: Motion,
 }
 
-/// An object that moves.
+/// A moving object.
 #[derive(Clone, Debug)]
 struct Moving {
     leaf: Leaf,
-    /// All that it is a leaf of.
+    /// The portals of which it is a leaf.
     portals: Vec<u32>,
-    /// What it passes through on its way. [Units: wu]
+    /// Bounding box of the space that it sweeps. [Units: wu]
     swept: Aabb,
-    /// The same.
+    /// Cells that it sweeps.
     cells: Vec<CellId>,
 }
 
@@ -39,21 +39,23 @@ pub(crate) struct Doors {
     /// Leaves of portal `p` are `leaves[first[p]..first[p + 1]]`.
     first: Vec<u32>,
     leaves: Vec<Leaf>,
-    /// By leaf: its place in `moving`.
+    /// Index of each leaf in `moving`.
     slots: Vec<u32>,
-    /// By portal: whether one sees through it when its leaves are shut.
+    /// Per portal, `true` if one sees through it when its leaves are shut.
     is_clear: Vec<bool>,
-    /// By portal: where its shut leaves are along its normal, from its plane. [Units: wu]
+    /// Offset of each portal's shut leaves along its normal, from its plane. [Units: wu]
     depths: Vec<f32>,
     most_depth: f64,
-    /// Ascending by detail.
+    /// In ascending order of details.
     moving: Vec<Moving>,
 }
 
 impl Doors {
+    /// Collects the leaves of a world.
+    ///
     /// # Errors
     ///
-    /// A portal that is filled by what does not exist.
+    /// When a fitting of a portal names an object that does not exist.
     pub(crate) fn of(world: &World) -> Result<Self, SightError> {
         let mut out = Self {
             first: vec![0],
@@ -104,22 +106,22 @@ impl Doors {
         end(p)..end(p + 1).max(end(p))
     }
 
-    /// The leaves of a portal.
+    /// Returns the leaves of a portal.
     pub(crate) fn leaves(&self, portal: PortalId) -> &[Leaf] {
         &self.leaves[self.range(portal)]
     }
 
-    /// Their places among all that moves.
+    /// Returns the indices of a portal's leaves among all moving objects.
     pub(crate) fn slots(&self, portal: PortalId) -> &[u32] {
         &self.slots[self.range(portal)]
     }
 
-    /// Whether one sees through a portal though its leaves are shut.
+    /// Returns `true` if one sees through a portal even with its leaves shut.
     pub(crate) fn is_clear(&self, portal: u32) -> bool {
         self.is_clear.get(portal as usize).copied().unwrap_or(true)
     }
 
-    /// Where a portal's leaves are when shut, along its normal from its plane. [Units: wu]
+    /// Returns the offset of a portal's shut leaves along its normal, from its plane. [Units: wu]
     pub(crate) fn depth(&self, portal: PortalId) -> f32 {
         self.depths
             .get(portal.0 as usize)
@@ -127,7 +129,7 @@ impl Doors {
             .unwrap_or_default()
     }
 
-    /// The greatest of these. [Units: wu]
+    /// Returns the largest absolute offset of any portal's leaves. [Units: wu]
     pub(crate) fn most_depth(&self) -> f64 {
         self.most_depth
     }
@@ -144,20 +146,20 @@ impl Doors {
         &self.moving[slot as usize].portals
     }
 
-    /// The place of an object among all that moves.
+    /// Returns the index of an object among all moving objects.
     pub(crate) fn slot(&self, detail: DetailId) -> Option<u32> {
         let found = self.moving.binary_search_by_key(&detail, |m| m.leaf.detail);
         found.ok().map(|i| i as u32)
     }
 
-    /// What an object passes through on its way, and the cells of that; `None` for what does not move.
+    /// Returns the box and the cells that a moving object sweeps; `None` for an object that does not move.
     pub(crate) fn way(&self, detail: u32) -> Option<(Aabb, &[CellId])> {
         let moving = &self.moving[self.slot(DetailId(detail))? as usize];
         Some((moving.swept, &moving.cells))
     }
 }
 
-/// Corners of an object in the model's pose.
+/// Vertices of an object in the model's pose.
 fn corners(world: &World, detail: DetailId) -> impl Iterator<Item = DVec3> {
     let object = &world[detail];
     let transform = object.placement();
@@ -166,7 +168,7 @@ fn corners(world: &World, detail: DetailId) -> impl Iterator<Item = DVec3> {
     positions.map(move |p| transform.transform_point3(point(*p)))
 }
 
-/// The box of a shut leaf along directions: across the opening, up, and along the portal's normal.
+/// The box of a shut leaf in a frame: across the opening, up, and along the portal's normal.
 fn shut_box(world: &World, axes: [DVec3; 3], leaf: &Leaf) -> Aabb {
     let shut = leaf.motion.at(0.0);
     let along = |p: DVec3| DVec3::from(axes.map(|a| a.dot(p)));
@@ -194,7 +196,7 @@ fn moving(world: &World, portal: &Portal, leaf: Leaf) -> Moving {
     let axes = axes_of(portal);
     let own = shut_box(world, axes, &leaf);
     let back = |p: DVec3| axes[0] * p.x + axes[1] * p.y + axes[2] * p.z;
-    // From the model's pose to a share of its way is how motions are told; these boxes are shut.
+    // Motions start from the model's pose; these boxes are of the shut one.
     let from_shut = leaf.motion.at(0.0).inverse();
     let mut swept = Aabb::EMPTY;
     let mut cells = Vec::new();
@@ -220,7 +222,7 @@ fn moving(world: &World, portal: &Portal, leaf: Leaf) -> Moving {
         let mut here = at(0);
         for pose in 1..=POSES {
             let next = at(pose);
-            // Between two poses nothing is farther from the first than it is at the second.
+            // Between two poses, no point is farther from the first pose than the second pose is.
             let moved = here.iter().zip(&next).map(|(a, b)| a.distance(*b));
             let margin = moved.fold(0.0, f64::max);
             swept = swept.union(Aabb::of_points(&here).expanded(margin));

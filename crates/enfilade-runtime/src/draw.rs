@@ -1,4 +1,4 @@
-//! What a frame draws: the visible chunks as few ranges of triangles.
+//! Draw lists: the visible chunks of a frame as few ranges of triangles.
 
 use std::ops::Index;
 
@@ -8,36 +8,36 @@ use crate::chunks::Chunk;
 use crate::seen::{ChunkId, DetailId, Seen};
 use crate::sight::Sight;
 
-/// A range of one batch's triangles, to be drawn at once.
+/// A range of one batch's triangles for one draw call.
 ///
 /// With a vertex buffer of `draw.batch(&world).primitive.positions` and an index buffer of
-/// [`Sight::indices`] for each batch, it is one indexed draw of `n_indices` from `first_index` on.
+/// [`Sight::indices`] per batch, it is one indexed draw of `n_indices` from `first_index` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Draw {
     /// Index into `World::batches`.
     pub batch: u32,
-    /// First index, three a triangle, in [`Sight::indices`] of the batch.
+    /// First index (three per triangle) in [`Sight::indices`] of the batch.
     pub first_index: u32,
-    /// How many indices.
+    /// Number of indices.
     pub n_indices: u32,
 }
 
 impl Draw {
-    /// The batch that it draws part of: positions, attributes, material. O(1).
+    /// Returns the batch that it draws a part of: positions, attributes, material. O(1).
     ///
     /// # Panics
     ///
-    /// When `world` is not the one that the [`Sight`] was built from.
+    /// If `world` is not the one that the [`Sight`] was built from.
     #[must_use]
     pub fn batch<'a>(&self, world: &'a World) -> &'a Batch {
         &world.batches[self.batch as usize]
     }
 
-    /// Its triangles, as triples of indices into the batch's positions. O(1).
+    /// Returns its triangles as triples of indices into the batch's positions. O(1).
     ///
     /// # Panics
     ///
-    /// When `sight` is not the one that it was listed for.
+    /// If `sight` is not the one that it was listed for.
     #[must_use]
     pub fn indices<'a>(&self, sight: &'a Sight) -> &'a [u32] {
         let first = self.first_index as usize;
@@ -45,11 +45,11 @@ impl Draw {
     }
 }
 
-/// The draws of one frame. Keep it from frame to frame: it allocates nothing once its buffers have grown.
+/// The draws of one frame. Keep it between frames: it allocates nothing once its buffers have grown.
 #[derive(Clone, Debug, Default)]
 pub struct DrawList {
     draws: Vec<Draw>,
-    /// By batch: one more than its place in the order of first appearance, or 0 where it is not seen.
+    /// Per batch: one more than its rank in order of first appearance, or 0 if it is not seen.
     ranks: Vec<u32>,
     /// Rank and chunk.
     sorted: Vec<(u32, u32)>,
@@ -62,8 +62,8 @@ impl DrawList {
         Self::default()
     }
 
-    /// Lists what an answer of `sight` sees, instead of what was listed before: batches near to far, in each as few
-    /// ranges as its visible chunks allow. O(n log n) in these chunks, and O(batches).
+    /// Replaces the list by the draws of `seen`, an answer of `sight`: batches near to far, each in as few ranges as its
+    /// visible chunks allow. O(n log n) in these chunks, and O(batches).
     ///
     /// Detail objects are placed meshes, drawn with their transforms: `for id in seen.details() { &world[*id] … }`.
     pub fn fill(&mut self, sight: &Sight, seen: &Seen<'_>) {
@@ -100,13 +100,13 @@ impl DrawList {
         }
     }
 
-    /// The draws, batches near to far.
+    /// Returns the draws, batches near to far.
     #[must_use]
     pub fn draws(&self) -> &[Draw] {
         &self.draws
     }
 
-    /// Triangles that they draw.
+    /// Returns the number of triangles drawn.
     #[must_use]
     pub fn n_triangles(&self) -> u64 {
         self.draws.iter().map(|d| u64::from(d.n_indices / 3)).sum()
@@ -124,7 +124,7 @@ impl<'a> IntoIterator for &'a DrawList {
 
 /// # Panics
 ///
-/// When there is no such chunk.
+/// If there is no such chunk.
 impl Index<ChunkId> for Sight {
     type Output = Chunk;
 
@@ -136,7 +136,7 @@ impl Index<ChunkId> for Sight {
 
 /// # Panics
 ///
-/// When there is no such detail object.
+/// If there is no such detail object.
 impl Index<DetailId> for World {
     type Output = DetailObject;
 

@@ -1,29 +1,28 @@
-//! Groups of exits, so that a cell with thousands of portals costs what is in view.
+//! Groups of exits: a cell with thousands of portals costs only those in view.
 //!
 //! Portal hierarchies after Gjørup, *Portal techniques* (1999), section 2.3.3: films without volume over
-//! a wall of windows, each with one portal around those behind it, which may be skipped with all that
-//! lies behind them, and which the far side bypasses. We depart from him: films are no cells. They are
-//! made when a world is loaded, from the exits of one cell, so the far side never meets them; and they
-//! need not be flat, since a box and the range of the normals say what a flat film says (all of it faces
-//! away, or lies out of view) of a round tower, too.
+//! a wall of windows, each with one portal around those behind it, which can be skipped together with
+//! everything behind it; the far side bypasses them. Here films are not cells. They are made from the exits
+//! of one cell when a world is loaded, so the far side never meets them. Nor need they be flat: a box and
+//! the range of the normals decide for a round tower, too, that all of it faces away or lies out of view.
 //!
-//! **Leaves out nothing:** a group is skipped only where each exit in it would be, by the same planes
-//! and tolerances (`see.rs`). So the answers are those of looking at each exit.
+//! **Skips nothing visible:** a group is skipped only if each exit in it would be, by the same planes and
+//! tolerances (`see.rs`). So the answers equal those of testing each exit.
 
 use glam::{DVec3, Vec3};
 
 use crate::point::point;
 
-/// Cells with so few exits are not grouped. Offices with 4 to 15 exits a room gain nothing; a facade
-/// of 64 windows does.
+/// Largest number of exits left ungrouped. Offices with 4 to 15 exits per room gain nothing; a facade of
+/// 64 windows does.
 const MIN_EXITS: usize = 16;
 
-/// A portal as left from one cell. 48 bytes, side by side for each cell.
+/// A portal as left from one cell. 48 bytes; the exits of a cell are contiguous.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exit {
-    /// A point of its plane, in the middle of the outline.
+    /// Midpoint of the outline, on the portal's plane.
     pub(crate) center: [f32; 3],
-    /// Of the sphere around `center` that holds the outline. [Units: wu]
+    /// Radius of the sphere around `center` that holds the outline. [Units: wu]
     pub(crate) radius: f32,
     /// Unit normal, towards `to`.
     pub(crate) normal: [f32; 3],
@@ -31,49 +30,49 @@ pub(crate) struct Exit {
     pub(crate) portal: u32,
     pub(crate) first_corner: u32,
     pub(crate) n_corners: u32,
-    /// Whether the corners run counter-clockwise about `normal`.
+    /// True if the vertices run counter-clockwise about `normal`.
     pub(crate) is_turned: bool,
 }
 
-/// Exits of one cell, side by side, or groups of them. One line of cache.
+/// A contiguous run of exits of one cell, or of groups of them. Fits one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct Group {
-    /// Around the outlines, and the tolerance.
+    /// Box around the outlines, grown by the tolerance.
     min: [f32; 3],
     max: [f32; 3],
-    /// Least and greatest coordinates of the normals.
+    /// Minimum and maximum of the normals' coordinates.
     normals: [[f32; 3]; 2],
-    /// Greatest distance of an exit's plane from the middle of the box, along its normal.
+    /// Greatest distance of an exit's plane from the center of the box, along the plane's normal.
     ahead: f32,
-    /// The exits; none where groups follow.
+    /// First exit; there are none where subgroups follow.
     first: u32,
     n: u32,
-    /// The next group that is no part of this one.
+    /// Index of the next group that is not a part of this one.
     after: u32,
 }
 
 impl Group {
-    /// The box around all outlines and their tolerance.
+    /// Returns the box around all outlines and their tolerance.
     #[inline]
     pub(crate) fn bounds(&self) -> [Vec3; 2] {
         [self.min.into(), self.max.into()]
     }
 
-    /// Whether the eye is behind all planes, farther than rounding explains.
+    /// Returns `true` if the eye is behind all planes by more than rounding.
     #[inline]
     pub(crate) fn faces_away(&self, eye: DVec3, tolerance: f64) -> bool {
         let [min, max] = [self.min, self.max].map(|p| point(p) - eye);
         let to_middle = self.middle() - eye;
         let [low, high] = self.normals.map(|n| point(n) * to_middle);
-        // Of any normal within the range, and any plane no farther ahead.
+        // For any normal within the range, and any plane no farther ahead.
         let ahead = f64::from(self.ahead) + low.max(high).element_sum();
-        // As of one exit, but of the farthest there could be.
+        // As for one exit, but at the farthest possible place.
         let reach = min.abs().max(max.abs()).max_element() + (max - min).length();
         ahead < -2.0 * tolerance - 1e-6 * reach
     }
 
-    /// Whether a box is apart from this one.
+    /// Returns `true` if a box is disjoint from this one.
     #[inline]
     pub(crate) fn is_apart_from(&self, low: DVec3, high: DVec3) -> bool {
         (low.cmpgt(point(self.max)) | high.cmplt(point(self.min))).any()
@@ -84,17 +83,17 @@ impl Group {
     }
 }
 
-/// The exits of a cell, a run at a time.
+/// The exits of a cell, one run at a time.
 pub(crate) struct Runs<'a> {
     exits: &'a [Exit],
     groups: &'a [Group],
     at: usize,
-    /// All exits, where they are in no groups.
+    /// True if the exits are not grouped.
     is_whole: bool,
 }
 
 impl<'a> Runs<'a> {
-    /// Of the exits `exits` of a cell, whose groups are `groups` or none. Both count from 0.
+    /// Iterates over the exits `exits` of a cell with groups `groups`, possibly none. Indices of both count from 0.
     pub(crate) fn new(exits: &'a [Exit], groups: &'a [Group]) -> Self {
         Self {
             exits,
@@ -104,7 +103,7 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// The next exits that lie in no group that is skipped; in the order of the list.
+    /// Returns the next exits, in list order, that lie in no skipped group.
     #[inline]
     pub(crate) fn next(
         &mut self,
@@ -129,8 +128,8 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// Sorts the exits of one cell so that neighbors in the list are neighbors in space and look the same
-/// way, and adds their groups, of `size` exits at most, none for 0. The order does not depend on `size`.
+/// Sorts the exits of one cell so that neighbors in the list are close in space and in direction, and adds
+/// groups of at most `size` exits; adds none if `size` is 0. The order does not depend on `size`.
 ///
 /// O(n log² n).
 pub(crate) fn group(
@@ -150,7 +149,7 @@ pub(crate) fn group(
     }
 }
 
-/// Halves differ in what they look at, then in where they are.
+/// Sorts by halves, split by direction first, then by position.
 fn sort(exits: &mut [Exit]) {
     if exits.len() < 2 {
         return;
@@ -162,7 +161,7 @@ fn sort(exits: &mut [Exit]) {
     };
     let (spread, normal_axis) = widest(|e| e.normal);
     let (_, axis) = widest(|e| e.center);
-    // Planes within 30 degrees are told apart better by where they are.
+    // Planes within 30 degrees are separated better by position.
     let by_normal = spread > 0.5;
     let key = |e: &Exit| {
         if by_normal {
@@ -238,7 +237,7 @@ mod tests {
     use crate::sight::Sight;
     use enfilade_testkit::window_tower;
 
-    /// Groups and exits that a question to a cell looks at.
+    /// Returns the numbers of groups and exits that a query visits in a cell.
     fn looked_at(sight: &Sight, cell: u32, is_skipped: impl Fn(&Group) -> bool) -> [usize; 2] {
         let (mut n_groups, mut n_exits) = (0, 0);
         let mut runs = sight.runs_of(cell);
@@ -259,7 +258,7 @@ mod tests {
         let tolerance = sight.tolerance;
         assert_eq!(looked_at(&sight, outdoors, |_| false)[1], 1600);
         let faces_away = |eye: DVec3| looked_at(&sight, outdoors, |g| g.faces_away(eye, tolerance));
-        // Before one facade, before two, and in the tower, whose facades all face away.
+        // In front of one facade, in front of two, and inside the tower, whose facades all face away.
         for (eye, n) in [
             ([30.0, 30.0, -20.0], 400),
             ([-20.0, 30.0, -20.0], 800),
@@ -267,7 +266,7 @@ mod tests {
         ] {
             let [n_groups, n_exits] = faces_away(eye.into());
             assert_eq!(n_exits, n);
-            // Groups of 6 or 7: with those above them, a third as many as windows.
+            // Groups of 6 or 7: together with their parents, a third as many as windows.
             assert!(n_groups <= 8 + n / 3, "{n_groups}");
         }
         let at = |p: DVec3| looked_at(&sight, outdoors, |g| g.is_apart_from(p, p));

@@ -1,9 +1,9 @@
-//! Following: which cell something is in, from step to step.
+//! Tracking of the cell that holds a moving object.
 //!
-//! What moves leaves a cell through a portal (Dirkse 2002, section 5.2). The portals that a step
-//! crosses say which ones, in order: doors to open, sounds to play, rooms to load. The locator has the
-//! last word wherever they lead elsewhere, so that a walk through a wall, a teleport or a step within
-//! a rounding of a portal does no lasting harm.
+//! A moving object leaves a cell through a portal (Dirkse 2002, section 5.2). A step reports the portals
+//! that it crosses, in order: doors to open, sounds to play, rooms to load. If they lead to another cell
+//! than the locator reports, the locator prevails, so a walk through a wall, a teleport or a step within
+//! rounding of a portal does no lasting harm.
 
 use enfilade_cpg::{CellId, PortalId};
 use glam::DVec3;
@@ -12,10 +12,10 @@ use crate::exits::Exit;
 use crate::point::point;
 use crate::sight::Sight;
 
-/// Portals that one step reports, at most; it may cross more.
+/// Maximum number of portals that one step reports; it may cross more.
 const MAX_CROSSED: usize = 16;
 
-/// An eye or object followed from cell to cell.
+/// An eye or object tracked from cell to cell.
 #[derive(Clone, Debug)]
 pub struct Follower {
     at: DVec3,
@@ -24,21 +24,21 @@ pub struct Follower {
     n_crossed: usize,
 }
 
-/// How the cell of a [`Follower`] was found.
+/// Outcome of a step of a [`Follower`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// It is in the cell it was in.
+    /// Still in the same cell.
     Stayed,
-    /// It went through portals: [`Follower::crossed`].
+    /// Moved through portals: see [`Follower::crossed`].
     Crossed,
-    /// The portals on its way do not lead to where it is: located anew.
+    /// The portals on the way do not lead to the new position: located anew.
     Relocated,
-    /// It is in no cell. [`Follower::cell`] still tells the last one.
+    /// In no cell. [`Follower::cell`] still returns the last one.
     Lost,
 }
 
 impl Follower {
-    /// Something that appears at a point: a spawn point, or where a teleport leads.
+    /// Places an object at a point, such as a spawn point.
     #[must_use]
     pub fn new(sight: &Sight, at: [f32; 3]) -> Self {
         Self {
@@ -49,25 +49,25 @@ impl Follower {
         }
     }
 
-    /// The cell it is in, or was in before it came into matter; `None` when it never was in one.
+    /// Returns its cell, or its last cell if it is in solid matter; `None` if it never was in one.
     #[must_use]
     pub fn cell(&self) -> Option<CellId> {
         self.cell
     }
 
-    /// Where it is. [Units: wu]
+    /// Returns its position. [Units: wu]
     #[must_use]
     pub fn position(&self) -> [f32; 3] {
         self.at.as_vec3().to_array()
     }
 
-    /// The portals that the last step crossed, in order; the first 16.
+    /// Returns the portals that the last step crossed, in order; at most 16.
     #[must_use]
     pub fn crossed(&self) -> &[PortalId] {
         &self.crossed[..self.n_crossed]
     }
 
-    /// Puts it elsewhere, whatever is in between.
+    /// Moves it to `to`, regardless of what lies in between.
     pub fn teleport(&mut self, sight: &Sight, to: [f32; 3]) -> Step {
         self.n_crossed = 0;
         self.at = point(to);
@@ -81,8 +81,8 @@ impl Follower {
         }
     }
 
-    /// Moves it in a straight line. Costs a test of each exit of the cells on the way, and one
-    /// question to the locator. Allocates nothing.
+    /// Moves it in a straight line to `to`. Tests each exit of the cells on the way and queries the locator
+    /// once. Allocates nothing.
     pub fn step(&mut self, sight: &Sight, to: [f32; 3]) -> Step {
         let (a, b) = (self.at, point(to));
         self.n_crossed = 0;
@@ -93,7 +93,7 @@ impl Follower {
         let mut cell = start.0;
         let mut t = 0.0;
         let mut last = u32::MAX;
-        // Crossings come in order along the segment, each portal once: it ends.
+        // Terminates: crossings come in order along the segment, each portal once.
         while let Some((at, exit)) = next_crossing(sight, cell, a, b, t, last) {
             if self.n_crossed < MAX_CROSSED {
                 self.crossed[self.n_crossed] = PortalId(exit.portal);
@@ -129,7 +129,7 @@ impl Follower {
     }
 }
 
-/// The next exit of `cell` that the segment crosses outwards, at `t` or later.
+/// Returns the next exit of `cell` that the segment crosses outwards, at `t` or later.
 fn next_crossing(
     sight: &Sight,
     cell: u32,
@@ -146,7 +146,7 @@ fn next_crossing(
         let normal = point(exit.normal);
         let center = point(exit.center);
         let (da, db) = (normal.dot(a - center), normal.dot(b - center));
-        // From this side to the other; a step that ends on the plane has not crossed it.
+        // A step that ends on the plane has not crossed it.
         if exit.portal == last || da > 0.0 || db <= 0.0 {
             continue;
         }
@@ -164,7 +164,7 @@ fn next_crossing(
     best
 }
 
-/// Whether `p` is so near to a portal between two cells that it may be said to be in either.
+/// Returns `true` if `p` is within tolerance of a portal between two cells, so that either may hold it.
 fn is_at_portal(sight: &Sight, p: DVec3, a: CellId, b: CellId) -> bool {
     let near = 4.0 * sight.tolerance();
     let mut runs = sight.runs_of(a.0);

@@ -1,19 +1,19 @@
-//! What can be seen, frame by frame, in a world of cells and portals.
+//! Per-frame visibility in a world of cells and portals.
 //!
-//! A [`Sight`] is made once from a world; a [`Viewer`] asks it what one eye sees, every frame, and
-//! gets cells, portals, chunks of triangles and detail objects, near to far. What moves between frames,
-//! doors above all, is a [`SightState`]. [`Sightlines`] answers from point to point, and a [`Follower`]
-//! knows which cell something is in as it moves.
+//! Build a [`Sight`] once from a world. Every frame, query a [`Viewer`] for one eye's view; it returns
+//! cells, portals, chunks of triangles and detail objects, near to far. A [`SightState`] holds what
+//! changes between frames, doors above all. [`Sightlines`] answers point-to-point queries, and a
+//! [`Follower`] tracks the cell of something that moves.
 //!
 //! ```
 //! use enfilade_runtime::{DrawList, Sight, SightState, View, Viewer};
 //! use enfilade_testkit::{GridParams, room_grid};
 //!
-//! // Once. A program reads its world with `enfilade_cpg::wire::decode_glb`.
+//! // Once. A program loads its world with `enfilade_cpg::wire::decode_glb`.
 //! let world = room_grid(&GridParams::offices(100, 1));
 //! let sight = Sight::build(&world)?;
 //! let mut state = SightState::new(&sight);
-//! let mut viewer = Viewer::new(&sight); // one a camera
+//! let mut viewer = Viewer::new(&sight); // one per camera
 //! let mut list = DrawList::new();
 //!
 //! // Every frame.
@@ -29,7 +29,7 @@
 //! }
 //! assert!(seen.cells().len() < world.graph.cells.len() / 2);
 //!
-//! // A door falls shut: what is behind it is gone from the next frame on.
+//! // Close a door: the cells behind it are gone from the next frame on.
 //! let &door = seen.portals().first().expect("a doorway in view");
 //! let before = seen.cells().len();
 //! state.close(door);
@@ -37,13 +37,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What is promised
+//! # Guarantees
 //!
-//! - **Conservative**: whatever a ray from the eye within the view meets first is in the answer, with
-//!   the tolerance of the world's own promises ([`Sight::tolerance`]). Every shortcut errs to visible.
-//! - **Bounded**: a cell is entered at most 16 times a face of the view, however its portals lie; and
+//! - **Conservative**: the answer contains the first hit of every ray from the eye within the view, up
+//!   to the tolerance of the world's own promises ([`Sight::tolerance`]). Every shortcut errs to visible.
+//! - **Bounded**: a cell is entered at most 16 times per face of the view, however its portals lie; and
 //!   [`SeeOptions::max_clips`] bounds the work of a frame, after which all within reach is visible.
-//! - **Nothing is allocated** in a question once the buffers have grown.
+//! - **Allocation-free**: a query allocates nothing once the buffers have grown.
 //!
 //! # Eyes at odd places
 //!
@@ -51,15 +51,15 @@
 //! | --- | --- |
 //! | on a portal's plane, in the opening | both cells, neither narrowed |
 //! | on the plane, beside the opening | the portal edge-on: next to nothing |
-//! | with its near plane beyond a portal | as ever: near planes are not used |
+//! | with its near plane beyond a portal | unaffected: near planes are not used |
 //! | in a wall, in a gap, outside a world without outdoors | everything in the view frustum |
 //! | in a locked cell | that cell, and what is seen through its portals |
 //!
-//! # What is not promised
+//! # Limits
 //!
-//! Answers are supersets, not exact; triangles that a wall of their own cell hides are in them unless
-//! a large polygon hides a whole chunk. Where one chunk ends up drawn twice by two faces of a view that
-//! looks all around is for the caller to sort out; each is listed once. Mirrors are not followed yet.
+//! Answers are supersets, not exact: triangles hidden by a wall of their own cell are included unless a
+//! large polygon hides the whole chunk. A chunk that two faces of an all-around view show is listed once;
+//! drawing it for both is the caller's task. Mirrors are not followed yet.
 
 mod boxes;
 mod chunks;

@@ -1,11 +1,11 @@
-//! Large polygons inside cells, and the shadows they throw.
+//! Occluders: large polygons inside cells, and their shadows.
 //!
-//! What lies wholly in the shadow of one convex polygon is not seen (Hudson et al., "Accelerated
+//! A thing entirely in the shadow of one convex polygon is not seen (Hudson et al., "Accelerated
 //! Occlusion Culling using Shadow Frusta", 1997; proposed for cells by Dirkse 2002, section 8.4).
-//! Rooms need none: their walls hide nothing in them. Big cells do: the outdoors, halls, open plan.
+//! Rooms gain nothing, since their walls hide nothing in them. Big cells do: the outdoors, halls, open plan.
 //!
-//! **Errs to visible.** Polygons are put together of whole triangles only, opaque and seen from their
-//! front, then shrunk; shadows do not join.
+//! **Errs to visible.** Polygons consist of whole triangles, opaque and seen from their front, and are then
+//! shrunk; shadows are not joined.
 
 use std::collections::HashMap;
 
@@ -17,16 +17,16 @@ use glam::{Vec3, Vec4};
 use crate::options::SightOptions;
 use crate::point::point;
 
-/// Corners that an occluder may have.
+/// Maximum number of vertices of an occluder.
 const MAX_CORNERS: usize = 8;
-/// Shadows used in one visit.
+/// Maximum number of shadows used in one visit.
 const MAX_SHADOWS: usize = 4;
-/// Corners this far off a triangle's plane still lie in it: merged polygons are as flat as their
-/// rounded corners. [Units: wu]
+/// Largest distance of a vertex from a triangle's plane at which it still lies in the plane: merged polygons
+/// are as flat as the rounding of their vertices. [Units: wu]
 const FLAT: f64 = 1e-5;
-/// How far corners are moved towards the middle, which outweighs [`FLAT`] and rounding. [Units: wu]
+/// Shift of vertices towards the middle; it outweighs [`FLAT`] and rounding. [Units: wu]
 const SHRINK: f64 = 1e-3;
-/// How far behind a polygon something must lie for it to be worth keeping. [Units: wu]
+/// Smallest distance behind a polygon at which a thing counts as hidden by it. [Units: wu]
 const BEHIND: f64 = 0.5;
 
 #[derive(Clone, Debug)]
@@ -46,16 +46,16 @@ pub(crate) struct Occluders {
     all: Vec<Occluder>,
 }
 
-/// Whether everything behind a surface of this material is hidden.
+/// Returns `true` if a surface of this material hides everything behind it.
 fn is_opaque(material: Option<&Material>) -> bool {
-    // Masked materials have holes. The text is not parsed: a name with that word only costs an
+    // Masked materials have holes. The text is not parsed: a name that contains the word only costs an
     // occluder.
     material.is_none_or(|m| !m.transparent && !m.gltf.contains("MASK") && m.base_color[3] >= 1.0)
 }
 
 type Key = [u32; 3];
 
-/// Finds the large polygons of each cell behind which other things of the cell lie.
+/// Finds the large polygons of each cell with other things of the cell behind them.
 pub(crate) fn occluders_of(world: &World, options: &SightOptions, tolerance: f64) -> Occluders {
     let n_cells = world.graph.cells.len();
     let mut out = Occluders {
@@ -95,7 +95,7 @@ pub(crate) fn occluders_of(world: &World, options: &SightOptions, tolerance: f64
     let area_of = |i: u32| triangle_area_normal(&triangles[i as usize].0).length() * 0.5;
     for (c, list) in by_cell.iter_mut().enumerate() {
         list.sort_by(|&a, &b| area_of(b).total_cmp(&area_of(a)).then(a.cmp(&b)));
-        // Middles of what could be hidden: triangles and portals.
+        // Midpoints of everything that could be hidden: triangles and portals.
         let mut targets: Vec<DVec3> = list
             .iter()
             .map(|&i| {
@@ -127,7 +127,7 @@ pub(crate) fn occluders_of(world: &World, options: &SightOptions, tolerance: f64
                     d < -BEHIND || (occluder.is_two_sided && d > BEHIND)
                 })
                 .count();
-            // A few triangles behind a wall are its reveals and the sills of its windows.
+            // A few triangles behind a wall are its reveals and window sills.
             if n_behind >= 4 {
                 found.push(occluder);
             }
@@ -143,7 +143,7 @@ pub(crate) fn occluders_of(world: &World, options: &SightOptions, tolerance: f64
     out
 }
 
-/// The polygon that a triangle grows to when coplanar neighbors are added while it stays convex.
+/// Grows a triangle into a polygon by adding coplanar neighbors while it stays convex.
 fn grow(
     seed: u32,
     triangles: &[(Triangle, [Key; 3], bool)],
@@ -174,7 +174,7 @@ fn grow(
             }
             let before = ring[(i + n - 1) % n].0;
             let after = ring[(i + 2) % n].0;
-            // Convex at the old corners, which may come to lie on a straight edge.
+            // Convex at the old vertices, which may come to lie on a straight edge.
             if turn(before, a.0, tip) < 0.0 || turn(tip, b.0, after) < 0.0 {
                 return None;
             }
@@ -188,8 +188,8 @@ fn grow(
         is_used.insert(other, ());
         ring.insert(i % n + 1, (tip, key));
         n_failed = 0;
-        // Corners on straight edges would only use up room. Their edges are whole all the same, but
-        // no longer edges of the mesh, so growth past them ends.
+        // Vertices on straight edges would only use up the limit. Dropping them keeps the outline, but its
+        // longer edges are not edges of the mesh, so growth past them ends.
         if ring.len() > MAX_CORNERS {
             straighten(&mut ring, normal);
             if ring.len() >= MAX_CORNERS {
@@ -221,14 +221,14 @@ fn grow(
     })
 }
 
-/// Drops corners on straight edges.
+/// Drops vertices on straight edges.
 fn straighten(ring: &mut Vec<(DVec3, Key)>, normal: DVec3) {
     let mut i = 0;
     while ring.len() > 3 && i < ring.len() {
         let n = ring.len();
         let (a, b, c) = (ring[(i + n - 1) % n].0, ring[i].0, ring[(i + 1) % n].0);
         let bend = (b - a).cross(c - b).dot(normal);
-        // The corner lies within 1e-6 of the line between its neighbors.
+        // The vertex lies within 1e-6 of the line between its neighbors.
         if bend <= 1e-6 * (c - a).length() {
             ring.remove(i);
         } else {
@@ -239,8 +239,8 @@ fn straighten(ring: &mut Vec<(DVec3, Key)>, normal: DVec3) {
 
 impl Occluder {
     fn shrink(&mut self, by: f64) {
-        // Along each corner's way to the middle: every edge moves inwards by as much times the sine of
-        // the angle between them, which is not small but in slivers, and those are small occluders.
+        // Each vertex moves towards the middle, so an edge moves inwards by that distance times the sine of the
+        // angle between them. The sine is small only in slivers, which are small occluders.
         for p in &mut self.corners[..self.n_corners] {
             let d = self.middle - *p;
             *p += d * (4.0 * by / d.length()).min(0.5);
@@ -248,14 +248,14 @@ impl Occluder {
     }
 }
 
-/// The shadow of one occluder: half-spaces `n · p + d >= 0`, all at once.
+/// The shadow of one occluder: an intersection of half-spaces `n · p + d >= 0`.
 #[derive(Clone, Copy, Debug)]
 struct Shadow {
     planes: [Vec4; MAX_CORNERS + 1],
     n_planes: usize,
 }
 
-/// The shadows that count in one visit.
+/// The shadows used in one visit.
 #[derive(Clone, Debug)]
 pub(crate) struct Shadows {
     shadows: [Shadow; MAX_SHADOWS],
@@ -278,9 +278,9 @@ impl Shadows {
         self.len = 0;
     }
 
-    /// The shadows of the occluders of `cell` that look largest from `eye`.
+    /// Sets up the shadows of those occluders of `cell` that look largest from `eye`.
     ///
-    /// `margin` is what rounding may move a plane by.
+    /// `margin` is the largest shift of a plane by rounding.
     pub(crate) fn cast(&mut self, occluders: &Occluders, cell: u32, eye: DVec3, margin: f64) {
         self.len = 0;
         let c = cell as usize;
@@ -296,7 +296,7 @@ impl Shadows {
                 continue;
             }
             let d2 = to_eye.length_squared();
-            // Solid angle, roughly.
+            // Approximate solid angle.
             let size = o.area * height.abs() / (d2 * d2.sqrt());
             if size > best[MAX_SHADOWS - 1].0 {
                 best[MAX_SHADOWS - 1] = (size, i);
@@ -341,7 +341,7 @@ impl Shadows {
         self.len += 1;
     }
 
-    /// Whether a box lies in one of the shadows.
+    /// Returns `true` if a box lies in one of the shadows.
     #[inline]
     pub(crate) fn hide_box(&self, min: Vec3, max: Vec3) -> bool {
         self.shadows[..self.len].iter().any(|shadow| {
@@ -353,7 +353,7 @@ impl Shadows {
         })
     }
 
-    /// Whether all points, each with `tolerance` around it, lie in one of the shadows.
+    /// Returns `true` if all points, each grown by `tolerance`, lie in one of the shadows.
     #[inline]
     pub(crate) fn hide_points(&self, points: &[[f32; 3]], tolerance: f32) -> bool {
         self.shadows[..self.len].iter().any(|shadow| {

@@ -1,18 +1,18 @@
-//! Settings of what is made from a world.
+//! Settings for building a [`Sight`](crate::Sight).
 
-/// How a world is made ready.
+/// Options of [`Sight::build_with`](crate::Sight::build_with).
 #[derive(Clone, Copy, Debug)]
 pub struct SightOptions {
-    /// Triangles that are culled together, at most. [Limit: above 0]
+    /// Maximum number of triangles culled together. [Limit: above 0]
     ///
-    /// Smaller chunks are culled more tightly, and cost a box test of about 2 ns each.
+    /// Smaller chunks are culled more tightly, at a box test of about 2 ns each.
     pub chunk_triangles: usize,
-    /// Large polygons kept of each cell, behind which things are not seen. [Limit: 0 for none]
+    /// Number of large polygons kept per cell to hide the things behind them. [Limit: 0 for none]
     pub occluders: usize,
     /// Smallest area of such a polygon. [Units: wu²]
     pub occluder_area: f32,
-    /// Portals of a cell that are skipped together, at most, where it has more than 16. Changes what a
-    /// question costs, not its answer. [Limit: 0 for each by itself]
+    /// Maximum number of portals skipped together in a cell with more than 16. Affects the cost of a query,
+    /// not its answer. [Limit: 0 to test each by itself]
     pub portal_group: usize,
 }
 

@@ -1,6 +1,6 @@
-//! The first thing on a segment, whatever it is: a wall, a detail object, or a portal that is shut there.
+//! First hit on a segment: a wall, a detail object, or a portal that is shut there.
 //!
-//! Exact but for the rounding of `f64`: no box and no tolerance decides. A portal is shut where it is closed, or beyond a plane
+//! Exact up to the rounding of `f64`: no box and no tolerance decides. A portal is shut where it is closed, or beyond a plane
 //! that narrows it ([`SightState::narrow`]).
 
 use enfilade_cpg::{CellId, PortalId, World};
@@ -11,28 +11,28 @@ use crate::seen::DetailId;
 use crate::sightline::Sightlines;
 use crate::state::SightState;
 
-/// Where a picked surface is looked at from, so far before it. [Units: wu]
+/// Distance in front of a picked surface at which its cell is located. [Units: wu]
 ///
-/// Farther than any rounding of a wall, and thinner than any leaf.
+/// Larger than any rounding of a wall, and smaller than the thickness of any leaf.
 const BEFORE: f64 = 1e-3;
 
-/// What a segment meets first.
+/// The first thing that a segment meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
     /// A structural triangle, or one of a seal.
     Wall {
         /// Index into `World::batches`.
         batch: u32,
-        /// The triangle in its batch.
+        /// Index of the triangle in its batch.
         triangle: u32,
     },
     /// A triangle of a detail object.
     Detail {
         /// The object.
         detail: DetailId,
-        /// The primitive of its mesh.
+        /// Index of the primitive in its mesh.
         primitive: u32,
-        /// The triangle in its primitive.
+        /// Index of the triangle in its primitive.
         triangle: u32,
     },
     /// A portal that is closed, or narrowed so that it is shut there.
@@ -40,12 +40,12 @@ pub enum Target {
 }
 
 impl Target {
-    /// The input's object that was met: index into `World::sources`, for its name and `extras`. `None` for seals, portals, and
-    /// where the world does not know it. O(objects of the batch).
+    /// Returns the input object that was hit, as an index into `World::sources`, for its name and `extras`. `None` for seals,
+    /// portals, and objects that the world does not name. O(objects of the batch).
     ///
     /// # Panics
     ///
-    /// When the target is none of this world's.
+    /// If the target is not of this world.
     #[must_use]
     pub fn source(&self, world: &World) -> Option<u32> {
         match *self {
@@ -56,43 +56,43 @@ impl Target {
     }
 }
 
-/// Where a segment ends, and at what.
+/// The end of a picked segment, and the target there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Where along the segment, 0 to 1.
+    /// Parameter along the segment, 0 to 1.
     pub t: f64,
-    /// The point. [Units: wu]
+    /// Position. [Units: wu]
     pub position: [f32; 3],
-    /// Unit normal of what was met, on the side of the segment's start.
+    /// Unit normal of the target, on the side of the segment's start.
     pub normal: [f32; 3],
-    /// Whether the front of a triangle was met, from which its corners run counter-clockwise; of a portal, whether it was
-    /// met from its second cell.
+    /// True if the segment hit the front of a triangle, from which its vertices run counter-clockwise; for a portal, if it
+    /// came from the portal's second cell.
     pub front: bool,
-    /// What was met.
+    /// The target.
     pub target: Target,
-    /// The cell from which it was met; `None` where that is matter.
+    /// The cell from which the segment hit; `None` in solid matter.
     pub cell: Option<CellId>,
 }
 
-/// A segment with an end that is no point.
+/// Error: an end of a segment is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the segment from {from:?} to {to:?} has a coordinate that is not finite")]
 pub struct NotFinite {
-    /// Its start.
+    /// Start of the segment.
     pub from: [f32; 3],
-    /// Its end.
+    /// End of the segment.
     pub to: [f32; 3],
 }
 
 impl Sightlines {
-    /// What the closed segment from `a` to `b` meets first, if anything: for picking, bullets, hands. [Units: wu]
+    /// Returns the first hit on the closed segment from `a` to `b`, if any: for picking, bullets, hands. [Units: wu]
     ///
-    /// Walls and seals, all detail objects, leaves of doors as `state` has them, and portals that `state` shuts where the segment crosses them. Costs a descent of
-    /// three trees, about a microsecond; allocates nothing. Locked cells stop nothing.
+    /// Tests walls and seals, all detail objects, leaves of doors where `state` puts them, and portals that `state` shuts where
+    /// the segment crosses them. Locked cells stop nothing. Descends three trees, in about a microsecond; allocates nothing.
     ///
     /// # Errors
     ///
-    /// When a coordinate is not finite.
+    /// If a coordinate is not finite.
     pub fn pick(
         &self,
         state: &SightState,
@@ -102,11 +102,11 @@ impl Sightlines {
         self.pick_where(state, a, b, |_| true)
     }
 
-    /// The same, passing by detail objects for which `counts` is false: glass, what has been carried away.
+    /// As [`Sightlines::pick`], but ignores detail objects for which `counts` returns `false`, such as glass or removed objects.
     ///
     /// # Errors
     ///
-    /// When a coordinate is not finite.
+    /// If a coordinate is not finite.
     pub fn pick_where(
         &self,
         state: &SightState,
@@ -129,7 +129,7 @@ impl Sightlines {
             first = Some(self.hit(&ray, hit.t, corners, hit.front, target));
             ray.t_max = hit.t;
         }
-        // Of two at the same place, a portal or an object lies on the wall.
+        // At equal distance, a portal or an object lies on the wall and wins.
         let object = self.details.first_hit(state, &ray, counts);
         if let Some(hit) = &object {
             let target = Target::Detail {
@@ -140,7 +140,7 @@ impl Sightlines {
             first = Some(self.hit(&ray, hit.t, &hit.corners, hit.front, target));
             ray.t_max = hit.t;
         }
-        // Before a leaf that shuts the portal, there is air.
+        // A leaf that shuts the portal is hit itself, instead of the portal's plane in front of it.
         let is_own_leaf = |portal| {
             let leaf = object.as_ref().map(|hit| hit.detail);
             leaf.is_some_and(|l| state.is_leaf_of(l, portal))
@@ -155,8 +155,8 @@ impl Sightlines {
         Ok(first)
     }
 
-    /// Whether the closed segment from `a` to `b` meets neither wall, nor seal, nor a portal that `state` shuts where it is
-    /// crossed. Details do not count: ask [`Sightlines::pick`]. False where a coordinate is not finite.
+    /// Returns `true` if the closed segment from `a` to `b` meets no wall, no seal, and no portal that `state` shuts where it is
+    /// crossed; `false` if a coordinate is not finite. Ignores details: for those, use [`Sightlines::pick`].
     #[must_use]
     pub fn is_clear(&self, state: &SightState, a: [f32; 3], b: [f32; 3]) -> bool {
         if !is_finite(a, b) {
@@ -168,7 +168,7 @@ impl Sightlines {
                 && self.first_shut(state, &Ray::segment(from, to)).is_none()
     }
 
-    /// The first opening that is shut where the ray crosses it: `t`, its number, and from which side.
+    /// Returns the first opening that is shut where the ray crosses it: `t`, its index, and `true` if its front was hit.
     fn first_shut(&self, state: &SightState, ray: &Ray) -> Option<(f64, u32, bool)> {
         let mut best: Option<(f64, u32, bool)> = None;
         self.shut.for_each_hit(ray, |hit| {

@@ -1,4 +1,4 @@
-//! Points of a file as points to compute with.
+//! Conversion of stored `f32` points to `f64`.
 
 use enfilade_geom::DVec3;
 

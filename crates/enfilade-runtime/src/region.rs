@@ -1,26 +1,25 @@
-//! Regions of the screen, and how a portal narrows them.
+//! Convex regions of the screen, narrowed by portals.
 //!
-//! After Luebke & Georges, "Portals and Mirrors" (I3D 1995), who narrow a rectangle, and Gjørup,
-//! *Portal techniques* (1999), section 2.3.4, who keeps the convex outline and removes edges from it
-//! outwards, least area first. We clip the outline in homogeneous coordinates, in `f64`.
+//! Luebke & Georges, "Portals and Mirrors" (I3D 1995), narrow a rectangle; Gjørup, *Portal techniques*
+//! (1999), section 2.3.4, keeps the convex outline and removes edges from it outwards, least area first.
+//! Here the outline is clipped in homogeneous coordinates, in `f64`.
 //!
-//! **Errs to visible.** A stored outline may be off by a rounding. So it is clipped to a region that
-//! is wider by the world's tolerance, and what comes out is widened by what the tolerance looks like
-//! from the eye, at the depth of its nearest corner. Derivation: a point `p` of the true opening has a
-//! point `p'` of the outline within the tolerance `d`. For an edge `e` of the clipped outline,
-//! `e·q' >= 0`, so `e·q >= -d·stretch` and, on the screen, `e·q/w >= -d·stretch / w(p)`, where
-//! `w(p) >= w_min - d`.
+//! **Errs to visible.** A stored outline may be off by rounding. It is clipped to a region widened by the
+//! world's tolerance, and the result is widened by the tolerance as seen from the eye at the depth of its
+//! nearest vertex. Derivation: a point `p` of the true opening has a point `p'` of the outline within the
+//! tolerance `d`. For an edge `e` of the clipped outline, `e·q' >= 0`, so `e·q >= -d·stretch` and, on the
+//! screen, `e·q/w >= -d·stretch / w(p)`, where `w(p) >= w_min - d`.
 
 use glam::{DVec2, DVec3};
 
-/// Corners that an outline may have; longer ones are reduced when a world is loaded.
+/// Maximum number of vertices of an outline; longer ones are reduced when a world is loaded.
 pub(crate) const MAX_CORNERS: usize = 32;
-/// Edges that a region may have.
+/// Maximum number of edges of a region.
 pub(crate) const MAX_EDGES: usize = 16;
-/// Room for an outline clipped by all edges of a region, the rectangle and a plane.
+/// Capacity for an outline clipped by all edges of a region, its rectangle and a plane.
 const BUFFER: usize = MAX_CORNERS + MAX_EDGES + 12;
 
-/// Corners of a polygon on the stack.
+/// Vertices of a polygon, on the stack.
 pub(crate) struct Polygon<T> {
     points: [T; BUFFER],
     len: usize,
@@ -51,11 +50,11 @@ impl<T: Copy + Default> Polygon<T> {
     }
 }
 
-/// A polygon being clipped, in two buffers by turns.
+/// A polygon being clipped, alternating between two buffers.
 pub(crate) struct Clipper {
     buffers: [Polygon<DVec3>; 2],
     current: usize,
-    /// Each cut adds one corner at most, unless rounding bends an outline that is a sliver.
+    /// True if a buffer overflowed. A cut adds at most one vertex, unless rounding bends a sliver.
     is_full: bool,
 }
 
@@ -82,7 +81,7 @@ impl Clipper {
         self.buffers[self.current].as_slice()
     }
 
-    /// Keeps the part with `plane · q >= least`; whether anything is left.
+    /// Keeps the part with `plane · q >= least`; returns `true` if any is left.
     #[inline]
     pub(crate) fn cut(&mut self, plane: DVec3, least: f64) -> bool {
         let [a, b] = &mut self.buffers;
@@ -114,16 +113,16 @@ impl Clipper {
     }
 }
 
-/// How the view is narrowed at a portal. All answers are supersets; the tighter, the dearer.
+/// Method of narrowing the view at a portal. All answers are supersets; tighter ones cost more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Narrowing {
-    /// By the rectangle around the portal on the screen.
+    /// The rectangle around the portal on the screen.
     Rectangle,
-    /// By the portal's outline (up to 16 edges).
+    /// The portal's outline, with up to 16 edges.
     Polygon,
-    /// By an outline of at most so many edges, reduced outwards. [Limit: 3 to 16]
+    /// An outline of at most this many edges, reduced outwards. [Limit: 3 to 16]
     ///
-    /// The rectangle around the portal bounds the view too, whatever the number.
+    /// The rectangle around the portal always bounds the view as well.
     PolygonOf(u8),
 }
 
@@ -137,13 +136,13 @@ impl Narrowing {
     }
 }
 
-/// A convex part of the screen: a rectangle, and edges that cut its corners off.
+/// A convex part of the screen: a rectangle, and edges that cut off its vertices.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Region {
-    /// Least and greatest corner, within `[-1, 1]`.
+    /// Minimum of the rectangle, within `[-1, 1]`.
     pub(crate) min: DVec2,
     pub(crate) max: DVec2,
-    /// What of it is left to be seen lies within `widened` of the hull of the corners.
+    /// Convex hull of the vertices; grown by `widened`, it holds everything seen through the region.
     corners: [DVec2; MAX_EDGES],
     /// Inside is `e · (x, y, w) >= 0`; `(e.x, e.y)` has unit length.
     edges: [DVec3; MAX_EDGES],
@@ -152,13 +151,13 @@ pub(crate) struct Region {
     widened: f64,
 }
 
-/// What is left of an outline after clipping.
+/// Rest of an outline after clipping.
 pub(crate) enum Clipped {
-    /// Nothing: the portal is out of view.
+    /// Empty: the portal is out of view.
     Out,
-    /// It is so close to the eye that it narrows nothing.
+    /// So close to the eye that it narrows nothing.
     Near,
-    /// The rest, nowhere nearer than `w_min`.
+    /// A polygon, with depth `w_min` or more.
     Part { w_min: f64 },
 }
 
@@ -186,12 +185,12 @@ impl Region {
         &self.corners[..usize::from(self.n_corners)]
     }
 
-    /// How far beyond the hull of the corners something may be seen.
+    /// Returns the distance beyond the hull of the vertices within which something may be seen.
     pub(crate) fn widened(&self) -> f64 {
         self.widened
     }
 
-    /// The four sides of the rectangle, as edges.
+    /// Returns the four sides of the rectangle, as edges.
     pub(crate) fn sides(&self) -> [DVec3; 4] {
         [
             DVec3::new(1.0, 0.0, -self.min.x),
@@ -206,8 +205,8 @@ impl Region {
         size.x * size.y
     }
 
-    /// Clips the outline in `outline` (clip space) to what lies in the region, or within `slack` of
-    /// it, and beyond `entry`: `(n, k)` with `n · q >= k`.
+    /// Clips the outline in `outline` (clip space) to the region grown by `slack`, and to the half-space
+    /// beyond `entry`: `(n, k)` with `n · q >= k`.
     pub(crate) fn clip(
         &self,
         outline: &mut Clipper,
@@ -228,14 +227,14 @@ impl Region {
             .iter()
             .fold(f64::INFINITY, |w, q| w.min(q.z));
         // Within the slack of the region's planes, points may even lie a little behind the eye.
-        // Twice the slack would do for a positive depth; more keeps the widening below 1 / 15.
+        // Twice the slack would suffice for a positive depth; more keeps the widening below 1 / 15.
         if w_min <= 16.0 * slack || outline.is_full {
             return Clipped::Near;
         }
         Clipped::Part { w_min }
     }
 
-    /// The region seen through what [`Region::clip`] left of an outline.
+    /// Returns the region seen through an outline clipped by [`Region::clip`].
     pub(crate) fn narrowed(
         &self,
         polygon: &[DVec3],
@@ -251,12 +250,12 @@ impl Region {
             max = max.max(p);
             points.push(p);
         }
-        // The tolerance itself is no more than the slack; 1e-12 covers the rounding of all this.
+        // The tolerance itself is at most the slack; 1e-12 covers the rounding of all this.
         let widened = slack / (w_min - slack) + 1e-12;
         self.around(points, min, max, widened, narrowing)
     }
 
-    /// The part of `self` around a convex polygon, widened.
+    /// Returns the part of `self` around a convex polygon, widened.
     fn around(
         &self,
         mut points: Polygon<DVec2>,
@@ -277,7 +276,7 @@ impl Region {
         let is_flat = |area: f64| area.abs() <= 1e-9 * (max - min).length_squared();
         let max_edges = narrowing.max_edges();
         if max_edges == 0 || points.len < 3 || is_flat(area) {
-            // Seen edge-on, the turning sense is rounding noise: the rectangle does without.
+            // Seen edge-on, its orientation is rounding noise: use the rectangle.
             out.corners[..4].copy_from_slice(&rectangle(out.min, out.max));
             out.widened = 0.0;
             if max_edges > 0 {
@@ -300,7 +299,7 @@ impl Region {
             out.corners[i] = a;
             let d = b - a;
             let length = d.length();
-            // A side of the rectangle says the same.
+            // Redundant with a side of the rectangle.
             let on_side = |at: f64, a: f64, b: f64| (a - at).abs() + (b - at).abs() < 1e-9;
             if length < 1e-9
                 || on_side(min.x, a.x, b.x)
@@ -323,17 +322,17 @@ impl Region {
         self.n_edges = other.n_edges;
     }
 
-    /// Whether all that can be seen through `self` lies in `other`.
+    /// Returns `true` if everything visible through `self` lies in `other`.
     pub(crate) fn is_within(&self, other: &Self) -> bool {
         let (mut least, mut greatest) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for &c in self.corners() {
             least = least.min(c);
             greatest = greatest.max(c);
         }
-        // Known twice: by the corners widened, and by the rectangle.
+        // Two bounds hold: the widened vertices, and the rectangle.
         let least = (least - self.widened).max(self.min);
         let greatest = (greatest + self.widened).min(self.max);
-        // Nothing is seen beyond the screen: its own sides need no room.
+        // Nothing is seen beyond the screen, so its own sides need no margin.
         let low = other.min.cmple(DVec2::NEG_ONE) | other.min.cmple(least);
         let high = other.max.cmpge(DVec2::ONE) | other.max.cmpge(greatest);
         (low & high).all()
@@ -344,7 +343,7 @@ impl Region {
             })
     }
 
-    /// A region that holds both.
+    /// Returns a region that contains both.
     pub(crate) fn joined(&self, other: &Self, narrowing: Narrowing) -> Self {
         let whole = self.rectangle_around(other);
         if narrowing == Narrowing::Rectangle {
@@ -360,20 +359,20 @@ impl Region {
         whole.around(hull(&points), min, max, widened, narrowing)
     }
 
-    /// The area by which the rectangle around both exceeds theirs, as a share of theirs.
+    /// Returns the area of the rectangle around both in excess of their own areas, as a fraction of those.
     pub(crate) fn waste_of_joining(&self, other: &Self) -> f64 {
         let size = self.max.max(other.max) - self.min.min(other.min);
         let own = self.area() + other.area();
         size.x * size.y / own.max(1e-12) - 1.0
     }
 
-    /// Of its rectangle in the screen's.
+    /// Returns the area of its rectangle as a fraction of the screen.
     pub(crate) fn share(&self) -> f64 {
         let size = (self.max.min(DVec2::ONE) - self.min.max(DVec2::NEG_ONE)).max(DVec2::ZERO);
         size.x * size.y * 0.25
     }
 
-    /// The rectangle around both, without edges.
+    /// Returns the rectangle around both, without edges.
     pub(crate) fn rectangle_around(&self, other: &Self) -> Self {
         let (min, max) = (self.min.min(other.min), self.max.max(other.max));
         let mut out = Self {
@@ -390,7 +389,7 @@ fn rectangle(min: DVec2, max: DVec2) -> [DVec2; 4] {
     [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)]
 }
 
-/// Drops corners that repeat their neighbor; returns twice the signed area.
+/// Drops vertices that repeat their neighbor; returns twice the signed area.
 fn tidy(points: &mut Polygon<DVec2>) -> f64 {
     let mut n = 0;
     for i in 0..points.len {
@@ -411,8 +410,8 @@ fn tidy(points: &mut Polygon<DVec2>) -> f64 {
 }
 
 /// Removes edges from a counter-clockwise convex polygon until `max_edges` are left, each time the
-/// one whose removal adds the least area (Gjørup 1999, section 2.3.4). Stops early where no two
-/// neighbors of an edge meet; a triangle has no such edge to spare.
+/// one whose removal adds the least area (Gjørup 1999, section 2.3.4). Stops early if the neighbors of
+/// no edge intersect; a triangle has no edge to spare.
 fn reduce(points: &mut Polygon<DVec2>, max_edges: usize) {
     while points.len > max_edges.max(3) {
         let n = points.len;
@@ -424,7 +423,7 @@ fn reduce(points: &mut Polygon<DVec2>, max_edges: usize) {
             // The neighbors of edge a b, extended over it, meet where a + s u = b + t v.
             let turn = u.perp_dot(v);
             if turn <= 0.0 {
-                continue; // They part, or run alongside.
+                continue; // They diverge, or are parallel.
             }
             let s = (b - a).perp_dot(v) / turn;
             let meet = a + u * s;
@@ -469,12 +468,12 @@ fn hull(points: &Polygon<DVec2>) -> Polygon<DVec2> {
     out
 }
 
-/// A convex polygon of at most `max_corners` around a convex polygon of any number, in its order.
+/// Returns a convex polygon of at most `max_corners` vertices around a convex polygon, in its order.
 ///
-/// For outlines when a world is loaded; allocates.
+/// Used for outlines when a world is loaded; allocates.
 pub(crate) fn reduced_around(points: &[DVec2], max_corners: usize) -> Vec<DVec2> {
     let mut at = points.to_vec();
-    // Groups of neighbors at a time, so that the buffer above is always large enough.
+    // Reduce groups of neighbors, so that the buffer above is always large enough.
     while at.len() > max_corners {
         let mut part = Polygon::new();
         if at.len() <= BUFFER {
@@ -489,8 +488,8 @@ pub(crate) fn reduced_around(points: &[DVec2], max_corners: usize) -> Vec<DVec2>
             at = part.as_slice().to_vec();
             continue;
         }
-        // Too many for the buffer: every edge but each fourth of a regular choice. The hull of the
-        // chosen edges' lines holds the polygon.
+        // Too many for the buffer: keep one edge in four, evenly spaced. The lines of the kept edges
+        // bound a polygon that contains the given one.
         let n = at.len();
         let step = n.div_ceil(MAX_CORNERS);
         let chosen: Vec<usize> = (0..n).step_by(step).collect();
@@ -502,7 +501,7 @@ pub(crate) fn reduced_around(points: &[DVec2], max_corners: usize) -> Vec<DVec2>
             let turn = u.perp_dot(v);
             let s = (q - p).perp_dot(v) / turn;
             if !(turn > 0.0 && s.is_finite()) {
-                // Parallel: give the box instead.
+                // Parallel: return the box instead.
                 let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
                 for &p in &at {
                     (min, max) = (min.min(p), max.max(p));

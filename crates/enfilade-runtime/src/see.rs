@@ -1,20 +1,21 @@
-//! Portal traversal: what an eye sees, frame by frame.
+//! Portal traversal: visibility from one eye, frame by frame.
 //!
-//! From the eye's cell, cross each portal whose outline survives clipping to what is left of the
-//! view, and narrow the view to what survived (Luebke & Georges, "Portals and Mirrors", I3D 1995;
-//! Dirkse 2002, chapter 3; Gjørup 1999, section 2.3.4). We depart from them in that the ways are not
-//! followed depth first but nearest first, from a queue:
+//! Starting in the eye's cell, cross each portal whose outline survives clipping to the current view, and
+//! narrow the view to the surviving part (Luebke & Georges, "Portals and Mirrors", I3D 1995; Dirkse 2002,
+//! chapter 3; Gjørup 1999, section 2.3.4). Unlike these, we do not search depth first but nearest first,
+//! from a queue:
 //!
 //! - A visit is a cell, a `Region` of the screen and the plane of the portal entered by, beyond which
-//!   it begins. It holds nothing of the way that led there, so two visits of a cell can be compared: one
-//!   within another adds nothing and is not entered. That also is Dirkse's lock against endless loops.
-//! - While visits of a cell wait, they can be joined where that wastes little (his section 8.4).
-//! - After 12 visits, the next joins all regions so far, and at last takes the whole screen. So a cell
-//!   is entered at most 16 times, an exit clipped at most 16 times, however the portals lie: linear in
-//!   the exits within reach.
+//!   it begins. It holds nothing of the path that led there, so two visits of a cell can be compared: one
+//!   contained in another adds nothing and is not entered. This also replaces Dirkse's lock against
+//!   endless loops.
+//! - While visits of a cell wait, they are joined if that wastes little (his section 8.4).
+//! - After 12 visits, the next joins all regions so far, and the last takes the whole screen. So a cell is
+//!   entered at most 16 times and an exit clipped at most 16 times, however the portals lie: linear in the
+//!   exits within reach.
 //!
-//! **Errs to visible**, everywhere: see `region.rs` for roundings; a budget that runs out makes visible
-//! all that is left within reach; an eye in no cell sees every cell in its view.
+//! **Errs to visible**, everywhere: see `region.rs` for rounding. If the budget runs out, everything left
+//! within reach is visible; an eye in no cell sees every cell in its view.
 
 mod listing;
 mod queue;
@@ -37,26 +38,26 @@ pub use viewer::{SeeOptions, Viewer};
 pub use window::{Crossing, Window};
 
 impl Viewer {
-    /// What `view` sees of `sight` in `state`. `sight` is the one the viewer was made for, or one of a
-    /// world with as many cells, portals, chunks and details.
+    /// Returns everything in `view` that is visible in `sight` with the doors of `state`. `sight` must be the one
+    /// that the viewer was made for, or of a world with as many cells, portals, chunks and details.
     ///
-    /// Time grows with what is seen, not with the world: a few microseconds for rooms. Allocates only
+    /// Time grows with the visible part, not with the world: a few microseconds for rooms. Allocates only
     /// while buffers grow.
     ///
     /// # Panics
     ///
-    /// When `sight` is of a larger world than the viewer was made for.
+    /// If `sight` is of a larger world than the viewer was made for.
     pub fn see<'a>(&'a mut self, sight: &Sight, state: &SightState, view: &View) -> Seen<'a> {
         let start = sight.locator.locate(view.eye).map(|c| c.0);
         self.see_in(sight, state, view, start)
     }
 
-    /// The same for an eye whose cell is known, from a [`Follower`](crate::Follower) or because there is
-    /// no locator. Wrong where the eye is not in it.
+    /// As [`Viewer::see`], for an eye whose cell is known, from a [`Follower`](crate::Follower) or because
+    /// there is no locator. The answer is wrong if the eye is not in `cell`.
     ///
     /// # Panics
     ///
-    /// As [`Viewer::see`], and when there is no such cell.
+    /// As [`Viewer::see`], and if there is no such cell.
     pub fn see_from<'a>(
         &'a mut self,
         sight: &Sight,
@@ -92,8 +93,8 @@ impl Viewer {
         Seen { lists: &self.out }
     }
 
-    /// What `view` sees when nothing hides anything: every cell, chunk and detail whose box meets it.
-    /// For comparison, and for programs that want to draw through walls.
+    /// Returns everything in `view` as if nothing hid anything: each cell, chunk and detail whose box meets it.
+    /// For comparison, and for programs that draw through walls.
     ///
     /// # Panics
     ///

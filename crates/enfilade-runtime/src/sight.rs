@@ -1,4 +1,4 @@
-//! What is made once from a world, to be asked many times.
+//! A world prepared for visibility queries.
 
 mod drawn;
 mod portals;
@@ -21,9 +21,9 @@ use portals::Portals;
 
 use crate::sight_error::SightError;
 
-/// A world made ready for questions: portals side by side, exits by cell, boxes in trees.
+/// A world prepared for visibility queries: contiguous portals, exits by cell, boxes in trees.
 ///
-/// Built once; shared by any number of [`Viewer`](crate::Viewer)s on any threads.
+/// Build it once; any number of [`Viewer`](crate::Viewer)s on any threads can share it.
 #[derive(Clone, Debug)]
 pub struct Sight {
     pub(crate) locator: Locator,
@@ -35,39 +35,39 @@ pub struct Sight {
     groups: Vec<Group>,
     pub(crate) corners: Vec<[f32; 3]>,
     pub(crate) trees: BoxTrees,
-    /// By cell: its chunks, then its details (from `chunks.len()` on).
+    /// Per cell: its chunks, then its details (from `chunks.len()` on).
     pub(crate) cell_roots: Vec<Root>,
-    /// What no cell sees: the insides of walls. For eyes that are there.
+    /// Items that no cell sees, inside walls; for eyes that are there.
     pub(crate) unlisted_root: Root,
-    /// Over the boxes of cells with all that is listed in them.
+    /// Over the boxes of cells, each with everything listed in it.
     pub(crate) world_root: Root,
     pub(crate) chunks: Vec<Chunk>,
     pub(crate) details: Vec<Detail>,
     pub(crate) occluders: Occluders,
-    /// By cell of the eye: the chunks and details that may be seen from it, where the world says so.
+    /// Per cell of the eye: the chunks and details that may be seen from it, if the world has that information.
     pub(crate) seen_from: Option<VisibleParts>,
-    /// By batch: its triangles as index triples, sorted so that chunks are ranges.
+    /// Per batch: its triangles as index triples, sorted so that chunks are ranges.
     indices: Vec<Vec<u32>>,
     pub(crate) doors: Arc<Doors>,
     pub(crate) n_portals: usize,
     pub(crate) n_triangles: u64,
-    /// How far a stored outline may be off. [Units: wu]
+    /// Largest error of a stored outline. [Units: wu]
     pub(crate) tolerance: f64,
     /// Largest absolute coordinate. [Units: wu]
     pub(crate) extent: f64,
 }
 
 impl Sight {
-    /// Makes `world` ready, with default options.
+    /// Prepares `world` with default options.
     ///
     /// # Errors
     ///
-    /// A world that [`World::validate`] would refuse; decoded worlds never are.
+    /// If [`World::validate`] would refuse the world; decoded worlds always pass.
     pub fn build(world: &World) -> Result<Self, SightError> {
         Self::build_with(world, &SightOptions::default())
     }
 
-    /// Makes `world` ready. O(n log n) in its triangles, details and portals.
+    /// Prepares `world`. O(n log n) in its triangles, details and portals.
     ///
     /// # Errors
     ///
@@ -81,8 +81,8 @@ impl Sight {
             portals.add(PortalId(i as u32), portal, n_cells)?;
         }
         let extent = drawn.extent.max(portals.extent);
-        // What a builder may snap and a file may round, of outline and wall each; `enfilade-verify`
-        // judges by the same measure.
+        // Snapping by a builder plus rounding in a file, for outline and wall each; `enfilade-verify` uses
+        // the same bound.
         let tolerance = (2.0 * world_tolerance(extent)).max(portals.off_plane);
         let (first_exit, mut exits) = portals.by_cell(n_cells);
         let (mut first_group, mut groups) = (vec![0], Vec::new());
@@ -120,45 +120,45 @@ impl Sight {
         })
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.cell_roots.len()
     }
 
-    /// How many portals there are.
+    /// Returns the number of portals.
     #[must_use]
     pub fn n_portals(&self) -> usize {
         self.n_portals
     }
 
-    /// How many structural batches there are.
+    /// Returns the number of structural batches.
     #[must_use]
     pub fn n_batches(&self) -> usize {
         self.indices.len()
     }
 
-    /// Structural triangles and those of placed details.
+    /// Returns the number of triangles, those of placed details included.
     #[must_use]
     pub fn n_triangles(&self) -> u64 {
         self.n_triangles
     }
 
-    /// The chunks that structural batches are divided into, by [`ChunkId`](crate::ChunkId).
+    /// Returns the chunks of the structural batches, indexed by [`ChunkId`](crate::ChunkId).
     #[must_use]
     pub fn chunks(&self) -> &[Chunk] {
         &self.chunks
     }
 
-    /// The triangles of a batch, as triples of indices into its positions, in an order in which every
-    /// [`Chunk`] is a range. To be drawn instead of the batch's own; empty for a batch that does not
+    /// Returns the triangles of a batch as triples of indices into its positions, ordered so that every
+    /// [`Chunk`] is a range. Draw these instead of the batch's own indices. Empty for a batch that does not
     /// exist.
     #[must_use]
     pub fn indices(&self, batch: u32) -> &[u32] {
         self.indices.get(batch as usize).map_or(&[], Vec::as_slice)
     }
 
-    /// Triangles of a detail object; 0 for one that does not exist.
+    /// Returns the number of triangles of a detail object; 0 for one that does not exist.
     #[must_use]
     pub fn detail_triangles(&self, detail: u32) -> u32 {
         self.details
@@ -166,24 +166,24 @@ impl Sight {
             .map_or(0, |d| d.n_triangles)
     }
 
-    /// The leaves of a portal: which objects shut it, and how they move. Empty where the world knows none.
+    /// Returns the leaves of a portal: the objects that shut it, and their motions. Empty if the world records none.
     #[must_use]
     pub fn leaves(&self, portal: PortalId) -> &[Leaf] {
         self.doors.leaves(portal)
     }
 
-    /// The portals that an object is a leaf of, in ascending order; empty for all other objects.
+    /// Returns the portals of which an object is a leaf, in ascending order; empty for all other objects.
     pub fn portals_of(&self, detail: DetailId) -> impl Iterator<Item = PortalId> {
         let slot = self.doors.slot(detail);
         let portals = slot.map_or(&[][..], |s| self.doors.portals(s));
         portals.iter().map(|&p| PortalId(p))
     }
 
-    /// The cells that an object is in, ascending: of a leaf, all on its way.
+    /// Returns the cells that an object is in, in ascending order; for a leaf, all that it sweeps.
     ///
     /// # Panics
     ///
-    /// When `world` is not the one that this was built from.
+    /// If `world` is not the one that this was built from.
     #[must_use]
     pub fn cells_of_detail(&self, world: &World, detail: DetailId) -> Vec<CellId> {
         let mut cells = world[detail].cells.clone();
@@ -195,20 +195,20 @@ impl Sight {
         cells
     }
 
-    /// How far from a portal's plane, along its normal, the middle of its shut leaves is: a panel put there to fill the opening
-    /// is hidden by them. 0 without leaves. [Units: wu]
+    /// Returns the distance of the middle of a portal's shut leaves from its plane, along its normal: a panel at that distance
+    /// that fills the opening is hidden by them. 0 without leaves. [Units: wu]
     #[must_use]
     pub fn depth_of_leaves(&self, portal: PortalId) -> f32 {
         self.doors.depth(portal)
     }
 
-    /// The cell of a point; `None` in solid matter. About 100 ns.
+    /// Returns the cell of a point; `None` in solid matter. Takes about 100 ns.
     #[must_use]
     pub fn locate(&self, p: [f32; 3]) -> Option<CellId> {
         self.locator.locate(point(p))
     }
 
-    /// How far a stored outline may be off the true opening: all answers allow for it. [Units: wu]
+    /// Returns the largest error of a stored outline; all answers allow for it. [Units: wu]
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         self.tolerance
@@ -220,7 +220,7 @@ impl Sight {
         &self.exits[self.first_exit[c] as usize..self.first_exit[c + 1] as usize]
     }
 
-    /// The same, without those in groups that the caller skips.
+    /// As [`Sight::exits_of`], without the exits in groups that the caller skips.
     #[inline]
     pub(crate) fn runs_of(&self, cell: u32) -> Runs<'_> {
         let c = cell as usize;
@@ -228,7 +228,7 @@ impl Sight {
         Runs::new(self.exits_of(cell), &self.groups[groups])
     }
 
-    /// Whether a point of an exit's plane lies in its outline, or within `near` of each edge's line.
+    /// Returns `true` if a point of an exit's plane lies in its outline, or within `near` of the line of each edge.
     pub(crate) fn is_in_outline(&self, exit: &Exit, p: DVec3, near: f64) -> bool {
         let normal = point(exit.normal);
         let corners = self.corners_of(exit);

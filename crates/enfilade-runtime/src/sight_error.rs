@@ -1,6 +1,6 @@
-//! What a world can have that no question could be answered with.
+//! Errors of building a [`Sight`](crate::Sight).
 
-/// Why a world cannot be asked.
+/// Reason why a world cannot be queried.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SightError {
@@ -9,26 +9,28 @@ pub enum SightError {
     PortalCells {
         /// The portal.
         portal: u32,
-        /// The cells that it names.
+        /// The cells that it joins.
         cells: [u32; 2],
-        /// How many cells there are.
+        /// Number of cells.
         n_cells: usize,
     },
     /// A portal's outline is not finite, or has no area.
-    #[error("portal {portal}: its outline of {n_corners} corners is no polygon with an area")]
+    #[error("portal {portal}: its outline of {n_corners} vertices has no area or is not finite")]
     PortalOutline {
         /// The portal.
         portal: u32,
-        /// Corners of its outline.
+        /// Number of its vertices.
         n_corners: usize,
     },
-    /// A batch or detail names a cell, mesh or corner that does not exist, or a corner that is not
+    /// A batch or detail refers to a cell, mesh or vertex that does not exist, or to a vertex that is not
     /// finite.
-    #[error("{what} {index} names a cell, mesh or corner that does not exist or is not finite")]
+    #[error(
+        "{what} {index} refers to a cell, mesh or vertex that does not exist, or to a vertex that is not finite"
+    )]
     Geometry {
-        /// `batch`, `detail`, or `portal` for what fills it.
+        /// `batch`, `detail`, or `portal` for its fittings.
         what: &'static str,
-        /// Which one.
+        /// Its index.
         index: u32,
     },
 }

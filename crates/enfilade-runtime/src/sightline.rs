@@ -1,15 +1,14 @@
-//! Line of sight from point to point: the first triangle met, found cell by cell.
+//! Lines of sight from point to point: the first triangle hit, found cell by cell.
 //!
-//! A segment stays in its cell until it crosses a portal (*sealed*), and whatever it meets before
-//! that is listed in the cell (*complete*); so the trees of the cells on its way answer, and these are
-//! small. Picking, bullets and what one character sees of another (Gjørup 1999, sections 2.2.4 and
-//! 3.3.4).
+//! A segment stays in its cell until it crosses a portal (*sealed*), and everything it meets before
+//! that is listed in the cell (*complete*); so the small trees of the cells on its way suffice. For
+//! picking, bullets, and visibility between characters (Gjørup 1999, sections 2.2.4 and 3.3.4).
 //!
-//! **Equal to the tree of the whole world**, hit for hit. Both promises hold but for what is nearer
-//! than a tolerance to an edge, so wherever anything is that near, the tree of the whole world is
-//! asked instead: a segment that passes an edge of a triangle or the rim of an opening, starts in
-//! matter, leaves a cell where no portal is, or meets a triangle that another of other cells overlaps.
-//! The tests of triangles are the same in all trees, to the bit.
+//! **Equal to the tree of the whole world**, hit for hit. Both promises hold except within a tolerance
+//! of an edge, so wherever anything is that near, the tree of the whole world is queried instead: if a
+//! segment passes an edge of a triangle or the rim of an opening, starts in solid matter, leaves a cell
+//! where no portal is, or meets a triangle overlapped by another of other cells. The triangle tests are
+//! identical in all trees, to the bit.
 
 use enfilade_cpg::{CellId, Locator, World};
 use enfilade_geom::ray::hit_triangle;
@@ -19,23 +18,23 @@ use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
 use crate::details::Details;
 use crate::point::point;
 
-/// Cells followed before the whole world's tree is asked; it is the faster one by then.
+/// Cells followed before falling back to the whole world's tree, which is faster by then.
 const MAX_CELLS: usize = 6;
 
 const NONE: u32 = u32::MAX;
 
-/// The first structural triangle on a segment, as [`Sightlines::first_hit`] tells it.
+/// The first structural triangle on a segment, from [`Sightlines::first_hit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SightHit {
-    /// Where along the segment, 0 to 1.
+    /// Parameter along the segment, 0 to 1.
     pub t: f64,
     /// Index into `World::batches`.
     pub batch: u32,
-    /// The triangle in its batch.
+    /// Index of the triangle in its batch.
     pub triangle: u32,
-    /// Whether its front was met: the side from which the corners run counter-clockwise.
+    /// True if its front was hit, from which its vertices run counter-clockwise.
     pub front: bool,
-    /// The cell in which the segment ended, where it was followed from cell to cell without doubt.
+    /// The cell in which the segment ended, if following it from cell to cell was unambiguous.
     pub cell: Option<CellId>,
 }
 
@@ -46,49 +45,48 @@ pub(crate) struct Opening {
     pub(crate) portal: u32,
     /// The two cells.
     cells: [u32; 2],
-    /// Which edges, opposite each corner, are the opening's rim.
+    /// Per edge, opposite each vertex: true if it is on the opening's rim.
     is_rim: [bool; 3],
 }
 
-/// Longest segment that is followed from cell to cell, in tolerances: `f64` rounds places along it to a thousandth of one.
+/// Longest segment followed from cell to cell, in tolerances: `f64` rounds positions along it to a thousandth of one.
 const LONGEST: f64 = 1e12;
 
 /// Marks an item that is an opening, not a wall.
 const OPENING: u32 = 1 << 30;
 
-/// A world made ready for lines of sight. Apart from [`Sight`](crate::Sight), because it holds the
-/// triangles themselves: about 150 bytes each, more for those that several cells see; those of a detail mesh once, however
+/// A world prepared for lines of sight. Separate from [`Sight`](crate::Sight), because it holds the triangles
+/// themselves: about 150 bytes each, more for those seen by several cells; those of a detail mesh once, however
 /// often it is placed.
 #[derive(Clone, Debug)]
 pub struct Sightlines {
     pub(crate) locator: Locator,
     pub(crate) whole: Bvh,
-    /// Batch and number in it.
+    /// Per triangle: batch, and index in it.
     pub(crate) source: Vec<(u32, u32)>,
-    /// Overlapped by a triangle that other cells list.
+    /// Per triangle: true if one listed by other cells overlaps it.
     is_doubtful: Vec<bool>,
-    /// Of all walls, for the cells.
+    /// All walls; the trees of the cells refer to them.
     pub(crate) triangles: Vec<Triangle>,
     pub(crate) openings: Vec<Opening>,
-    /// Over the openings.
+    /// Tree over the openings.
     pub(crate) shut: Bvh,
     pub(crate) details: Details,
     trees: BoxTrees,
-    /// By cell: over its walls and openings.
+    /// Per cell: root over its walls and openings.
     roots: Vec<Root>,
     near: f64,
 }
 
-/// How following a segment ended.
+/// Outcome of following a segment.
 enum Walk {
-    /// What it met (`t`, triangle, front), and the cell where it ended.
+    /// The hit, if any (`t`, triangle, front), and the cell where it ended.
     Sure(Option<(f64, u32, bool)>, u32),
     Doubtful,
 }
 
 impl Sightlines {
-    /// Makes a valid world ready: O(n log n) in its triangles. [`Sightlines::pick`] and [`Sightlines::is_clear`] are what
-    /// to ask it.
+    /// Prepares a valid world for [`Sightlines::pick`] and [`Sightlines::is_clear`]. O(n log n) in its triangles.
     #[must_use]
     pub fn build(world: &World) -> Self {
         let mut triangles: Vec<Triangle> = Vec::new();
@@ -106,7 +104,7 @@ impl Sightlines {
         }
         let whole = Bvh::build(&triangles);
         let extent = whole.bounds().extent();
-        // As for `Sight`: twice what a builder may snap.
+        // As for `Sight`: twice the snapping of a builder.
         let near = 2.0 * world_tolerance(extent);
         let mut openings = Vec::new();
         let mut opening_boxes: Vec<Vec<u32>> = vec![Vec::new(); by_cell.len()];
@@ -127,7 +125,7 @@ impl Sightlines {
             }
         }
         let mut trees = BoxTrees::default();
-        // Twice the tolerance, because the test of edges measures askew; and what `f32` rounds off.
+        // Twice the tolerance, because the edge test measures at a slant; plus the rounding of `f32`.
         let margin = 2.0 * near + extent * (1.0 / 1_048_576.0);
         let roots = by_cell
             .iter()
@@ -161,10 +159,10 @@ impl Sightlines {
         }
     }
 
-    /// The first structural triangle on the closed segment from `a` to `b`. Details do not count.
-    /// `None` also for points that are not finite.
+    /// Returns the first structural triangle on the closed segment from `a` to `b`; `None` for points that are
+    /// not finite. Ignores details.
     ///
-    /// By one tree over the whole world, which measured faster than following the segment from cell to
+    /// Uses one tree over the whole world, which measured faster than following the segment from cell to
     /// cell (`docs/benchmarks/sight.md`).
     #[must_use]
     pub fn first_hit(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
@@ -172,7 +170,7 @@ impl Sightlines {
             .map(|hit| self.named(hit, None))
     }
 
-    /// The same answer, found by following the segment from cell to cell, with the cell where it ends.
+    /// As [`Sightlines::first_hit`], by following the segment from cell to cell; also reports the cell where it ends.
     #[must_use]
     pub fn first_hit_by_cells(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
         let (a, b) = (point(a), point(b));
@@ -198,7 +196,7 @@ impl Sightlines {
         Some((hit.t, hit.triangle, hit.front))
     }
 
-    /// What the ray meets of one cell beyond `from`, but for the portal come by.
+    /// Returns the first hits of the ray in one cell beyond `from`, except on the portal entered by.
     fn events(&self, cell: u32, look: &Look, from: f64, came_by: u32) -> Events {
         let mut found = Events {
             wall: (f64::INFINITY, NONE),
@@ -262,8 +260,7 @@ impl Sightlines {
             let found = self.events(cell, &look, t - step, came_by);
             let until = found.wall.0.min(found.opening.0).min(1.0);
             let is_doubtful = found.edge <= until + step
-                // What the cell lists and the segment met before it came here would have been in
-                // its way.
+                // A wall or opening of this cell hit before entry should have stopped the segment.
                 || found.wall.0 < t + step
                 || found.opening.0 < t + step
                 // Two at once.
@@ -278,7 +275,7 @@ impl Sightlines {
                 (t, came_by, cell) = (found.opening.0, opening.portal, opening.other(cell));
                 continue;
             }
-            // The very test of the whole world's tree.
+            // The same test as in the whole world's tree.
             let hit = self
                 .triangles
                 .get(found.wall.1 as usize)
@@ -304,7 +301,7 @@ impl Opening {
     }
 }
 
-/// What a ray meets of one cell, each `t` the least.
+/// First hits of a ray in one cell, each the least `t`.
 struct Events {
     wall: (f64, u32),
     next_wall: f64,
@@ -320,27 +317,27 @@ impl Events {
     }
 }
 
-/// How a ray meets a triangle.
+/// Intersection of a ray with a triangle.
 enum Met {
     Nothing,
-    /// It passes an edge within the tolerance, at `t` between these.
+    /// Passes an edge within the tolerance, for `t` between these.
     Edge(f64, f64),
-    /// It meets the inside at about this `t`.
+    /// Hits the interior at about this `t`.
     Inside(f64),
 }
 
-/// A segment made ready for triangles, sheared as in `enfilade_geom::ray`.
+/// A segment prepared for triangle tests, sheared as in `enfilade_geom::ray`.
 struct Look {
     boxes: BoxRay,
     origin: [f64; 3],
     axes: [usize; 3],
     shear: [f64; 3],
-    /// Parts of the segment nearer to each other than this may be in the other order.
+    /// Differences in `t` below this do not decide an order.
     step: f64,
 }
 
 impl Look {
-    /// `None` for a segment that is no longer than a few tolerances, so long that rounding is more than those, or not
+    /// `None` if the segment is not longer than a few tolerances, is so long that rounding exceeds those, or is not
     /// finite.
     fn new(ray: &Ray, near: f64) -> Option<Self> {
         let d = ray.direction;
@@ -380,12 +377,12 @@ impl Look {
                 z,
             )
         });
-        // Twice the area beside each edge, the edge opposite each corner.
+        // Twice the area beside each edge, each opposite its vertex.
         let beside = |i: usize, j: usize| p[j].0.perp_dot(p[i].0);
         let side = [beside(2, 1), beside(0, 2), beside(1, 0)];
         let det = side[0] + side[1] + side[2];
         let sign = if det < 0.0 { -1.0 } else { 1.0 };
-        // The shear measures along a coordinate plane: by up to √3 more than straight across. Squared.
+        // The shear measures along a coordinate plane: up to √3 times the perpendicular distance. Squared.
         let reach2 = 3.0625 * near * near;
         let mut is_edge = false;
         for k in 0..3 {
@@ -407,7 +404,7 @@ impl Look {
             (low * sz, high * sz)
         };
         let at = (side[0] * p[0].1 + side[1] * p[1].1 + side[2] * p[2].1) * sz / det;
-        // Along the plane the place is rounding noise: anywhere on the triangle.
+        // Along the plane, `t` is rounding noise: anywhere on the triangle.
         let is_steep = det.abs()
             > 1e-3
                 * (p[0].0 - p[1].0)
@@ -431,8 +428,8 @@ impl Look {
     }
 }
 
-/// Which triangles are overlapped, in their plane, by one that other cells list: a segment meets both
-/// at once, and which comes first is not for one cell to say.
+/// Per triangle, `true` if one listed by other cells overlaps it in its plane: a segment meets both at
+/// once, and a single cell cannot decide which comes first.
 fn doubtful(
     world: &World,
     triangles: &[Triangle],
@@ -462,13 +459,13 @@ fn doubtful(
         .collect()
 }
 
-/// Whether two triangles of a plane overlap by more than `near`: no edge has them on two sides.
+/// Returns `true` if two coplanar triangles overlap by more than `near`, so that no edge separates them.
 fn overlap_in_plane(plane: &Plane, a: &Triangle, b: &Triangle, near: f64) -> bool {
     let apart = |t: &Triangle, other: &Triangle| {
         (0..3).any(|k| {
             let along = t[(k + 1) % 3] - t[k];
             let mut out = along.cross(plane.normal).normalize_or_zero();
-            // Away from the third corner.
+            // Away from the third vertex.
             if out.dot(t[(k + 2) % 3] - t[k]) > 0.0 {
                 out = -out;
             }

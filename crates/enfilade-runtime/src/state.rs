@@ -1,4 +1,4 @@
-//! What changes while a program runs: portals open, close and narrow, leaves of doors move; cells are locked.
+//! Run-time state: open, closed and narrowed portals, poses of door leaves, locked cells.
 
 use std::sync::Arc;
 
@@ -11,38 +11,38 @@ use crate::point::point;
 use crate::seen::DetailId;
 use crate::sight::Sight;
 
-/// Half-spaces that narrow one portal, at most.
+/// Maximum number of half-spaces that narrow one portal.
 const MAX_CUTS: usize = 4;
 
-/// Which portals are open, how far, how the leaves of doors stand, and which cells may be entered; by default all are open,
-/// and leaves stand as the model has them.
+/// State of portals, door leaves and cells. By default all portals are open, no cell is locked, and leaves stand as in the
+/// model.
 ///
-/// A door whose leaves are [shut](SightState::set_leaves) lets no sight through, unless one sees through a leaf. As the
-/// model has it, a door lets sight through however its leaves stand: a model's doors are mostly shut, and a game's are not.
+/// A door whose leaves are [shut](SightState::set_leaves) blocks sight, unless one sees through a leaf. In the model's pose,
+/// a door lets sight through however its leaves stand: doors are mostly shut in models, and open in games.
 ///
-/// Shared by all viewers of a world. Setting costs nanoseconds and takes effect with the next
-/// question. What is asked for of a portal or cell that does not exist is ignored.
+/// Shared by all viewers of a world. Setters take nanoseconds and take effect with the next query. They ignore portals and
+/// cells that do not exist.
 #[derive(Clone, Debug)]
 pub struct SightState {
-    /// A byte a portal, apart from the planes, so that a view of a large world touches few cache lines: how many
-    /// planes narrow it, or [`CLOSED`] more.
+    /// One byte per portal, apart from the planes, so that a view of a large world touches few cache lines: the number of
+    /// planes that narrow it, plus the flags [`CLOSED`] and [`SHUT`].
     portals: Vec<u8>,
     /// Open where `n · p + d >= 0`.
     cuts: Vec<[[f32; 4]; MAX_CUTS]>,
     is_locked: Vec<bool>,
     doors: Arc<Doors>,
-    /// By moving leaf: the share of its way from shut (0) to open (1); `None` as in the model.
+    /// Per moving leaf: its position from shut (0) to open (1); `None` as in the model.
     shares: Vec<Option<f32>>,
 }
 
-/// Marks a portal that lets nothing through.
+/// Flag of a closed portal.
 const CLOSED: u8 = 0x80;
-/// Marks a portal that shut leaves let nothing through.
+/// Flag of a portal blocked by its shut leaves.
 const SHUT: u8 = 0x40;
 const N_CUTS: u8 = !(CLOSED | SHUT);
 
 impl SightState {
-    /// Everything open, leaves as the model has them.
+    /// Makes a state with everything open and leaves as in the model.
     #[must_use]
     pub fn new(sight: &Sight) -> Self {
         Self {
@@ -54,7 +54,7 @@ impl SightState {
         }
     }
 
-    /// Of no world: everything open.
+    /// Makes a state of an empty world.
     pub(crate) fn new_empty() -> Self {
         Self {
             portals: Vec::new(),
@@ -65,7 +65,7 @@ impl SightState {
         }
     }
 
-    /// Opens a portal fully; its leaves stand fully open.
+    /// Opens a portal fully, and its leaves.
     pub fn open(&mut self, portal: PortalId) {
         if let Some(p) = self.portals.get_mut(portal.0 as usize) {
             *p = 0;
@@ -73,7 +73,7 @@ impl SightState {
         self.set_leaves(portal, 1.0);
     }
 
-    /// Closes a portal, and shuts its leaves: nothing is seen through it, not even through leaves of glass.
+    /// Closes a portal and shuts its leaves: nothing is seen through it, not even through leaves of glass.
     pub fn close(&mut self, portal: PortalId) {
         self.set_leaves(portal, 0.0);
         if let Some(p) = self.portals.get_mut(portal.0 as usize) {
@@ -81,10 +81,10 @@ impl SightState {
         }
     }
 
-    /// Moves the leaves of a portal to a share of their way from shut (0) to fully open (1), clamped to these. Once all are
-    /// shut, nothing is seen through it, unless one sees through a leaf (`World::is_see_through`). A portal without
-    /// [leaves](Sight::leaves) stays as it is, and so does one that was [closed](SightState::close), until it is
-    /// [opened](SightState::open). Leaves that shut several portals move for all of them.
+    /// Moves the leaves of a portal to a position between shut (0) and fully open (1), clamped to that range. Once all are
+    /// shut, the portal blocks sight, unless one sees through a leaf (`World::is_see_through`). Does not affect a portal
+    /// without [leaves](Sight::leaves), or one that was [closed](SightState::close), until it is [opened](SightState::open).
+    /// Leaves that shut several portals move for all of them.
     pub fn set_leaves(&mut self, portal: PortalId, share: f32) {
         if share.is_nan() {
             return;
@@ -107,8 +107,8 @@ impl SightState {
         }
     }
 
-    /// How the leaves of a portal stand, on their way from shut (0) to fully open (1): as [set](SightState::set_leaves), or
-    /// as the model has them; the first of several. `None` for a portal without leaves.
+    /// Returns the position of a portal's leaves, from shut (0) to fully open (1), as [set](SightState::set_leaves) or as in
+    /// the model; of the first, if there are several. `None` for a portal without leaves.
     #[must_use]
     pub fn leaves(&self, portal: PortalId) -> Option<f32> {
         let &slot = self.doors.slots(portal).first()?;
@@ -116,8 +116,8 @@ impl SightState {
         Some(self.shares[slot as usize].unwrap_or_else(as_modeled))
     }
 
-    /// The leaves that were moved, in ascending order, each with the transform that takes it from where the model has it to
-    /// where it stands, in world space: to be applied after the object's own transform.
+    /// Returns the moved leaves in ascending order, each with the transform from its pose in the model to its current pose, in
+    /// world space: apply it after the object's own transform.
     pub fn moved(&self) -> impl Iterator<Item = (DetailId, DMat4)> {
         let shares = (0..).zip(&self.shares);
         shares.filter_map(|(slot, share)| {
@@ -126,7 +126,7 @@ impl SightState {
         })
     }
 
-    /// That transform of one object; `None` for one that was not moved. O(log leaves).
+    /// Returns the transform of one object, as in [`SightState::moved`]; `None` if it was not moved. O(log leaves).
     #[must_use]
     pub fn pose(&self, detail: DetailId) -> Option<DMat4> {
         let slot = self.doors.slot(detail)?;
@@ -134,33 +134,33 @@ impl SightState {
         Some(self.doors.moving(slot).motion.at(share))
     }
 
-    /// How each leaf stands, in ascending order of objects: what [`SightState::moved`] depends on, to be compared.
+    /// Returns the position of each leaf, in ascending order of objects. If equal, [`SightState::moved`] is equal.
     #[must_use]
     pub fn shares(&self) -> &[Option<f32>] {
         &self.shares
     }
 
-    /// Portals that let nothing through, in ascending order.
+    /// Returns the portals that let nothing through, in ascending order.
     pub fn shut_portals(&self) -> impl Iterator<Item = PortalId> {
         let portals = (0..).zip(&self.portals);
         let shut = portals.filter(|(_, flags)| **flags & (CLOSED | SHUT) != 0);
         shut.map(|(p, _)| PortalId(p))
     }
 
-    /// Whether an object is a leaf of a portal.
+    /// Returns `true` if an object is a leaf of a portal.
     pub(crate) fn is_leaf_of(&self, detail: DetailId, portal: PortalId) -> bool {
         let leaves = self.doors.leaves(portal);
         leaves.iter().any(|l| l.detail == detail)
     }
 
-    /// Where in a portal its shut leaves are. [Units: wu]
+    /// Returns the offset of a portal's shut leaves from its plane. [Units: wu]
     pub(crate) fn depth(&self, portal: u32) -> f64 {
         self.doors.depth(PortalId(portal)).into()
     }
 
-    /// Opens a portal on one side of a plane only, as a sliding door or a rising shutter does:
-    /// where `normal · p >= normal · through`. Several planes add up, at most four; further ones, and
-    /// planes without a direction, narrow nothing. [`SightState::open`] starts anew.
+    /// Narrows a portal to one side of a plane, `normal · p >= normal · through`, as a sliding door or a rising
+    /// shutter does. At most four planes add up; further ones, and planes with a zero normal, have no effect.
+    /// [`SightState::open`] removes them.
     pub fn narrow(&mut self, portal: PortalId, normal: [f32; 3], through: [f32; 3]) {
         let Some(p) = self.portals.get_mut(portal.0 as usize) else {
             return;
@@ -175,15 +175,15 @@ impl SightState {
         *p += 1;
     }
 
-    /// Locks a cell: it is never entered, though an eye may be in it. For what is not loaded, or not
-    /// to be seen by this one.
+    /// Locks or unlocks a cell. A locked cell is never entered, though an eye may be in it. For cells that are not
+    /// loaded, or not to be seen by this viewer.
     pub fn lock(&mut self, cell: CellId, locked: bool) {
         if let Some(c) = self.is_locked.get_mut(cell.0 as usize) {
             *c = locked;
         }
     }
 
-    /// Whether a portal lets anything through.
+    /// Returns `true` if a portal lets anything through.
     #[must_use]
     pub fn is_open(&self, portal: PortalId) -> bool {
         self.portals
@@ -191,7 +191,7 @@ impl SightState {
             .is_none_or(|p| p & (CLOSED | SHUT) == 0)
     }
 
-    /// Whether a cell is locked.
+    /// Returns `true` if a cell is locked.
     #[must_use]
     pub fn is_locked(&self, cell: CellId) -> bool {
         self.is_locked
@@ -200,8 +200,8 @@ impl SightState {
             .unwrap_or_default()
     }
 
-    /// Whether nothing passes a portal at a point of its opening: it is closed, or a plane that narrows it leaves the
-    /// point out. O(1). [Units: wu]
+    /// Returns `true` if nothing passes a portal at the point `p` of its opening: it is closed, or a plane that narrows it
+    /// excludes the point. O(1). [Units: wu]
     #[must_use]
     pub(crate) fn is_shut_at(&self, portal: PortalId, p: DVec3) -> bool {
         let is_out = |cut: &[f32; 4]| {

@@ -1,47 +1,47 @@
-//! The eye: where it is, which way it looks, how wide.
+//! The eye: its position, direction and field of view.
 //!
 //! A view is a map from world to clip space with the eye at the origin: `q = F · (p - eye)` gives
-//! `q = (x, y, w)`, and what the eye sees has `|x| <= w` and `|y| <= w`. Depth is `w`, in meters along
+//! `q = (x, y, w)`, and the visible part has `|x| <= w` and `|y| <= w`. Depth is `w`, in meters along
 //! the view direction. No division takes place here: points beside and behind the eye (`w <= 0`) are
 //! ordinary points, and clipping deals with them.
 //!
-//! A view of 180 degrees and more has no such map. It is taken as six faces of a cube, which hold all
-//! directions: a superset.
+//! A view of 180 degrees or more has no such map. It is replaced by the six faces of a cube, which hold
+//! all directions: a superset.
 
 use glam::{DMat3, DVec3};
 
 use enfilade_geom::DMat4;
 
-/// Widest angle between opposite sides of a view of one face; wider views look all around.
+/// Widest angle between opposite sides of a view with one face; wider views look all around.
 /// [Units: rad]
 ///
 /// At 170 degrees the screen is 11 times as wide as it is far; beyond, its middle is so small that a
 /// cube of six faces narrows better.
 const MAX_FOV: f64 = 170.0 / 180.0 * std::f64::consts::PI;
 
-/// Why there can be no such view.
+/// Reason why a view is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ViewError {
     /// Eye, direction or matrix holds a number that is not finite.
     #[error("the view's {what} is not finite")]
     NotFinite {
-        /// What it is.
+        /// Its name.
         what: &'static str,
     },
-    /// A direction without a length.
+    /// The view direction is zero.
     #[error("the view has no direction: the point looked at must differ from the eye")]
     NoDirection,
-    /// An angle or aspect that is not positive.
+    /// An angle or aspect ratio is not positive.
     #[error("the view's {what} is {value}; it must be greater than 0")]
     NotPositive {
-        /// What it is.
+        /// Its name.
         what: &'static str,
         /// Its value.
         value: f32,
     },
-    /// The matrix is no perspective projection: it has no eye, or not this one.
-    #[error("the matrix is no perspective projection seen from the eye given")]
+    /// The matrix is not a perspective projection, or has another eye.
+    #[error("the matrix is not a perspective projection with the given eye")]
     NotPerspective,
 }
 
@@ -50,9 +50,9 @@ pub enum ViewError {
 pub(crate) struct Face {
     /// `q = map · (p - eye)`; the third row, which gives `w`, has unit length.
     pub(crate) map: DMat3,
-    /// Takes normals of world planes to clip space: the inverse transposed.
+    /// Maps normals of world planes to clip space: the inverse transpose of `map`.
     pub(crate) normals: DMat3,
-    /// Longest change of `a x + b y + c w` for a step of one meter in the world, where `(a, b)` has
+    /// Largest change of `a x + b y + c w` for a step of one meter in the world, where `(a, b)` has
     /// unit length and `|c|` is at most that of a line that meets the screen.
     pub(crate) stretch: f64,
 }
@@ -77,13 +77,13 @@ impl Face {
     }
 }
 
-/// Where the eye is, which way it looks, and how wide.
+/// Position, direction and field of view of an eye.
 #[derive(Clone, Debug)]
 pub struct View {
     pub(crate) eye: DVec3,
     pub(crate) faces: [Face; 6],
     pub(crate) n_faces: usize,
-    /// What is farther along the view direction is not seen. Infinite for none.
+    /// Nothing farther along the view direction is seen; infinite for no limit.
     pub(crate) far: f64,
 }
 
@@ -97,17 +97,17 @@ fn finite(v: [f32; 3], what: &'static str) -> Result<DVec3, ViewError> {
 }
 
 impl View {
-    /// A camera at `eye` that looks along `toward` (any length), upright towards `up`.
+    /// Makes a camera at `eye` that looks along `toward` (any length), with `up` upwards.
     ///
-    /// `fov_y` is the angle from the lower to the upper edge [Units: rad] [Limit: above 0], `aspect` the
-    /// width of the picture divided by its height [Limit: above 0]. A view wider or higher than 170
-    /// degrees looks [all around](View::around), which holds it.
+    /// `fov_y` is the vertical field of view [Units: rad] [Limit: above 0], `aspect` the width of the picture
+    /// divided by its height [Limit: above 0]. A view wider or higher than 170 degrees looks
+    /// [all around](View::around), which contains it.
     ///
-    /// An `up` that is parallel to `toward`, or zero, is replaced by another direction.
+    /// If `up` is zero or parallel to `toward`, another direction replaces it.
     ///
     /// # Errors
     ///
-    /// What is not finite, a direction without length, an angle or aspect that is not positive.
+    /// If a value is not finite, `toward` is zero, or `fov_y` or `aspect` is not positive.
     pub fn perspective(
         eye: [f32; 3],
         toward: [f32; 3],
@@ -141,15 +141,15 @@ impl View {
         Self::of_face(at, rows.transpose()).ok_or(ViewError::NotPerspective)
     }
 
-    /// The camera of an engine: its `view_projection` matrix (column-major, world to clip, either
+    /// Makes the camera of an engine from its `view_projection` matrix (column-major, world to clip, either
     /// direction of depth, with or without a far plane) and its `eye`.
     ///
-    /// Only the rows of `x`, `y` and `w` are used; near and far planes are not. The eye is asked for
-    /// because a matrix in `f32` knows it only to a millimeter or so.
+    /// Only the rows of `x`, `y` and `w` are used; near and far planes are not. The eye is a parameter because
+    /// it can be recovered from a matrix in `f32` only to about a millimeter.
     ///
     /// # Errors
     ///
-    /// What is not finite; an orthographic or singular matrix, or one with another eye.
+    /// If a value is not finite, or the matrix is orthographic, singular, or has another eye.
     pub fn from_view_projection(
         eye: [f32; 3],
         view_projection: [[f32; 4]; 4],
@@ -163,7 +163,7 @@ impl View {
         let rows = [row(0), row(1), row(3)];
         let map = DMat3::from_cols(rows[0].truncate(), rows[1].truncate(), rows[2].truncate())
             .transpose();
-        // The eye is where x, y and w vanish, but for the rounding of the matrix.
+        // At the eye, x, y and w vanish up to the rounding of the matrix.
         for r in rows {
             let (direction, offset) = (r.truncate(), r.w);
             let size = direction.length() * (1.0 + at.length()) + offset.abs();
@@ -174,11 +174,11 @@ impl View {
         Self::of_face(at, map).ok_or(ViewError::NotPerspective)
     }
 
-    /// Every direction from `eye`: for shadows, sound, or who can be seen from here at all.
+    /// Looks in every direction from `eye`: for shadows, sound, or everything that can be seen from a point.
     ///
     /// # Errors
     ///
-    /// An eye that is not finite.
+    /// If `eye` is not finite.
     pub fn around(eye: [f32; 3]) -> Result<Self, ViewError> {
         let at = finite(eye, "eye")?;
         let face = |x: DVec3, y: DVec3, w: DVec3| Face::new(DMat3::from_cols(x, y, w).transpose());
@@ -202,12 +202,12 @@ impl View {
         })
     }
 
-    /// The same view, cut off `far` meters along the view direction (in every direction for a view
-    /// all around, whose faces are cut each by its own plane). [Units: wu] [Limit: above 0]
+    /// Returns the view cut off `far` meters along the view direction; in a view all around, each face is cut by
+    /// its own plane. [Units: wu] [Limit: above 0]
     ///
     /// # Errors
     ///
-    /// A distance that is not greater than 0: nothing could be seen.
+    /// If `far` is not greater than 0: nothing could be seen.
     pub fn with_far(mut self, far: f32) -> Result<Self, ViewError> {
         if far.is_nan() || far <= 0.0 {
             return Err(ViewError::NotPositive {
@@ -219,14 +219,14 @@ impl View {
         Ok(self)
     }
 
-    /// Where the eye is. [Units: wu]
+    /// Returns the position of the eye. [Units: wu]
     #[must_use]
     pub fn eye(&self) -> [f32; 3] {
         self.eye.as_vec3().to_array()
     }
 
-    /// The same view of a world in another frame: `turn` takes that frame's directions to those of this one, `at` is where its
-    /// origin is in this one. [Units: wu]
+    /// Returns the view in the frame of another world: `turn` maps that frame's directions to this one's, `at` is its origin
+    /// in this one. [Units: wu]
     #[must_use]
     pub fn in_frame(&self, turn: &DMat3, at: DVec3) -> Self {
         let mut view = self.clone();
@@ -238,10 +238,10 @@ impl View {
         view
     }
 
-    /// How many pixels a meter has, at most, where a sphere is that is in view, in a picture of `size`: for levels of
-    /// detail. To first order in what moves, which is little where it matters.
+    /// Returns the largest number of pixels per meter anywhere in a sphere in view, in a picture of `size`: for levels of
+    /// detail. First order in displacements, which are small where it matters.
     ///
-    /// Infinite where the sphere reaches behind the eye, and for views all around, which are no pictures.
+    /// Infinite if the sphere reaches behind the eye, and for views all around, which are not pictures.
     #[must_use]
     pub fn pixels_per_meter(&self, center: [f32; 3], radius: f32, size: [u32; 2]) -> f32 {
         let center = DVec3::from_array(center.map(f64::from));
@@ -259,7 +259,7 @@ impl View {
         (per_axis[0].hypot(per_axis[1]) / depth) as f32
     }
 
-    /// How many faces it has: 1, or 6 where it looks all around.
+    /// Returns the number of faces: 1, or 6 if it looks all around.
     #[must_use]
     pub fn n_faces(&self) -> usize {
         self.n_faces
@@ -285,7 +285,7 @@ mod tests {
     const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
     #[test]
-    fn the_corners_of_the_picture_are_the_corners_of_the_screen() {
+    fn vertices_of_the_picture_map_to_those_of_the_screen() {
         let view = View::perspective(EYE, [0.0, 0.0, -2.0], UP, 1.0, 2.0).unwrap();
         let t = f64::from(0.5_f32).tan();
         let p = view.eye + 3.0 * DVec3::new(2.0 * t, t, -1.0);
@@ -341,7 +341,7 @@ mod tests {
             let [a, b] = [on_picture(p), on_picture(p + step)];
             let pixels = (a[0] - b[0]).hypot(a[1] - b[1]);
             let most = view.pixels_per_meter(p.as_vec3().to_array(), 0.01, size.map(|n| n as u32));
-            // What rounding leaves of a millionth of a meter.
+            // Rounding error of a millionth of a meter.
             prop_assert!(pixels <= f64::from(most) * step.length() * 1.001 + 1e-9, "{pixels} {most}");
         }
     }
@@ -355,7 +355,7 @@ mod tests {
         assert_eq!(at(1.0, 2.0), f32::INFINITY);
         assert_eq!(at(-1.0, 0.5), f32::INFINITY);
         assert_eq!(at(f32::NAN, 0.5), f32::INFINITY);
-        // Not more than twice as many as there are: straight ahead it is 100 / 2 / tan 0.5 in a meter's distance.
+        // At most twice the exact number: straight ahead it is 100 / 2 / tan 0.5 at a distance of one meter.
         assert!(at(1.0, 0.0) < 2.0 * 50.0 / 0.5_f32.tan());
         assert_eq!(
             View::around(EYE)

@@ -1,4 +1,4 @@
-//! No question allocates once its buffers have grown.
+//! Queries allocate nothing once their buffers have grown.
 
 use enfilade_runtime::{
     DrawList, Follower, Narrowing, SeeOptions, Sight, SightState, Sightlines, View, Viewer,

@@ -1,4 +1,4 @@
-//! Leaves of doors: what they shut, where they stand, what is seen and picked of them. FEATURES: W5.
+//! Door leaves: the portals they shut, their poses, their visibility, and picking them. FEATURES: W5.
 
 use enfilade_cpg::{CellId, Locator, PortalId, Pvs, VisibleParts, World};
 use enfilade_geom::{DMat4, DVec3};
@@ -38,7 +38,7 @@ fn a_door_lets_sight_through_until_its_leaf_is_shut() {
     let mut state = SightState::new(&sight);
     let eye = middle(&world) - DVec3::X * 1.5;
     let seen = |state: &SightState| cells(&sight, state, eye, DVec3::X);
-    // Shut in the model, which is no reason to hide what is behind.
+    // Shut in the model: that must not hide anything.
     assert_eq!(state.leaves(DOOR), Some(0.0));
     assert_eq!(seen(&state), [0, 1]);
     assert_eq!(state.moved().count(), 0);
@@ -47,7 +47,7 @@ fn a_door_lets_sight_through_until_its_leaf_is_shut() {
     assert_eq!(state.shut_portals().collect::<Vec<_>>(), [DOOR]);
     state.set_leaves(DOOR, 0.01);
     assert_eq!(seen(&state), [0, 1]);
-    // What was closed stays closed, however its leaf moves, until it is opened.
+    // A closed portal stays closed, however its leaf moves, until it is opened.
     state.close(DOOR);
     state.set_leaves(DOOR, 1.0);
     assert_eq!(seen(&state), [0]);
@@ -114,7 +114,7 @@ fn a_leaf_of_several_portals_moves_for_all() {
     );
 }
 
-/// Corners of a detail where a state has it.
+/// Vertices of a detail in the pose that a state gives it.
 fn corners(world: &World, state: &SightState, detail: DetailId) -> Vec<DVec3> {
     let object = &world[detail];
     let own = DMat4::from_cols_array(&object.transform.map(f64::from));
@@ -124,7 +124,7 @@ fn corners(world: &World, state: &SightState, detail: DetailId) -> Vec<DVec3> {
     positions.map(|p| m.transform_point3(vector(*p))).collect()
 }
 
-/// Wherever a leaf stands, an eye that has a free line to a point of it has it in its answer.
+/// Wherever a leaf stands, an eye with a clear line to a point of it sees it.
 #[test]
 fn a_leaf_is_seen_wherever_it_stands() {
     let world = with_doors(room_grid(&GridParams::offices(24, 3)), |p| p % 5 == 0);
@@ -181,9 +181,9 @@ fn a_leaf_is_seen_wherever_it_stands() {
     assert!(n_seen > 300, "{n_seen}");
 }
 
-/// What a world says of what is seen from a cell is of leaves where the model has them: none is left out for it.
+/// Precomputed visibility holds leaves in the model's pose only, so it must never exclude a leaf.
 #[test]
-fn a_leaf_is_seen_whatever_was_computed_before() {
+fn precomputed_visibility_never_hides_a_leaf() {
     let mut world = two_rooms(false);
     let n = world.graph.cells.len() as u32;
     let mut pvs = Pvs::of_ascending((0..n).map(|_| 0..n));
@@ -216,7 +216,7 @@ fn a_turned_leaf_is_picked_where_it_stands() {
     let (from, to) = (center - DVec3::X, center + DVec3::X);
     let leaf = sight.leaves(DOOR)[0].detail;
     let is_leaf = |t: Target| matches!(t, Target::Detail { detail, .. } if detail == leaf);
-    // Shut, from both sides: the leaf, not the opening before it.
+    // Shut, from both sides: hit the leaf, not the opening in front of it.
     state.set_leaves(DOOR, 0.0);
     for (a, b, off) in [(from, to, 0.04), (to, from, 0.08)] {
         let (target, at) = pick(&state, a, b).unwrap();
@@ -238,7 +238,7 @@ fn a_turned_leaf_is_picked_where_it_stands() {
         1,
         "{hits:?}"
     );
-    // A portal without leaves is a wall of its own.
+    // A shut portal without leaves is hit itself.
     let mut bare = world.clone();
     bare.graph.portals[0].fittings.clear();
     bare.details.clear();

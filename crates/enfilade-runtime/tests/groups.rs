@@ -1,4 +1,4 @@
-//! Portals in groups: the answers are those of portals one by one. Covers P7.
+//! Groups of portals give the same answers as portals one by one. Covers P7.
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_runtime::{
@@ -7,7 +7,7 @@ use enfilade_runtime::{
 use enfilade_testkit::{GridParams, Rng, courtyard, room_grid, window_tower};
 use proptest::prelude::*;
 
-/// All lists of an answer, in their order. What it took is left out: that is to differ.
+/// All lists of an answer, in order. Statistics are left out, since they must differ.
 fn lists(seen: &Seen<'_>) -> String {
     let of_visit = |v| (v, seen.planes(v));
     let visits: Vec<_> = seen.visits().iter().map(of_visit).collect();
@@ -36,7 +36,7 @@ fn point_in(rng: &mut Rng, world: &World) -> [f32; 3] {
     [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32)
 }
 
-/// Anywhere, or within a rounding or a step of a portal.
+/// A point anywhere, or within rounding or a step of a portal.
 fn eye_in(rng: &mut Rng, world: &World) -> [f32; 3] {
     let portals = &world.graph.portals;
     if portals.is_empty() || rng.chance(0.6) {
@@ -62,8 +62,8 @@ fn view(rng: &mut Rng, eye: [f32; 3]) -> View {
     view
 }
 
-/// Cells of many exits: towers, courtyards, and grids whose squares mostly join, turned so that no box
-/// is tight.
+/// Worlds with cells of many exits: towers, courtyards, and grids whose squares are mostly joined, rotated so
+/// that no box is tight.
 fn worlds() -> impl Strategy<Value = World> {
     let grid = (0_u64..1 << 32, 20_usize..120, 0.5_f64..0.95, 0.0_f64..3.0).prop_map(
         |(seed, rooms, merges, turn)| {
@@ -97,7 +97,7 @@ proptest! {
             occlusion,
             min_share,
             precomputed: true,
-            // Fewer clips would be capped later: the answer would be smaller.
+            // A lower limit would cap the ungrouped query first, with a different answer.
             max_clips: u32::MAX,
         };
         let mut viewers = [&single, &grouped].map(|s| Viewer::with_options(s, options));

@@ -1,5 +1,5 @@
-//! Questions that no sane program asks: infinities, what is no number, the ends of `f32`. Nothing panics, and what is no
-//! point is in no cell, sees nothing and meets nothing.
+//! Hostile queries: infinities, NaN, the limits of `f32`. Nothing panics, and a point that is not finite is in no cell, sees
+//! nothing and meets nothing.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::ray::hit_triangle;
@@ -47,7 +47,7 @@ impl Pool {
     fn point(&mut self) -> [f32; 3] {
         let graph = &self.world.graph;
         let mut p = match self.rng.below(4) {
-            // In a cell, at a corner of a portal.
+            // In a cell, at a vertex of a portal.
             0 => {
                 let b = graph.cells[self.rng.below(graph.cells.len())].aabb;
                 [0, 1, 2].map(|k| b[0][k] + (b[1][k] - b[0][k]) * self.rng.unit() as f32)
@@ -64,7 +64,7 @@ impl Pool {
         p
     }
 
-    /// Where a segment meets the first triangle, by a look at each.
+    /// Returns the first `t` at which a segment meets a triangle, by brute force.
     fn first_hit(&self, a: [f32; 3], b: [f32; 3]) -> Option<f64> {
         let point = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
         let ray = Ray::segment(point(a), point(b));
@@ -106,7 +106,7 @@ fn is_finite(p: [f32; 3]) -> bool {
     p.iter().all(|x| x.is_finite())
 }
 
-/// Asks everything once.
+/// Runs every kind of query once.
 fn ask(pool: &mut Pool, sight: &Sight, lines: &Sightlines, viewer: &mut Viewer) {
     let mut state = SightState::new(sight);
     for _ in 0..pool.rng.below(4) {
@@ -137,7 +137,7 @@ fn ask(pool: &mut Pool, sight: &Sight, lines: &Sightlines, viewer: &mut Viewer) 
             "{told}: {hit:?}"
         );
     }
-    // From farther off, `f64` no longer tells a wall from the next: no answer is the right one.
+    // From farther away, `f64` no longer separates one wall from the next: any answer is right.
     let is_told = is_segment && a.iter().all(|x| x.abs() < 1e9);
     if is_told && pool.rng.below(8) == 0 {
         let truth = pool.first_hit(a, b);
@@ -161,7 +161,7 @@ fn ask(pool: &mut Pool, sight: &Sight, lines: &Sightlines, viewer: &mut Viewer) 
         );
         assert!(follower.cell().is_none_or(|c| c.idx() < sight.n_cells()));
     }
-    // A step from nowhere crosses nothing.
+    // A step from a point that is not finite crosses nothing.
     if !is_finite(a) {
         let mut follower = Follower::new(sight, b);
         follower.step(sight, a);

@@ -1,4 +1,4 @@
-//! Lines of sight against brute force, and things followed from cell to cell.
+//! Lines of sight against brute force, and objects followed from cell to cell.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
@@ -30,11 +30,11 @@ fn a_million_segments_equal_brute_force() {
             let a = point(&mut rng, &world);
             let mut b = point(&mut rng, &world);
             if i % 4 == 0 {
-                // Near: many of these meet nothing.
+                // Nearby: many of these meet nothing.
                 b = [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * 0.05);
             }
             if i % 32 == 1 {
-                // To corners of portals: along walls, through rims.
+                // To vertices of portals: along walls, through rims.
                 let portals = &world.graph.portals;
                 let outline = &portals[rng.below(portals.len())].outline;
                 b = outline[rng.below(outline.len())];
@@ -48,7 +48,7 @@ fn a_million_segments_equal_brute_force() {
         }
     }
     assert!(n_hits > 500_000, "{n_hits}");
-    // Otherwise the comparison says nothing.
+    // Guard against a vacuous comparison.
     assert!(
         f64::from(n_by_cells) > 0.9 * f64::from(n_hits),
         "{n_by_cells} of {n_hits}"
@@ -115,7 +115,7 @@ fn things_are_followed_through_portals_and_found_again() {
         );
         if step != Step::Lost {
             let found = sight.locate(to);
-            // But for a rounding at a portal, which no random point meets.
+            // Exact: no random point is within rounding of a portal.
             assert_eq!(follower.cell(), found);
         }
         match step {

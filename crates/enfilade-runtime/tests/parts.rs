@@ -1,4 +1,4 @@
-//! What a world says is seen from a cell bounds what an eye in it sees.
+//! Precomputed visibility of a cell bounds the answer for an eye in it.
 
 use enfilade_cpg::{CellId, CellSet, PartNumbers, Pvs, VisibleParts, World};
 use enfilade_runtime::{SeeOptions, Sight, SightState, View, Viewer};
@@ -22,7 +22,7 @@ fn middle(world: &World, cell: CellId) -> [f32; 3] {
 
 // Covers Q5.
 #[test]
-fn what_the_eyes_cell_cannot_see_is_left_out_and_nothing_else() {
+fn precomputed_visibility_bounds_the_answer_and_nothing_else() {
     let mut world = two_rooms();
     let numbers = PartNumbers::new(&world);
     let n = world.graph.cells.len();
@@ -31,7 +31,7 @@ fn what_the_eyes_cell_cannot_see_is_left_out_and_nothing_else() {
         let mut indoors = world.graph.indoor_cells().map(|c| c.0);
         (indoors.next().unwrap(), indoors.next().unwrap())
     };
-    // From the first room nothing of the other cells is seen, but the first triangle of each second batch.
+    // The first room sees nothing of the other cells, except the first triangle of every second batch.
     let is_first = |part: u32| {
         let mut batches = (1..world.batches.len()).step_by(2);
         batches.any(|i| numbers.of_batch(i).start == part)
@@ -44,7 +44,7 @@ fn what_the_eyes_cell_cannot_see_is_left_out_and_nothing_else() {
             .filter(|&part| !is_cut || is_first(part))
             .collect::<Vec<_>>()
     };
-    // A row of every part for (a, a) would make all of the second room seen: only what the cell holds.
+    // Listing all parts for (a, a) would make the whole second room visible, so list only those of the cell.
     let of_cell = |cell: CellId| {
         let mut parts: Vec<u32> = Vec::new();
         for (i, batch) in world.batches.iter().enumerate() {
@@ -101,7 +101,7 @@ fn what_the_eyes_cell_cannot_see_is_left_out_and_nothing_else() {
         .iter()
         .filter(|d| !is_elsewhere(&world.details[d.0 as usize].cells));
     assert!(kept.into_iter().all(|d| details.contains(d)));
-    // Chunks stay where one of their triangles is seen.
+    // A chunk stays if one of its triangles is seen.
     let mut n_hidden = 0;
     for chunk in &all_chunks {
         let batch = sight[*chunk].batch as usize;
@@ -114,7 +114,7 @@ fn what_the_eyes_cell_cannot_see_is_left_out_and_nothing_else() {
         n_hidden += usize::from(is_out);
         assert_eq!(!chunks.contains(chunk), is_out, "{chunk:?}");
     }
-    // From the second room all is as ever, and so it is for an eye in no cell.
+    // From the second room nothing changes, nor for an eye in no cell.
     assert_eq!(ask(middle(&world, b), true), ask(middle(&world, b), false));
     let outside = [1e4; 3];
     assert_eq!(ask(outside, true), ask(outside, false));

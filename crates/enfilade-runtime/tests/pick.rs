@@ -1,4 +1,4 @@
-//! The first thing on a segment against brute force, doors that are shut in part, and lists of draws.
+//! First hits on segments against brute force, partly shut doors, and draw lists.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ fn point(rng: &mut Rng, world: &World) -> [f32; 3] {
     [0, 1, 2].map(|k| b[0][k] + (b[1][k] - b[0][k]) * rng.unit() as f32)
 }
 
-/// Turns, scales, mirrors and flattens objects of a world.
+/// Rotates, scales, mirrors and flattens objects of a world.
 fn placed_anyhow(mut world: World, rng: &mut Rng) -> World {
     let objects: Vec<DetailObject> = world.details.clone();
     for (i, object) in objects.into_iter().enumerate() {
@@ -35,7 +35,7 @@ fn placed_anyhow(mut world: World, rng: &mut Rng) -> World {
     world
 }
 
-/// Everything that a segment meets, by trying every triangle; `t` and what.
+/// Returns every hit of a segment by brute force: `t` and target.
 fn brute(
     world: &World,
     state: &SightState,
@@ -91,7 +91,7 @@ fn brute(
 }
 
 #[test]
-fn what_is_picked_is_what_brute_force_meets_first() {
+fn picks_equal_brute_force() {
     let mut rng = Rng::new(5);
     let [mut n_walls, mut n_details, mut n_portals, mut n_none] = [0; 4];
     for seed in 0..4_u32 {
@@ -129,7 +129,7 @@ fn what_is_picked_is_what_brute_force_meets_first() {
             let ray = Ray::segment(dvec(a), dvec(b));
             let truth = brute(&world, &state, &cuts, &ray);
             let hit = lines.pick(&state, a, b).unwrap();
-            // Whatever is met at the same place but for a rounding may be told.
+            // Any target at the same distance up to rounding is right.
             let first = truth.first().map_or(2.0, |h| h.0);
             let near = 1e-6;
             match hit {
@@ -156,18 +156,18 @@ fn what_is_picked_is_what_brute_force_meets_first() {
             assert_eq!(lines.is_clear(&state, a, b), !truth.iter().any(is_matter));
         }
     }
-    // Otherwise the comparison says nothing.
+    // Guard against a vacuous comparison.
     let counts = [n_walls, n_details, n_portals, n_none];
     assert!(counts.iter().all(|&n| n > 300), "{counts:?}");
 }
 
 #[test]
-fn what_is_picked_tells_the_object_that_it_comes_from() {
+fn a_hit_reports_its_source_object() {
     let mut world = room_grid(&GridParams {
         furniture: 6,
         ..GridParams::offices(4, 3)
     });
-    // A source a triangle of structure, and one a detail behind them.
+    // One source per structural triangle, and one per detail after them.
     let mut n = 0;
     for batch in &mut world.batches {
         for _ in 0..batch.primitive.indices.len() / 3 {
@@ -240,7 +240,7 @@ fn objects_can_be_passed_by() {
 }
 
 #[test]
-fn what_is_no_number_is_an_error_and_not_clear() {
+fn points_that_are_not_finite_are_errors_and_not_clear() {
     let world = room_grid(&GridParams::offices(4, 1));
     let lines = Sightlines::build(&world);
     let state = SightState::new(&Sight::build(&world).unwrap());
@@ -258,7 +258,7 @@ fn what_is_no_number_is_an_error_and_not_clear() {
     }
     assert!(lines.is_clear(&state, good, good));
     assert_eq!(lines.pick(&state, good, good), Ok(None));
-    // Far away, but a point.
+    // Far away, but finite.
     let far = [f32::MAX, 1.0, 1.0];
     assert!(lines.pick(&state, good, far).is_ok());
 }
@@ -298,7 +298,7 @@ fn a_draw_list_draws_each_visible_chunk_once_in_few_ranges() {
         }
         assert_eq!(drawn, wanted);
         assert_eq!(list.n_triangles(), wanted.len() as u64 / 3);
-        // Near to far, each batch in one go; two ranges of a batch do not touch.
+        // Near to far, each batch in one go; no two ranges of a batch touch.
         let mut batches: Vec<u32> = list.draws().iter().map(|d| d.batch).collect();
         batches.dedup();
         assert_eq!(batches, order);

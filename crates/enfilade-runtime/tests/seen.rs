@@ -1,4 +1,4 @@
-//! What rays hit is in the answer, on worlds that are exact by construction.
+//! The answer contains everything that rays hit, on worlds that are exact by construction.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -8,11 +8,11 @@ use enfilade_runtime::{Narrowing, SeeOptions, Seen, Sight, SightState, View, Vie
 use enfilade_testkit::{GridParams, Rng, courtyard, room_grid};
 use proptest::prelude::*;
 
-/// A world with all its triangles, structural ones first by batch, then those of details.
+/// A world with all its triangles: structural ones by batch, then those of details.
 struct Truth {
     world: World,
     structure: Bvh,
-    /// Batch and corners of each structural triangle.
+    /// Batch and vertices of each structural triangle.
     source: Vec<(u32, [u32; 3])>,
     details: Bvh,
     detail_of: Vec<u32>,
@@ -53,7 +53,7 @@ impl Truth {
         }
     }
 
-    /// The batch-and-corners of all triangles, and the details, that rays in the view hit.
+    /// Returns all targets that rays in the view hit: triangles by batch and vertices, and details.
     fn hit(&self, rng: &mut Rng, view: &Camera, n: usize) -> Vec<Hit> {
         let mut out = Vec::new();
         for _ in 0..n {
@@ -80,7 +80,7 @@ enum Hit {
     Detail(u32),
 }
 
-/// A camera as the runtime and the rays both understand it.
+/// A camera for both the runtime and the rays.
 #[derive(Clone, Copy, Debug)]
 struct Camera {
     eye: [f32; 3],
@@ -140,7 +140,7 @@ fn answered(sight: &Sight, seen: &Seen<'_>) -> HashMap<Hit, ()> {
 fn eye_in(world: &World, rng: &mut Rng, i: usize) -> DVec3 {
     let portals = &world.graph.portals;
     if i.is_multiple_of(3) && !portals.is_empty() {
-        // In a doorway: on its plane, as far as `f32` can say, or near it.
+        // In a doorway: on its plane, up to `f32` rounding, or near it.
         let p = &portals[rng.below(portals.len())];
         let (a, b, c) = (
             to_dvec(p.outline[0]),
@@ -168,7 +168,7 @@ proptest! {
 
     // Covers R1, R2 and R3.
     #[test]
-    fn whatever_a_ray_hits_is_in_the_answer_in_every_mode(
+    fn every_ray_hit_is_in_the_answer_in_every_mode(
         seed in 0_u64..1 << 32, rooms in 2_usize..160, merges in 0.0_f64..0.5,
         turn in prop_oneof![Just(0.0), 0.1_f64..3.0], outdoors: bool, max_clips in prop_oneof![Just(20_000_u32), 1_u32..20],
     ) {
@@ -194,7 +194,7 @@ proptest! {
                     prop_assert!(answer.contains_key(hit), "{mode:?} {camera:?} {hit:?}");
                 }
                 for (d, detail) in truth.world.details.iter().enumerate() {
-                    // As if it moved: nothing that the lists hold is lost.
+                    // Moving objects: `sees_box` must not lose anything that the lists hold.
                     let m = DMat4::from_cols_array(&detail.transform.map(f64::from));
                     let corners = (0..8).map(|c| {
                         m.transform_point3(DVec3::from([0, 1, 2].map(|k| f64::from(c >> k & 1))))
@@ -209,7 +209,7 @@ proptest! {
                     } else if !answer.contains_key(&Hit::Detail(d as u32)) {
                         let shadowed = seen.counts().shadowed > 0;
                         let grown = truth.world.graph.cells.len() > 1 && seen.sees_box(&detail.cells, aabb);
-                        // Boxes in the tree are grown by the tolerance, these are not.
+                        // Boxes in the tree are grown by the tolerance; these are not.
                         prop_assert!(shadowed || !grown);
                     }
                 }
@@ -227,7 +227,7 @@ proptest! {
     }
 
     #[test]
-    fn a_view_all_around_sees_what_any_view_sees(seed in 0_u64..1 << 32) {
+    fn a_view_all_around_contains_any_other_view(seed in 0_u64..1 << 32) {
         let world = room_grid(&GridParams { merges: 0.2, ..GridParams::offices(60, seed) });
         let sight = Sight::build(&world).unwrap();
         let state = SightState::new(&sight);
@@ -247,8 +247,8 @@ proptest! {
     }
 }
 
-/// Where nothing is joined, a tighter region sees less. (Joining is by what waits together, which the
-/// order of visits decides, so only sums can be compared in general; see `docs/benchmarks/sight.md`.)
+/// Where nothing is joined, a tighter region sees less. (Which visits are joined depends on which wait together, and so
+/// on their order: in general only sums can be compared; see `docs/benchmarks/sight.md`.)
 // Covers R2.
 #[test]
 fn polygons_answer_no_more_than_rectangles() {
@@ -316,10 +316,10 @@ fn a_courtyard_of_64_windows_is_bounded() {
             if seen.counts().is_eye_lost {
                 continue;
             }
-            // The bound that the module proves.
+            // The bound proved in `see.rs`.
             assert!(seen.visits().len() <= 16 * world.graph.cells.len());
             assert!(seen.counts().clips <= 16 * n_exits);
-            // What is measured stays far below it: in a ring of one room, the start and the court.
+            // The measured number stays far below it: in a ring of one room, the start and the court.
             let most = if one_room { 20 } else { 300 };
             assert!(seen.visits().len() <= most, "{}", seen.visits().len());
         }
@@ -367,7 +367,7 @@ fn closed_portals_locked_cells_and_doors_ajar() {
     assert_eq!(see(&state, &mut viewer, eye, DVec3::X), [0]);
     state.lock(CellId(1), false);
 
-    // A sliding door, open by a tenth at the side of the first corner.
+    // A sliding door, open by a tenth at the side of the first vertex.
     let along = (to_dvec(portal.outline[2]) - corner) * DVec3::Z;
     let edge = corner + along * 0.1;
     let (normal, through) = ((-along).as_vec3().to_array(), edge.as_vec3().to_array());
@@ -392,7 +392,7 @@ fn closed_portals_locked_cells_and_doors_ajar() {
     );
     assert_eq!(n(&mut viewer, narrow(DVec3::X)), 1, "at the leaf");
 
-    // On the plane: in the opening both rooms are seen, whichever way one looks.
+    // On the plane: in the opening both rooms are seen, whatever the view direction.
     for away in [0.0, 1e-7, -1e-7] {
         state.open(enfilade_cpg::PortalId(0));
         let at = middle + DVec3::X * away;
@@ -430,16 +430,16 @@ fn an_eye_in_no_cell_sees_every_cell_and_each_object_once() {
     }
 }
 
-/// A viewer is asked for one view after the other: what hid something in one has no say in the next.
+/// A viewer answers one view after another: an occluder of one must not affect the next.
 #[test]
-fn an_eye_in_no_cell_sees_what_no_cell_lists_whatever_was_asked_before() {
+fn an_eye_in_no_cell_sees_unlisted_triangles_after_any_query() {
     let mut world = courtyard(8, true);
     let middle = DVec3::new(15.0, 1.5, 15.0);
     let away: Vec<DVec3> = (0..16)
         .map(|k| f64::from(k) * std::f64::consts::TAU / 16.0)
         .map(|angle| DVec3::new(angle.cos(), 0.0, angle.sin()))
         .collect();
-    // A wall across the room on one side of the yard, which throws a shadow there.
+    // A wall across the room on one side of the yard, which casts a shadow there.
     let mut wall = world.batches[0].clone();
     wall.cells = vec![CellId(1)];
     wall.primitive = enfilade_geom::scene::Primitive {
@@ -494,7 +494,7 @@ fn an_eye_in_no_cell_sees_what_no_cell_lists_whatever_was_asked_before() {
 }
 
 #[test]
-fn a_door_is_shut_whatever_was_said_of_its_leaf() {
+fn a_closed_door_is_shut_whatever_the_pose_of_its_leaf() {
     let world = room_grid(&GridParams::offices(9, 1));
     let sight = Sight::build(&world).unwrap();
     let mut state = SightState::new(&sight);
@@ -552,9 +552,9 @@ fn empty_and_hostile_worlds() {
     broken(&|w| w.details[0].transform[0] = f32::NAN);
 }
 
-/// An outline of very many corners is reduced outwards, and loses nothing.
+/// An outline of very many vertices is reduced outwards and loses nothing.
 #[test]
-fn a_round_window_of_a_thousand_corners() {
+fn a_round_window_of_a_thousand_vertices() {
     let mut world = room_grid(&GridParams {
         size: [2, 1, 1],
         doors: 1.0,
@@ -583,7 +583,7 @@ fn a_round_window_of_a_thousand_corners() {
     let state = SightState::new(&sight);
     let eye = middle - DVec3::X;
     for p in &ring {
-        // A hair inside the rim, through a very narrow view.
+        // Just inside the rim, through a very narrow view.
         let toward = middle + (to_dvec(*p) - middle) * 0.999 - eye;
         let view = View::perspective(
             eye.as_vec3().to_array(),
@@ -626,7 +626,7 @@ fn portals_of_a_small_share_are_listed_and_not_followed() {
         let some = stopping.see(&sight, &state, &view);
         let cells: BTreeSet<CellId> = all.cells().iter().copied().collect();
         assert!(some.cells().iter().all(|c| cells.contains(c)), "view {i}");
-        // What is visible is seen, or behind a portal that is named.
+        // Everything visible is seen, or lies behind a listed portal.
         let behind: BTreeSet<CellId> = some.stopped().iter().map(|s| s.1).collect();
         assert!(some.cells().len() == cells.len() || !behind.is_empty());
         for &(portal, cell) in some.stopped() {

@@ -1,4 +1,4 @@
-//! What a visit adds to the answer: cells, portals, and what of their boxes is in the view.
+//! Results of a visit: cells, portals, and the items whose boxes are in the view.
 
 use enfilade_cpg::{CellId, PortalId};
 use glam::{DVec3, Vec3};
@@ -30,7 +30,7 @@ impl Traversal<'_, '_> {
     }
 
     pub(super) fn set_planes(&mut self, region: &Region, entry: Option<(DVec3, f64)>) {
-        // Normals of clip space to normals of the world: by the map transposed.
+        // Normals go from clip space to world space by the transposed map.
         let to_world = self.face.map.transpose();
         self.planes.clear();
         if let Some((n, h)) = entry {
@@ -76,7 +76,7 @@ impl Traversal<'_, '_> {
         }
     }
 
-    /// Adds what of a tree's things is inside the planes and not in a shadow.
+    /// Adds the items of a tree that are inside the planes and not in a shadow.
     pub(super) fn cull(&mut self, root: Root) {
         let sight = self.sight;
         let n_chunks = sight.chunks.len() as u32;

@@ -1,4 +1,4 @@
-//! Which visits of a cell wait: those within others are spared, those alike are joined.
+//! The queue of visits: drops those contained in others, joins those that are alike.
 
 use std::cmp::Reverse;
 
@@ -9,14 +9,14 @@ use super::viewer::{Mark, Pending, Stage};
 use super::window::NONE;
 use crate::region::Region;
 
-/// Visits of one cell that wait at the same time; more are joined.
+/// Maximum number of visits of one cell that wait at the same time; further ones are joined.
 const MAX_QUEUED: u8 = 4;
-/// Visits of one cell entered as they come.
+/// Visits of one cell entered unchanged.
 const MAX_ENTERED: u8 = 12;
-/// Further visits that join all regions so far; the one after takes the whole screen.
+/// Further visits that join all regions so far; the next one takes the whole screen.
 const MAX_JOINED: u8 = 3;
-/// Waiting visits are joined where the rectangle around both is larger than they are by less than
-/// this share. Below 0.1 doors side by side stay apart; above 0.5 rooms behind walls appear.
+/// Waiting visits are joined if the rectangle around both exceeds their areas by less than this
+/// fraction. Below 0.1 doors side by side stay apart; above 0.5 rooms behind walls appear.
 const WASTE: f64 = 0.25;
 
 impl Traversal<'_, '_> {
@@ -35,7 +35,7 @@ impl Traversal<'_, '_> {
         *mark
     }
 
-    /// Queues a visit, unless it adds nothing; joins it to others where that is cheaper.
+    /// Queues a visit unless it adds nothing; joins it to another if that is cheaper.
     pub(super) fn push(
         &mut self,
         cell: u32,
@@ -54,8 +54,8 @@ impl Traversal<'_, '_> {
             let next = other.next;
             if other.state != Stage::Gone {
                 if self.covers((&other.region, other.entry), (&region, entry)) {
-                    // What waits and is nearer now is entered by the same queue entry; only the order
-                    // of what is drawn may differ a little.
+                    // The waiting visit covers it. If the new one is nearer, only the order of drawing may
+                    // differ a little.
                     self.viewer.out.counts.spared += 1;
                     self.viewer.marks[cell as usize].n_waiting = n_waiting;
                     return;
@@ -75,7 +75,7 @@ impl Traversal<'_, '_> {
             at = next;
         }
         if mark.n_entered >= MAX_ENTERED {
-            // Joins everything so far, at last the whole screen.
+            // Join everything so far; at last take the whole screen.
             let mut at = mark.head;
             while at != NONE {
                 let other = &mut self.viewer.pending[at as usize];
@@ -95,7 +95,7 @@ impl Traversal<'_, '_> {
         } else if best != NONE && (least_waste < WASTE || n_waiting >= MAX_QUEUED) {
             let other = &mut self.viewer.pending[best as usize];
             other.region = other.region.joined(&region, narrowing);
-            // Beyond either plane, as both are seen along: the same plane, or none.
+            // Begin beyond the nearer of two parallel planes; without a common direction, drop the bound.
             other.entry = match (other.entry, entry) {
                 (Some((n, h)), Some((m, k))) if n.dot(m) > 1.0 - 1e-9 => Some((n, h.min(k))),
                 _ => None,
@@ -129,7 +129,7 @@ impl Traversal<'_, '_> {
             .push(Reverse((near.max(0.0).to_bits(), index)));
     }
 
-    /// Whether one visit of a cell holds all that another sees.
+    /// Returns `true` if one visit of a cell contains everything that another sees.
     fn covers(
         &self,
         (region, entry): (&Region, Option<(DVec3, f64)>),
@@ -146,7 +146,7 @@ impl Traversal<'_, '_> {
             return true;
         }
         // The depth along a ray r is h / (n · r): the entry must not be farther along any ray of the
-        // other's region, nor of its widened rim.
+        // other's region, including its widened rim.
         let (n, m) = (self.face.normals * n, self.face.normals * m);
         let difference = n * k - m * h;
         let rim = other.widened() * difference.truncate().length();

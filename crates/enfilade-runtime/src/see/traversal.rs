@@ -1,4 +1,4 @@
-//! From cell to cell through portals that the view is clipped to.
+//! Traversal from cell to cell, clipping the view to portals.
 
 use std::cmp::Reverse;
 
@@ -15,7 +15,7 @@ use crate::sight::Sight;
 use crate::state::SightState;
 use crate::view::{Face, View};
 
-/// One face of one question.
+/// One face of one query.
 pub(super) struct Traversal<'v, 'a> {
     pub(super) viewer: &'v mut Viewer,
     pub(super) sight: &'a Sight,
@@ -24,7 +24,7 @@ pub(super) struct Traversal<'v, 'a> {
     pub(super) face: &'a Face,
     pub(super) face_index: u8,
     pub(super) planes: Planes,
-    /// What the tolerance changes in clip space.
+    /// Effect of the tolerance in clip space.
     pub(super) slack: f64,
 }
 
@@ -40,7 +40,7 @@ impl Traversal<'_, '_> {
         viewer.face_stamp += 1;
     }
 
-    /// Queues the eye's cell, and those that it may as well be in.
+    /// Queues the eye's cell, and those within tolerance of the eye.
     pub(super) fn start(&mut self, cell: Option<u32>) {
         self.begin_face();
         self.add_eye(cell);
@@ -53,8 +53,8 @@ impl Traversal<'_, '_> {
             return;
         };
         self.push_start(cell);
-        // An eye in a doorway is in both cells: which one it is said to be in is a rounding. At the
-        // corner of several portals that may go on.
+        // An eye in a doorway is in both cells: rounding decides which one is reported. Where several
+        // portals meet, this may repeat.
         let mut i = 0;
         while i < self.viewer.pending.len() {
             let cell = self.viewer.pending[i].cell;
@@ -75,7 +75,7 @@ impl Traversal<'_, '_> {
                 }
             }
         }
-        // An eye in two cells sees what either does; that is rare, and costs no more than without.
+        // An eye in two cells sees the union of both. This is rare, so the precomputed bound is left out.
         // All faces of a view begin alike.
         if self.viewer.pending.len() == 1 && !self.viewer.is_bounded {
             self.viewer.bound_by(self.sight, cell);
@@ -89,8 +89,8 @@ impl Traversal<'_, '_> {
         self.push(cell, NONE, Region::screen(), None, 0.0);
     }
 
-    /// Whether the eye may be said to be in the cell behind an exit: it is within a few tolerances of an open portal's
-    /// outline, or between a shut one and its leaves.
+    /// Returns `true` if the eye may be in the cell behind an exit: within a few tolerances of the outline of an open
+    /// portal, or between a shut one and its leaves.
     fn may_be_beyond(&self, exit: &Exit) -> bool {
         let near = 4.0 * self.sight.tolerance;
         let depth = if self.state.is_open(PortalId(exit.portal)) {
@@ -129,12 +129,12 @@ impl Traversal<'_, '_> {
         }
     }
 
-    /// Everything that can be reached from what waits counts as visible.
+    /// Makes everything visible that can be reached from the waiting visits.
     fn flood(&mut self) {
         self.viewer.queue.clear();
         let sight = self.sight;
         let mut at = 0;
-        // Visits that were entered lead on as well: their exits may not all have been looked at.
+        // Visits already entered lead on, too: some of their exits may not have been tested.
         let mut n = self.viewer.pending.len();
         while at < n {
             let cell = self.viewer.pending[at].cell;
@@ -176,13 +176,13 @@ impl Traversal<'_, '_> {
             .for_each_inside(sight.world_root, &planes, |cell, _| {
                 self.cull_whole(cell, NONE);
             });
-        // Where no cell is in the view, the shadows are still those of the last question.
+        // If no cell is in the view, the shadows are still those of the last query.
         self.viewer.shadows.clear();
         self.set_planes(&Region::screen(), None);
         self.cull(sight.unlisted_root);
     }
 
-    /// Adds what of a cell is in the view, as if nothing hid it.
+    /// Adds the items of a cell that are in the view, as if nothing hid them.
     fn cull_whole(&mut self, cell: u32, via: u32) {
         self.set_planes(&Region::screen(), None);
         self.viewer.shadows.clear();
@@ -231,8 +231,8 @@ impl Traversal<'_, '_> {
         }
     }
 
-    /// Whether [`Traversal::try_exit`] would come to nothing for all exits of a group: the planes are those
-    /// of the visit, to which it clips.
+    /// Returns `true` if [`Traversal::try_exit`] would reject all exits of a group. The planes are those of
+    /// the visit to which it clips.
     #[inline]
     fn is_skipped(&self, group: &Group) -> bool {
         let [min, max] = group.bounds();
@@ -311,10 +311,10 @@ impl Traversal<'_, '_> {
             self.add_stop(exit);
             return;
         }
-        // A plane so near says nothing, and its turning sense may be noise.
+        // A plane this near bounds nothing, and its orientation may be noise.
         let beyond = (ahead > 16.0 * tolerance).then_some((normal, ahead));
         self.add_portal(exit.portal);
-        // Along every ray it lies beyond the portal entered by; less is rounding, or comes of joining.
+        // Along every ray it lies beyond the portal entered by; less is due to rounding or joining.
         let near = near.max(nearest);
         if self.viewer.stepping.is_border(exit.to) {
             let window = Window {

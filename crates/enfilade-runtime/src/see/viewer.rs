@@ -1,4 +1,4 @@
-//! Who asks what an eye sees: options, and buffers kept from frame to frame.
+//! Options of a viewer, and its buffers, kept from frame to frame.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,20 +11,20 @@ use crate::region::{Clipper, Narrowing, Region};
 use crate::seen::{Lists, SeeCounts};
 use crate::sight::Sight;
 
-/// How a view is followed.
+/// Options of a [`Viewer`].
 #[derive(Clone, Copy, Debug)]
 pub struct SeeOptions {
-    /// How portals narrow the view.
+    /// Method of narrowing the view at portals.
     pub narrowing: Narrowing,
-    /// Whether large polygons inside cells hide what is behind them.
+    /// True if large polygons inside cells hide the things behind them.
     pub occlusion: bool,
-    /// Whether what the world says can be seen from the eye's cell (`enfilade pvs --parts`) bounds the answer.
+    /// True if the visibility precomputed for the eye's cell (`enfilade pvs --parts`) bounds the answer.
     pub precomputed: bool,
-    /// Portals clipped at most; after that, all cells within reach count as visible.
+    /// Maximum number of portals clipped; after that, all cells within reach count as visible.
     pub max_clips: u32,
-    /// A portal whose rectangle is less than this share of the screen is not followed but listed in
-    /// [`Seen::stopped`](crate::Seen::stopped), for something cheaper to stand in for what is behind it (Gjørup 1999, section
-    /// 2.3.2; Dirkse 2002, section 4.1.1). [Limit: 0 to 1; only at 0 are answers supersets]
+    /// Smallest portal followed, as its rectangle's share of the screen. Smaller ones are listed in
+    /// [`Seen::stopped`](crate::Seen::stopped), for the caller to draw a cheap stand-in (Gjørup 1999, section 2.3.2; Dirkse
+    /// 2002, section 4.1.1). [Limit: 0 to 1; only at 0 are answers supersets]
     pub min_share: f32,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Pending {
     pub(super) cell: u32,
     pub(super) via: u32,
     pub(super) region: Region,
-    /// World normal of the portal entered by and its distance from the eye; what is seen lies beyond.
+    /// World-space normal of the portal entered by, and its distance from the eye; the visible part lies beyond.
     pub(super) entry: Option<(DVec3, f64)>,
     pub(super) near: f64,
     /// Next visit of the same cell.
@@ -60,7 +60,7 @@ pub(super) enum Stage {
     Gone,
 }
 
-/// Per cell and face, valid while `stamp` is current.
+/// State of a cell in the current face; valid while `stamp` is current.
 #[derive(Clone, Copy)]
 pub(super) struct Mark {
     pub(super) stamp: u32,
@@ -69,10 +69,10 @@ pub(super) struct Mark {
     pub(super) n_entered: u8,
 }
 
-/// Asks what one eye sees, frame by frame; keeps its buffers, so that nothing is allocated once they
-/// have grown to what the world's views need.
+/// Queries visibility for one eye, frame by frame. Keeps its buffers: allocates nothing once they have
+/// grown to the needs of the world's views.
 ///
-/// Memory: 16 bytes a cell, 8 bytes a portal, 4 bytes a chunk and detail.
+/// Memory: 16 bytes per cell, 8 bytes per portal, 4 bytes per chunk and detail.
 pub struct Viewer {
     pub(super) options: SeeOptions,
     pub(super) marks: Vec<Mark>,
@@ -80,7 +80,7 @@ pub struct Viewer {
     pub(super) portal_stamps: Vec<u32>,
     pub(super) stop_stamps: Vec<u32>,
     pub(super) item_stamps: Vec<u32>,
-    /// By chunk and detail, a bit: whether it may be seen from the eye's cell. Counts where `is_bounded`.
+    /// A bit per chunk and detail: set if it may be seen from the eye's cell. Valid if `is_bounded`.
     pub(super) allowed: Vec<u64>,
     pub(super) is_bounded: bool,
     pub(super) face_stamp: u32,
@@ -94,13 +94,13 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// A viewer of `sight`, with default options.
+    /// Makes a viewer of `sight` with default options.
     #[must_use]
     pub fn new(sight: &Sight) -> Self {
         Self::with_options(sight, SeeOptions::default())
     }
 
-    /// A viewer of `sight`.
+    /// Makes a viewer of `sight`.
     #[must_use]
     pub fn with_options(sight: &Sight, options: SeeOptions) -> Self {
         let mark = Mark {
@@ -129,12 +129,12 @@ impl Viewer {
         }
     }
 
-    /// How views are followed; may be changed between questions.
+    /// Returns the options, which may be changed between queries.
     pub fn options_mut(&mut self) -> &mut SeeOptions {
         &mut self.options
     }
 
-    /// Takes what may be seen from the eye's cell, where the world says so.
+    /// Loads the precomputed visibility of the eye's cell, if the world has it.
     pub(super) fn bound_by(&mut self, sight: &Sight, cell: u32) {
         let Some(seen) = sight
             .seen_from

@@ -1,4 +1,4 @@
-//! What is handed on from one world to another: parts of the screen.
+//! Parts of the screen, passed from one world to another.
 
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DMat3;
@@ -9,17 +9,17 @@ use crate::region::Region;
 /// Stands for no portal, and no visit.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// A part of the screen, through which something is seen.
+/// A part of the screen through which something is seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     pub(super) region: Region,
-    /// Normal of the plane beyond which it is seen, and that plane's distance from the eye.
+    /// Normal of the plane beyond which the view begins, and that plane's distance from the eye.
     pub(super) entry: Option<(DVec3, f64)>,
     pub(super) near: f64,
 }
 
 impl Window {
-    /// The whole screen.
+    /// Returns the whole screen.
     #[must_use]
     pub fn screen() -> Self {
         Self {
@@ -29,7 +29,7 @@ impl Window {
         }
     }
 
-    /// The same for a view [in another frame](crate::View::in_frame): `turn` takes that frame's directions to those of this one.
+    /// Returns the window of a view [in another frame](crate::View::in_frame); `turn` maps directions of that frame to this one.
     #[must_use]
     pub fn in_frame(&self, turn: &DMat3) -> Self {
         let turned = |(n, h): (DVec3, f64)| (turn.transpose() * n, h);
@@ -40,18 +40,18 @@ impl Window {
     }
 }
 
-/// Where a view left a world, or came to a cell that was watched.
+/// A place where a view left a world or reached a watched cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
-    /// The cell that was watched, or the one that is the world's border.
+    /// The watched cell, or the border of the world.
     pub cell: CellId,
-    /// The portal that it was entered by; `None` for the eye's own cell, and where that is not known.
+    /// The portal entered by; `None` for the eye's own cell, or if unknown.
     pub via: Option<PortalId>,
     /// The part of the screen.
     pub window: Window,
 }
 
-/// How a stepped question differs from one in one go.
+/// State of a stepped query.
 #[derive(Default)]
 pub(super) struct Stepping {
     pub(super) is_on: bool,

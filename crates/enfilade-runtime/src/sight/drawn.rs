@@ -1,4 +1,4 @@
-//! What of a world is drawn, in pieces small enough to be left out one by one, and the trees over their boxes.
+//! The drawn parts of a world, in pieces small enough to be culled one by one, and the trees over their boxes.
 
 use enfilade_cpg::{Batch, CellId, DetailObject, VisibleParts, World};
 use enfilade_geom::Aabb;
@@ -10,7 +10,7 @@ use crate::options::SightOptions;
 use crate::point::point;
 use crate::sight_error::SightError;
 
-/// A detail object, placed.
+/// A placed detail object.
 #[derive(Clone, Debug)]
 pub(crate) struct Detail {
     pub(crate) bounds: Aabb,
@@ -21,9 +21,9 @@ pub(crate) struct Detail {
 pub(super) struct Drawn {
     pub(super) chunks: Vec<Chunk>,
     pub(super) details: Vec<Detail>,
-    /// By batch: its triangles as index triples, sorted so that chunks are ranges.
+    /// Per batch: its triangles as index triples, sorted so that chunks are ranges.
     pub(super) indices: Vec<Vec<u32>>,
-    /// By triangle of all batches in order, its chunk.
+    /// Chunk of each triangle, over all batches in order.
     chunk_of: Vec<u32>,
     /// Largest absolute coordinate, or 1. [Units: wu]
     pub(super) extent: f64,
@@ -68,7 +68,7 @@ impl Drawn {
         Ok(drawn)
     }
 
-    /// `None` where it names what does not exist, or a corner is not finite.
+    /// `None` if it refers to a missing index, or a vertex is not finite.
     fn add_batch(
         &mut self,
         world: &World,
@@ -102,7 +102,7 @@ impl Drawn {
         Some(())
     }
 
-    /// `None` where it names what does not exist, or a corner is not finite.
+    /// `None` if it refers to a missing index, or a vertex is not finite.
     fn add_detail(&mut self, world: &World, detail: &DetailObject) -> Option<()> {
         let mesh = world.detail_meshes.get(detail.mesh as usize);
         let mesh = mesh.filter(|_| exist(world, &detail.cells))?;
@@ -127,8 +127,8 @@ impl Drawn {
         Some(())
     }
 
-    /// By cell, the chunks and details (from `chunks.len()` on) that may be seen from it, where the world says so. Time: pairs of
-    /// cells that see each other, and what the second ones hold.
+    /// Per cell, the chunks and details (from `chunks.len()` on) that may be seen from it, if the world has that information.
+    /// Time: pairs of cells that see each other, times the contents of the second.
     pub(super) fn seen_from(&self, world: &World, doors: &Doors) -> Option<VisibleParts> {
         let pvs = world.pvs.as_ref()?;
         let is_whole = pvs.n_cells() == world.graph.cells.len();
@@ -139,7 +139,7 @@ impl Drawn {
             let chunk = self.chunk_of.get(part as usize);
             chunk.map_or_else(detail, |&chunk| chunk as usize)
         };
-        // Cell by cell; an item is seen if any part of it is, of whatever cell.
+        // Cell by cell; an item is seen if any part of it is, in any cell.
         let mut last_seen_by = vec![u32::MAX; n_chunks + self.details.len()];
         let mut rows = vec![Vec::new(); pvs.n_cells()];
         for (pair, (from, _)) in pvs.pairs().enumerate() {
@@ -152,7 +152,7 @@ impl Drawn {
                 }
             }
         }
-        // What is known of leaves is known of where the model has them: they move, and are never left out.
+        // The precomputed visibility of leaves is for the model's pose; they move, so never leave them out.
         let leaves = (0..self.details.len()).filter(|&d| doors.way(d as u32).is_some());
         let leaves: Vec<u32> = leaves.map(|d| (n_chunks + d) as u32).collect();
         for row in &mut rows {
@@ -220,7 +220,7 @@ impl Boxes {
     }
 }
 
-/// By cell the chunks and details that it sees, and those that no cell sees.
+/// Per cell, the chunks and details that it sees; and those that no cell sees.
 fn listed(world: &World, drawn: &Drawn, doors: &Doors) -> (Vec<Vec<Boxed>>, Vec<Boxed>) {
     let mut listed: Vec<Vec<Boxed>> = world.graph.cells.iter().map(|_| Vec::new()).collect();
     let mut unlisted = Vec::new();

@@ -1,4 +1,4 @@
-//! Portals of a world as exits of its cells, with convex outlines of few corners.
+//! Portals of a world as exits of its cells, with convex outlines of few vertices.
 
 use enfilade_cpg::{Portal, PortalId};
 use enfilade_geom::{DVec2, DVec3, Plane, Winding};
@@ -8,15 +8,15 @@ use crate::point::point;
 use crate::region::{MAX_CORNERS, reduced_around};
 use crate::sight_error::SightError;
 
-/// Pieces are used instead of the outline where there are at most so many.
+/// Maximum number of pieces used in place of the outline.
 const MAX_PIECES: usize = 4;
-/// ... and where they fill less of the outline than this.
+/// Pieces replace the outline only if they fill less than this share of it.
 const PIECES_SHARE: f64 = 0.75;
 
-/// Exits while they are collected.
+/// Exits under construction.
 #[derive(Default)]
 pub(super) struct Portals {
-    /// With the cell that each leaves.
+    /// Each with the cell that it leaves.
     exits: Vec<(u32, Exit)>,
     pub(super) corners: Vec<[f32; 3]>,
     pub(super) extent: f64,
@@ -49,7 +49,7 @@ impl Portals {
             .iter()
             .filter_map(|p| convex(p, normal))
             .collect();
-        // A piece that is no polygon may be a sliver by rounding, and light passes it all the same.
+        // A piece without an area may be a sliver by rounding, and light passes it all the same.
         let is_whole = pieces.len() != portal.pieces.len();
         let area: f64 = pieces.iter().map(Winding::area).sum();
         let openings = if is_whole
@@ -68,7 +68,7 @@ impl Portals {
     }
 
     fn add_opening(&mut self, id: PortalId, cells: [u32; 2], opening: &Winding, normal: DVec3) {
-        // Bounds are rounded to the `f32` in which they are read.
+        // Compute bounds from the rounded `f32` values, as they are read.
         let center = opening.aabb().center().as_vec3();
         let middle = center.as_dvec3();
         let first_corner = self.corners.len() as u32;
@@ -113,8 +113,8 @@ impl Portals {
     }
 }
 
-/// The convex polygon around corners of a plane, counter-clockwise about `normal`, of at most
-/// `MAX_CORNERS`; `None` without an area, or with a corner that is not finite.
+/// Returns the convex polygon around points of a plane, counter-clockwise about `normal`, of at most
+/// `MAX_CORNERS` vertices; `None` if it has no area, or a point is not finite.
 fn convex(corners: &[[f32; 3]], normal: DVec3) -> Option<Winding> {
     if corners.len() < 3 || corners.iter().flatten().any(|x| !x.is_finite()) {
         return None;
@@ -123,7 +123,7 @@ fn convex(corners: &[[f32; 3]], normal: DVec3) -> Option<Winding> {
     let middle = points.iter().sum::<DVec3>() / points.len() as f64;
     let plane = Plane::through(middle, normal);
     let hull = Winding::hull_in_plane(&plane, &points);
-    // Corners that rounding put off the hull are what the tolerance is for.
+    // The tolerance covers vertices that rounding put off the hull.
     if hull.points.len() < 3 {
         return None;
     }
