@@ -5,21 +5,20 @@
 
 use std::collections::BTreeMap;
 
-/// Folders not rewritten yet. Remove entries; add none.
+/// Folders and files not rewritten yet. Remove entries; add none.
 const STILL: &[&str] = &[
     "crates/enfilade-bake/",
     "crates/enfilade-bench/",
     "crates/enfilade-cli/",
     "crates/enfilade-complex/",
     "crates/enfilade-cpg/",
-    "crates/enfilade-geom/",
+    "crates/enfilade-geom/src/allowance.rs",
     "crates/enfilade-import/",
     "crates/enfilade-render/",
     "crates/enfilade-report/",
     "crates/enfilade-testkit/",
     "crates/enfilade-verify/",
     "crates/enfilade-vis/",
-    "crates/enfilade-voxel/",
     "crates/enfilade-world/",
     "crates/enfilade/",
     "fuzz/",

@@ -1,7 +1,7 @@
-//! Incoherent rays against a building-like scene: millions a second on one thread.
+//! Incoherent rays against a building-like scene, in millions per second on one thread.
 //!
-//! Prints one CSV line per query, with the share of rays that hit, so that a change of answers
-//! shows beside a change of speed.
+//! Prints one CSV line per query, with the fraction of rays that hit, so that a change of answers shows
+//! beside a change of speed.
 #![allow(clippy::print_stdout, reason = "a benchmark's result is its output")]
 
 use std::time::Instant;

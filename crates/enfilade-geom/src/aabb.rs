@@ -5,32 +5,32 @@ use crate::{DVec3, Triangle};
 /// An axis-aligned box. [Units: wu] Empty when any `min` exceeds its `max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// Least corner.
+    /// Minimum along each axis.
     pub min: DVec3,
-    /// Greatest corner.
+    /// Maximum along each axis.
     pub max: DVec3,
 }
 
 impl Aabb {
-    /// The box that holds nothing; growing it by a point gives that point.
+    /// The empty box; growing it by a point gives the box of that point.
     pub const EMPTY: Self = Self {
         min: DVec3::INFINITY,
         max: DVec3::NEG_INFINITY,
     };
 
-    /// The box from two corners.
+    /// Makes the box from its minimum and maximum.
     #[must_use]
     pub const fn new(min: DVec3, max: DVec3) -> Self {
         Self { min, max }
     }
 
-    /// The smallest box around `points`.
+    /// Returns the smallest box around `points`.
     #[must_use]
     pub fn of_points<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, &p| b.including(p))
     }
 
-    /// This box, grown to hold `p`.
+    /// Returns this box grown to contain `p`.
     #[must_use]
     pub fn including(self, p: DVec3) -> Self {
         Self {
@@ -39,7 +39,7 @@ impl Aabb {
         }
     }
 
-    /// The smallest box around both.
+    /// Returns the smallest box around both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -48,7 +48,7 @@ impl Aabb {
         }
     }
 
-    /// What both share; may be empty.
+    /// Returns the common part of both; may be empty.
     #[must_use]
     pub fn intersection(self, other: Self) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Aabb {
         }
     }
 
-    /// Grown by `margin` on every side.
+    /// Returns the box grown by `margin` on every side.
     #[must_use]
     pub fn expanded(self, margin: f64) -> Self {
         Self {
@@ -66,14 +66,14 @@ impl Aabb {
         }
     }
 
-    /// Whether nothing is inside.
+    /// Returns `true` if the box contains no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()
     }
 
-    /// The corners of each face by their indices in [`Self::corners`], counter-clockwise from outside: low and high
-    /// of x, of y, of z.
+    /// Vertices of each face as indices into [`Self::corners`], counter-clockwise from outside: low and high
+    /// side of x, of y, of z.
     pub const FACES: [[usize; 4]; 6] = [
         [0, 4, 6, 2],
         [1, 3, 7, 5],
@@ -83,7 +83,7 @@ impl Aabb {
         [4, 5, 7, 6],
     ];
 
-    /// The eight corners: bit `k` of an index says whether axis `k` is at its greatest.
+    /// Returns the eight vertices: bit `k` of an index is set if axis `k` is at its maximum.
     #[must_use]
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|i| {
@@ -92,45 +92,45 @@ impl Aabb {
         })
     }
 
-    /// The six faces, see [`Self::FACES`].
+    /// Returns the six faces, in the order of [`Self::FACES`].
     #[must_use]
     pub fn faces(&self) -> [[DVec3; 4]; 6] {
         let corners = self.corners();
         Self::FACES.map(|face| face.map(|c| corners[c]))
     }
 
-    /// Two triangles for each face, counter-clockwise from outside.
+    /// Returns two triangles per face, counter-clockwise from outside.
     #[must_use]
     pub fn triangles(&self) -> Vec<Triangle> {
         let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
         self.faces().into_iter().flat_map(halves).collect()
     }
 
-    /// Edge lengths; negative where empty.
+    /// Returns the edge lengths; negative if empty.
     #[must_use]
     pub fn size(&self) -> DVec3 {
         self.max - self.min
     }
 
-    /// Middle.
+    /// Returns the center.
     #[must_use]
     pub fn center(&self) -> DVec3 {
         (self.min + self.max) * 0.5
     }
 
-    /// Whether the closed boxes touch.
+    /// Returns `true` if the closed boxes intersect.
     #[must_use]
     pub fn overlaps(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
-    /// Whether `p` lies in the closed box.
+    /// Returns `true` if `p` lies in the closed box.
     #[must_use]
     pub fn contains(&self, p: DVec3) -> bool {
         self.min.cmple(p).all() && p.cmple(self.max).all()
     }
 
-    /// Squared distance from `p` to the box; 0 inside.
+    /// Returns the squared distance from `p` to the box; 0 inside.
     #[must_use]
     pub fn distance_squared(&self, p: DVec3) -> f64 {
         (self.min - p)
@@ -139,14 +139,14 @@ impl Aabb {
             .length_squared()
     }
 
-    /// Surface area; 0 when empty.
+    /// Returns the surface area; 0 if empty.
     #[must_use]
     pub fn surface_area(&self) -> f64 {
         let s = self.size().max(DVec3::ZERO);
         2.0 * (s.x * s.y + s.y * s.z + s.z * s.x)
     }
 
-    /// Volume; 0 when empty.
+    /// Returns the volume; 0 if empty.
     #[must_use]
     pub fn volume(&self) -> f64 {
         let s = self.size().max(DVec3::ZERO);

@@ -1,11 +1,11 @@
-//! The bounding volume hierarchy: which triangles a ray, a box or a point meets.
+//! Bounding volume hierarchy: finds the triangles that a ray, a box or a point meets.
 //!
-//! Built top-down by binned surface-area heuristic (Wald, "On fast Construction of SAH-based
-//! Bounding Volume Hierarchies", RT 2007), four children a node. Boxes are `f32`, rounded
-//! outwards, and every box test errs to "may meet"; triangles are `f64` and decide. What a
-//! triangle test alone would answer, the tree answers too: it never loses a hit.
+//! Built top-down by the binned surface-area heuristic (Wald, "On fast Construction of SAH-based
+//! Bounding Volume Hierarchies", RT 2007), four children per node. Boxes are `f32`, rounded outwards, and
+//! every box test errs to "may meet"; triangles are `f64` and decide. The tree never loses a hit: its
+//! answers are those of testing every triangle.
 //!
-//! Same triangles in the same order give the same tree and the same answers.
+//! Equal triangles in equal order give an equal tree and equal answers.
 
 mod build;
 
@@ -22,7 +22,7 @@ use build::{Built, Node, build_nodes, round_down, round_up};
 
 /// Enough for `MAX_SAH_DEPTH` levels and 16 more that quarter 2³² triangles, three pushes each.
 const STACK_SIZE: usize = 192;
-/// A tree over triangles that answers in about the logarithm of their number.
+/// A tree over triangles, with queries in time about logarithmic in their number.
 #[derive(Clone, Debug)]
 pub struct Bvh {
     nodes: Vec<Node>,
@@ -33,30 +33,30 @@ pub struct Bvh {
     bounds: Aabb,
 }
 
-/// What [`Bvh::nearest`] found.
+/// Result of [`Bvh::nearest`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// How far. [Units: wu]
+    /// Distance. [Units: wu]
     pub distance: f64,
     /// Index of the triangle.
     pub triangle: u32,
-    /// Its nearest point.
+    /// Nearest point of the triangle.
     pub point: DVec3,
 }
 
-/// A series of queries of one tree by [`Bvh::any_within`], near each other.
+/// A series of queries of one tree with [`Bvh::any_within`], at points near each other.
 #[derive(Clone, Debug, Default)]
 pub struct NearSeries {
-    /// Where the last one found a triangle.
+    /// Position in leaf order of the last triangle found.
     last: Option<usize>,
-    /// How many triangles all of them looked at.
+    /// Number of triangles tested by all queries.
     pub n_looked: u64,
 }
 
 impl Bvh {
-    /// Builds the tree. O(n log n); 128 bytes a node and 76 a triangle.
+    /// Builds the tree. O(n log n); 128 bytes per node and 76 per triangle.
     ///
-    /// Triangles with a corner that is not finite or beyond 10¹⁵ are left out: nothing meets them.
+    /// Ignores triangles with a vertex that is not finite or beyond 10¹⁵.
     #[must_use]
     pub fn build(triangles: &[Triangle]) -> Self {
         let Built { nodes, ids, bounds } = build_nodes(triangles);
@@ -72,25 +72,25 @@ impl Bvh {
         }
     }
 
-    /// The box around all triangles.
+    /// Returns the box around all triangles.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// Number of triangles that can be met.
+    /// Returns the number of triangles in the tree.
     #[must_use]
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// Whether there is no triangle to meet.
+    /// Returns `true` if the tree has no triangle.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
 
-    /// Whether the closed segment from `a` to `b` meets a triangle for which `excluded` is false.
+    /// Returns `true` if the closed segment from `a` to `b` meets a triangle for which `excluded` returns `false`.
     #[must_use]
     pub fn any_hit(&self, a: DVec3, b: DVec3, mut excluded: impl FnMut(u32) -> bool) -> bool {
         let ray = Ray::segment(a, b);
@@ -104,9 +104,9 @@ impl Bvh {
         met.is_break()
     }
 
-    /// The first triangle along the ray for which `excluded` is false.
+    /// Returns the first triangle along the ray for which `excluded` returns `false`.
     ///
-    /// Of several at the very same `t`, the one with the least index.
+    /// At equal `t`, the triangle with the least index.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray, mut excluded: impl FnMut(u32) -> bool) -> Option<Hit> {
         let sheared = ShearedRay::new(ray);
@@ -129,7 +129,7 @@ impl Bvh {
         best
     }
 
-    /// Calls `visit` with every triangle that the ray meets, in no order that means anything.
+    /// Calls `visit` for each triangle that the ray meets, in arbitrary order.
     pub fn for_each_hit(&self, ray: &Ray, mut visit: impl FnMut(Hit)) {
         let sheared = ShearedRay::new(ray);
         let _ = self.walk::<()>(ray, DVec3::ZERO, |i, t_max| {
@@ -144,8 +144,8 @@ impl Bvh {
         });
     }
 
-    /// Calls `visit` with every triangle nearer than `radius` to the closed segment from `a` to `b`
-    /// and its distance, until `visit` breaks; returns whether it did.
+    /// Calls `visit` for each triangle nearer than `radius` to the closed segment from `a` to `b`, with its
+    /// distance, until `visit` breaks.
     pub fn for_each_near_segment(
         &self,
         a: DVec3,
@@ -154,7 +154,7 @@ impl Bvh {
         mut visit: impl FnMut(u32, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         self.for_each_around_segment(a, b, radius, |id, triangle| {
-            // Both ends on one side, farther than the radius: spares most triangles the rest.
+            // Early out for most triangles: both ends on one side of the plane, farther than the radius.
             let n = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
             let (da, db) = (n.dot(a - triangle[0]), n.dot(b - triangle[0]));
             let nearer = da.abs().min(db.abs());
@@ -170,8 +170,8 @@ impl Bvh {
         })
     }
 
-    /// Calls `visit` with every triangle in a leaf whose box, grown by `radius`, the closed segment
-    /// meets: all that are within `radius` (finite), and some that are not. Breaks as `visit` does.
+    /// Calls `visit` for each triangle in a leaf whose box, grown by `radius` (finite), the closed segment
+    /// meets: a superset of those within `radius`. Stops if `visit` breaks.
     pub fn for_each_around_segment(
         &self,
         a: DVec3,
@@ -179,7 +179,7 @@ impl Bvh {
         radius: f64,
         mut visit: impl FnMut(u32, &Triangle) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        // Without a length there is no direction; any other will do for a point-like segment.
+        // A segment without length has no direction; any will do.
         let mut ray = Ray::segment(a, b);
         if ray.direction == DVec3::ZERO {
             ray = Ray {
@@ -193,9 +193,9 @@ impl Bvh {
         })
     }
 
-    /// Calls `visit` with every triangle in a leaf whose box a box of half sizes `half` may touch as its center moves along
-    /// the ray: all that it touches, and some that it does not. Roughly from near to far; `visit` may lower the `t` after
-    /// which nothing matters. A ray without a direction stands for its origin.
+    /// Calls `visit` for each triangle in a leaf whose box may be touched by a box of half sizes `half` whose center moves along
+    /// the ray: a superset of the triangles touched, roughly near to far. `visit` may lower the `t` after which triangles are
+    /// ignored. A ray without a direction stands for its origin.
     pub fn for_each_swept(
         &self,
         ray: &Ray,
@@ -213,8 +213,8 @@ impl Bvh {
         });
     }
 
-    /// Calls `visit` with every triangle that touches the closed box, and perhaps with some that
-    /// miss it by rounding.
+    /// Calls `visit` for each triangle that touches the closed box, and perhaps for some that miss it by
+    /// rounding.
     pub fn for_each_in_box(&self, query: &Aabb, mut visit: impl FnMut(u32)) {
         self.walk_box(query, |i| {
             if triangle_touches_box(&self.triangle(i), query) {
@@ -224,7 +224,7 @@ impl Bvh {
         });
     }
 
-    /// [`Bvh::for_each_in_box`], until `is_found` says so of one; whether it did.
+    /// As [`Bvh::for_each_in_box`], until `is_found` returns `true`; returns `true` if it did.
     pub fn any_in_box(&self, query: &Aabb, mut is_found: impl FnMut(u32) -> bool) -> bool {
         let mut any = false;
         self.walk_box(query, |i| {
@@ -234,7 +234,7 @@ impl Bvh {
         any
     }
 
-    /// Calls `visit` with the places of triangles whose boxes touch the closed box, until it says no.
+    /// Calls `visit` with the positions of triangles in leaves whose boxes touch the closed box, until it returns `false`.
     fn walk_box(&self, query: &Aabb, mut visit: impl FnMut(usize) -> bool) {
         if self.nodes.is_empty() || query.is_empty() {
             return;
@@ -275,9 +275,9 @@ impl Bvh {
         }
     }
 
-    /// How far some triangle is from `p` that is within `reach`; not the nearest, but the first that is found. [Units: wu]
+    /// Returns the distance from `p` of some triangle within `reach`: the first found, not the nearest. [Units: wu]
     ///
-    /// Queries of one series begin with the triangle that the last one found: what holds here mostly holds close by.
+    /// A query of a series starts with the triangle of the last one, which is mostly near enough for the next point, too.
     #[must_use]
     pub fn any_within(&self, p: DVec3, reach: f64, series: &mut NearSeries) -> Option<f64> {
         if !p.is_finite() {
@@ -299,11 +299,11 @@ impl Bvh {
         found
     }
 
-    /// How far `p` is from the triangle at a place, if that is no more than `reach`.
+    /// Returns the distance of `p` from the triangle at a position in leaf order, if at most `reach`.
     fn within(&self, place: usize, p: DVec3, reach: f64) -> Option<f64> {
         let t = self.triangle(place);
         let n = (t[1] - t[0]).cross(t[2] - t[0]);
-        // Nearly all that a box meets is told by its plane.
+        // The plane rejects nearly all triangles whose boxes are near.
         let off = n.dot(p - t[0]);
         if off * off > reach * reach * n.length_squared() {
             return None;
@@ -312,15 +312,15 @@ impl Bvh {
         (d2 <= reach * reach).then(|| d2.sqrt())
     }
 
-    /// The triangle nearest to `p`, if one is within `max_distance` (infinity allowed).
+    /// Returns the triangle nearest to `p`, if one is within `max_distance` (infinity allowed).
     ///
-    /// Of several at the very same distance, the one with the least index.
+    /// At equal distance, the triangle with the least index.
     #[must_use]
     pub fn nearest(&self, p: DVec3, max_distance: f64) -> Option<Nearest> {
         self.nearest_counted(p, max_distance, &mut 0)
     }
 
-    /// [`Bvh::nearest`], and how many triangles were looked at.
+    /// As [`Bvh::nearest`]; also returns the number of triangles tested.
     #[must_use]
     pub fn nearest_counted(
         &self,
@@ -384,8 +384,8 @@ impl Bvh {
         self.triangles[i].map(DVec3::from_array)
     }
 
-    /// Visits the triangles (by place in leaf order) of every leaf whose box, grown by `reach` along each
-    /// axis, the ray meets before `t_max`, which `visit` may lower; roughly from near to far.
+    /// Visits the triangles (by position in leaf order) of every leaf whose box, grown by `reach` along each
+    /// axis, the ray meets before `t_max`, roughly near to far. `visit` may lower `t_max`.
     #[inline]
     fn walk<B>(
         &self,
@@ -398,7 +398,7 @@ impl Bvh {
             return ControlFlow::Continue(());
         }
         // Scaled so that the longest component is 1: no `f32` overflows. A component under 1e-12
-        // of it is raised to that, and moves by less than the margin within reach of the boxes.
+        // of it is raised to that, which moves the ray by less than the margin within reach of the boxes.
         let direction = ray.direction / longest;
         let direction = direction
             .abs()
@@ -459,7 +459,7 @@ impl Bvh {
     }
 }
 
-/// How far the rounding of `p` and of differences with it can move a box plane. [Units: wu]
+/// Returns the largest shift of a box plane by the rounding of `p` and of differences with it. [Units: wu]
 fn box_margin(bounds: &Aabb, p: DVec3) -> f64 {
     let reach = bounds
         .min
@@ -516,8 +516,8 @@ impl Stack {
         while mask != 0 {
             let k = mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            // From an origin that `f32` cannot hold, even the empty box of an unused child is met; taken for a child, it would
-            // lead back to the root, for ever.
+            // From an origin that `f32` cannot hold, even the empty box of an unused child is met; it must not be taken for a child,
+            // or it would lead back to the root for ever.
             if node.counts[k] == 0 && node.children[k] == 0 {
                 continue;
             }

@@ -1,8 +1,8 @@
-//! Geometry that every other crate of enfilade stands on: boxes, planes, windings (convex planar
-//! polygons), the scene as it was read, and the bounding volume hierarchy.
+//! Geometry shared by all crates of enfilade: boxes, planes, windings (convex planar polygons), the input
+//! scene, and the bounding volume hierarchy.
 //!
-//! Conventions, everywhere: right-handed, +Y up, meters; front faces are counter-clockwise;
-//! building computes in `f64`, files hold `f32`.
+//! Conventions, everywhere: right-handed, +Y up, meters; front faces are counter-clockwise; builders
+//! compute in `f64`, files hold `f32`.
 
 mod aabb;
 mod allowance;
@@ -30,7 +30,7 @@ pub use winding::Winding;
 /// A triangle in world space. [Units: wu]
 pub type Triangle = [DVec3; 3];
 
-/// Normal of a triangle scaled by twice its area.
+/// Returns the normal of a triangle with twice its area as length.
 #[must_use]
 pub fn triangle_area_normal(t: &Triangle) -> DVec3 {
     (t[1] - t[0]).cross(t[2] - t[0])

@@ -2,7 +2,7 @@
 
 use crate::{DVec3, Triangle, triangle_area_normal};
 
-/// An oriented plane: `normal · p + d = 0`; the positive side is where the sum is greater.
+/// An oriented plane `normal · p + d = 0`; its positive side is where the sum is greater.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Unit normal.
@@ -12,7 +12,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The plane through `point` with unit `normal`.
+    /// Makes the plane through `point` with unit `normal`.
     #[must_use]
     pub fn through(point: DVec3, normal: DVec3) -> Self {
         Self {
@@ -21,21 +21,21 @@ impl Plane {
         }
     }
 
-    /// The plane of a triangle, facing its counter-clockwise side; `None` when it has no area.
+    /// Returns the plane of a triangle, facing its counter-clockwise side; `None` if the triangle has no area.
     #[must_use]
     pub fn of_triangle(t: &Triangle) -> Option<Self> {
         let n = triangle_area_normal(t).try_normalize()?;
-        // The middle of the triangle keeps the rounding of the offset small for far-away corners.
+        // The centroid keeps the rounding of the offset small for distant vertices.
         Some(Self::through((t[0] + t[1] + t[2]) / 3.0, n))
     }
 
-    /// Distance of `p`, positive on the side that the normal points to.
+    /// Returns the distance of `p`, positive on the side of the normal.
     #[must_use]
     pub fn signed_distance(&self, p: DVec3) -> f64 {
         self.normal.dot(p) + self.d
     }
 
-    /// The same plane facing the other way.
+    /// Returns the plane facing the other way.
     #[must_use]
     pub fn flipped(self) -> Self {
         Self {
@@ -44,13 +44,13 @@ impl Plane {
         }
     }
 
-    /// `p` moved onto the plane along its normal.
+    /// Projects `p` onto the plane along its normal.
     #[must_use]
     pub fn project(&self, p: DVec3) -> DVec3 {
         p - self.normal * self.signed_distance(p)
     }
 
-    /// Two unit vectors that span the plane, with `u × v = normal`.
+    /// Returns two unit vectors that span the plane, with `u × v = normal`.
     #[must_use]
     pub fn basis(&self) -> (DVec3, DVec3) {
         let n = self.normal;

@@ -1,16 +1,16 @@
 //! Small convex polygons without heap allocation: split, measure, subtract.
 //!
-//! Builders make tens of millions of them, nearly all with three to six corners, so they live inline.
-//! [`Winding`](crate::Winding) is what is kept of them.
+//! Builders make tens of millions of them, nearly all with three to six vertices, so they are stored
+//! inline. Those that are kept become a [`Winding`](crate::Winding).
 
 use smallvec::SmallVec;
 
 use crate::{Aabb, DVec3, Plane};
 
-/// A convex planar polygon; which way it turns depends on where it came from.
+/// A convex planar polygon; its orientation depends on its origin.
 pub type Poly = SmallVec<[DVec3; 6]>;
 
-/// Where a polygon lies about a plane.
+/// Position of a polygon relative to a plane.
 #[expect(
     clippy::large_enum_variant,
     reason = "lives for a match; a box would allocate a million times"
@@ -18,19 +18,19 @@ pub type Poly = SmallVec<[DVec3; 6]>;
 pub enum Sides {
     /// In the plane, within the tolerance.
     On,
-    /// Wholly on the positive side.
+    /// Entirely on the positive side.
     Front,
-    /// Wholly on the negative side.
+    /// Entirely on the negative side.
     Back,
     /// Cut in two: the positive and the negative part.
     Both(Poly, Poly),
 }
 
-/// Splits a polygon; corners within `eps` of the plane belong to both parts unmoved.
+/// Splits a polygon; vertices within `eps` of the plane belong to both parts unmoved.
 #[must_use]
 pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
     let n = points.len();
-    // Most polygons lie on one side: nothing is kept until one does not.
+    // Most polygons lie on one side: copy nothing until one does not.
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for &p in points {
         let d = plane.signed_distance(p);
@@ -54,7 +54,7 @@ pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
             back.push(p);
         }
         if (dp > eps && dq < -eps) || (dp < -eps && dq > eps) {
-            // Always cut from the front corner, so that both directions of an edge round alike.
+            // Always cut from the front vertex, so that both directions of an edge round alike.
             let (a, b, da, db) = if dp > 0.0 {
                 (p, q, dp, dq)
             } else {
@@ -68,7 +68,7 @@ pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
     Sides::Both(front, back)
 }
 
-/// The part on the positive side; `None` when no area is left.
+/// Returns the part on the positive side; `None` if no area is left.
 #[must_use]
 pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
     match split(points, plane, eps) {
@@ -78,7 +78,7 @@ pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
     }
 }
 
-/// Leaves the part on the positive side; whether there is any.
+/// Keeps the part on the positive side; returns `true` if any is left.
 #[must_use]
 pub fn clip_in_place(points: &mut Poly, plane: &Plane, eps: f64) -> bool {
     match split(points, plane, eps) {
@@ -89,7 +89,7 @@ pub fn clip_in_place(points: &mut Poly, plane: &Plane, eps: f64) -> bool {
     true
 }
 
-/// The part in a box; `None` when no area is left. A polygon in a face of the box counts as in it.
+/// Returns the part in a box; `None` if no area is left. A polygon in a face of the box counts as inside.
 #[must_use]
 pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
     let b = Aabb::of_points(points);
@@ -118,7 +118,7 @@ pub fn clip_to_box(points: &[DVec3], bounds: &Aabb, eps: f64) -> Option<Poly> {
     Some(poly)
 }
 
-/// The section of a plane with a box, counter-clockwise seen from the positive side.
+/// Returns the section of a plane with a box, counter-clockwise seen from the positive side.
 #[must_use]
 pub fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
     for axis in 0..3 {
@@ -160,7 +160,7 @@ pub fn section_of_box(plane: &Plane, bounds: &Aabb, eps: f64) -> Option<Poly> {
     clip_to_box(&square, bounds, eps)
 }
 
-/// Twice the area times the unit normal (Newell's sum, about the first corner).
+/// Returns twice the area times the unit normal (Newell's sum about the first vertex).
 #[must_use]
 pub fn area_normal(points: &[DVec3]) -> DVec3 {
     let Some(&o) = points.first() else {
@@ -169,15 +169,15 @@ pub fn area_normal(points: &[DVec3]) -> DVec3 {
     points.windows(2).map(|e| (e[0] - o).cross(e[1] - o)).sum()
 }
 
-/// Area. [Units: wu²]
+/// Returns the area. [Units: wu²]
 #[must_use]
 pub fn area(points: &[DVec3]) -> f64 {
     area_normal(points).length() * 0.5
 }
 
-/// Least distance between two parallel lines that hold the polygon between them. [Units: wu]
+/// Returns the least distance between two parallel lines that enclose the polygon. [Units: wu]
 ///
-/// For a convex polygon one of the two lines holds an edge, so trying all edges finds it.
+/// For a convex polygon one of the lines contains an edge, so all edges are tried.
 #[must_use]
 pub fn width(points: &[DVec3]) -> f64 {
     let normal = area_normal(points).normalize_or_zero();
@@ -196,22 +196,22 @@ pub fn width(points: &[DVec3]) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
-/// Whether both the area and the [`width`] reach a limit; mostly without a search for the width.
+/// Returns `true` if both the area and the [`width`] reach a limit, mostly without computing the width.
 #[must_use]
 pub fn is_larger(points: &[DVec3], min_area: f64, min_width: f64) -> bool {
     let area = area(points);
     if area < min_area {
         return false;
     }
-    // What is narrow has little area for its length; a thousandth is for rounding.
+    // A narrow polygon has little area for its length; a thousandth is for rounding.
     let length = Aabb::of_points(points).size().length();
     area >= 1.001 * min_width * length || width(points) >= min_width
 }
 
-/// Cuts `poly` by a convex `cover` in the same plane, which turns counter-clockwise about
-/// `normal`: appends what lies outside to `outside` and returns what lies inside.
+/// Cuts `poly` by a convex `cover` in the same plane, counter-clockwise about `normal`: appends the parts
+/// outside to `outside` and returns the part inside.
 ///
-/// Where less than `min_width` lies inside, `poly` is kept whole as outside.
+/// If the part inside is narrower than `min_width`, appends the whole `poly` to `outside`.
 pub fn cut_out(
     poly: &[DVec3],
     cover: &[DVec3],
@@ -244,7 +244,7 @@ pub fn cut_out(
     if hit && (min_width <= 0.0 || width(&inside) >= min_width) {
         return Some(inside);
     }
-    // No overlap worth the name: keep the polygon in one piece instead of the shreds cut so far.
+    // No significant overlap: keep the polygon in one piece instead of the shreds cut so far.
     outside.truncate(before);
     outside.push(poly.into());
     None

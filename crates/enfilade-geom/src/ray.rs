@@ -1,26 +1,26 @@
-//! Rays against single triangles, and distances between points, segments and triangles.
+//! Intersection of rays with triangles, and distances between points, segments and triangles.
 //!
 //! The intersection is that of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection"
-//! (JCGT 2(1), 2013), in `f64`: corners are sheared so that the ray becomes the z axis, and the
-//! signs of the edge functions then depend on nothing but the sheared corners. Two products are
-//! rounded and subtracted, so a sign can come out as zero but never reversed, and zero counts as a
-//! hit: no ray passes between triangles that share their corners.
+//! (JCGT 2(1), 2013), in `f64`: vertices are sheared so that the ray becomes the z axis, and the signs of
+//! the edge functions then depend only on the sheared vertices. Two products are rounded and subtracted,
+//! so a sign can come out as zero but never reversed, and zero counts as a hit: no ray passes between
+//! triangles that share their vertices.
 
 use crate::{DVec3, Triangle};
 
 /// A ray, or a segment when `t_max` is finite: the points `origin + t · direction`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where `t = 0`. [Units: wu]
+    /// Point at `t = 0`. [Units: wu]
     pub origin: DVec3,
-    /// Any length but zero; `t` counts in it.
+    /// Direction of any length but zero, the unit of `t`.
     pub direction: DVec3,
-    /// Largest `t` that counts, itself included. May be infinite.
+    /// Largest valid `t`, inclusive. May be infinite.
     pub t_max: f64,
 }
 
 impl Ray {
-    /// The closed segment from `a` (`t = 0`) to `b` (`t = 1`).
+    /// Makes the closed segment from `a` (`t = 0`) to `b` (`t = 1`).
     #[must_use]
     pub fn segment(a: DVec3, b: DVec3) -> Self {
         Self {
@@ -30,25 +30,25 @@ impl Ray {
         }
     }
 
-    /// The point at `t`.
+    /// Returns the point at `t`.
     #[must_use]
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + self.direction * t
     }
 }
 
-/// Where a ray meets a triangle.
+/// Intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Position along the ray, in lengths of its direction.
     pub t: f64,
     /// Index of the triangle.
     pub triangle: u32,
-    /// Whether the ray meets the side from which the corners run counter-clockwise.
+    /// True if the ray meets the side from which the vertices run counter-clockwise.
     pub front: bool,
 }
 
-/// A ray made ready for many triangles: the axes and the shear of the watertight test.
+/// A ray prepared for many triangles: the axes and the shear of the watertight test.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShearedRay {
     origin: [f64; 3],
@@ -68,7 +68,7 @@ impl ShearedRay {
         };
         let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
         if d[kz] < 0.0 {
-            // Keeps the turning sense of triangles under the projection.
+            // Keeps the orientation of triangles under the projection.
             std::mem::swap(&mut kx, &mut ky);
         }
         let inverse = 1.0 / d[kz];
@@ -79,7 +79,7 @@ impl ShearedRay {
         }
     }
 
-    /// `t` and whether the front was met; `None` when missed, edge-on or not a number.
+    /// Returns `t`, and `true` for a hit on the front; `None` if missed, edge-on or NaN.
     #[inline]
     pub(crate) fn hit(&self, triangle: &[[f64; 3]; 3], t_max: f64) -> Option<(f64, bool)> {
         let [kx, ky, kz] = self.axes;
@@ -105,8 +105,8 @@ impl ShearedRay {
     }
 }
 
-/// Where `ray` meets one triangle; [`Hit::triangle`] is 0. Edges and corners count as hit, a
-/// triangle seen edge-on does not.
+/// Intersects `ray` with one triangle; [`Hit::triangle`] is 0. Edges and vertices count as hit, a triangle
+/// seen edge-on does not.
 #[must_use]
 pub fn hit_triangle(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
     let (t, front) = ShearedRay::new(ray).hit(&triangle.map(|p| p.to_array()), ray.t_max)?;
@@ -117,7 +117,7 @@ pub fn hit_triangle(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
     })
 }
 
-/// The point of the closed segment `a b` nearest to `p`.
+/// Returns the point of the closed segment `a b` nearest to `p`.
 #[must_use]
 pub fn closest_point_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     let ab = b - a;
@@ -128,10 +128,10 @@ pub fn closest_point_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     a + ab * ((p - a).dot(ab) / length_squared).clamp(0.0, 1.0)
 }
 
-/// The point of a closed triangle nearest to `p`, degenerate triangles included.
+/// Returns the point of a closed triangle nearest to `p`, degenerate triangles included.
 ///
-/// After Ericson, *Real-Time Collision Detection* (2005), section 5.1.5, restated: inside the
-/// triangle's prism it is the foot of the perpendicular, elsewhere the best of the three edges.
+/// After Ericson, *Real-Time Collision Detection* (2005), section 5.1.5, restated: inside the triangle's
+/// prism it is the foot of the perpendicular, elsewhere the nearest point of the three edges.
 #[must_use]
 pub fn closest_point_on_triangle(p: DVec3, t: &Triangle) -> DVec3 {
     let n = (t[1] - t[0]).cross(t[2] - t[0]);
@@ -151,17 +151,17 @@ pub fn closest_point_on_triangle(p: DVec3, t: &Triangle) -> DVec3 {
         .unwrap_or(t[0])
 }
 
-/// Squared distance between the closed segments `p q` and `a b`. [Units: wu²]
+/// Returns the squared distance between the closed segments `p q` and `a b`. [Units: wu²]
 ///
-/// The least of the four end-to-segment distances and, where both feet lie inside, that of the
-/// common perpendicular. Never less than the truth by more than rounding.
+/// The least of the four end-to-segment distances and, if both feet lie inside, that of the common
+/// perpendicular. Never less than the true value by more than rounding.
 #[must_use]
 pub fn segment_distance_squared(p: DVec3, q: DVec3, a: DVec3, b: DVec3) -> f64 {
     let (d, e, r) = (q - p, b - a, p - a);
     let n = d.cross(e);
     let n2 = n.length_squared();
-    // Sine squared of the angle: below this the cross product is rounding noise, and the ends
-    // answer for lines that close to parallel.
+    // Sine squared of the angle: below this the cross product is rounding noise, and for lines this
+    // close to parallel the ends suffice.
     if n2 > 1e-20 * d.length_squared() * e.length_squared() {
         let s = e.cross(r).dot(n) / n2;
         let t = d.cross(r).dot(n) / n2;
@@ -178,7 +178,7 @@ pub fn segment_distance_squared(p: DVec3, q: DVec3, a: DVec3, b: DVec3) -> f64 {
     ends.into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// Distance between the closed segment `p q` and the outline of a triangle. [Units: wu]
+/// Returns the distance between the closed segment `p q` and the outline of a triangle. [Units: wu]
 #[must_use]
 pub fn segment_to_edges_distance(p: DVec3, q: DVec3, t: &Triangle) -> f64 {
     (0..3)
@@ -187,19 +187,19 @@ pub fn segment_to_edges_distance(p: DVec3, q: DVec3, t: &Triangle) -> f64 {
         .sqrt()
 }
 
-/// Distance between the closed segment `p q` and a closed triangle; 0 where they meet. [Units: wu]
+/// Returns the distance between the closed segment `p q` and a closed triangle; 0 if they meet. [Units: wu]
 #[must_use]
 pub fn segment_to_triangle_distance(p: DVec3, q: DVec3, t: &Triangle) -> f64 {
     if hit_triangle(&Ray::segment(p, q), t).is_some() {
         return 0.0;
     }
-    // Apart, the nearest points are an edge and the segment, or an end and the face.
+    // If disjoint, the nearest points are on an edge and the segment, or an end and the face.
     segment_to_edges_distance(p, q, t)
         .min(closest_point_on_triangle(p, t).distance(p))
         .min(closest_point_on_triangle(q, t).distance(q))
 }
 
-/// Whether a triangle and a closed box touch; may say yes for one that misses by rounding.
+/// Returns `true` if a triangle and a closed box touch, and perhaps if they miss each other by rounding.
 ///
 /// Separating axes after Akenine-Möller, "Fast 3D Triangle-Box Overlap Testing" (2001).
 #[must_use]
@@ -210,7 +210,7 @@ pub fn triangle_touches_box(t: &Triangle, bounds: &crate::Aabb) -> bool {
     let center = bounds.center();
     let half = bounds.size() * 0.5;
     let v = t.map(|p| p - center);
-    // Rounding of a product of two differences of coordinates, with room to spare.
+    // Rounding of a product of two differences of coordinates, with a margin.
     let slack = 1e-14 * (center.abs() + half + v[0].abs() + v[1].abs() + v[2].abs()).max_element();
     let apart = |axis: DVec3| {
         let reach = half.dot(axis.abs()) + slack * axis.abs().element_sum();
@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn the_front_is_the_side_seen_counter_clockwise() {
         for axis in 0..3 {
-            // The same picture with the axes renamed in a cycle.
+            // The same configuration with the axes permuted cyclically.
             let turn = |p: DVec3| match axis {
                 0 => p,
                 1 => DVec3::new(p.z, p.x, p.y),
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_corners_and_edges_count_as_hit() {
+    fn ends_vertices_and_edges_count_as_hit() {
         let hit = |a: [f64; 3], b: [f64; 3]| {
             hit_triangle(&Ray::segment(a.into(), b.into()), &T).is_some()
         };
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_between_the_corners_of_a_slanted_triangle_is_apart_from_it() {
+    fn a_box_between_the_vertices_of_a_slanted_triangle_does_not_touch_it() {
         let t = [DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z * 2.0];
         let near = |m: f64| crate::Aabb::new(DVec3::ZERO, DVec3::splat(m));
         assert!(!triangle_touches_box(&t, &near(0.66)));

@@ -1,11 +1,11 @@
-//! A scene as it was read: meshes with materials, placed as objects, each structural or detail.
+//! The input scene: meshes with materials, placed as objects, each structural or detail.
 //!
-//! Importers fill it, the builders read its structural triangles, and the writer carries its
-//! materials and textures through to the output unchanged.
+//! Importers fill it, builders read its structural triangles, and the writer carries its materials and
+//! textures through to the output unchanged.
 
 use crate::{Aabb, ConvexSolid, DMat4, DVec3, Triangle};
 
-/// Everything that an input file, or several of them, held.
+/// The contents of one or more input files.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Meshes in their own space; several objects may place the same one.
@@ -16,84 +16,83 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Textures that materials refer to, by glTF's `textures` index.
     pub textures: Vec<Texture>,
-    /// Pictures that textures refer to.
+    /// Images that textures refer to.
     pub images: Vec<Image>,
-    /// The convex solids that structural objects are made of, where the input says so (brushes), in
-    /// world space.
+    /// Convex solids of structural objects in world space, if the input is made of them (brushes).
     pub solids: Vec<ConvexSolid>,
-    /// Named things that are no meshes, as the input had them.
+    /// Named things without a mesh, as in the input.
     pub entities: Vec<Entity>,
-    /// The input's own tree of names. A node comes after the one above it.
+    /// The input's tree of names. Each node comes after its parent.
     pub nodes: Vec<SourceNode>,
-    /// Lights, cameras and marked places, as the input had them.
+    /// Lights, cameras and markers, as in the input.
     pub fixtures: Vec<Fixture>,
-    /// What the input says of itself as a whole.
+    /// The input's metadata as a whole.
     pub about: About,
 }
 
-/// What an input says of itself as a whole.
+/// Metadata of an input as a whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct About {
-    /// Whose work it is and under which terms, one line a file; may be empty.
+    /// Authors and license, one line per file; may be empty.
     pub copyright: String,
-    /// What the scene's root carries for applications: a JSON value as text, or empty.
+    /// Application data of the scene's root: a JSON value as text, or empty.
     pub extras: String,
 }
 
-/// A node of the input's own tree: what it calls a thing, and what it says of it.
+/// A node of the input's tree: a name, and application data.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SourceNode {
-    /// Name, may be empty; names need not be unique.
+    /// Name; may be empty or repeated.
     pub name: String,
-    /// The node above. Index into the same list, less than the node's own.
+    /// Parent, as an index into the same list, less than the node's own.
     pub parent: Option<u32>,
-    /// What the input attaches for applications: a JSON value as text, or empty.
+    /// Application data: a JSON value as text, or empty.
     pub extras: String,
 }
 
-/// A light, a camera or a marked place, carried through as it was read.
+/// A light, a camera or a marker, carried through as read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fixture {
-    /// What it is.
+    /// Its kind.
     pub kind: FixtureKind,
-    /// Name of the node that places it, may be empty.
+    /// Name of the node that places it; may be empty.
     pub name: String,
-    /// Its own space, which looks along -z, to world space: a rotation and a translation. [Units: wu]
+    /// Transform to world space from its own, which looks along -z: a rotation and a translation. [Units: wu]
     pub transform: DMat4,
     /// The light (`KHR_lights_punctual`) or camera as a glTF 2.0 JSON object, lengths in meters; empty for a marker.
     pub gltf: String,
-    /// What the input attaches for applications: a JSON value as text, or empty.
+    /// Application data: a JSON value as text, or empty.
     pub extras: String,
 }
 
-/// What a [`Fixture`] is.
+/// Kind of a [`Fixture`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FixtureKind {
     /// A point, spot or directional light.
     Light,
     /// A perspective or orthographic camera.
     Camera,
-    /// A place that the input names and puts nothing at: a start, a spawn point, an anchor.
+    /// A named place without an object: a start, a spawn point, an anchor.
     Marker,
 }
 
-/// Something that an input names and places without giving it a shape here: a light, a start.
+/// A named and placed thing of the input without a shape of its own here: a light, a start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Entity {
-    /// What it is, e.g. `info_player_start`.
+    /// Its class, e.g. `info_player_start`.
     pub class: String,
-    /// Where it is, if it says so. [Units: wu]
+    /// Its position, if given. [Units: wu]
     pub position: Option<DVec3>,
-    /// Everything it says, in its order, as text.
+    /// All its properties in order, as text.
     pub properties: Vec<(String, String)>,
-    /// The object made of its shapes. Index into [`Scene::objects`].
+    /// The object made of its shapes, as an index into [`Scene::objects`].
     pub object: Option<u32>,
 }
 
 /// A mesh in its own space.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// Name, may be empty.
+    /// Name; may be empty.
     pub name: String,
     /// Parts by material.
     pub primitives: Vec<Primitive>,
@@ -102,15 +101,15 @@ pub struct Mesh {
 /// Triangles of one material.
 #[derive(Clone, Debug, Default)]
 pub struct Primitive {
-    /// Corner positions. [Units: wu]
+    /// Vertex positions. [Units: wu]
     pub positions: Vec<[f32; 3]>,
-    /// Unit normals, one a position, or empty.
+    /// Unit normals, one per position, or empty.
     pub normals: Vec<[f32; 3]>,
-    /// Tangents as in glTF, one a position, or empty.
+    /// Tangents as in glTF, one per position, or empty.
     pub tangents: Vec<[f32; 4]>,
-    /// Texture coordinate sets, each with one entry a position.
+    /// Sets of texture coordinates, each with one entry per position.
     pub uvs: Vec<Vec<[f32; 2]>>,
-    /// Linear RGBA vertex colors, one a position, or empty.
+    /// Linear RGBA vertex colors, one per position, or empty.
     pub colors: Vec<[f32; 4]>,
     /// Triangles as triples of position indices, each in range.
     pub indices: Vec<u32>,
@@ -121,21 +120,21 @@ pub struct Primitive {
 /// A placed mesh.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// Name, unique names not required.
+    /// Name; may be repeated.
     pub name: String,
     /// Index into [`Scene::meshes`].
     pub mesh: u32,
     /// Mesh space to world space (meters, +Y up).
     pub transform: DMat4,
-    /// What the object is to the decomposition.
+    /// Its role in the decomposition.
     pub role: Role,
-    /// Why it has that role, as shown to the user.
+    /// Reason for the role, as shown to the user.
     pub reason: String,
-    /// What the input says it is. Index into [`Scene::nodes`]; several objects may come from one node.
+    /// The input node that it comes from, as an index into [`Scene::nodes`]; several objects may share one.
     pub node: Option<u32>,
 }
 
-/// What an object is to the decomposition.
+/// Role of an object in the decomposition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Role {
     /// Bounds rooms: walls, floors, roofs.
@@ -144,10 +143,10 @@ pub enum Role {
     Detail,
 }
 
-/// A surface's look. Carried through as it was read.
+/// The appearance of a surface, carried through as read.
 #[derive(Clone, Debug, Default)]
 pub struct Material {
-    /// Name, may be empty.
+    /// Name; may be empty.
     pub name: String,
     /// The material as a glTF 2.0 JSON object, texture indices referring to [`Scene::textures`].
     pub gltf: String,
@@ -159,7 +158,7 @@ pub struct Material {
     pub base_color: [f32; 4],
 }
 
-/// A texture: a picture and how to sample it.
+/// A texture: an image and a sampler.
 #[derive(Clone, Debug, Default)]
 pub struct Texture {
     /// Index into [`Scene::images`].
@@ -168,10 +167,10 @@ pub struct Texture {
     pub sampler: String,
 }
 
-/// A picture as encoded bytes.
+/// An image as encoded bytes.
 #[derive(Clone, Debug, Default)]
 pub struct Image {
-    /// Name, may be empty.
+    /// Name; may be empty.
     pub name: String,
     /// MIME type, e.g. `image/png`.
     pub mime: String,
@@ -179,7 +178,7 @@ pub struct Image {
     pub bytes: Vec<u8>,
 }
 
-/// Where a triangle came from.
+/// Origin of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TriangleSource {
     /// Index into [`Scene::objects`].
@@ -191,10 +190,9 @@ pub struct TriangleSource {
 }
 
 impl Scene {
-    /// Corners of one triangle in world space, rounded to the `f32` that files hold.
+    /// Returns the vertices of a triangle in world space, rounded to the `f32` that files hold.
     ///
-    /// Builder, file and checks must all mean the same triangle, so that rounding is done here,
-    /// once, and never again.
+    /// Builder, file and checks must all use the same triangle, so this is the only place that rounds it.
     #[must_use]
     pub fn world_triangle(&self, source: TriangleSource) -> Triangle {
         let object = &self.objects[source.object as usize];
@@ -211,7 +209,7 @@ impl Scene {
         })
     }
 
-    /// All triangles of objects with `role`, in order of object, primitive and triangle.
+    /// Returns all triangles of objects with `role`, in order of object, primitive and triangle.
     pub fn triangle_sources(&self, role: Role) -> impl Iterator<Item = TriangleSource> + '_ {
         self.objects
             .iter()
@@ -232,7 +230,7 @@ impl Scene {
             })
     }
 
-    /// World box of one object.
+    /// Returns the box of one object in world space.
     #[must_use]
     pub fn object_aabb(&self, object: usize) -> Aabb {
         let o = &self.objects[object];

@@ -1,64 +1,64 @@
 //! Disjoint sets.
 
-/// Disjoint sets of the numbers `0..n`, which are joined two at a time (union-find).
+/// Disjoint sets of the numbers `0..n`, joined two at a time (union-find).
 ///
-/// The least member of a set stands for it, so that results depend on what was joined, not on the order in which.
+/// The least member of a set represents it, so that results do not depend on the order of joins.
 ///
-/// Paths are halved on the way and sets are joined without ranks: `O(log n)` a call, amortized; Tarjan & van
-/// Leeuwen, "Worst-case analysis of set union algorithms" (1984).
+/// Uses path halving without ranks: `O(log n)` per call, amortized; Tarjan & van Leeuwen, "Worst-case analysis of set union
+/// algorithms" (1984).
 #[derive(Clone, Debug)]
 pub struct Sets(Vec<u32>);
 
 impl Sets {
-    /// `n` sets of one member each.
+    /// Makes `n` sets of one member each.
     ///
     /// # Panics
     ///
-    /// If `n` is more than `u32` counts.
+    /// If `n` exceeds `u32`.
     #[must_use]
     pub fn new(n: usize) -> Self {
-        let n = u32::try_from(n).expect("more members than 32 bits number");
+        let n = u32::try_from(n).expect("more than 2^32 members");
         Self((0..n).collect())
     }
 
-    /// Number of members of all sets.
+    /// Returns the number of members of all sets.
     #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is no member.
+    /// Returns `true` if there are no members.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Adds a set of one more member; gives its number, which follows those of all others.
+    /// Adds a set of one new member; returns its number, which follows all others.
     ///
     /// # Panics
     ///
-    /// If there are as many members as `u32` counts.
+    /// If the number of members exceeds `u32`.
     pub fn add(&mut self) -> u32 {
-        let x = u32::try_from(self.0.len()).expect("more members than 32 bits number");
+        let x = u32::try_from(self.0.len()).expect("more than 2^32 members");
         self.0.push(x);
         x
     }
 
-    /// For each member the least of its set, in one pass.
+    /// Returns the least member of each member's set, in one pass.
     #[must_use]
     pub fn into_least(mut self) -> Vec<u32> {
-        // None points to a greater member, so all before are done.
+        // No member points to a greater one, so all before are done.
         for x in 0..self.0.len() {
             self.0[x] = self.0[self.0[x] as usize];
         }
         self.0
     }
 
-    /// The least member of the set of `x`.
+    /// Returns the least member of the set of `x`.
     ///
     /// # Panics
     ///
-    /// If `x` is no member.
+    /// If `x` is not a member.
     #[inline]
     pub fn find(&mut self, mut x: u32) -> u32 {
         while self.0[x as usize] != x {
@@ -68,11 +68,11 @@ impl Sets {
         x
     }
 
-    /// Joins the sets of `a` and `b`; gives the least member of what they are now.
+    /// Joins the sets of `a` and `b`; returns the least member of the union.
     ///
     /// # Panics
     ///
-    /// If one of the two is no member.
+    /// If one of the two is not a member.
     #[inline]
     pub fn join(&mut self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.find(a), self.find(b));
@@ -89,10 +89,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn members_are_together_as_labels_written_over_say(
+        fn sets_equal_those_of_relabeling(
             n in 1_usize..40, joins in prop::collection::vec((0_u32..40, 0_u32..40), 0..60),
         ) {
-            // The last member comes later than the rest.
+            // The last member is added later than the rest.
             let mut sets = Sets::new(n - 1);
             prop_assert_eq!(sets.add() as usize, n - 1);
             let mut label: Vec<u32> = (0..n as u32).collect();

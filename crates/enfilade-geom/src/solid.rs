@@ -1,39 +1,38 @@
-//! Convex solids: the intersection of half-spaces, as brushes are.
+//! Convex solids: intersections of half-spaces, such as brushes.
 
 use crate::{Aabb, DMat3, DVec3, Plane, Winding};
 
 /// A bounded convex solid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexSolid {
-    /// Its faces' planes, facing outwards; planes that bound no face are left out.
+    /// Planes of its faces, facing outwards; planes that bound no face are left out.
     pub planes: Vec<Plane>,
-    /// A face a plane, counter-clockwise seen from outside; corners are shared exactly.
+    /// One face per plane, counter-clockwise seen from outside; vertices are shared exactly.
     pub faces: Vec<Winding>,
-    /// For each face the index of its plane among those given.
+    /// Per face, the index of its plane among those given.
     pub sources: Vec<u32>,
 }
 
-/// Why planes bound no solid.
+/// Reason why planes bound no solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolidError {
-    /// Nothing is behind all planes: the solid is empty, flat, or its planes face inwards.
+    /// No point is behind all planes: the solid is empty, flat, or its planes face inwards.
     Empty,
-    /// It reaches to infinity: a side is missing.
+    /// The solid is unbounded: a side is missing.
     Unbounded,
 }
 
 impl ConvexSolid {
-    /// The solid behind all of `planes`.
+    /// Makes the solid behind all of `planes`.
     ///
-    /// Faces are found by clipping, then each corner is solved anew from the three planes that meet
-    /// there and is one point for all faces around it, so that the surface is closed to the last bit.
-    /// Corners closer than `eps` are one. `reach` is the largest coordinate that counts as bounded.
-    /// Time `O(n²)` for `n` planes.
+    /// Finds faces by clipping, then solves each vertex anew from the three planes that meet there and uses
+    /// that one point in all faces around it, so that the surface is closed to the last bit. Merges vertices
+    /// closer than `eps`. `reach` is the largest coordinate of a bounded solid. `O(n²)` for `n` planes.
     ///
     /// # Errors
-    /// When the planes bound nothing, or leave a way to infinity.
+    /// If the planes bound nothing, or leave the solid unbounded.
     pub fn from_planes(planes: &[Plane], reach: f64, eps: f64) -> Result<Self, SolidError> {
-        /// Corners of a face with the plane that made each of its edges.
+        /// Vertices of a face, each with the plane that made its edge.
         type Edged = Vec<(DVec3, u32)>;
         let mut corners: Vec<DVec3> = Vec::new();
         let mut solid = Self {
@@ -42,7 +41,7 @@ impl ConvexSolid {
             sources: Vec::new(),
         };
         for (i, plane) in planes.iter().enumerate() {
-            // The same plane twice bounds the same face once.
+            // A repeated plane bounds the same face once.
             let is_same =
                 |o: &Plane| plane.normal.dot(o.normal) > 1.0 - 1e-12 && (plane.d - o.d).abs() < eps;
             if planes[..i].iter().any(is_same) {
@@ -69,7 +68,7 @@ impl ConvexSolid {
                 .iter()
                 .any(|(p, edge)| *edge == u32::MAX || p.abs().max_element() > reach)
             {
-                // A corner of the square that was begun with is left.
+                // A vertex of the initial square is left.
                 if !area_is_flat(&face, eps) {
                     return Err(SolidError::Unbounded);
                 }
@@ -78,7 +77,7 @@ impl ConvexSolid {
             let n = face.len();
             let mut points: Vec<DVec3> = Vec::with_capacity(n);
             for k in 0..n {
-                // The edge before a corner ends there, its own begins there.
+                // At each vertex, the edge before ends and its own begins.
                 let edges = [face[(k + n - 1) % n].1, face[k].1];
                 let solved = meet(
                     plane,
@@ -114,7 +113,7 @@ impl ConvexSolid {
         Ok(solid)
     }
 
-    /// The smallest box around it.
+    /// Returns the smallest box around it.
     #[must_use]
     pub fn aabb(&self) -> Aabb {
         self.faces
@@ -122,7 +121,7 @@ impl ConvexSolid {
             .fold(Aabb::EMPTY, |b, f| b.union(f.aabb()))
     }
 
-    /// Volume. [Units: wu³]
+    /// Returns the volume. [Units: wu³]
     #[must_use]
     pub fn volume(&self) -> f64 {
         let Some(&o) = self.faces.first().and_then(|f| f.points.first()) else {
@@ -134,7 +133,7 @@ impl ConvexSolid {
             .sum()
     }
 
-    /// Whether `p` is farther than `eps` inside.
+    /// Returns `true` if `p` is more than `eps` inside.
     #[must_use]
     pub fn contains(&self, p: DVec3, eps: f64) -> bool {
         self.planes
@@ -142,7 +141,7 @@ impl ConvexSolid {
             .all(|plane| plane.signed_distance(p) < -eps)
     }
 
-    /// The solid scaled by `scale` (above 0), turned by `rotation`, and moved by `offset` after that.
+    /// Returns the solid scaled by `scale` (above 0), then rotated by `rotation`, then moved by `offset`.
     #[must_use]
     pub fn placed(&self, scale: f64, rotation: &DMat3, offset: DVec3) -> Self {
         let moved = |p: &DVec3| *rotation * *p * scale + offset;
@@ -167,11 +166,11 @@ impl ConvexSolid {
         }
     }
 
-    /// Takes what lies inside out of `polygon`, a part of the plane of normal `normal`; the rest is
-    /// appended to `outside`.
+    /// Subtracts the solid from `polygon`, a part of the plane with normal `normal`; appends the rest to
+    /// `outside`.
     ///
-    /// What lies in a face that looks the other way counts as inside; what lies in a face that looks
-    /// the same way counts as inside if `takes_shared`.
+    /// A part in a face that faces the other way counts as inside; a part in a face that faces the same way
+    /// counts as inside if `takes_shared`.
     pub fn cut_from(
         &self,
         polygon: Winding,
@@ -180,7 +179,7 @@ impl ConvexSolid {
         eps: f64,
         outside: &mut Vec<Winding>,
     ) {
-        // First whether any of it is inside, lest it falls apart for nothing.
+        // First test that any of it is inside, to avoid needless cuts.
         let mut inside = Some(polygon.clone());
         for plane in &self.planes {
             let Some(rest) = inside else { break };
@@ -218,7 +217,7 @@ fn area_is_flat(face: &[(DVec3, u32)], eps: f64) -> bool {
     w.area() < eps * eps
 }
 
-/// The part behind `plane`; its new edge is marked `mark`.
+/// Returns the part behind `plane`; marks its new edge with `mark`.
 fn clip_behind(face: &[(DVec3, u32)], plane: &Plane, mark: u32, eps: f64) -> Vec<(DVec3, u32)> {
     let n = face.len();
     let dist: Vec<f64> = face.iter().map(|f| plane.signed_distance(f.0)).collect();
@@ -234,7 +233,7 @@ fn clip_behind(face: &[(DVec3, u32)], plane: &Plane, mark: u32, eps: f64) -> Vec
         let ((p, edge), q) = (face[i], face[j].0);
         let (dp, dq) = (dist[i], dist[j]);
         if dp <= eps {
-            // From a corner in the plane the new edge begins if the old one leaves to the front.
+            // At a vertex in the plane, the new edge begins if the old one leaves to the front.
             out.push((p, if dp >= -eps && dq > eps { mark } else { edge }));
         }
         if dp < -eps && dq > eps {
@@ -246,7 +245,7 @@ fn clip_behind(face: &[(DVec3, u32)], plane: &Plane, mark: u32, eps: f64) -> Vec
     out
 }
 
-/// The point that three planes share.
+/// Returns the common point of three planes.
 fn meet(a: &Plane, b: &Plane, c: &Plane) -> Option<DVec3> {
     let bc = b.normal.cross(c.normal);
     let det = a.normal.dot(bc);
@@ -257,10 +256,10 @@ fn meet(a: &Plane, b: &Plane, c: &Plane) -> Option<DVec3> {
     Some(sum / det)
 }
 
-/// For each face of each solid, the parts of it that no other solid hides, in order.
+/// Returns, per solid and face in order, the parts that no other solid hides.
 ///
-/// Where two faces coincide and look the same way, the later solid's stays. Time about linear in
-/// solids that each meet few others.
+/// If two faces coincide and face the same way, the later solid's stays. Time about linear in the solids
+/// if each meets few others.
 #[must_use]
 pub fn exposed_faces(solids: &[&ConvexSolid], eps: f64) -> Vec<Vec<Vec<Winding>>> {
     let boxes: Vec<Aabb> = solids.iter().map(|s| s.aabb()).collect();
@@ -311,17 +310,17 @@ pub fn exposed_faces(solids: &[&ConvexSolid], eps: f64) -> Vec<Vec<Vec<Winding>>
         .collect()
 }
 
-/// Boxes in a balanced tree, for "which of them meet this one".
+/// Boxes in a balanced tree, for overlap queries.
 #[derive(Clone, Debug, Default)]
 pub struct BoxTree {
-    /// In preorder; each with the node after its subtree and, for leaves, the box's index.
+    /// In preorder; each with the index of the node after its subtree and, for leaves, the box's index.
     nodes: Vec<(Aabb, u32, u32)>,
 }
 
 const INNER: u32 = u32::MAX;
 
 impl BoxTree {
-    /// Builds the tree in `O(n log n)`.
+    /// Builds the tree. `O(n log n)`.
     #[must_use]
     pub fn new(boxes: &[Aabb]) -> Self {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -363,7 +362,7 @@ impl BoxTree {
         }
     }
 
-    /// Calls `take` with every box that overlaps `bounds`, borders included.
+    /// Calls `take` for each box that overlaps `bounds`, borders included.
     pub fn for_each_in_box(&self, bounds: &Aabb, mut take: impl FnMut(u32)) {
         let mut at = 0;
         while at < self.nodes.len() {
@@ -411,7 +410,7 @@ mod tests {
         for (f, p) in b.faces.iter().zip(&b.planes) {
             assert!(f.area_normal().dot(p.normal) > 0.0);
         }
-        // Eight corners, not twenty-four: shared to the last bit.
+        // Eight vertices, not twenty-four: shared to the last bit.
         let mut corners: Vec<[u64; 3]> = b
             .faces
             .iter()
@@ -424,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn planes_that_bound_nothing_are_told() {
+    fn planes_that_bound_nothing_are_errors() {
         let b = boxed([0.0; 3], [1.0; 3]);
         let from = |planes: &[Plane]| ConvexSolid::from_planes(planes, 1e4, 1e-4).unwrap_err();
         assert_eq!(from(&b.planes[..5]), SolidError::Unbounded);

@@ -1,33 +1,33 @@
-//! How near counts as touching, where corners are `f32` numbers.
+//! Tolerances for contact between geometry with `f32` vertices.
 //!
-//! Half a unit in the last place of an `f32` is `6e-8` of the number, and a plane through three such corners strays a
-//! few times that over its own polygon's neighborhood. Builders, the run-time and the checker take the same share of
-//! the scene's extent, so that none of them calls open what another calls closed.
+//! Half a unit in the last place of an `f32` is `6e-8` of the number, and a plane through three such vertices deviates by a
+//! few times that in the neighborhood of its polygon. Builders, the run-time and the checker use the same fraction of the
+//! scene's extent, so that none calls open what another calls closed.
 
 use crate::Aabb;
 
-/// How far planes and corners stray, as a share of the largest coordinate.
+/// Deviation of planes and vertices, as a fraction of the largest coordinate.
 const SHARE: f64 = 4e-7;
 
-/// Corners this near to a plane lie in it, for coordinates up to `extent` from the origin. [Units: wu]
+/// Returns the distance within which a vertex lies in a plane, for coordinates up to `extent` from the origin. [Units: wu]
 ///
-/// Not less than 2 µm, which is far below any opening that matters.
+/// At least 2 µm, far below any relevant opening.
 #[must_use]
 pub fn plane_tolerance(extent: f64) -> f64 {
     (SHARE * extent).max(2e-6)
 }
 
-/// How far a builder may move planes and a file may round corners, of a world with coordinates up to `extent` from the
-/// origin: what lies nearer to a wall or a portal's outline is judged neither way. [Units: wu]
+/// Returns the largest shift of planes by a builder and of vertices by a file, in a world with coordinates up to `extent`
+/// from the origin: checks do not judge anything nearer than that to a wall or a portal's outline. [Units: wu]
 ///
-/// Not less than 20 µm, whichever builder made the world.
+/// At least 20 µm, for any builder.
 #[must_use]
 pub fn world_tolerance(extent: f64) -> f64 {
     (SHARE * extent).max(2e-5)
 }
 
 impl Aabb {
-    /// The largest coordinate of it, as an absolute number; 0 when empty. [Units: wu]
+    /// Returns its largest absolute coordinate; 0 if empty. [Units: wu]
     #[must_use]
     pub fn extent(&self) -> f64 {
         if self.is_empty() {

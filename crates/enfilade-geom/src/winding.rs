@@ -6,18 +6,18 @@ use crate::{Aabb, DVec3, Plane};
 /// A convex planar polygon, counter-clockwise seen from its plane's positive side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Winding {
-    /// Corners in order; at least three in a polygon with area.
+    /// Vertices in order; at least three in a polygon with area.
     pub points: Vec<DVec3>,
 }
 
 impl Winding {
-    /// The polygon with these corners.
+    /// Makes the polygon with these vertices.
     #[must_use]
     pub fn new(points: Vec<DVec3>) -> Self {
         Self { points }
     }
 
-    /// A square of half-width `reach` around the point of `plane` nearest to `center`.
+    /// Makes a square of half-width `reach` around the point of `plane` nearest to `center`.
     #[must_use]
     pub fn square(plane: &Plane, center: DVec3, reach: f64) -> Self {
         let (u, v) = plane.basis();
@@ -30,7 +30,7 @@ impl Winding {
         ])
     }
 
-    /// The cross-section of `plane` with a box; `None` where they do not meet in an area.
+    /// Returns the section of `plane` with a box; `None` if they have no area in common.
     #[must_use]
     pub fn section_of_box(plane: &Plane, bounds: &Aabb) -> Option<Self> {
         let center = bounds.center();
@@ -42,19 +42,19 @@ impl Winding {
         Some(w)
     }
 
-    /// Twice the area times the unit normal (Newell's sum, about the first corner).
+    /// Returns twice the area times the unit normal (Newell's sum about the first vertex).
     #[must_use]
     pub fn area_normal(&self) -> DVec3 {
         poly::area_normal(&self.points)
     }
 
-    /// Area. [Units: wu²]
+    /// Returns the area. [Units: wu²]
     #[must_use]
     pub fn area(&self) -> f64 {
         poly::area(&self.points)
     }
 
-    /// Centroid of the area; the mean of the corners when there is none.
+    /// Returns the centroid of the area; the mean of the vertices if there is none.
     #[must_use]
     pub fn centroid(&self) -> DVec3 {
         let Some(&o) = self.points.first() else {
@@ -74,36 +74,36 @@ impl Winding {
         }
     }
 
-    /// Mean of the corners.
+    /// Returns the mean of the vertices.
     #[must_use]
     pub fn mean(&self) -> DVec3 {
         self.points.iter().sum::<DVec3>() / self.points.len().max(1) as f64
     }
 
-    /// The same polygon seen from the other side.
+    /// Returns the polygon seen from the other side.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self::new(self.points.iter().rev().copied().collect())
     }
 
-    /// The smallest box around it.
+    /// Returns the smallest box around it.
     #[must_use]
     pub fn aabb(&self) -> Aabb {
         Aabb::of_points(&self.points)
     }
 
-    /// The part on the positive side of `plane`; corners within `eps` of it count as on it.
+    /// Returns the part on the positive side of `plane`; vertices within `eps` of it count as on it.
     ///
-    /// `None` when nothing but an edge or a corner is left.
+    /// `None` if only an edge or a vertex is left.
     #[must_use]
     pub fn clipped(&self, plane: &Plane, eps: f64) -> Option<Self> {
         self.split(plane, eps).0
     }
 
-    /// The parts on the positive and on the negative side of `plane`.
+    /// Returns the parts on the positive and on the negative side of `plane`.
     ///
-    /// Corners within `eps` of the plane belong to both parts unmoved; a polygon that lies in the
-    /// plane altogether is given to neither side.
+    /// Vertices within `eps` of the plane belong to both parts unmoved; a polygon in the plane belongs to
+    /// neither.
     #[must_use]
     pub fn split(&self, plane: &Plane, eps: f64) -> (Option<Self>, Option<Self>) {
         let whole = || Some(self.clone());
@@ -116,7 +116,7 @@ impl Winding {
         }
     }
 
-    /// Whether `p`, a point of the polygon's plane, lies in it, edges included, with `eps` to spare.
+    /// Returns `true` if `p`, a point of the polygon's plane, lies in it or within `eps` of it.
     #[must_use]
     pub fn contains_in_plane(&self, p: DVec3, eps: f64) -> bool {
         let normal = self.area_normal().normalize_or_zero();
@@ -131,7 +131,7 @@ impl Winding {
         })
     }
 
-    /// Convex hull of points of `plane`, in its order. Collinear points are dropped.
+    /// Returns the convex hull of points of `plane`, counter-clockwise. Drops collinear points.
     #[must_use]
     pub fn hull_in_plane(plane: &Plane, points: &[DVec3]) -> Self {
         let (u, v) = plane.basis();

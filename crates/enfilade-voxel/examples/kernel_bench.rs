@@ -5,8 +5,8 @@
 //! kernel_bench KERNEL INPUT NX NY NZ [--repeats N] [--threads N] [--h H] [--out FILE]
 //! ```
 //!
-//! For most kernels INPUT holds a byte a voxel, x fastest, 0 for occupied. For `voxelize` it holds
-//! the nine little-endian `f64` of each triangle, in voxel coordinates.
+//! For most kernels INPUT holds one byte per voxel, x fastest, 0 for occupied. For `voxelize` it holds
+//! nine little-endian `f64` per triangle, in voxel coordinates.
 #![expect(clippy::print_stdout, reason = "a command-line tool")]
 
 use std::time::Instant;
@@ -26,13 +26,13 @@ fn cpu_seconds() -> (f64, f64) {
     (seconds(usage.user_time()), seconds(usage.system_time()))
 }
 
-/// Not known here.
+/// Not available on this platform.
 #[cfg(not(unix))]
 fn cpu_seconds() -> (f64, f64) {
     (f64::NAN, f64::NAN)
 }
 
-/// A figure of `/proc/self/status`. [Units: MiB] 0 where there is no such file.
+/// A value from `/proc/self/status`; 0 if there is no such file. [Units: MiB]
 fn memory(field: &str) -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find(|l| l.starts_with(field));
@@ -49,7 +49,7 @@ struct Times {
     peak: f64,
 }
 
-/// Runs `call` on fresh input `repeats` times; keeps the last answer.
+/// Runs `call` on fresh input `repeats` times; returns the last answer.
 fn measure<I, O>(repeats: usize, input: impl Fn() -> I, call: impl Fn(I) -> O) -> (Times, O) {
     let mut times = Times {
         user: vec![],
@@ -61,7 +61,7 @@ fn measure<I, O>(repeats: usize, input: impl Fn() -> I, call: impl Fn(I) -> O) -
     for _ in 0..repeats {
         drop(answer.take());
         let given = input();
-        // Linux starts the high-water mark afresh; elsewhere the figure is too high.
+        // Linux resets the high-water mark; elsewhere the value is too high.
         _ = std::fs::write("/proc/self/clear_refs", "5");
         let resident = memory("VmRSS");
         let (user, system) = cpu_seconds();
@@ -120,7 +120,7 @@ fn main() {
     );
 }
 
-/// A kernel and what it is run on.
+/// A kernel and its input.
 struct Run<'a> {
     kernel: &'a str,
     dims: [usize; 3],
@@ -131,7 +131,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Runs it: times, figures of the answer as JSON, and the answer's bytes where they are written.
+    /// Runs it; returns the times, figures of the answer as JSON, and the answer's bytes for output.
     fn kernel(&self) -> (Times, String, Vec<u8>) {
         let dims = self.dims;
         let occupied = || BitVolume::from_fn(dims, |i| self.bytes[i] == 0);
@@ -209,7 +209,7 @@ impl Run<'_> {
                 )
             }
             "voxelize" => self.voxelize(),
-            other => panic!("no kernel `{other}`"),
+            other => panic!("unknown kernel `{other}`"),
         };
         (times, result, out)
     }

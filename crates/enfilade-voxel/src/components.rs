@@ -1,30 +1,30 @@
 //! Connected components of set voxels, and flooding from seeds.
 //!
-//! Runs of set voxels along x are the nodes; a union-find joins each with the runs it touches in
-//! the rows before it (He, Chao and Suzuki, "A Run-Based Two-Scan Labeling Algorithm", 2008, in
-//! three dimensions). The least run of a component is its root, so labels come out in scan order.
+//! Runs of set voxels along x are the nodes; a union-find joins each with the runs that it touches in
+//! the rows before it (He, Chao and Suzuki, "A Run-Based Two-Scan Labeling Algorithm", 2008, in three
+//! dimensions). The least run of a component is its root, so labels come out in scan order.
 
 use enfilade_geom::Sets;
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, for_runs, set_bits};
 
-/// Which voxels touch.
+/// Adjacency of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Connectivity {
-    /// Those that share a face.
+    /// Voxels that share a face.
     Faces6,
-    /// Those that share a face, an edge or a corner.
+    /// Voxels that share a face, an edge or a vertex.
     Corners26,
 }
 
 /// Connected components as dense labels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Components {
-    /// Label of each voxel: 0 where clear, else `1..=n_components`, numbered by each component's
-    /// first voxel in index order.
+    /// Label of each voxel: 0 if clear, otherwise `1..=n_components`, numbered by each component's first
+    /// voxel in index order.
     pub labels: Vec<u32>,
-    /// How many there are.
+    /// Number of components.
     pub n_components: u32,
 }
 
@@ -43,12 +43,13 @@ struct Runs {
     root: Vec<u32>,
 }
 
-/// Labels the connected components of the voxels set.
+/// Labels the connected components of the set voxels.
 ///
-/// Time is linear in voxels (for the labels) plus runs. Takes 4 bytes a voxel for the labels, 12
-/// bytes a run and 4 bytes a row.
+/// Linear in voxels (for the labels) plus runs. Takes 4 bytes per voxel for the labels, 12 bytes per run
+/// and 4 bytes per row.
 ///
 /// # Panics
+/// If there are 2³² runs or more.
 /// When there are 2³² runs or more.
 #[must_use]
 pub fn components(set: &BitVolume, connectivity: Connectivity) -> Components {
@@ -71,7 +72,7 @@ pub fn components(set: &BitVolume, connectivity: Connectivity) -> Components {
             n_components += 1;
             n_components
         } else {
-            // The root is a lesser run and has its label by now.
+            // The root is a lesser run, so it already has its label.
             root[root[run] as usize]
         };
     }
@@ -90,12 +91,13 @@ pub fn components(set: &BitVolume, connectivity: Connectivity) -> Components {
     }
 }
 
-/// The voxels of `set` that a path of set voxels joins to one in `seeds`.
+/// Returns the voxels of `set` connected by a path of set voxels to one in `seeds`.
 ///
-/// Seeds that are not set flood nothing. Time is linear in runs and rows; takes one bit a voxel
-/// for the answer and the scratch of [`components`].
+/// Ignores seeds that are not set. Linear in runs and rows; takes one bit per voxel for the answer and the
+/// scratch memory of [`components`].
 ///
 /// # Panics
+/// If the boxes differ in size, or there are 2³² runs or more.
 /// When the boxes differ in size, or there are 2³² runs or more.
 #[must_use]
 pub fn flood(set: &BitVolume, seeds: &BitVolume, connectivity: Connectivity) -> BitVolume {
@@ -185,7 +187,7 @@ fn connected_runs(set: &BitVolume, connectivity: Connectivity) -> Runs {
     }
 }
 
-/// Joins the runs of two rows that overlap when each is widened by `reach`.
+/// Joins the runs of two rows that overlap if each is widened by `reach`.
 fn join(
     runs: &[Run],
     sets: &mut Sets,
@@ -202,8 +204,8 @@ fn join(
             b += 1;
         } else {
             sets.join(a as u32, b as u32);
-            // The one that ends first touches nothing further on: the next run of the other row
-            // leaves a gap of a voxel at least.
+            // The run that ends first touches nothing further on: the next run of the other row
+            // leaves a gap of at least a voxel.
             if p.to < q.to {
                 a += 1;
             } else {

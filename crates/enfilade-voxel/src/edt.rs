@@ -1,33 +1,32 @@
 //! Exact Euclidean distance transform.
 //!
-//! Squared distance is separable: a pass along x takes the distance to the nearest occupied voxel
-//! of the row, passes along y and z take `min over k of (f(k) + (i - k)²)` (Meijster, Roerdink and
+//! Squared distance is separable: a pass along x computes the distance to the nearest occupied voxel of
+//! the row, passes along y and z compute `min over k of (f(k) + (i - k)²)` (Meijster, Roerdink and
 //! Hesselink, "A General Algorithm for Computing Distance Transforms in Linear Time", 2000;
 //! Felzenszwalb and Huttenlocher, "Distance Transforms of Sampled Functions", 2012).
 //!
-//! Both papers build each line's lower envelope, which branches on every sample. We take the
-//! minimum directly, outwards from `k = i`, over [`LANES`] lines at once, and stop as soon as
-//! `(i - k)²` exceeds the greatest value of the block: indoors that is after a few steps, each a
-//! handful of vector instructions for all lanes. In 16 bits it ends after 255 steps whatever the
-//! scene. In floating point, where it need not, a block that runs for [`PATIENCE`] steps falls
-//! back to the envelope, so the time stays linear in the voxels.
+//! Both papers build the lower envelope of each line, which branches on every sample. We take the minimum
+//! directly, outwards from `k = i`, over [`LANES`] lines at once, and stop as soon as `(i - k)²` exceeds
+//! the greatest value of the block: indoors after a few steps, each a handful of vector instructions for
+//! all lanes. In 16 bits the loop ends after 255 steps at most. In floating point it need not, so a block
+//! that runs for [`PATIENCE`] steps falls back to the envelope, and the time stays linear in the voxels.
 
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, for_runs};
 
-/// Neighboring lines that are handled together.
+/// Number of neighboring lines processed together.
 const LANES: usize = 64;
 
-/// Steps outwards after which a floating-point block takes the lower envelope instead.
+/// Steps outwards after which a floating-point block falls back to the lower envelope.
 const PATIENCE: usize = 96;
 
 /// A squared distance.
 trait Squared: Copy + Send + Sync + PartialOrd + 'static {
-    /// No occupied voxel, or too far to say.
+    /// No occupied voxel, or too far to represent.
     const FAR: Self;
     const ZERO: Self;
-    /// Steps outwards worth taking.
+    /// Maximum number of useful steps outwards.
     const MAX_STEPS: usize;
     fn of_steps(k: usize) -> Self;
     fn plus(self, other: Self) -> Self;
@@ -39,7 +38,7 @@ trait Squared: Copy + Send + Sync + PartialOrd + 'static {
 impl Squared for u16 {
     const FAR: Self = u16::MAX;
     const ZERO: Self = 0;
-    // 256² is past 16 bits.
+    // 256² exceeds 16 bits.
     const MAX_STEPS: usize = 255;
 
     fn of_steps(k: usize) -> Self {
@@ -127,25 +126,25 @@ impl Squared for f32 {
     }
 }
 
-/// Squared distance from each voxel to the nearest one set in `occupied`, 65,535 where that is
-/// not less. [Units: vx²]
+/// Returns the squared distance from each voxel to the nearest one set in `occupied`, at most 65,535.
+/// [Units: vx²]
 ///
-/// Exact below 65,535. The outside of the box is not occupied. Takes 2 bytes a voxel for the
-/// answer, 16 bytes a row along x, and `2 * nx * max(ny, nz)` bytes a thread.
+/// Exact below 65,535. Voxels outside the box are not occupied. Takes 2 bytes per voxel for the answer, 16
+/// bytes per row along x, and `2 * nx * max(ny, nz)` bytes per thread.
 #[must_use]
 pub fn distance_squared(occupied: &BitVolume) -> Vec<u16> {
     transform(occupied, None)
 }
 
-/// [`distance_squared`] that takes no trouble with the voxels of `far`. [Units: vx²]
+/// As [`distance_squared`], with less work in the voxels of `far`. [Units: vx²]
 ///
-/// Exact wherever the answer is less than that of all voxels of `far`, and never too small anywhere. A block of 64
-/// voxels in `far` costs a few copies instead of a step for each voxel of its distance.
+/// Exact wherever the answer is less than at every voxel of `far`, and never too small. A block of 64 voxels
+/// in `far` costs a few copies instead of a step for each voxel of its distance.
 ///
 /// # Panics
-/// When the two boxes differ in size.
+/// If the two boxes differ in size.
 //
-// Exact, as the nearest occupied voxel is found by way of voxels that lie no farther from it: in its row, then in its
+// Exact, because the nearest occupied voxel is found through voxels that lie no farther from it: in its row, then in its
 // slice.
 #[must_use]
 pub fn distance_squared_near(occupied: &BitVolume, far: &BitVolume) -> Vec<u16> {
@@ -153,11 +152,11 @@ pub fn distance_squared_near(occupied: &BitVolume, far: &BitVolume) -> Vec<u16> 
     transform(occupied, Some(far))
 }
 
-/// Distance from each voxel to the nearest one set in `occupied`; infinite where there is none.
+/// Returns the distance from each voxel to the nearest one set in `occupied`; infinite if there is none.
 /// [Units: vx]
 ///
-/// Squares below 2²⁴ (4,096 voxels) are exact before the root is taken. The outside of the box is
-/// not occupied. Takes 4 bytes a voxel and scratch as in [`distance_squared`].
+/// Squares below 2²⁴ (4,096 voxels) are exact before the square root. Voxels outside the box are not
+/// occupied. Takes 4 bytes per voxel and scratch memory as in [`distance_squared`].
 #[must_use]
 pub fn distance(occupied: &BitVolume) -> Vec<f32> {
     let mut out: Vec<f32> = transform(occupied, None);
@@ -177,7 +176,7 @@ fn transform<T: Squared>(occupied: &BitVolume, far: Option<&BitVolume>) -> Vec<T
     }
     let squares: Vec<T> = (0..=nx).map(T::of_steps).collect();
     let falling: Vec<T> = squares.iter().rev().copied().collect();
-    // x and y while a slice is in cache.
+    // Along x and y while a slice is in cache.
     field
         .par_chunks_mut(nx * ny)
         .enumerate()
@@ -207,7 +206,7 @@ fn transform<T: Squared>(occupied: &BitVolume, far: Option<&BitVolume>) -> Vec<T
     field
 }
 
-/// Squared distance along one row: rising and falling squares, copied from tables.
+/// Writes the squared distances along one row: rising and falling squares, copied from tables.
 fn distances_in_row<T: Squared>(bits: &[u64], row: &mut [T], squares: &[T], falling: &[T]) {
     let n = row.len();
     let mut free_from = 0;
@@ -236,8 +235,8 @@ fn distances_in_row<T: Squared>(bits: &[u64], row: &mut [T], squares: &[T], fall
     }
 }
 
-/// Replaces each column `rows[..][x]` by `min over k of (rows[k][x] + (i - k)²)`, or something greater where `far`, given a
-/// row and a block, has a bit.
+/// Replaces each column `rows[..][x]` by `min over k of (rows[k][x] + (i - k)²)`, or by a larger value where `far` of a row
+/// and a block has a bit.
 fn along_rows<T: Squared>(
     rows: &mut [&mut [T]],
     scratch: &mut Vec<[T; LANES]>,
@@ -245,7 +244,7 @@ fn along_rows<T: Squared>(
 ) {
     let (n, width) = (rows.len(), rows[0].len());
     let blocks = width.div_ceil(LANES);
-    // Lanes past the end hold zero, so that they never ask for another step.
+    // Lanes past the end hold zero, so that they never need another step.
     scratch.clear();
     scratch.resize(n * blocks, [T::ZERO; LANES]);
     for (i, row) in rows.iter().enumerate() {
@@ -265,7 +264,7 @@ fn along_rows<T: Squared>(
     }
 }
 
-/// Writes the least parabola at each row of a block; `false` when it gave up.
+/// Writes the least parabola at each row of a block; returns `false` if it gave up.
 fn least_parabolas<T: Squared>(
     block: &[[T; LANES]],
     far: &impl Fn(usize) -> u64,
@@ -279,7 +278,7 @@ fn least_parabolas<T: Squared>(
             write(i, &least);
             continue;
         }
-        // Lanes that lie far never ask for another step.
+        // Far lanes never need another step.
         let asks = std::array::from_fn(|lane| {
             if far >> lane & 1 == 0 {
                 T::FAR
@@ -305,13 +304,13 @@ fn least_parabolas<T: Squared>(
     true
 }
 
-/// Rows on each side between two looks at the maximum: a look costs as much as a row.
+/// Rows on each side between two tests of the maximum: a test costs as much as a row.
 const STRIDE: usize = 4;
 
-/// Takes the rows `k..k + STRIDE` away from `i` into account; the greatest value left.
+/// Includes the rows `k..k + STRIDE` away from `i` in the minimum; returns the greatest value left.
 //
-// Apart and not inlined, as a parameter the compiler knows `least` to be nobody else's: inlined,
-// it fell back to one lane at a time, five times slower.
+// Not inlined, so that the compiler knows `least` to be unaliased: inlined, it processed one lane at a
+// time, five times slower.
 #[inline(never)]
 fn widened<T: Squared>(
     least: &mut [T; LANES],
@@ -336,7 +335,7 @@ fn widened<T: Squared>(
     greatest(least, asks)
 }
 
-/// The greatest of the lanes that ask for more: those at `FAR` and not at zero.
+/// Returns the greatest of the lanes that need more steps: those at `FAR` and not at zero.
 fn greatest<T: Squared>(values: &[T; LANES], asks: &[T; LANES]) -> T {
     let of = |(&v, &ask): (&T, &T)| v.least(ask);
     values
@@ -351,7 +350,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Each voxel against every occupied one.
+    /// Brute force: each voxel against every occupied one.
     fn oracle(occupied: &BitVolume) -> Vec<Option<u64>> {
         let [nx, ny, nz] = occupied.dims();
         let at = |i: usize| [i % nx, i / nx % ny, i / nx / ny];
@@ -422,7 +421,7 @@ mod tests {
         ) {
             let occupied = scattered([nx, ny, nz], &places);
             let exact = distance_squared(&occupied);
-            // Some of what is at least so far.
+            // Some of the voxels at least that far away.
             let far = BitVolume::from_fn([nx, ny, nz], |i| exact[i] >= from && i % 9 >= left_out);
             let least = far.iter_set().map(|i| exact[i]).min().unwrap_or(u16::MAX);
             for (i, &d) in distance_squared_near(&occupied, &far).iter().enumerate() {

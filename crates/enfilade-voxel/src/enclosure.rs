@@ -1,8 +1,7 @@
-//! How enclosed air is: on how many of six sides something is in the way.
+//! Enclosure of air: the number of directions, out of six, in which something is in the way.
 //!
-//! What people call a room need not be a basin of the distance field: where a whole wall is missing,
-//! the air is as wide at its edge as in its middle, and a flood drains it. But it still has a floor, a ceiling and
-//! three walls.
+//! A room need not be a basin of the distance field: where a whole wall is missing, the air is as wide at its edge as in
+//! its middle, and a flood drains it. But it still has a floor, a ceiling and three walls.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,10 +10,10 @@ use super::components::{Connectivity, flood};
 use super::grid::BitVolume;
 use super::widest::{border, coords};
 
-/// For each free voxel the number of directions among the six along the axes in which something occupied lies, however far;
+/// Returns, per free voxel, the number of directions among the six along the axes with an occupied voxel at any distance;
 /// 0 for occupied voxels, which are those at distance 0.
 ///
-/// Linear in voxels. Takes a byte a voxel and a byte a column.
+/// Linear in voxels. Takes a byte per voxel and a byte per column.
 #[must_use]
 pub fn enclosure([nx, ny, _]: [usize; 3], distances: &[u16]) -> Vec<u8> {
     let n = distances.len();
@@ -42,17 +41,17 @@ pub fn enclosure([nx, ny, _]: [usize; 3], distances: &[u16]) -> Vec<u8> {
     out
 }
 
-/// Air that is enclosed on four sides is a passage, on five a room without a wall or roof.
+/// Enclosed air: with four sides a passage, with five a room without a wall or roof.
 pub const ENCLOSED: std::ops::RangeInclusive<u8> = 4..=6;
-/// Air that is enclosed on more sides is preferred unless it is smaller than this share.
+/// Smallest volume, as a fraction of the larger air, at which more enclosed air is preferred.
 const SHARE: f64 = 0.5;
 
-/// The deepest voxel of the largest connected air that is enclosed on four sides or more, open to the outermost layer and
-/// somewhere as deep as `least_depth`; `None` where there is no such air. Of voxels as deep, the one in the middle of
-/// the most that are together.
+/// Returns the deepest voxel of the largest connected air that is enclosed on four sides or more, open to the outermost layer
+/// and somewhere as deep as `least_depth`; `None` if there is no such air. Of equally deep voxels, the one in the middle of
+/// the largest connected group.
 ///
-/// Air enclosed on five or six sides is preferred to larger air that is less enclosed, if it has half its volume. Linear
-/// in voxels; takes three bits a voxel, and 8 bytes for each voxel of the front. [Units of `least_depth`: vx²]
+/// Prefers air enclosed on five or six sides to larger air that is less enclosed, if it has half its volume. Linear
+/// in voxels; takes three bits per voxel, and 8 bytes per voxel of the front. [Units of `least_depth`: vx²]
 #[must_use]
 pub fn deepest_enclosed(
     dims: [usize; 3],
@@ -85,7 +84,7 @@ pub fn deepest_enclosed(
             deepest.push(i);
         }
     });
-    // Rooms are as deep as they are high; the largest of those as high is meant.
+    // All voxels halfway up a room are equally deep; take the largest group of them.
     let mut floors = BitVolume::new(dims);
     for &i in &deepest {
         let [x, y, z] = coords(dims, i);
@@ -97,7 +96,7 @@ pub fn deepest_enclosed(
     middle_of(dims, &deepest)
 }
 
-/// Volume and a voxel of the largest connected part that is deep enough, ties by index. Clears `set`.
+/// Returns the volume and a voxel of the largest connected part that is deep enough; ties by index. Clears `set`.
 fn largest(set: &mut BitVolume, distances: &[u16], least_depth: u16) -> Option<(usize, usize)> {
     let mut best: Option<(usize, usize)> = None;
     for seed in 0..set.n_voxels() {
@@ -116,7 +115,7 @@ fn largest(set: &mut BitVolume, distances: &[u16], least_depth: u16) -> Option<(
     best
 }
 
-/// Visits all voxels that faces join to `seed` within `set`, and takes them out of it.
+/// Visits all voxels connected to `seed` through faces within `set`, and removes them from it.
 fn gather(set: &mut BitVolume, seed: usize, mut visit: impl FnMut(usize)) {
     let dims = set.dims();
     let [x, y, z] = coords(dims, seed);
@@ -133,7 +132,7 @@ fn gather(set: &mut BitVolume, seed: usize, mut visit: impl FnMut(usize)) {
     }
 }
 
-/// The one of some voxels that is nearest to their mean, ties by index.
+/// Returns the voxel nearest to the mean of some voxels; ties by index.
 fn middle_of(dims: [usize; 3], voxels: &[usize]) -> Option<usize> {
     let at = |i: usize| coords(dims, i).map(|c| c as f64);
     let n = voxels.len() as f64;
@@ -143,14 +142,14 @@ fn middle_of(dims: [usize; 3], voxels: &[usize]) -> Option<usize> {
     voxels.iter().min_by(nearest).copied()
 }
 
-/// Where the way up from a point leads on past furniture, and no more through doors: at this share of the radius of the
-/// largest ball so far.
+/// Radius, as a fraction of the largest ball so far, below which the ascent stops: it passes furniture, but not doors.
 const PINCH: f64 = 0.6;
 
-/// A deepest voxel of the air around a free one: a flood through voxels no less enclosed than there takes the deepest first, and
-/// ends where the next is narrower than `PINCH` of the deepest so far. Of voxels as deep, the one that it comes to first.
+/// Returns a deepest voxel of the air around a free one. A flood through voxels at least as enclosed as the start takes the
+/// deepest first, and ends when the next is narrower than `PINCH` of the deepest so far. Of equally deep voxels, the first
+/// reached.
 ///
-/// `O(n log n)` in the voxels flooded. Takes a bit a voxel, and 16 bytes for each voxel of the front.
+/// `O(n log n)` in the voxels flooded. Takes a bit per voxel, and 16 bytes per voxel of the front.
 #[must_use]
 pub fn ascend(dims: [usize; 3], distances: &[u16], enclosure: &[u8], start: usize) -> usize {
     let mut seen = BitVolume::new(dims);
@@ -175,7 +174,7 @@ pub fn ascend(dims: [usize; 3], distances: &[u16], enclosure: &[u8], start: usiz
     best
 }
 
-/// The voxels that share a face with one.
+/// Returns the voxels that share a face with one.
 fn neighbors(dims: [usize; 3], of: usize) -> impl Iterator<Item = [usize; 3]> {
     let at = coords(dims, of);
     (0..6).filter_map(move |k: usize| {
@@ -196,7 +195,7 @@ mod tests {
 
     const N: [usize; 3] = [40, 20, 30];
 
-    /// The shell of the box from `lo` to `hi`, less what `hole` says.
+    /// The shell of the box from `lo` to `hi`, without the voxels for which `hole` returns `true`.
     fn shell(lo: [usize; 3], hi: [usize; 3], hole: impl Fn([usize; 3]) -> bool + Sync) -> Vec<u16> {
         let bits = BitVolume::from_fn(N, |i| {
             let at = [i % N[0], i / N[0] % N[1], i / (N[0] * N[1])];
@@ -212,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_are_counted_as_a_walk_to_the_edge_counts_them() {
+    fn enclosure_equals_a_walk_to_the_edge() {
         let distances = shell([4, 3, 5], [30, 15, 21], |[x, y, z]| {
             x == 30 || (y == 15 && z < 12)
         });
@@ -241,7 +240,7 @@ mod tests {
         let room = shell([4, 3, 5], [30, 15, 21], |at| at[0] == 30);
         let [x, y, z] = start(&room).unwrap();
         assert!((9..30).contains(&x) && (8..=10).contains(&y) && (11..=15).contains(&z));
-        // Closed all around there is no way out; of a floor alone no air is enclosed.
+        // A closed shell has no way out; a floor alone encloses no air.
         assert_eq!(start(&shell([4, 3, 5], [30, 15, 21], |_| false)), None);
         assert_eq!(start(&shell([4, 3, 5], [30, 15, 21], |at| at[1] > 3)), None);
         // Too narrow for a room.

@@ -1,13 +1,12 @@
-//! Air that is outdoors for sure, and far from everything: known before the flood, from a look at a quarter of the
-//! resolution.
+//! Air that is certainly outdoors and far from everything, found before the flood at a quarter of the resolution.
 //!
-//! Around a winding level or a site most of the volume is sky. A distance field has its greatest values there, so that
-//! most of the time of a distance transform and of a flood goes where nothing is. A watershed of blocks of 4³ voxels
-//! takes a 64th of the time and tells nearly all of it.
+//! Around a winding level or a site most of the volume is sky. The distance field has its greatest values there, so a
+//! distance transform and a flood spend most of their time on empty space. A watershed of blocks of 4³ voxels takes a 64th
+//! of the time and finds nearly all of it.
 //!
-//! What is decided so is what the flood would decide by itself: a block counts only where it lies well away from all that is
-//! occupied, in the outdoors' own basin, and in no ball of air that is centered in another basin. Distances in all other
-//! air remain exact, and with them all peaks and saddles.
+//! The decisions equal those of the full flood: a block counts only if it lies well away from everything occupied, in the
+//! outdoor basin, and in no ball of air centered in another basin. Distances in all other air remain exact, and with them
+//! all peaks and saddles.
 
 use rayon::prelude::*;
 
@@ -18,19 +17,19 @@ use super::widest::border;
 
 /// Edge of a block. [Units: vx]
 const EDGE: usize = 4;
-/// Blocks of a word of voxels.
+/// Blocks per word of voxels.
 const PER_WORD: usize = 64 / EDGE;
 /// Blocks nearer than this to an occupied one are left to the flood. [Units: blocks]
 const NEAR: f64 = 4.0;
-/// By how much distances between voxels differ from those between their blocks at most: twice two half diagonals.
+/// Largest difference between the distance of voxels and that of their blocks: twice two half diagonals.
 /// [Units: blocks]
 const ASTRAY: f64 = 4.0;
 /// Basins of blocks with dynamics below this are rounding. [Units: blocks]
 const NOISE: f64 = 0.5;
 
-/// Free voxels that are outdoors and at least eight voxels away from all that is set in `blocked`; not all that are.
+/// Returns free voxels that are outdoors and at least eight voxels away from everything set in `blocked`; a subset.
 ///
-/// Linear in voxels, with an eighth of a byte for each of them for the answer, and a tenth more while it is looked for.
+/// Linear in voxels; takes an eighth of a byte per voxel for the answer, and a tenth more during the search.
 #[must_use]
 pub fn far_outdoors(blocked: &BitVolume) -> BitVolume {
     let blocks = blocks_of(blocked);
@@ -42,7 +41,7 @@ pub fn far_outdoors(blocked: &BitVolume) -> BitVolume {
     };
     let flood = watershed(dims, squared.clone(), options);
     let depth = |v: usize| f64::from(squared[v]).sqrt();
-    // How far the ball around each block of another basin reaches on from there, rounded up.
+    // Reach of the ball around each block of another basin, rounded up.
     let mut reach: Vec<u16> = (0..squared.len())
         .into_par_iter()
         .map(|v| match flood.labels.get(v) {
@@ -55,7 +54,7 @@ pub fn far_outdoors(blocked: &BitVolume) -> BitVolume {
     voxels_of(blocked.dims(), &BitVolume::from_fn(dims, is_far))
 }
 
-/// Blocks with a voxel set, and one more block around all of them.
+/// Returns the blocks with a voxel set, with a margin of one block around them.
 fn blocks_of(voxels: &BitVolume) -> BitVolume {
     let [nx, ny, nz] = voxels.dims();
     let mut out = BitVolume::new([nx, ny, nz].map(|n| n.div_ceil(EDGE) + 2));
@@ -81,7 +80,7 @@ fn blocks_of(voxels: &BitVolume) -> BitVolume {
     out
 }
 
-/// The voxels of a box of `dims` whose blocks are set.
+/// Returns the voxels of a box of `dims` whose blocks are set.
 fn voxels_of([nx, ny, nz]: [usize; 3], blocks: &BitVolume) -> BitVolume {
     let mut out = BitVolume::new([nx, ny, nz]);
     let [.., by, _] = blocks.dims();
@@ -109,8 +108,8 @@ fn voxels_of([nx, ny, nz]: [usize; 3], blocks: &BitVolume) -> BitVolume {
     out
 }
 
-/// Replaces each value by the greatest there is less the steps to it, diagonal ones counting as one: cubes around what
-/// reaches, which hold the balls. Two scans, each looking at half of the 26 neighbors.
+/// Replaces each value by the maximum over all values minus the steps to them, diagonal ones counting as one: cubes, which
+/// contain the balls. Two scans, each over half of the 26 neighbors.
 fn spread([nx, ny, nz]: [usize; 3], reach: &mut [u16]) {
     let (row, layer) = (nx as isize, (nx * ny) as isize);
     let mut back: Vec<[isize; 3]> = Vec::new();
@@ -151,8 +150,8 @@ mod tests {
 
     const DIMS: [usize; 3] = [150, 90, 120];
 
-    /// Fills the shell of the box from `lo` to one before `hi`, two voxels thick, with a doorway so high and wide through
-    /// the side of least x.
+    /// Fills the shell of the box from `lo` to one before `hi`, two voxels thick, with a doorway of the given height and width
+    /// through the side of least x.
     fn hall(voxels: &mut BitVolume, lo: [usize; 3], hi: [usize; 3], door: [usize; 2]) {
         for z in lo[2]..hi[2] {
             for y in lo[1]..hi[1] {
@@ -193,8 +192,8 @@ mod tests {
         })
     }
 
-    /// How much deeper a hall must be than its way out, so that rounding to blocks does not hide it: what counts as noise, and half
-    /// the diagonals of two blocks for each of both depths. [Units: vx]
+    /// Excess depth of a hall over its exit that survives rounding to blocks: the noise, and half the diagonals of two blocks
+    /// for each of both depths. [Units: vx]
     const ROUNDED: f64 = (NOISE + 2.0 * 1.733) * EDGE as f64;
 
     fn flooded(
@@ -236,8 +235,8 @@ mod tests {
                     prop_assert_eq!(near[v], squared[v], "distance of voxel {}", v);
                 }
             }
-            // Blocks round distances. So an alcove, whose opening is nearly as wide as itself, may become outdoors; a hall,
-            // which is deeper than its way out by more than that rounding, must not.
+            // Blocks round distances. So an alcove, nearly as wide at its opening as inside, may become outdoors; a hall that is
+            // deeper than its exit by more than that rounding must not.
             let halls = flooded(&voxels, squared.clone(), None, ROUNDED);
             let mut middles: BTreeMap<u32, usize> = BTreeMap::new();
             for v in (0..squared.len()).filter(|&v| halls.labels.get(v) > 1) {

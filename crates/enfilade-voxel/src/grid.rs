@@ -1,13 +1,13 @@
-//! The voxel box in the world, and a bit a voxel.
+//! Voxel grids in the world, and volumes with one bit per voxel.
 
 use std::ops::Range;
 
 use enfilade_geom::{Aabb, DVec3};
 
-/// Where a box of voxels lies in the world.
+/// Placement of a box of voxels in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// Least corner of voxel `(0, 0, 0)`. [Units: wu]
+    /// Minimum of voxel `(0, 0, 0)` along each axis. [Units: wu]
     pub origin: DVec3,
     /// Edge of a voxel. [Units: wu] [Limit: above 0]
     pub voxel: f64,
@@ -16,11 +16,11 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The smallest grid of cubes with edge `voxel` around `bounds`, with `pad` more voxels on
-    /// every side. An empty box gives the padding alone.
+    /// Makes the smallest grid of cubes with edge `voxel` around `bounds`, with `pad` more voxels on every
+    /// side. An empty box gives the padding alone.
     ///
     /// # Panics
-    /// When `voxel` is not a positive number or `bounds` is not finite.
+    /// If `voxel` is not a positive number or `bounds` is not finite.
     #[must_use]
     pub fn covering(bounds: &Aabb, voxel: f64, pad: usize) -> Self {
         assert!(
@@ -39,7 +39,7 @@ impl Grid {
             "bounds must be finite"
         );
         let n = (bounds.size() / voxel).ceil().max(DVec3::ONE);
-        // Centered: what rounding up added is shared by both sides.
+        // Centered: both sides share the excess of rounding up.
         let origin = bounds.center() - n * (0.5 * voxel) - pad as f64 * voxel;
         Self {
             origin,
@@ -48,45 +48,45 @@ impl Grid {
         }
     }
 
-    /// Voxels in the box.
+    /// Returns the number of voxels in the box.
     #[must_use]
     pub fn n_voxels(&self) -> usize {
         self.dims.iter().product()
     }
 
-    /// Index of voxel `(i, j, k)`.
+    /// Returns the index of voxel `(i, j, k)`.
     #[must_use]
     pub fn index(&self, i: usize, j: usize, k: usize) -> usize {
         debug_assert!(i < self.dims[0] && j < self.dims[1] && k < self.dims[2]);
         i + self.dims[0] * (j + self.dims[1] * k)
     }
 
-    /// Voxel `(i, j, k)` at `index`.
+    /// Returns the voxel `(i, j, k)` at `index`.
     #[must_use]
     pub fn coords(&self, index: usize) -> [usize; 3] {
         let [nx, ny, _] = self.dims;
         [index % nx, index / nx % ny, index / nx / ny]
     }
 
-    /// Center of voxel `(i, j, k)`, which may lie outside the box. [Units: wu]
+    /// Returns the center of voxel `(i, j, k)`, which may lie outside the box. [Units: wu]
     #[must_use]
     pub fn center(&self, i: usize, j: usize, k: usize) -> DVec3 {
         self.to_world(DVec3::new(i as f64, j as f64, k as f64) + 0.5)
     }
 
-    /// World point to voxel coordinates: voxel `(i, j, k)` spans `i..i + 1`, `j..j + 1`, `k..k + 1`.
+    /// Converts a world point to voxel coordinates: voxel `(i, j, k)` spans `i..i + 1`, `j..j + 1`, `k..k + 1`.
     #[must_use]
     pub fn to_voxel(&self, world: DVec3) -> DVec3 {
         (world - self.origin) / self.voxel
     }
 
-    /// Voxel coordinates to a world point.
+    /// Converts voxel coordinates to a world point.
     #[must_use]
     pub fn to_world(&self, voxel: DVec3) -> DVec3 {
         self.origin + voxel * self.voxel
     }
 
-    /// The voxel that holds a world point; `None` outside the box.
+    /// Returns the voxel that contains a world point; `None` outside the box.
     #[must_use]
     pub fn voxel_at(&self, world: DVec3) -> Option<[usize; 3]> {
         let v = self.to_voxel(world).floor().to_array();
@@ -94,7 +94,7 @@ impl Grid {
         inside.then(|| v.map(|c| c as usize))
     }
 
-    /// The whole box in the world.
+    /// Returns the whole box in the world.
     #[must_use]
     pub fn aabb(&self) -> Aabb {
         let [nx, ny, nz] = self.dims.map(|n| n as f64);
@@ -102,7 +102,7 @@ impl Grid {
     }
 }
 
-/// One bit a voxel. Each row along x starts a new 64-bit word; the bits past its end are zero.
+/// A volume of one bit per voxel. Each row along x starts a new 64-bit word; the bits past its end are zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BitVolume {
     dims: [usize; 3],
@@ -110,7 +110,7 @@ pub struct BitVolume {
 }
 
 impl BitVolume {
-    /// All voxels clear. Takes one bit a voxel, rows rounded up to 64.
+    /// Makes a volume with all voxels clear. Takes one bit per voxel, rows rounded up to 64.
     #[must_use]
     pub fn new(dims: [usize; 3]) -> Self {
         Self {
@@ -119,7 +119,7 @@ impl BitVolume {
         }
     }
 
-    /// The volume whose bit at each index is `set(index)`, rows in parallel.
+    /// Makes the volume whose bit at each index is `set(index)`, rows in parallel.
     #[must_use]
     pub fn from_fn(dims: [usize; 3], set: impl Fn(usize) -> bool + Sync) -> Self {
         use rayon::prelude::*;
@@ -141,43 +141,43 @@ impl BitVolume {
         out
     }
 
-    /// Voxels along x, y and z.
+    /// Returns the numbers of voxels along x, y and z.
     #[must_use]
     pub fn dims(&self) -> [usize; 3] {
         self.dims
     }
 
-    /// Voxels in the box, set or not.
+    /// Returns the number of voxels in the box, set or not.
     #[must_use]
     pub fn n_voxels(&self) -> usize {
         self.dims.iter().product()
     }
 
-    /// Words that one row along x takes.
+    /// Returns the number of words per row along x.
     #[must_use]
     pub(crate) fn row_words(&self) -> usize {
         self.dims[0].div_ceil(64)
     }
 
-    /// All words, rows in order of y, then z; bit `i % 64` of word `i / 64` of a row is voxel `i`.
+    /// Returns all words, rows in order of y, then z; bit `i % 64` of word `i / 64` of a row is voxel `i`.
     #[must_use]
     pub(crate) fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The same, to write. Bits past a row's end must stay zero.
+    /// As [`Self::words`], mutable. Bits past a row's end must stay zero.
     pub(super) fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
     }
 
-    /// Words of row `row = j + ny * k`.
+    /// Returns the words of row `row = j + ny * k`.
     #[must_use]
     pub fn row(&self, row: usize) -> &[u64] {
         let n = self.row_words();
         &self.words[row * n..(row + 1) * n]
     }
 
-    /// Sets one row: bits past its end must be 0.
+    /// Sets one row. Bits past its end must be 0.
     pub fn set_row(&mut self, row: usize, words: &[u64]) {
         let n = self.row_words();
         self.words_mut()[row * n..][..n].copy_from_slice(words);
@@ -186,27 +186,27 @@ impl BitVolume {
     /// Sets the voxels `along` x of one row.
     ///
     /// # Panics
-    /// When they do not lie in the row.
+    /// If they do not lie in the row.
     pub fn fill_row(&mut self, row: usize, along: Range<usize>) {
         assert!(along.end <= self.dims[0], "{along:?} outside the row");
         let n = self.row_words();
         set_bits(&mut self.words[row * n..][..n], along.start, along.end);
     }
 
-    /// The bit of voxel `(i, j, k)`.
+    /// Returns the bit of voxel `(i, j, k)`.
     ///
     /// # Panics
-    /// When the voxel is outside the box.
+    /// If the voxel is outside the box.
     #[must_use]
     pub fn get(&self, i: usize, j: usize, k: usize) -> bool {
         let (word, bit) = self.position(i, j, k);
         self.words[word] >> bit & 1 != 0
     }
 
-    /// The bit of the voxel at `index`.
+    /// Returns the bit of the voxel at `index`.
     ///
     /// # Panics
-    /// When the index is out of range.
+    /// If the index is out of range.
     #[must_use]
     pub fn get_index(&self, index: usize) -> bool {
         let (row, i) = (index / self.dims[0], index % self.dims[0]);
@@ -216,7 +216,7 @@ impl BitVolume {
     /// Sets or clears the bit of voxel `(i, j, k)`.
     ///
     /// # Panics
-    /// When the voxel is outside the box.
+    /// If the voxel is outside the box.
     pub fn set(&mut self, i: usize, j: usize, k: usize, value: bool) {
         let (word, bit) = self.position(i, j, k);
         if value {
@@ -235,13 +235,13 @@ impl BitVolume {
         ((j + ny * k) * self.row_words() + i / 64, i % 64)
     }
 
-    /// Voxels set.
+    /// Returns the number of set voxels.
     #[must_use]
     pub fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
     }
 
-    /// Indices of the voxels set, ascending.
+    /// Returns the indices of the set voxels in ascending order.
     pub fn iter_set(&self) -> impl Iterator<Item = usize> + '_ {
         let per_row = self.row_words().max(1);
         self.words.iter().enumerate().flat_map(move |(at, &word)| {
@@ -257,7 +257,7 @@ impl BitVolume {
         })
     }
 
-    /// Every voxel the other way round.
+    /// Returns the volume with every voxel inverted.
     #[must_use]
     pub fn complement(&self) -> Self {
         let mut out = Self {
@@ -276,7 +276,7 @@ impl BitVolume {
         out
     }
 
-    /// Those set that share a face with one in the box that is not.
+    /// Returns the set voxels that share a face with a clear one in the box.
     #[must_use]
     pub fn rim(&self) -> Self {
         use rayon::prelude::*;
@@ -304,7 +304,7 @@ impl BitVolume {
                     beside(z + 1 < nz, row + ny),
                 ];
                 for (w, word) in words.iter_mut().enumerate() {
-                    // Beyond both ends of the row nothing is missing.
+                    // Nothing is clear beyond both ends of the row.
                     let before = if w == 0 { 1 } else { here[w - 1] >> 63 };
                     let after = here.get(w + 1).map_or(1, |next| next & 1) << 63;
                     let end = nx - 1 - w * 64;
@@ -317,10 +317,10 @@ impl BitVolume {
         out
     }
 
-    /// Sets every voxel that `other` has set.
+    /// Sets every voxel that is set in `other`.
     ///
     /// # Panics
-    /// When the boxes differ in size.
+    /// If the boxes differ in size.
     pub fn union_with(&mut self, other: &Self) {
         assert_eq!(self.dims, other.dims, "boxes of one size");
         self.words

@@ -6,8 +6,8 @@
 //! cube from `(i, j, k)` to `(i + 1, j + 1, k + 1)` in voxel coordinates; its center is at
 //! `+ 0.5`. Distances are between voxel centers, in voxel edges. [Units: vx]
 //!
-//! Every kernel gives the same answer for any number of threads, and uses the thread pool that it
-//! is called in ([`rayon::ThreadPool::install`]).
+//! Every kernel gives the same answer for any number of threads. It uses the current thread pool
+//! ([`rayon::ThreadPool::install`]).
 
 mod components;
 mod edt;

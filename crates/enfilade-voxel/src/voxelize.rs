@@ -1,40 +1,39 @@
 //! Conservative surface voxelization.
 //!
-//! A closed triangle touches a closed cube when none of 13 axes separates them: the cube's three
-//! face normals, the triangle's normal, and the nine cross products of their edges
-//! (Akenine-Möller, "Fast 3D Triangle-Box Overlap Testing", 2001). As Schwarz and Seidel
-//! ("Fast Parallel Surface and Solid Voxelization on GPUs", 2010, §3) note, for cubes of one size
-//! each test is linear in the cube's position. So we test no single cube: for a layer z the axes
-//! along x give an interval of rows, and for a row the others give an interval of x, whose bits
-//! are set at once.
+//! A closed triangle touches a closed cube if none of 13 axes separates them: the cube's three face
+//! normals, the triangle's normal, and the nine cross products of their edges (Akenine-Möller, "Fast 3D
+//! Triangle-Box Overlap Testing", 2001). As Schwarz and Seidel ("Fast Parallel Surface and Solid
+//! Voxelization on GPUs", 2010, §3) note, for cubes of one size each test is linear in the cube's
+//! position. So we do not test single cubes: for a layer z the axes along x give an interval of rows, and
+//! for a row the others give an interval of x, whose bits are set at once.
 //!
-//! **Errs to marking too much:** every test is loosened by a bound on its rounding
-//! ([`SLACK`]), so a touched cube is never missed; a cube is marked wrongly only where the
-//! triangle passes within that slack of it.
+//! **Errs to marking too much:** every test is loosened by a bound on its rounding ([`SLACK`]), so a
+//! touched cube is never missed; a cube is marked wrongly only if the triangle passes within that slack of
+//! it.
 
 use enfilade_geom::{DVec3, Triangle};
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, Grid, set_bits};
 
-/// Rounding allowed for, relative to the greatest voxel coordinate that enters a test.
+/// Rounding allowance, relative to the greatest voxel coordinate that enters a test.
 ///
 /// A test is a few products and sums of coordinates below that magnitude, each rounded by
 /// 2⁻⁵³ ≈ 1.1e-16 of it; conversion to voxel coordinates adds as much again. 1e-13 is over a
 /// hundred times their sum; at 10,000 voxels it is a billionth of a voxel.
 const SLACK: f64 = 1e-13;
 
-/// Layers that one task fills.
+/// Layers per task.
 const SLAB: usize = 8;
 
 /// Marks every voxel of `grid` whose closed cube a triangle touches.
 ///
-/// Triangles with a corner that is not finite are left out; degenerate ones mark what their
-/// segment or point touches. What lies outside the grid is ignored. Time grows with triangles
-/// plus rows of voxels touched. Takes one bit a voxel and 8 bytes for each triangle and slab of
-/// 8 layers that it enters.
+/// Ignores triangles with a vertex that is not finite, and everything outside the grid; degenerate triangles
+/// mark the voxels that their segment or point touches. Linear in triangles plus rows of voxels touched.
+/// Takes one bit per voxel, and 8 bytes per triangle and slab of 8 layers that it enters.
 ///
 /// # Panics
+/// If there are 2³² triangles or more.
 /// When there are 2³² triangles or more.
 #[must_use]
 pub fn voxelize(grid: &Grid, triangles: &[Triangle]) -> BitVolume {
@@ -92,7 +91,7 @@ pub fn voxelize(grid: &Grid, triangles: &[Triangle]) -> BitVolume {
     out
 }
 
-/// `low <= along * t + across · (others) <= high` for the cube's least corner.
+/// The test `low <= along * t + across · (others) <= high` for the cube's minimum.
 #[derive(Clone, Copy, Default)]
 struct Band {
     /// Factors of x, y and z.
@@ -101,7 +100,7 @@ struct Band {
     high: f64,
 }
 
-/// One triangle's tests, in voxel coordinates of the cube's least corner.
+/// The tests of one triangle, in voxel coordinates of the cube's minimum.
 struct Setup {
     min: [usize; 3],
     max: [usize; 3],
@@ -112,7 +111,7 @@ struct Setup {
 }
 
 impl Setup {
-    /// Least and greatest voxel that the triangle's box touches; `None` outside the grid.
+    /// Returns the least and greatest voxel that the triangle's box touches; `None` outside the grid.
     fn bounds(grid: &Grid, t: &Triangle) -> Option<([usize; 3], [usize; 3])> {
         let p = t.map(|p| grid.to_voxel(p));
         if !p.iter().all(|p| p.is_finite()) {
@@ -123,7 +122,7 @@ impl Setup {
         let mut min = [0; 3];
         let mut max = [0; 3];
         for a in 0..3 {
-            // Closed cubes: a corner on a face touches the cubes of both sides.
+            // Closed cubes: a vertex on a face touches the cubes of both sides.
             let first = (low[a] - slack).ceil() - 1.0;
             let last = (high[a] + slack).floor();
             if last < 0.0 || first >= grid.dims[a] as f64 {
@@ -143,7 +142,7 @@ impl Setup {
         let band = |axis: DVec3| -> Band {
             // Scaled to greatest component 1, so that the slack means the same for every axis.
             let scale = axis.abs().max_element();
-            // A null axis separates nothing; nor does one that overflowed, which errs to marking.
+            // A null axis separates nothing, nor does one that overflowed: that errs to marking.
             if scale == 0.0 || !axis.is_finite() {
                 return Band {
                     normal: [0.0; 3],
@@ -154,7 +153,7 @@ impl Setup {
             let n = axis / scale;
             let d = p.map(|p| n.dot(p));
             let (low, high) = (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2]));
-            // The cube reaches from `n · corner + negative` to `n · corner + positive`.
+            // The cube spans `n · corner + negative` to `n · corner + positive`.
             let positive: f64 = n.max(DVec3::ZERO).element_sum();
             let negative: f64 = n.min(DVec3::ZERO).element_sum();
             Band {
@@ -179,7 +178,7 @@ impl Setup {
         })
     }
 
-    /// Calls `run(x0, x1, y, z)` for each row's touched voxels `x0..=x1` in layers `from..=to`.
+    /// Calls `run(x0, x1, y, z)` for the touched voxels `x0..=x1` of each row in layers `from..=to`.
     fn mark(&self, from: usize, to: usize, mut run: impl FnMut(usize, usize, usize, usize)) {
         for z in self.min[2].max(from)..=self.max[2].min(to) {
             let fixed = |b: &Band| b.normal[2] * z as f64;
@@ -195,7 +194,7 @@ impl Setup {
     }
 }
 
-/// The integers of `first..=last` that pass every band along `axis`.
+/// Returns the integers of `first..=last` that pass every band along `axis`.
 fn narrowed(
     first: usize,
     last: usize,
@@ -230,7 +229,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What is left of a polygon on the side `sign * p[axis] <= sign * at`.
+    /// Returns the part of a polygon on the side `sign * p[axis] <= sign * at`.
     fn cut(polygon: &[DVec3], axis: usize, at: f64, sign: f64) -> Vec<DVec3> {
         let depth = |p: DVec3| sign * (at - p[axis]);
         let mut out = Vec::new();
@@ -265,10 +264,10 @@ mod tests {
         }
     }
 
-    /// Voxelizes and compares with clipping: what the shrunk cube touches must be marked, what the
-    /// grown one misses must not.
+    /// Voxelizes and compares with clipping: cubes touched after shrinking must be marked, cubes missed after
+    /// growing must not.
     fn check(dims: [usize; 3], t: &Triangle) {
-        // Clipping rounds too, by some 1e-15 of coordinates below 100 and a few steps.
+        // Clipping rounds, too, by about 1e-15 of coordinates below 100 and a few steps.
         let margin = 1e-9;
         let bits = voxelize(&unit_grid(dims), std::slice::from_ref(t));
         for z in 0..dims[2] {
@@ -299,14 +298,14 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1500))]
         #[test]
-        fn marked_voxels_are_those_that_clipping_leaves_something_in(t in prop::array::uniform3(corner())) {
+        fn marked_voxels_equal_those_found_by_clipping(t in prop::array::uniform3(corner())) {
             check([11, 10, 12], &t);
         }
     }
 
     #[test]
-    fn touching_counts_on_faces_edges_and_corners() {
-        // A point on a lattice corner touches eight cubes, one on a face two.
+    fn contact_counts_on_faces_edges_and_vertices() {
+        // A point at a lattice vertex touches eight cubes, one in a face two.
         let at = |x, y, z| voxelize(&unit_grid([4; 3]), &[[DVec3::new(x, y, z); 3]]).count();
         assert_eq!(at(2.0, 2.0, 2.0), 8);
         assert_eq!(at(2.0, 2.0, 1.5), 4);
@@ -334,7 +333,7 @@ mod tests {
                 assert_eq!(voxelize(&grid, &[[p, q, DVec3::ZERO]]).count(), 0);
             }
         }
-        // Overflowing products may mark too much; they must mark what is touched.
+        // Overflowing products may mark too much, never too little.
         let huge = [p, DVec3::new(1e300, 4.5, 4.5), DVec3::new(1e300, 5.5, 4.5)];
         let bits = voxelize(&grid, &[huge]);
         assert!((4..9).all(|x| bits.get(x, 4, 4)));

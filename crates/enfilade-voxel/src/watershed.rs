@@ -2,22 +2,20 @@
 //!
 //! The free voxels are flooded from deep to shallow (Meyer, "Topographic distance and watershed
 //! lines", 1994; Haumont, Debeir and Sillion, "Volumetric Cell-and-Portal Generation", 2003): each
-//! regional maximum of the distance starts a basin when its level comes up, and a basin spreads to
-//! its neighbors in order of level, first come first served within one, so that plateaus are
-//! shared out by influence zones. Where two basins first meet is their saddle. A basin whose
-//! dynamics (peak minus saddle; Grimaud, "A new measure of contrast", 1992) stay below `h` joins
-//! the deeper one on the spot. Once the flood is `h` below a peak that basin stays for good, so
-//! every contact that is recorded is one between two basins of the answer.
+//! regional maximum of the distance starts a basin when its level is reached, and a basin spreads to its
+//! neighbors in order of level, first come first served within one level, so that influence zones divide
+//! plateaus. The saddle of two basins is where they first meet. A basin whose dynamics (peak minus saddle;
+//! Grimaud, "A new measure of contrast", 1992) are below `h` joins the deeper one at once. After the flood
+//! has fallen `h` below a peak, that basin is final, so every recorded contact is between two basins of
+//! the answer.
 //!
-//! **Levels** are distances in steps of 1/64 voxel, rounded down. As
-//! consecutive squares of distances below 32 voxels lie further apart than that, only wider
-//! spaces lose any order at all.
+//! **Levels** are distances in steps of 1/64 voxel, rounded down. Consecutive squares of distances below 32
+//! voxels are further apart than that, so only wider spaces lose any order.
 //!
-//! **Memory:** the flood works in place, in the array that held the squared distances: a word
-//! holds a voxel's level until a basin reaches it and the basin's number from then on. 16-bit
-//! words number 16,383 basins alive at once; the numbers of merged ones are used again. More than
-//! half of that alive moves the volume into 32-bit words. The queue holds the shell of voxels that
-//! lie within one voxel below the flood's level.
+//! **Memory:** the flood works in place, in the array of squared distances: a word holds a voxel's level
+//! until a basin reaches it, and then the basin's number. 16-bit words can number 16,383 live basins;
+//! numbers of merged ones are reused. If more than half of that are alive, the volume moves into 32-bit
+//! words. The queue holds the shell of voxels within one voxel below the flood's level.
 
 mod basins;
 mod flood;
@@ -31,29 +29,29 @@ use flood::Flood;
 
 pub use basins::{Basin, Labels, Saddle, Watershed};
 
-/// What to flood.
+/// Options of [`watershed`].
 #[derive(Clone, Debug, Default)]
 pub struct WatershedOptions {
     /// Basins with dynamics (peak minus highest saddle) below this join a deeper one. [Units: vx]
     /// [Limit: 0 and above]
     pub h: f64,
-    /// The free voxels set here are one basin, infinitely deep, with label 1.
+    /// The free voxels set here form one basin, infinitely deep, with label 1.
     pub outdoors: Option<BitVolume>,
 }
 
 /// Floods a field of squared distances from deep to shallow.
 ///
-/// `squared` is what [`distance_squared`](super::distance_squared) gives for a box of `dims`; 0 is
-/// occupied, and distances of 256 voxels and more count as one level. It is consumed, and its
-/// memory becomes the labels.
+/// `squared` is the result of [`distance_squared`](super::distance_squared) for a box of `dims`; 0 is
+/// occupied, and distances of 256 voxels and more count as one level. Its memory becomes the labels.
 ///
-/// Time is linear in the voxels. On top of the 2 bytes a voxel it takes about 4 bytes for each
-/// voxel of the widest shell one voxel thick (0.4 bytes a voxel of a furnished building at 5 cm),
-/// and 4 for each local maximum. When more than 8,191 basins are alive at once it takes 4 bytes a
-/// voxel, and 6 while it moves.
+/// Linear in the voxels. In addition to the 2 bytes per voxel it takes about 4 bytes for each voxel of
+/// the largest shell one voxel thick (0.4 bytes per voxel of a furnished building at 5 cm), and 4 for each
+/// local maximum. If more than 8,191 basins are alive at once it takes 4 bytes per voxel, and 6 during the
+/// move.
 ///
 /// # Panics
-/// When `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is
+/// If `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is negative or
+/// NaN.
 /// negative or NaN.
 #[must_use]
 pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions) -> Watershed {
@@ -88,11 +86,11 @@ pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions)
     wide.finish(outdoors)
 }
 
-/// Marks the dams between basins, one voxel thick: each voxel that shares a face with one of a
-/// lesser label other than 0. What is left of different basins does not touch.
+/// Marks the dams between basins, one voxel thick: each voxel that shares a face with one of a lesser
+/// label other than 0. The remaining voxels of different basins do not touch.
 ///
 /// # Panics
-/// When `labels` is not of size `dims`.
+/// If `labels` is not of size `dims`.
 #[must_use]
 pub fn mark_dams(dims: [usize; 3], labels: &Labels) -> BitVolume {
     assert_eq!(
@@ -155,7 +153,7 @@ impl<'a, T> Neighbors<'a, T> {
     }
 }
 
-/// Squared distances to levels, in place.
+/// Converts squared distances to levels, in place.
 fn to_levels(words: &mut [u16]) {
     let table: Vec<u16> = (0..=u16::MAX)
         .map(|d| (f64::from(d).sqrt() * f64::from(STEPS)) as u16)
@@ -167,10 +165,10 @@ fn to_levels(words: &mut [u16]) {
     });
 }
 
-/// Voxels where a basin may start, deepest first, then by index.
+/// Returns voxels where a basin may start, deepest first, then by index.
 ///
-/// No neighbor is higher, and none of those before it in the scan is as high: every regional
-/// maximum has such a voxel, its first. None is in `outdoors`.
+/// No neighbor is higher, and no earlier neighbor in the scan is equal: every regional maximum has such a
+/// voxel, its first. None is in `outdoors`.
 fn local_maxima(dims: [usize; 3], levels: &[u16], outdoors: Option<&BitVolume>) -> Vec<u32> {
     let [nx, ny, nz] = dims;
     let mut found: Vec<u32> = (0..ny * nz)

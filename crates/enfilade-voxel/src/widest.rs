@@ -1,14 +1,14 @@
-//! The widest path: from a voxel to the edge of the box, through air as wide as can be.
+//! The widest path from a voxel to the edge of the box.
 //!
-//! The *bottleneck* of a path is its least distance to what is occupied; the widest path has the
-//! greatest bottleneck of all (Pollack, "The Maximum Capacity Through a Network", 1960). It is found
-//! as the watershed floods, from the deepest voxel of the front downwards (Meyer, "Topographic
-//! Distance and Watershed Lines", 1994, §4), with a bucket a level. Of all widest paths the shortest
-//! is taken: Dijkstra's algorithm with buckets (Dial, "Shortest-Path Forest with Topological
-//! Ordering", 1969) in the air that is at least as wide as the bottleneck.
+//! The *bottleneck* of a path is its least distance to occupied voxels; the widest path has the greatest
+//! bottleneck of all (Pollack, "The Maximum Capacity Through a Network", 1960). The search resembles the
+//! watershed's flood: from the deepest voxel of the front downwards (Meyer, "Topographic Distance and
+//! Watershed Lines", 1994, §4), with a bucket per level. Of all widest paths it takes the shortest:
+//! Dijkstra's algorithm with buckets (Dial, "Shortest-Path Forest with Topological Ordering", 1969) in the
+//! air that is at least as wide as the bottleneck.
 //!
-//! A step goes to one of 26 neighbors, and only where all voxels of the box around both are wide
-//! enough: a path never slips between two voxels that touch at an edge or a corner.
+//! A step goes to one of 26 neighbors, and only if all voxels of the box around both are wide enough: a
+//! path never slips between two voxels that touch at an edge or a vertex.
 
 use super::components::{Connectivity, flood};
 use super::grid::BitVolume;
@@ -16,27 +16,27 @@ use super::grid::BitVolume;
 /// A path from a voxel to the edge of the box.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WidestPath {
-    /// Voxel indices from the start on; each is one of the 26 neighbors of the one before, the last
-    /// lies in the outermost layer.
+    /// Voxel indices from the start on; each is one of the 26 neighbors of the one before, the last lies in
+    /// the outermost layer.
     pub voxels: Vec<usize>,
-    /// Which of them is the narrowest, or leads by what is: behind it begins air wider than it that reaches the edge. On a
-    /// stretch that is narrowest all along, such as a passage, its far end.
+    /// Index in `voxels` of the narrowest one, or of one that steps past it: wider air that reaches the edge begins behind it.
+    /// On a stretch of constant narrowest width, such as a passage, its far end.
     pub narrowest: usize,
     /// Squared distance there. [Units: vx²]
     pub bottleneck: u16,
 }
 
-/// The widest path from `start` to the outermost layer of the box, and the shortest of those;
-/// `None` where occupied voxels close every way, or `start` is occupied.
+/// Returns the widest path from `start` to the outermost layer of the box, and of those the shortest;
+/// `None` if occupied voxels close every way, or `start` is occupied.
 ///
-/// `distances` are squared, as [`distance_squared`](super::distance_squared) gives them: 0 is
-/// occupied, and from 65,535 on (256 voxels) all air is as wide. [Units: vx²]
+/// `distances` are squared, as from [`distance_squared`](super::distance_squared): 0 is occupied, and all
+/// air from 65,535 on (256 voxels) is equally wide. [Units: vx²]
 ///
-/// Time is linear in voxels and levels. Takes a byte and two bits a voxel, and 8 to 16 bytes for each voxel of
-/// the front. Equal input gives an equal path.
+/// Linear in voxels and levels. Takes a byte and two bits per voxel, and 8 to 16 bytes per voxel of the front.
+/// Deterministic.
 ///
 /// # Panics
-/// When `distances` has not one value a voxel, or `start` is not among them.
+/// If `distances` does not have one value per voxel, or `start` is out of range.
 #[must_use]
 pub fn widest_path(dims: [usize; 3], distances: &[u16], start: usize) -> Option<WidestPath> {
     assert_eq!(
@@ -51,11 +51,11 @@ pub fn widest_path(dims: [usize; 3], distances: &[u16], start: usize) -> Option<
         &border(dims),
         Connectivity::Faces6,
     );
-    // From the narrowest place on nothing is in the way any more. Where nothing is wider, it is the last.
+    // Nothing is in the way after the narrowest place. If nothing is wider, it is the last.
     let end = voxels.iter().position(|&v| beyond.get_index(v));
     let before = || (0..end.unwrap_or(voxels.len())).rev();
     let is_narrow = |&i: &usize| distances[voxels[i]] == bottleneck;
-    // A slanting step may pass beside the narrowest voxels without touching one.
+    // A diagonal step may pass beside the narrowest voxels without touching one.
     let leads_by_narrow = |&i: &usize| {
         let next = *voxels.get(i + 1).unwrap_or(&voxels[i]);
         narrowest_around(dims, distances, [voxels[i], next]) == bottleneck
@@ -71,11 +71,11 @@ pub fn widest_path(dims: [usize; 3], distances: &[u16], start: usize) -> Option<
 }
 
 impl WidestPath {
-    /// Corners of a line along the path with few of them, as voxel indices: every voxel that it touches is as wide as the
-    /// bottleneck. The places of `keep` in [`Self::voxels`], ascending, remain corners.
+    /// Returns the vertices of a polyline along the path with few of them, as voxel indices: every voxel that it touches is as
+    /// wide as the bottleneck. The positions `keep` in [`Self::voxels`], ascending, remain vertices.
     ///
-    /// From each corner on to the last voxel before the first that is not in sight: time is at most that of the path's
-    /// length times the box's diagonal. `dims` and `distances` are those that the path was found in.
+    /// Each vertex is followed by the last voxel before the first that is not in sight: time is at most the length of the path
+    /// times the box's diagonal. `dims` and `distances` must be those of the search.
     #[must_use]
     pub fn corners(&self, dims: [usize; 3], distances: &[u16], keep: &[usize]) -> Vec<usize> {
         let last = self.voxels.len() - 1;
@@ -90,7 +90,7 @@ impl WidestPath {
             if is_kept && is_in_sight(i) {
                 from = i;
             } else if !is_in_sight(i) {
-                // A step is always in sight, so that the one before is beyond the corner.
+                // A step is always in sight, so the one before is beyond the vertex.
                 out.push(self.voxels[i - 1]);
                 from = if is_kept { i } else { i - 1 };
             }
@@ -102,7 +102,7 @@ impl WidestPath {
     }
 }
 
-/// Least squared distance in the box around both ends of a step.
+/// Returns the least squared distance in the box around both ends of a step.
 fn narrowest_around(dims: [usize; 3], distances: &[u16], ends: [usize; 2]) -> u16 {
     let [a, b] = ends.map(|i| coords(dims, i));
     let vertex = |c: usize| [0, 1, 2].map(|k| if c >> k & 1 == 1 { a[k] } else { b[k] });
@@ -110,7 +110,7 @@ fn narrowest_around(dims: [usize; 3], distances: &[u16], ends: [usize; 2]) -> u1
     (0..8).map(|c| at(vertex(c))).min().unwrap_or(0)
 }
 
-/// Whether all voxels are wide enough that the line between the middles of two touches.
+/// Returns `true` if all voxels touched by the line between the centers of two are wide enough.
 fn is_clear_line(dims: [usize; 3], distances: &[u16], ends: [usize; 2], least: u16) -> bool {
     let strides = [1, dims[0] as isize, (dims[0] * dims[1]) as isize];
     let [a, b] = ends.map(|i| coords(dims, i));
@@ -139,7 +139,7 @@ fn is_clear_line(dims: [usize; 3], distances: &[u16], ends: [usize; 2], least: u
     true
 }
 
-/// The outermost layer of voxels.
+/// Returns the outermost layer of voxels.
 #[must_use]
 pub fn border(dims: [usize; 3]) -> BitVolume {
     let [nx, ny, nz] = dims;
@@ -165,7 +165,7 @@ pub(super) fn coords([nx, ny, _]: [usize; 3], index: usize) -> [usize; 3] {
     [index % nx, index / nx % ny, index / (nx * ny)]
 }
 
-/// Greatest squared distance at which air joins `start` to the outermost layer.
+/// Returns the greatest squared distance at which air connects `start` to the outermost layer.
 fn bottleneck(dims: [usize; 3], distances: &[u16], start: usize) -> Option<u16> {
     let mut seen = BitVolume::new(dims);
     let mut mark = |at: [usize; 3]| {
@@ -224,13 +224,13 @@ const STEPS: [([isize; 3], usize); 26] = {
     }
     out
 };
-/// Buckets that are in use at a time: one for each length up to the longest.
+/// Number of buckets in use at a time: one for each length up to the longest.
 const RING: usize = 18;
-/// How the start was come to, where others have the number of the step.
+/// Marks the start, where other voxels have the index of the step that reached them.
 const BEGIN: u8 = 26;
 const UNSEEN: u8 = u8::MAX;
 
-/// The shortest path from `start` to the outermost layer where nothing is below `least`.
+/// Returns the shortest path from `start` to the outermost layer through voxels of at least `least`.
 fn shortest(dims: [usize; 3], distances: &[u16], start: usize, least: u16) -> Vec<usize> {
     let strides = [1, dims[0] as isize, (dims[0] * dims[1]) as isize];
     let offset = |step: [isize; 3]| -> isize { (0..3).map(|k| step[k] * strides[k]).sum() };
@@ -263,7 +263,7 @@ fn shortest(dims: [usize; 3], distances: &[u16], start: usize, least: u16) -> Ve
     vec![start]
 }
 
-/// Whether all voxels of the box around both ends of a step are wide enough.
+/// Returns `true` if all voxels of the box around both ends of a step are wide enough.
 fn is_clear(
     distances: &[u16],
     from: usize,
@@ -347,7 +347,7 @@ mod tests {
         assert_eq!(path.voxels[0], start);
         let last = path.voxels[path.voxels.len() - 1];
         assert!(is_border(dims, coords(dims, last)));
-        // Were all the air that the path sweeps wider, so were a way from face to face within it.
+        // If all the air that the path sweeps were wider, so were a path from face to face within it.
         let least_of_step = |i: usize| {
             let next = path.voxels[(i + 1).min(path.voxels.len() - 1)];
             narrowest_around(dims, distances, [path.voxels[i], next])
@@ -411,7 +411,7 @@ mod tests {
 
     #[test]
     fn a_step_that_slants_past_the_narrowest_voxels_is_the_narrowest_place() {
-        // Two rooms one voxel high in a layer, joined over an edge by two voxels that are narrower.
+        // Two rooms one voxel high in a layer, joined across an edge by two voxels that are narrower.
         let dims = [6, 6, 3];
         let mut distances = vec![0; 6 * 6 * 3];
         let mut set = |x: usize, y: usize, d: u16| distances[x + 6 * (y + 6)] = d;
@@ -438,7 +438,7 @@ mod tests {
         let mut distances = vec![0; 9 * 9];
         distances[36..45].copy_from_slice(&row);
         let path = widest_path([9, 9, 1], &distances, 37).unwrap();
-        // One layer is all edge.
+        // In a single layer, every voxel is at the edge.
         assert_eq!((path.voxels.len(), path.narrowest), (1, 0));
         let mut deep = vec![0; 9 * 9 * 3];
         deep[81..162].copy_from_slice(&distances);

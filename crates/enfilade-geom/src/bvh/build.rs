@@ -1,26 +1,26 @@
-//! How the tree over triangles is built, and its nodes.
+//! Nodes of the tree over triangles, and its construction.
 
 use glam::{Vec3, Vec4};
 
 use crate::{Aabb, DVec3, Triangle};
 
-/// Triangles a leaf may hold; four `f64` triangles cost about as much as one more node.
+/// Maximum number of triangles in a leaf; four `f64` triangles cost about as much as one more node.
 const LEAF_SIZE: usize = 4;
-/// Candidate planes an axis is divided by.
+/// Number of candidate planes per axis.
 const N_BINS: usize = 16;
-/// Below this depth nodes are split by count, so that hostile input cannot make the tree deep.
+/// Depth from which nodes are split by count, so that hostile input cannot make the tree deep.
 const MAX_SAH_DEPTH: usize = 40;
-/// Larger coordinates overflow `f32` products on the way; such triangles are never met.
+/// Largest coordinate; beyond it `f32` products overflow, and triangles are ignored.
 const MAX_COORDINATE: f64 = 1e15;
 
-/// Four children: their boxes as `[min, max][axis]`, and what they are.
+/// Four children: their boxes as `[min, max][axis]`, and their references.
 #[derive(Clone, Debug)]
 #[repr(align(128))]
 pub(super) struct Node {
     pub(super) bounds: [[Vec4; 3]; 2],
-    /// A node, or the first triangle of a leaf.
+    /// Index of a node, or of the first triangle of a leaf.
     pub(super) children: [u32; 4],
-    /// Triangles of a leaf; 0 for a node. Unused children have an empty box.
+    /// Number of triangles of a leaf; 0 for a node. Unused children have an empty box.
     pub(super) counts: [u32; 4],
 }
 
@@ -30,14 +30,14 @@ const UNUSED: Node = Node {
     counts: [0; 4],
 };
 
-/// What the builder knows of a triangle.
+/// A triangle during the construction.
 struct Entry {
     bounds: Aabb,
     center: DVec3,
     id: u32,
 }
 
-/// Nodes over triangles that stand in leaf order.
+/// Nodes, and the leaf order of the triangles.
 pub(super) struct Built {
     pub(super) nodes: Vec<Node>,
     /// Index of each triangle in the caller's list.
@@ -45,7 +45,7 @@ pub(super) struct Built {
     pub(super) bounds: Aabb,
 }
 
-/// Builds the nodes over all triangles whose corners are finite and not too far away.
+/// Builds the nodes over all triangles whose vertices are finite and not too far away.
 pub(super) fn build_nodes(triangles: &[Triangle]) -> Built {
     let mut entries: Vec<Entry> = triangles
         .iter()
@@ -87,14 +87,14 @@ pub(super) fn round_up(p: DVec3) -> Vec3 {
     -round_down(-p)
 }
 
-/// A part of the entries that becomes one child.
+/// A range of the entries that becomes one child.
 struct Part {
     first: usize,
     count: usize,
     bounds: Aabb,
 }
 
-/// Appends the node over `entries`, which start at `offset` in leaf order, and all below it.
+/// Appends the node over `entries`, which start at `offset` in leaf order, and all nodes below it.
 fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth: usize) {
     if entries.is_empty() {
         return;
@@ -107,7 +107,7 @@ fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth
         bounds: whole,
     }];
     while parts.len() < 4 {
-        // The part whose children a ray is likeliest to meet; by count, the largest.
+        // Split the part that a ray most likely enters; by count, the largest.
         let weight = |p: &Part| {
             if by_count {
                 p.count as f64
@@ -202,7 +202,7 @@ fn split(entries: &mut [Entry]) -> usize {
         }
     }
     let Some((_, axis, bin)) = best else {
-        // All centers in one place: any halves are as good.
+        // All centers coincide: any split is as good.
         return entries.len() / 2;
     };
     let mut left = 0;
@@ -216,6 +216,6 @@ fn split(entries: &mut [Entry]) -> usize {
 }
 
 fn bin_of(center: f64, min: f64, size: f64) -> usize {
-    // A tiny size can make the quotient infinite or not a number; the cast and `min` tame both.
+    // A tiny size can make the quotient infinite or NaN; the cast and `min` handle both.
     (((center - min) / size * N_BINS as f64) as usize).min(N_BINS - 1)
 }

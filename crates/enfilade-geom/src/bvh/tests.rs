@@ -4,7 +4,7 @@ use super::*;
 use crate::ray::hit_triangle;
 
 fn coordinate() -> impl Strategy<Value = f64> {
-    // Whole numbers make shared corners, coplanar triangles and axis-parallel rays common.
+    // Integers make shared vertices, coplanar triangles and axis-parallel rays common.
     prop_oneof![(-8..8).prop_map(f64::from), -8.0..8.0]
 }
 
@@ -16,8 +16,8 @@ fn soup() -> impl Strategy<Value = Vec<Triangle>> {
     proptest::collection::vec([point(), point(), point()], 0..60)
 }
 
-/// Exact sign of the volume of `a b c d`, 0 within rounding of the test under way: determinants of
-/// coordinates up to 16 apart are rounded by about 1e-12, and 1e-9 leaves room.
+/// Exact sign of the volume of `a b c d`, or 0 within the rounding of the tested code: determinants of
+/// coordinates up to 16 apart are rounded by about 1e-12; 1e-9 leaves a margin.
 fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
     let at = |p: DVec3| robust::Coord3D {
         x: p.x,
@@ -32,7 +32,7 @@ fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
     }
 }
 
-/// Whether the segment meets the triangle, by exact predicates; `None` when too close to say.
+/// Returns `true` if the segment meets the triangle, by exact predicates; `None` if too close to decide.
 fn oracle(a: DVec3, b: DVec3, t: &Triangle) -> Option<bool> {
     let ends = [side(t[0], t[1], t[2], a), side(t[0], t[1], t[2], b)];
     let edges = [
@@ -63,7 +63,7 @@ proptest! {
                 prop_assert_eq!(found.is_some(), expected);
             }
             if let Some(hit) = found {
-                // Front is where the volume of triangle and start is negative (robust's orient3d).
+                // The front is where the volume of triangle and start is negative (orient3d of `robust`).
                 let start = side(t[0], t[1], t[2], a);
                 prop_assert!(start == 0 || hit.front == (start < 0));
             }
@@ -71,7 +71,7 @@ proptest! {
     }
 
     #[test]
-    fn rays_find_what_testing_every_triangle_finds(soup in soup(), a in point(), b in point(), skip in 0..4u32) {
+    fn rays_equal_a_test_of_every_triangle(soup in soup(), a in point(), b in point(), skip in 0..4u32) {
         prop_assume!(a != b);
         let bvh = Bvh::build(&soup);
         for t_max in [1.0, f64::INFINITY] {
@@ -112,7 +112,7 @@ proptest! {
         let found = bvh.nearest(p, f64::INFINITY);
         prop_assert_eq!(found.map_or(f64::INFINITY, |n| n.distance), least);
         prop_assert_eq!(bvh.nearest(p, limit).is_some(), least <= limit);
-        // Nothing on any triangle is nearer; the answer's point is on its triangle.
+        // No point on any triangle is nearer; the point returned is on its triangle.
         if let Some(found) = found {
             for t in &soup {
                 for (i, j) in (0..=8).flat_map(|i| (0..=8 - i).map(move |j| (i, j))) {
@@ -136,7 +136,7 @@ proptest! {
             let has_sample = samples.into_iter().any(|(u, v)| query.contains(t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v));
             let is_found = found.contains(&(i as u32));
             prop_assert!(is_found || !has_sample);
-            // And nothing whose clipping by the box leaves it empty by a clear margin.
+            // And no triangle is found that misses the box by a clear margin.
             if is_found {
                 let mut w = Some(crate::Winding::new(t.to_vec()));
                 let grown = query.expanded(1e-6);
@@ -192,7 +192,7 @@ proptest! {
     }
 }
 
-/// A closed bumpy sphere whose rows are turned so that corners fall nowhere special.
+/// A closed bumpy sphere with rotated rows, so that no vertex has a special position.
 fn bumpy_sphere(n: usize) -> Vec<Triangle> {
     let at = |i: usize, j: usize| {
         let (theta, phi) = (
@@ -200,7 +200,7 @@ fn bumpy_sphere(n: usize) -> Vec<Triangle> {
             std::f64::consts::TAU * ((j % (2 * n)) as f64 + 0.3) / (2 * n) as f64,
         );
         let r = 3.0 + 0.2 * (5.0 * phi).sin() * (4.0 * theta).sin();
-        // Corners are shared exactly, poles included.
+        // Vertices are shared exactly, poles included.
         let ring = if i == 0 || i == n { 0.0 } else { theta.sin() };
         DVec3::new(
             r * ring * phi.cos(),
@@ -225,7 +225,7 @@ fn no_ray_leaves_a_closed_surface_between_its_triangles() {
     let eye = DVec3::new(0.123, -0.456, 0.0789);
     for t in &mesh {
         for k in 0..=16 {
-            // Through corners and along edges, where rounding decides.
+            // Through vertices and along edges, where rounding decides.
             for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                 let through = a.lerp(b, f64::from(k) / 16.0);
                 assert!(bvh.any_hit(eye, eye + (through - eye) * 3.0, |_| false));
@@ -248,8 +248,8 @@ fn hostile_triangles_neither_panic_nor_hide_the_others() {
         [DVec3::ONE, DVec3::ONE, DVec3::X],
         1000,
     ));
-    // Centers that shrink towards a corner make the heuristic peel one triangle a level.
-    // Their boxes all hold the origin, so that nothing there is spared the whole depth.
+    // Centers that shrink towards a vertex make the heuristic peel off one triangle per level.
+    // Their boxes all contain the origin, so that a query there visits the whole depth.
     soup.extend((0..2000).map(|i| {
         let s = 0.5f64.powi(i / 2) * 1e12;
         [

@@ -1,8 +1,8 @@
-//! What a flood tells: the basin of each voxel, the basins, and where they touch.
+//! Result of a flood: the basin of each voxel, the basins, and their contacts.
 
 use std::ops::{BitOr, BitXor, Range};
 
-/// Levels to a voxel of distance.
+/// Levels per voxel of distance.
 pub(super) const STEPS: u32 = 64;
 
 /// The basin of each voxel.
@@ -15,7 +15,7 @@ pub enum Labels {
 }
 
 impl Labels {
-    /// Makes sure that labels below `n` can be set.
+    /// Ensures that labels below `n` can be set.
     pub fn make_room_for(&mut self, n: usize) {
         if n > usize::from(u16::MAX) + 1
             && let Self::U16(v) = self
@@ -32,7 +32,7 @@ impl Labels {
         }
     }
 
-    /// Label of the voxel at `index`; 0 when it is occupied.
+    /// Returns the label of the voxel at `index`; 0 if it is occupied.
     #[must_use]
     pub fn get(&self, index: usize) -> u32 {
         match self {
@@ -41,7 +41,7 @@ impl Labels {
         }
     }
 
-    /// Voxels.
+    /// Returns the number of voxels.
     #[must_use]
     pub fn len(&self) -> usize {
         match self {
@@ -50,7 +50,7 @@ impl Labels {
         }
     }
 
-    /// Whether there is no voxel.
+    /// Returns `true` if there are no voxels.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -58,7 +58,7 @@ impl Labels {
 
     /// Calls `run(voxels, label)` for each maximal run of voxels with one label within `range`, ascending.
     ///
-    /// Some dozen voxels at a time where a run is long.
+    /// Compares some dozen voxels at a time where a run is long.
     pub fn for_runs(&self, range: Range<usize>, run: impl FnMut(Range<usize>, u32)) {
         match self {
             Self::U16(v) => for_runs(v, range, run),
@@ -66,13 +66,13 @@ impl Labels {
         }
     }
 
-    /// All labels in index order.
+    /// Returns all labels in index order.
     pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.len()).map(|i| self.get(i))
     }
 }
 
-/// Labels compared at a time.
+/// Number of labels compared at a time.
 const CHUNK: usize = 64;
 
 fn for_runs<T>(labels: &[T], range: Range<usize>, mut run: impl FnMut(Range<usize>, u32))
@@ -100,32 +100,32 @@ pub struct Basin {
     pub peak: f64,
     /// Index of a voxel at that distance; outdoors, of its first voxel.
     pub peak_voxel: usize,
-    /// Voxels in it.
+    /// Number of voxels.
     pub n_voxels: u64,
 }
 
-/// Where two basins touch.
+/// Contact between two basins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saddle {
-    /// Label of the one basin; less than `b`.
+    /// Label of the first basin; less than `b`.
     pub a: u32,
-    /// Label of the other.
+    /// Label of the second.
     pub b: u32,
     /// Greatest distance at which they touch, rounded down to 1/64. [Units: vx]
     pub distance: f64,
     /// Index of a voxel at that distance that has a neighbor in the other basin.
     pub voxel: usize,
-    /// Voxel faces that they share.
+    /// Number of voxel faces that they share.
     pub n_faces: u64,
 }
 
-/// Basins of the distance field and how they touch.
+/// Basins of the distance field and their contacts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watershed {
-    /// Basin of each voxel, 0 where occupied. Every basin except outdoors is 6-connected.
+    /// Basin of each voxel, 0 if occupied. Every basin except outdoors is 6-connected.
     pub labels: Labels,
-    /// Basin with label `i + 1` at `i`: outdoors first if asked for, then deepest first, then by
-    /// index of the peak.
+    /// The basin with label `i + 1` is at `i`: outdoors first if requested, then deepest first, then by index
+    /// of the peak.
     pub basins: Vec<Basin>,
     /// Touching pairs, by distance from great to small, then by labels.
     pub saddles: Vec<Saddle>,

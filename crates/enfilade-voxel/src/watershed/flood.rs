@@ -11,7 +11,7 @@ use super::queue::{BATCH, NONE, Queue, Shape};
 
 /// A word of the volume: a level, or a basin's number once reached.
 ///
-/// The two top bits say which: reached, and done with (off the queue). All clear is a level, 0
+/// The two top bits tell which: reached, and finished (off the queue). If both are clear it is a level, 0
 /// for occupied.
 pub(super) trait Word: Copy + Send + Sync {
     const REACHED: u32;
@@ -77,7 +77,7 @@ pub(super) struct Flood<W> {
     queue: Queue,
     /// Basin by number; number 0 is the outdoors or unused.
     pools: Vec<Pool>,
-    /// Basins that have joined; numbers are given deepest first, so that the least of a set is the deepest.
+    /// Joined basins; numbers are given deepest first, so the least of a set is the deepest.
     joined: Sets,
     contacts: BTreeMap<(u32, u32), Contact>,
 }
@@ -103,7 +103,7 @@ impl<W: Word> Flood<W> {
         }
     }
 
-    /// Gives the outdoors its voxels; those that touch other free voxels are queued.
+    /// Assigns the outdoors its voxels; queues those that touch other free voxels.
     pub(super) fn seed(&mut self, outdoors: &BitVolume) {
         let mut first = None;
         for v in outdoors.rim().iter_set() {
@@ -118,7 +118,7 @@ impl<W: Word> Flood<W> {
                 self.queue.push(level, v as u32);
             }
         }
-        // The queue knows the level of what it holds; the rest touches nothing else.
+        // The queue remembers the level of its voxels; the others touch nothing else.
         let nx = self.dims[0];
         for row in 0..self.dims[1] * self.dims[2] {
             for_runs(outdoors.row(row), |from, to| {
@@ -134,12 +134,12 @@ impl<W: Word> Flood<W> {
         self.pools[0].voxel = first.unwrap_or(0);
     }
 
-    /// Floods until all is flooded, or `false` when numbers have run out.
+    /// Floods everything; returns `false` if numbers have run out.
     pub(super) fn run(&mut self) -> bool {
         while self.level > 0 {
             self.drain();
             while let Some(&voxel) = self.starts.get(self.next_start) {
-                // One that is not reached still is its level.
+                // A voxel that is not reached still holds its level.
                 let word = self.words[voxel as usize].get();
                 if word & W::REACHED == 0 {
                     if word != self.level {
@@ -167,7 +167,7 @@ impl<W: Word> Flood<W> {
         true
     }
 
-    /// Floods from all that is queued at the current level.
+    /// Floods from all voxels queued at the current level.
     fn drain(&mut self) {
         let mut batch = [0; BATCH];
         loop {
@@ -182,7 +182,7 @@ impl<W: Word> Flood<W> {
         }
     }
 
-    /// Reads what [`Self::spread`] is about to, all at once: no load waits for another.
+    /// Reads the words that [`Self::spread`] needs, all at once, so that no load waits for another.
     fn fetch(&self, batch: &[u32]) {
         let [row, slice] = [self.dims[0], self.dims[0] * self.dims[1]];
         let mut seen = 0;
@@ -221,14 +221,14 @@ impl<W: Word> Flood<W> {
         }
     }
 
-    /// Two basins touch at `voxel`: merges them or notes it. Returns what `number` is now.
+    /// Merges two basins that touch at `voxel`, or records the contact. Returns the current number of `number`.
     #[cold]
     fn touch(&mut self, number: u32, other: u32, voxel: u32) -> u32 {
         let other = self.joined.find(other);
         if other == number {
             return number;
         }
-        // Numbers were given deepest first, of equal ones the first, and keep that order.
+        // Numbers are given deepest first, ties in order of index, and keep that order.
         let (deep, shallow) = (number.min(other), number.max(other));
         debug_assert!(self.pools[deep as usize].peak >= self.pools[shallow as usize].peak);
         if self.pools[shallow as usize].peak - self.level < self.h {
@@ -279,7 +279,7 @@ impl<W: Word> Flood<W> {
 }
 
 impl Flood<u16> {
-    /// The same state in 32-bit words.
+    /// Returns the same state in 32-bit words.
     pub(super) fn widened(self) -> Flood<u32> {
         let words = self
             .words
@@ -310,9 +310,9 @@ impl Flood<u16> {
     }
 }
 
-/// How a finished volume becomes labels.
+/// Conversion of a finished volume to labels.
 pub(super) trait Relabel {
-    /// `label` by number, 0 where the number is not used.
+    /// Replaces each number by its `label`, 0 for an unused number.
     fn relabel(self, label: &[u32]) -> Labels;
 }
 
@@ -350,7 +350,7 @@ where
     Vec<W>: Relabel,
 {
     pub(super) fn finish(mut self, outdoors: bool) -> Watershed {
-        // Numbers were given deepest first, in order of index, so their order is the answer's.
+        // Numbers are given deepest first, in order of index, which is the order of the answer.
         let mut label = vec![0u32; self.pools.len()];
         let mut basins = Vec::new();
         for (n, pool) in self.pools.iter().enumerate() {

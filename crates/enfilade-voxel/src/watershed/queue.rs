@@ -1,21 +1,21 @@
-//! What the flood stands on: queues by level, and the neighbors of a voxel.
+//! Data structures of the flood: queues by level, and the neighbors of a voxel.
 
-/// Queue entries to a chunk: half a kilobyte, for in a small scene most of the hundreds of levels that wait hold few.
+/// Queue entries per chunk: half a kilobyte, because in a small scene most of the hundreds of waiting levels hold few.
 const CHUNK: usize = 128;
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Voxels taken from the queue at a time, so that the memory they need is fetched at once.
 ///
-/// The flood waits for memory, not for arithmetic: on a building of 256³ voxels, entries taken one
-/// by one spent four fifths of their time on the first look at a neighbor.
+/// The flood is bound by memory, not by arithmetic: on a building of 256³ voxels, taking entries one by one
+/// spent four fifths of the time on the first access to a neighbor.
 pub(super) const BATCH: usize = 32;
 
-/// First-in-first-out queues, one a level, in chunks of one pool.
+/// First-in-first-out queues, one per level, in chunks of one pool.
 pub(super) struct Queue {
     chunks: Vec<[u32; CHUNK]>,
     next: Vec<u32>,
     free: Vec<u32>,
-    /// For each level: first and last chunk, where to read in the first, where to write in the last.
+    /// Per level: first and last chunk, read position in the first, write position in the last.
     ends: Vec<[u32; 4]>,
 }
 
@@ -48,8 +48,8 @@ impl Queue {
         end[3] += 1;
     }
 
-    /// A new chunk. Room is made by eighths: twice as much, as vectors do by themselves, would be
-    /// half of all that a flood needs besides the volume.
+    /// Adds a chunk. Capacity grows by an eighth: doubling, as vectors do, would take half of all memory that
+    /// a flood needs besides the volume.
     #[cold]
     fn grow(&mut self) -> u32 {
         let n = self.chunks.len();
@@ -61,7 +61,7 @@ impl Queue {
         n as u32
     }
 
-    /// Takes the oldest entries of a level, [`BATCH`] at most; 0 when there is none.
+    /// Takes the oldest entries of a level, [`BATCH`] at most, and returns their number; 0 if there are none.
     pub(super) fn pop(&mut self, level: u32, into: &mut [u32; BATCH]) -> usize {
         let end = &mut self.ends[level as usize];
         if end[0] == end[1] && (end[0] == NONE || end[2] == end[3]) {
@@ -89,7 +89,7 @@ impl Queue {
     }
 }
 
-/// A box whose neighbors are found without dividing.
+/// A box with division-free neighbor search.
 #[derive(Clone, Copy)]
 pub(super) struct Shape {
     n: [u32; 3],
@@ -107,7 +107,7 @@ impl Shape {
         }
     }
 
-    /// `value / divisor`. The inverse is too large by less than 1, which adds less than
+    /// Returns `value / divisor`. The inverse is too large by less than 1, which adds less than
     /// `value / 2⁶⁴ < 2⁻³²` to the quotient: less than its distance to the next integer above,
     /// which is at least `1 / divisor`.
     #[inline(always)]
@@ -119,7 +119,7 @@ impl Shape {
         }
     }
 
-    /// The six voxels that share a face; [`NONE`] outside the box.
+    /// Returns the six voxels that share a face; [`NONE`] outside the box.
     #[inline(always)]
     pub(super) fn neighbors(&self, voxel: u32) -> [u32; 6] {
         let [nx, ny, nz] = self.n;

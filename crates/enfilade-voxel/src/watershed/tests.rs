@@ -19,7 +19,7 @@ fn level(squared: u16) -> u32 {
     (f64::from(squared).sqrt() * 64.0).floor() as u32
 }
 
-/// The greatest level at which a path from `from` to each voxel can stay: relaxed to a fixpoint.
+/// Greatest level at which a path from `from` to each voxel can stay, relaxed to a fixpoint.
 fn widest_paths(dims: [usize; 3], levels: &[u32], from: usize) -> Vec<u32> {
     let mut best = vec![0; levels.len()];
     best[from] = levels[from];
@@ -54,7 +54,7 @@ fn widest_between(n: usize, saddles: &[Saddle], from: u32) -> Vec<f64> {
     best
 }
 
-/// All that holds for every watershed, whatever the field.
+/// Checks all invariants of a watershed, for any field.
 fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>) -> Watershed {
     let w = watershed(
         dims,
@@ -98,7 +98,7 @@ fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>
                 before.peak > b.peak || (before.peak == b.peak && before.peak_voxel < b.peak_voxel)
             );
         }
-        // Connected, and by a way up: every voxel is reached from the peak inside the basin.
+        // Connected by an ascending path: every voxel is reached from the peak inside the basin.
         let mut seen = vec![false; labels.len()];
         let mut open = vec![b.peak_voxel];
         seen[b.peak_voxel] = true;
@@ -148,8 +148,8 @@ fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>
         assert!(pair[0].distance >= pair[1].distance);
     }
 
-    // The saddles keep the field's passes: between any two peaks, the widest way along saddles is
-    // as wide as the widest way through voxels; and no basin is shallower than h.
+    // The saddles keep the field's passes: between any two peaks, the widest path along saddles is
+    // as wide as the widest path through voxels; and no basin is shallower than h.
     if outdoors.is_none() {
         for (i, b) in w.basins.iter().enumerate() {
             let wide = widest_paths(dims, &levels, b.peak_voxel);
@@ -176,8 +176,8 @@ fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>
     w
 }
 
-/// Voxels that deserve a basin by the definition of dynamics: every way to a higher voxel, or to
-/// one as high that comes earlier in the scan, goes down by `h` or more, and by one level at least.
+/// Voxels that must have a basin by the definition of dynamics: every path to a higher voxel, or to an
+/// equally high one earlier in the scan, descends by `h` or more, and by one level at least.
 fn significant_peaks(dims: [usize; 3], squared: &[u16], h: f64) -> Vec<usize> {
     let levels: Vec<u32> = squared.iter().map(|&d| level(d)).collect();
     let mut order: Vec<usize> = (0..levels.len()).filter(|&v| levels[v] > 0).collect();
@@ -246,7 +246,7 @@ proptest! {
 }
 
 proptest! {
-    /// Against one list a level. Long bursts cross the ends of chunks, full and empty.
+    /// Compares with one list per level. Long bursts cross the ends of chunks, full and empty.
     #[test]
     fn queues_are_first_in_first_out(bursts in prop::collection::vec((0u32..3, 0u32..1200, 0usize..50), 1..60)) {
         let mut queue = Queue::new(3);
@@ -322,7 +322,7 @@ fn two_rooms() -> ([usize; 3], BitVolume) {
 }
 
 #[test]
-fn a_doorway_parts_two_rooms() {
+fn a_doorway_separates_two_rooms() {
     let (dims, occupied) = two_rooms();
     let w = check(dims, &distance_squared(&occupied), 1.0, None);
     let peaks: Vec<f64> = w.basins.iter().map(|b| b.peak).collect();
@@ -331,7 +331,7 @@ fn a_doorway_parts_two_rooms() {
     // The doorway is 5 x 8 voxels; the dam stands in it.
     assert_eq!(w.saddles[0].n_faces, 40);
     assert!((20..23).contains(&(w.saddles[0].voxel % 41)));
-    // The shallow room's dynamics are 3: at more they are one.
+    // The shallow room's dynamics are 3: above that threshold both rooms are one.
     assert_eq!(
         check(dims, &distance_squared(&occupied), 3.0, None)
             .basins
@@ -357,10 +357,10 @@ fn outdoors_takes_the_space_around_it() {
         (w.basins[0].peak, w.basins[0].peak_voxel),
         (f64::INFINITY, 31 + 41 * (10 + 21 * 6))
     );
-    // Outdoors has the east room, the west room is its own.
+    // The east room is part of outdoors, the west room is a basin.
     assert_eq!(w.labels.get(25 + 41 * (3 + 21 * 2)), 1);
     assert_eq!((w.basins[1].peak, w.saddles[0].distance), (8.0, 3.0));
-    // Seeded on its slope, it does not take what is deeper by h; with a greater h it does.
+    // Seeded on its slope, outdoors does not take a basin deeper by h; with a greater h it does.
     let mut slope = BitVolume::new(dims);
     slope.set(38, 10, 6, true);
     assert_eq!(
@@ -385,7 +385,7 @@ fn empty_and_full_boxes_have_no_basins() {
     }
 }
 
-/// A checkerboard of single free voxels at 1 and 2, each a basin or joined, past 14 bits of them.
+/// A checkerboard of single free voxels at 1 and 2, each a basin or joined, more than 14 bits of them.
 fn many_basins(dims: [usize; 3], h: f64) -> Watershed {
     let squared: Vec<u16> = (0..dims.iter().product::<usize>())
         .map(|v| {
@@ -402,23 +402,23 @@ fn many_basins(dims: [usize; 3], h: f64) -> Watershed {
 #[test]
 fn numbers_run_out_and_are_found_again() {
     let dims = [60, 40, 20];
-    // All 24,000 maxima stay: 32-bit words while flooding, 16-bit labels after.
+    // All 24,000 maxima stay: 32-bit words during the flood, 16-bit labels after.
     let all = many_basins(dims, 1.0);
     assert_eq!(all.basins.len(), 24_000);
     assert!(matches!(all.labels, Labels::U16(_)));
     assert_eq!(all.basins.iter().map(|b| b.n_voxels).sum::<u64>(), 48_000);
-    // None stays but one.
+    // Only one stays.
     let one = many_basins(dims, 1.5);
     assert_eq!(one.basins.len(), 1);
     assert_eq!(one.basins[0].n_voxels, 48_000);
-    // More than 16 bits can label.
+    // More basins than 16 bits can label.
     let wide = many_basins([80, 60, 30], 1.0);
     assert_eq!(wide.basins.len(), 72_000);
     assert!(matches!(wide.labels, Labels::U32(_)));
 }
 
-/// Hills of falling height, each merging into the one before when it is met: 20,000 numbers are
-/// used up over many levels with few alive, so they are given out again.
+/// Hills of decreasing height, each merging into the one before on contact: 20,000 numbers are used up over
+/// many levels with few alive, so they are reused.
 #[test]
 fn renumbering_changes_nothing() {
     let dims = [40_000, 1, 1];
