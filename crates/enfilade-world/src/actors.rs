@@ -1,20 +1,21 @@
-//! Those who go about their errands, far from any eye: where each is follows from its plan and the time, and costs nothing until
-//! somebody asks.
+//! Actors on errands, simulated lazily: the position of each follows from its plan and the time, and costs nothing until it is
+//! queried.
 //!
-//! After Gjørup 1999, section 3.3.4: a car that enters a segment gets an entry, an exit and a time, is looked at again only when
-//! that time is over, and its place between them is computed only where it is seen; sounds and effects of cells that have
-//! not been seen for a while sleep. Beyond him, a plan reaches over many cells, so that the cells on it need not be asked; and plans change
-//! only by events that have a time, with chance drawn from actor and event alone. So who is where at a time does not depend on who
+//! After Gjørup 1999, section 3.3.4: a car that enters a segment gets an entry, an exit and a time, is updated again only when
+//! that time is over, and its position in between is computed only where it is seen; sounds and effects sleep in cells that have
+//! not been seen for a while. Beyond him, a plan spans many cells, so that the cells on it need no updates; and plans change
+//! only by events with a time, whose random numbers depend on actor and event alone. So positions do not depend on views,
+//! queries, or the steps in which time advances.
 //! looked, how often, or in which steps time went by.
 //!
 //! | file | holds |
 //! | --- | --- |
-//! | `chance.rs` | chance that two numbers decide |
-//! | `plan.rs` | places and times, straight lines between them |
-//! | `wheel.rs` | who is due when |
-//! | `crowd.rs` | all actors: events, cells, places |
-//! | `errand.rs` | plans of those who go somewhere, stay, and go on |
-//! | `awake.rs` | which cells are seen or heard, or were a short while ago |
+//! | `chance.rs` | random numbers determined by seed, actor and event |
+//! | `plan.rs` | points with times, straight lines between them |
+//! | `wheel.rs` | timing wheel of due actors |
+//! | `crowd.rs` | all actors: events, cells, positions |
+//! | `errand.rs` | plans that go somewhere, stay, and go on |
+//! | `awake.rs` | cells that are seen or heard, or were recently |
 
 mod awake;
 mod chance;

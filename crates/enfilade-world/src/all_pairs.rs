@@ -1,16 +1,16 @@
-//! Least lengths between all pairs of few nodes, kept while links open and close.
+//! Least lengths between all pairs of few nodes, maintained while links open and close.
 //!
-//! A table of lengths and of the last link of each way, by source. A link that opens or closes changes only what is behind it: of
-//! each source, the nodes whose way used it, or that it makes nearer (after Ramalingam & Reps, "An incremental algorithm for a
-//! generalization of the shortest-path problem", Journal of Algorithms 21, 1996). `O(n²)` memory; a change costs `O(n)` and, for
-//! every pair whose way changes, its links and a heap's logarithm.
+//! A table of lengths and of the last link of each path, by source. A link that opens or closes changes only paths through it:
+//! for each source, the nodes whose path used it, or that it brings nearer (after Ramalingam & Reps, "An incremental algorithm for
+//! a generalization of the shortest-path problem", Journal of Algorithms 21, 1996). `O(n²)` memory; a change costs `O(n)` and, for
+//! every pair whose path changes, its links times the logarithm of a heap.
 //!
-//! Lengths are whole numbers: sums are exact in any order, so that the table is equal to one made anew, to the bit.
+//! Lengths are integers: sums are exact in any order, so the table equals a new one, to the bit.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// No way.
+/// No path.
 pub(crate) const FAR: u32 = u32::MAX;
 /// No link.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -28,26 +28,26 @@ pub(crate) struct Edge {
 struct Leg {
     link: u32,
     to: u32,
-    /// Its place among the links of the node that it leads to.
+    /// Its index among the links of the node that it leads to.
     place: u16,
 }
 
-/// No link's place.
+/// Stands for no link's index.
 const NOWHERE: u16 = u16::MAX;
 
-/// The table, and the graph that it is of.
+/// The table and its graph.
 #[derive(Clone, Debug)]
 pub(crate) struct AllPairs {
     n: usize,
     links: Vec<Edge>,
-    /// By node its first link, and the number of all.
+    /// Per node its first link, and the number of all.
     first: Vec<u32>,
     /// Links of nodes, node by node.
     around: Vec<Leg>,
-    /// By source and node, the length of the way.
+    /// Per source and node, the length of the path.
     length: Vec<u32>,
-    /// Its last link, by its place among those of the node. Apart from lengths, and short: next hops read no more, and the less memory
-    /// there is, the more of it is near.
+    /// Per source and node, its last link, as an index among those of the node. Apart from lengths and in 16 bits: next hops read
+    /// nothing else, and a small table stays in cache.
     last: Vec<u16>,
     heap: BinaryHeap<Reverse<(u32, u32)>>,
     /// Nodes behind a closed link, and a mark for each.
@@ -56,11 +56,11 @@ pub(crate) struct AllPairs {
 }
 
 impl AllPairs {
-    /// Of `n` nodes. O(n · links · log n).
+    /// Makes the table of `n` nodes. O(n · links · log n).
     ///
     /// # Panics
     ///
-    /// When a node has more than 65,535 links.
+    /// If a node has more than 65,535 links.
     pub(crate) fn new(n: usize, links: Vec<Edge>) -> Self {
         let mut around: Vec<(u32, u32, u32)> = Vec::new();
         for (i, link) in (0..).zip(&links) {
@@ -109,23 +109,23 @@ impl AllPairs {
         self.n
     }
 
-    /// From one node to another; [`FAR`] where there is no way.
+    /// Returns the length from one node to another; [`FAR`] if there is no path.
     #[inline]
     pub(crate) fn length(&self, from: u32, to: u32) -> u32 {
         self.length[to as usize * self.n + from as usize]
     }
 
-    /// The first link on the way from one node to another; [`NONE`] where there is no way, or none is needed.
+    /// Returns the first link on the path from one node to another; [`NONE`] if there is no path, or none is needed.
     #[inline]
     pub(crate) fn first_link(&self, from: u32, to: u32) -> u32 {
-        // Links lead both ways: it is the last one of the way back.
+        // Links are symmetric: it is the last one of the path back.
         match self.last[to as usize * self.n + from as usize] {
             NOWHERE => NONE,
             place => self.around[self.first[from as usize] as usize + usize::from(place)].link,
         }
     }
 
-    /// Opens or closes a link. O(n + pairs whose way changes).
+    /// Opens or closes a link. O(n + pairs whose path changes).
     pub(crate) fn set_open(&mut self, link: u32, is_open: bool) {
         let at = &mut self.links[link as usize];
         if at.is_open == is_open {
@@ -162,7 +162,7 @@ impl AllPairs {
         }
     }
 
-    /// Settles what is in the heap, and all that comes nearer by it.
+    /// Settles all nodes in the heap, and all that they bring nearer.
     fn spread(&mut self, source: usize) {
         let row = source * self.n;
         while let Some(Reverse((length, node))) = self.heap.pop() {
@@ -186,7 +186,7 @@ impl AllPairs {
         }
     }
 
-    /// Finds new ways from a source to a node and all that were reached through it.
+    /// Finds new paths from a source to a node and to all nodes reached through it.
     fn cut(&mut self, source: usize, node: u32) {
         let row = source * self.n;
         self.behind.clear();
@@ -198,7 +198,7 @@ impl AllPairs {
             next += 1;
             for i in self.first[from as usize]..self.first[from as usize + 1] {
                 let Leg { to, place, .. } = self.around[i as usize];
-                // Ways from a source are a tree: a link into `from` is the last one of no other.
+                // Paths from a source form a tree: a link into `from` is the last one of no other.
                 if self.last[row + to as usize] == place && !self.is_behind[to as usize] {
                     self.is_behind[to as usize] = true;
                     self.behind.push(to);
@@ -232,7 +232,7 @@ impl AllPairs {
     }
 }
 
-/// The sum, [`FAR`] where it is more than a length can be.
+/// Returns the sum, or [`FAR`] if it exceeds the greatest length.
 #[inline]
 pub(crate) fn sum(a: u32, b: u32) -> u32 {
     a.saturating_add(b)

@@ -1,19 +1,19 @@
 //! Block tridiagonal systems of 2 × 2 blocks that are symmetric and positive definite.
 //!
-//! Elimination by blocks (Golub & Van Loan, "Matrix Computations", §4.5.1), without exchange of rows, which such systems do not need.
-//! O(rows). A block that rounding has made singular ends it.
+//! Elimination by blocks (Golub & Van Loan, "Matrix Computations", §4.5.1) without pivoting, which such systems do not need.
+//! O(rows). Fails at a block that rounding has made singular.
 
-/// A row of the system; overwritten as it is solved.
+/// A row of the system; overwritten by the solver.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Block {
     pub(crate) diagonal: [[f64; 2]; 2],
-    /// To the next row; its transpose is from the next row to this.
+    /// Coefficients of the next row; their transpose couples the next row to this one.
     pub(crate) above: [[f64; 2]; 2],
     /// The right side; afterwards the solution.
     pub(crate) right: [f64; 2],
 }
 
-/// Solves a system in place; whether it could.
+/// Solves a system in place; returns `true` on success.
 pub(crate) fn solve(blocks: &mut [Block]) -> bool {
     for i in 0..blocks.len() {
         if i > 0 {
@@ -29,7 +29,7 @@ pub(crate) fn solve(blocks: &mut [Block]) -> bool {
                 block.right[k] -= down[k][0] * before.right[0] + down[k][1] * before.right[1];
             }
         }
-        // From here on the inverse stands where the diagonal stood.
+        // From here on the inverse replaces the diagonal.
         let Some(inverse) = inverse(blocks[i].diagonal) else {
             return false;
         };
@@ -51,7 +51,7 @@ fn product(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
 }
 
 fn inverse(m: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
-    // Where all of a string is straight, moving a point along it changes nothing: a little is added.
+    // Where a string is straight, moving a point along it changes nothing: add a little.
     let little = 1e-12 * (m[0][0] + m[1][1]);
     let [[a, b], [c, d]] = [[m[0][0] + little, m[0][1]], [m[1][0], m[1][1] + little]];
     let determinant = a * d - b * c;
@@ -66,7 +66,7 @@ mod tests {
     /// W11.
     #[test]
     fn a_chain_of_springs_is_in_balance() {
-        // Each row: 2 to itself, -1 to its neighbors; pulled at the last by 1: xᵢ = i + 1.
+        // Each row: 2 to itself, -1 to its neighbors; the last pulled by 1: xᵢ = i + 1.
         let row = |last: f64| Block {
             diagonal: [[2.0, 0.0], [0.0, 2.0]],
             above: [[-1.0, 0.0], [0.0, -1.0]],

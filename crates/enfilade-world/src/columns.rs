@@ -1,31 +1,31 @@
-//! Triangles into columns of matter: where, above each square of a grid in plan, something is.
+//! Columns of solid matter above the squares of a grid in plan, from triangles.
 //!
-//! As Recast does (Mononen, "Recast Navigation", 2009): each triangle is clipped to the squares that it touches, and the heights of
-//! what is left there are a span. So no wall is missed, however thin; each is up to one square too thick. O(triangles + squares
+//! As in Recast (Mononen, "Recast Navigation", 2009): each triangle is clipped to the squares that it touches, and the heights of
+//! the clipped part form a span. So no wall is missed, however thin; each is up to one square too thick. O(triangles + squares
 //! that they cover). Clipping rounds; a square that a triangle only touches may count as covered.
 
 use enfilade_geom::{DVec3, Triangle};
 
-/// Squares in plan.
+/// A grid of squares in plan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Squares {
-    /// Least corner. [Units: wu]
+    /// Minimum along each axis. [Units: wu]
     pub(crate) origin: [f64; 2],
     /// Side of a square. [Units: wu]
     pub(crate) side: f64,
-    /// Along x and z.
+    /// Number along x and z.
     pub(crate) n: [usize; 2],
 }
 
 impl Squares {
-    /// The square of a point, if there is one.
+    /// Returns the square of a point, if it is in the grid.
     pub(crate) fn at(&self, p: DVec3) -> Option<[usize; 2]> {
         let x = self.along(p);
         let is_in = |k: usize| x[k] >= 0.0 && x[k] < self.n[k] as f64;
         (is_in(0) && is_in(1)).then(|| x.map(|x| x as usize))
     }
 
-    /// Coordinates of a point in squares.
+    /// Converts a point to coordinates in squares.
     pub(crate) fn along(&self, p: DVec3) -> [f64; 2] {
         [
             (p.x - self.origin[0]) / self.side,
@@ -38,20 +38,20 @@ impl Squares {
     }
 }
 
-/// Matter above a square.
+/// A height interval of solid matter above a square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Span {
     pub(crate) square: u32,
     pub(crate) low: f32,
     pub(crate) high: f32,
-    /// Whether its top is flat enough to stand on.
+    /// True if its top is flat enough to stand on.
     pub(crate) is_floor: bool,
 }
 
-/// Tops this near to each other are one. [Units: wu]
+/// Tops nearer to each other than this are merged. [Units: wu]
 const SAME: f32 = 0.02;
 
-/// The spans of all triangles, ascending by square and height, none touching another. `slope` is the steepest floor. [Units: rad]
+/// Returns the spans of all triangles, ascending by square and height, none touching another. `slope` is the steepest floor. [Units: rad]
 pub(crate) fn spans(
     squares: &Squares,
     triangles: impl Iterator<Item = Triangle>,
@@ -61,7 +61,7 @@ pub(crate) fn spans(
     let (mut row, mut part, mut rest) = (Vec::new(), Vec::new(), Vec::new());
     for t in triangles {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();
-        // Models do not say which side of a floor is up.
+        // Models do not record which side of a floor is up.
         let is_floor = normal.y.abs() >= slope.cos();
         let Some([first, last]) = range(squares, &t, 1) else {
             continue;
@@ -118,19 +118,19 @@ fn merged(spans: Vec<Span>) -> Vec<Span> {
     merged
 }
 
-/// The squares that points reach along an axis of the grid; `None` where they reach none.
+/// Returns the range of squares that points cover along an axis of the grid; `None` if it is empty.
 fn range(squares: &Squares, points: &[DVec3], axis: usize) -> Option<[usize; 2]> {
     let along = points.iter().map(|&p| squares.along(p)[axis]);
     let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |h, x| {
         (h.0.min(x), h.1.max(x))
     });
     let n = squares.n[axis] as f64;
-    // Not for what is no number, either.
+    // False for NaN, too.
     let is_in = low < n && high >= 0.0;
     is_in.then(|| [low, high].map(|x| x.clamp(0.0, n - 1.0) as usize))
 }
 
-/// The part of a convex polygon from `low` to `high` along an axis.
+/// Writes the part of a convex polygon from `low` to `high` along an axis.
 fn clip(polygon: &[DVec3], axis: usize, low: f64, high: f64, part: &mut Vec<DVec3>) {
     part.clear();
     for (i, &a) in polygon.iter().enumerate() {
@@ -139,7 +139,7 @@ fn clip(polygon: &[DVec3], axis: usize, low: f64, high: f64, part: &mut Vec<DVec
         if (low..=high).contains(&from) {
             part.push(a);
         }
-        // Where the edge crosses either side, in its own order.
+        // Crossings of the edge with both sides, in order along the edge.
         let mut cuts = [low, high].map(|x| (x - from) / (to - from));
         if cuts[0] > cuts[1] {
             cuts.swap(0, 1);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_that_touch_are_one_and_the_top_one_says_what_one_stands_on() {
+    fn touching_spans_merge_and_the_top_one_is_the_floor() {
         let span = |low, high, is_floor| Span {
             square: 3,
             low,

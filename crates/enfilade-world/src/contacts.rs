@@ -1,13 +1,13 @@
-//! What a body touches: walls, objects and shut doors of the cells that it reaches, and no others.
+//! Contact of bodies with walls, objects and shut doors, only in the cells that they reach.
 //!
 //! Candidates are found by flooding (Gjørup 1999, section 3.3.4): from the body's cell through each portal that it touches, with
-//! a stamp for each cell so that none is visited twice. He asks for the portals that the bounding sphere touches; here the body
-//! itself is tried against the pieces of the opening, grown by the layout's tolerance, so that rounding errs to "touches".
+//! a stamp per cell so that none is visited twice. Gjørup tests portals against the bounding sphere; here the body itself is
+//! tested against the pieces of the opening, grown by the layout's tolerance, so that rounding errs to "touches".
 //!
 //! | file | holds |
 //! | --- | --- |
 //! | `body.rs` | spheres, capsules, boxes |
-//! | `kernel.rs` | one body, one triangle: touching, and when first touched |
+//! | `kernel.rs` | one body, one triangle: contact, and time of first contact |
 //! | `walls.rs` | triangles by cell, made once |
 //! | `flood.rs` | the cells and triangles on a body's way |
 //! | `caster.rs` | casts and contacts |

@@ -1,9 +1,9 @@
-//! Edges of walls that shortest ways bend about: where the air of a cell takes more than half of what is around them.
+//! Edges of walls about which shortest paths bend: more than half of their surroundings is air of the cell.
 //!
-//! A shortest way among walls bends only at such edges (Sharir & Schorr, "On shortest paths in polyhedral spaces", 1986). They are
-//! found by asking the locator on a small circle about each edge, not by the mesh: whatever its triangles, an edge within a flat
-//! wall has as much air as matter around it, and one that points into the air more. Edges in one line are joined before. O(edges ·
-//! points along them). What is rounder than a step of the circle, 11°, from triangle to triangle is taken for flat.
+//! A shortest path among walls bends only at such edges (Sharir & Schorr, "On shortest paths in polyhedral spaces", 1986). They are
+//! found by querying the locator on a small circle about each edge, not from the mesh: whatever its triangles, an edge within a flat
+//! wall has as much air as solid around it, and a convex one has more air. Collinear edges are joined before. O(edges · points along
+//! them). A surface that turns by less than a step of the circle, 11°, from triangle to triangle counts as flat.
 
 use std::collections::BTreeMap;
 
@@ -12,23 +12,23 @@ use enfilade_geom::{DVec3, Triangle};
 
 use crate::layout::Layout;
 
-/// An edge, and a point of it just off the wall.
+/// A convex edge, and a point of it just off the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Where ways may bend. [Units: wu]
+    /// Point at which paths may bend. [Units: wu]
     pub at: DVec3,
-    /// Both ends of the edge that they may slide along. [Units: wu]
+    /// Ends of the edge along which the point may slide. [Units: wu]
     pub edge: [DVec3; 2],
 }
 
-/// Radius of the circle. [Units: wu] Thinner than walls, wider than what rounding leaves open.
+/// Radius of the circle: less than the thickness of walls, more than gaps by rounding. [Units: wu]
 const AROUND: f64 = 0.02;
-/// Points of the circle.
+/// Number of points on the circle.
 const N_AROUND: usize = 32;
-/// Lines this near to each other are one. [Units: wu]
+/// Lines nearer to each other than this are one. [Units: wu]
 const SAME_LINE: f64 = 1e-3;
 
-/// The corners of a cell with these walls: points at most `spacing` from each other along the edges, `off` from the wall. [Units: wu]
+/// Returns the [`Corner`]s of a cell with these walls: points at most `spacing` apart along the edges, `off` from the wall. [Units: wu]
 pub(crate) fn corners(
     layout: &Layout,
     cell: CellId,
@@ -43,7 +43,7 @@ pub(crate) fn corners(
         let away: Vec<DVec3> = (0..n)
             .map(|k| into_air(layout, cell, at(k as f64 + 0.5), to - from, flat))
             .collect();
-        // Runs along which the edge points into the air.
+        // Runs along which the edge is convex.
         let mut k = 0;
         while k < n {
             let first = k;
@@ -66,7 +66,7 @@ pub(crate) fn corners(
     found
 }
 
-/// Which way the air is about an edge that points into it; zero for an edge that does not. `flat` lies along a wall at the edge.
+/// Returns the direction into the air at a convex edge; zero for other edges. `flat` lies along a wall at the edge.
 fn into_air(layout: &Layout, cell: CellId, p: DVec3, along: DVec3, flat: DVec3) -> DVec3 {
     let u = flat.normalize_or_zero();
     let v = along.normalize_or_zero().cross(u);
@@ -80,7 +80,7 @@ fn into_air(layout: &Layout, cell: CellId, p: DVec3, along: DVec3, flat: DVec3) 
             sum += d;
         }
     }
-    // About the edge of a sheet without thickness there is air all around: away from the sheet.
+    // The edge of a sheet without thickness has air all around: go away from the sheet.
     match n {
         0..=16 => DVec3::ZERO,
         N_AROUND => -u,
@@ -88,10 +88,10 @@ fn into_air(layout: &Layout, cell: CellId, p: DVec3, along: DVec3, flat: DVec3) 
     }
 }
 
-/// The edges of triangles, those in one line that touch joined: both ends, and a direction into a triangle at it.
+/// Returns the edges of triangles, joined where they are collinear and touch: both ends, and a direction into a triangle there.
 fn lines(walls: &[Triangle]) -> Vec<(DVec3, DVec3, DVec3)> {
     type Key = [i64; 6];
-    /// From and to along the line.
+    /// Start and end along the line.
     type Stretch = (f64, f64);
     let mut by_line: BTreeMap<Key, (DVec3, DVec3, DVec3, Vec<Stretch>)> = BTreeMap::new();
     for t in walls {

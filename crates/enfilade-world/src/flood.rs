@@ -1,7 +1,7 @@
-//! Which cells a shape reaches: those that it comes to through openings that it meets.
+//! Flood of a shape through cells: finds the cells that it reaches through openings that it meets.
 //!
-//! After Dirkse 2002, section 5.1.2, figure 36, but with stamps instead of locks that are undone on return, which walk all
-//! simple paths: each cell is entered once, each opening tested from either side once. O(openings of the cells reached).
+//! After Dirkse 2002, section 5.1.2, figure 36, but with stamps instead of locks that are undone on return, which enumerate all
+//! simple paths: each cell is entered once, each opening tested once from either side. O(openings of the cells reached).
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
@@ -11,14 +11,14 @@ use crate::pose::Pose;
 use crate::shape::{Shape, is_near};
 use crate::space::{PartId, Place, Space};
 
-/// Floods, and keeps its buffers.
+/// The flood; keeps its buffers.
 #[derive(Clone, Debug, Default)]
 pub struct Flood {
-    /// By cell of all parts.
+    /// Per cell of all parts.
     stamps: Vec<u32>,
     stamp: u32,
     places: Vec<Place>,
-    /// The shape in the frames of the parts that it came to, as many as `n_posed`.
+    /// The shape in the frames of the parts that it reached, `n_posed` of them.
     posed: Vec<Posed>,
     n_posed: usize,
     clearance: f64,
@@ -31,21 +31,21 @@ struct Posed {
     points: Vec<DVec3>,
 }
 
-/// A shape at its place.
+/// A shape at a pose.
 #[derive(Clone, Copy)]
 pub struct Posted<'a> {
     /// The shape.
     pub shape: &'a Shape,
-    /// How far it [reaches](Shape::reach). [Units: wu]
+    /// Its [reach](Shape::reach). [Units: wu]
     pub reach: f64,
     /// The part in whose frame it stands.
     pub frame: PartId,
-    /// Where it stands there.
+    /// Its pose there.
     pub pose: &'a Pose,
 }
 
 impl<'a> Posted<'a> {
-    /// A shape at a pose in the frame of a part.
+    /// Places a shape at a pose in the frame of a part.
     #[must_use]
     pub fn new(shape: &'a Shape, frame: PartId, pose: &'a Pose) -> Self {
         Self {
@@ -58,13 +58,12 @@ impl<'a> Posted<'a> {
 }
 
 impl Flood {
-    /// The places that a shape reaches from one of them, through openings that it meets and that `passes` lets it pass; the
-    /// first is `start`, the others come in the order in which they are reached. What is within the tolerance of an opening
-    /// meets it.
+    /// Returns the places that a shape reaches from `start`, through openings that it meets and for which `passes` returns `true`: first
+    /// `start`, then the others in the order in which they are reached. A shape within the tolerance of an opening meets it.
     ///
     /// # Panics
     ///
-    /// When `start` or the shape's frame is not of `space`.
+    /// If `start` or the shape's frame is not of `space`.
     pub fn reach(
         &mut self,
         space: &Space,
@@ -115,8 +114,8 @@ impl Flood {
         &self.places
     }
 
-    /// How far the shape of the last flood may move without meeting an opening that it did not meet: less than the true
-    /// distance, and 0 where parts stand in a cell that it reached. [Units: wu]
+    /// Returns the distance by which the shape of the last flood may move without meeting another opening: a lower bound, and 0 where
+    /// parts stand in a cell that it reached. [Units: wu]
     #[must_use]
     pub fn clearance(&self) -> f64 {
         self.clearance
@@ -134,7 +133,7 @@ impl Flood {
         self.clearance = f64::INFINITY;
     }
 
-    /// Goes on around a part, behind one of its doors.
+    /// Continues in the surroundings of a part, behind one of its doors.
     fn leave(
         &mut self,
         space: &Space,
@@ -178,7 +177,7 @@ impl Flood {
         }
     }
 
-    /// Whether the shape meets a portal's opening.
+    /// Returns `true` if the shape meets a portal's opening.
     fn meets(&mut self, space: &Space, posted: &Posted, id: PartId, portal: PortalId) -> bool {
         let layout = &space.parts[id.idx()].layout;
         let opening = layout.opening(portal);
@@ -200,7 +199,7 @@ impl Flood {
         is_met
     }
 
-    /// The shape in the frame of a part.
+    /// Returns the shape in the frame of a part.
     fn posed_in(&mut self, space: &Space, posted: &Posted, id: PartId) -> &Posed {
         let known = self.posed[..self.n_posed]
             .iter()
@@ -225,7 +224,7 @@ impl Flood {
     }
 }
 
-/// Whether a ball reaches the plane of an opening.
+/// Returns `true` if a ball reaches the plane of an opening.
 fn is_beside(opening: &Opening, center: DVec3, reach: f64) -> bool {
     opening.height_of(center).abs() <= reach
 }

@@ -1,13 +1,13 @@
-//! Shortest ways through the air of a concave cell, where a wall of it may be between two points.
+//! Shortest paths through the air of a concave cell, where a wall may be between two points.
 //!
-//! A graph of the points that see each other: [corners](Corner) at the edges of the cell's walls, and the points of its portals. All
-//! lengths between corners are found once (Floyd, "Algorithm 97: shortest path", 1962); a way is then the best over the corners that its
-//! ends see. A way may bend at any point of an edge, and corners are a meter apart: the bends of a way that was found slide along
-//! their edges to where it is shortest, each in turn, by unfolding the edge (Sharir & Schorr 1986). Walls are the structure of the cell,
-//! its portals are closed: ways stay within. Furniture is not considered.
+//! A graph of points that see each other: [`Corner`]s at convex edges of the cell's walls, and the points of its portals. All
+//! lengths between `Corner`s are found once (Floyd, "Algorithm 97: shortest path", 1962); a query takes the best path over those
+//! that its ends see. A path may bend at any point of an edge, while `Corner`s are a meter apart: the bends of the path slide along
+//! their edges to where it is shortest, one after another, by unfolding the edge (Sharir & Schorr 1986). Walls are the structure of
+//! the cell, its portals are closed: paths stay inside. Furniture is ignored.
 //!
-//! Lengths are those of true ways, never less than the shortest; slid, within a thousandth of it in rooms with corners, and farther off
-//! about what is round. `O(n³)` for `n` corners, once; a question costs a line of sight for each corner of the cell.
+//! Lengths are those of true paths, never less than the shortest; after sliding, within a thousandth of it about sharp edges, and
+//! less exact about round surfaces. `O(n³)` for `n` `Corner`s, once; a query costs a line of sight for each `Corner` of the cell.
 
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::scene::Primitive;
@@ -17,23 +17,23 @@ use crate::edges::{Corner, corners};
 use crate::layout::{Layout, Opening};
 use crate::search::Ways;
 
-/// Between points along an edge. [Units: wu]
+/// Distance between points along an edge. [Units: wu]
 const SPACING: f64 = 1.0;
-/// Corners of a cell, at most: beyond, some of those near to others are left out.
+/// Maximum number of `Corner`s of a cell; beyond, some of those near to others are left out.
 const MAX_CORNERS: usize = 256;
-/// Corners this near to each other are one at first. [Units: wu]
+/// `Corner`s nearer to each other than this are merged at first. [Units: wu]
 const NEAR: f64 = 0.05;
-/// Points of a cell's portals, at most: with more, as about a tower of a thousand windows, lines stay straight.
+/// Maximum number of points of a cell's portals; with more, as about a tower of a thousand windows, lines stay straight.
 const MAX_POINTS: usize = 2048;
-/// How far points lie off walls and portals. [Units: wu]
+/// Distance of points from walls and portals. [Units: wu]
 const OFF: f64 = 1e-3;
-/// Times that each bend of a way slides.
+/// Number of times that each bend of a path slides.
 const SLIDES: usize = 24;
 
-/// What is known of the concave cells of a world. Made once.
+/// Path graphs of the concave cells of a world. Made once.
 #[derive(Clone, Debug)]
 pub struct Geodesics {
-    /// By cell; `None` where lines between any two points stay in the air, or are taken to.
+    /// Per cell; `None` where lines between any two points stay in the air, or are assumed to.
     cells: Vec<Option<Concave>>,
     off: f64,
 }
@@ -43,19 +43,19 @@ struct Concave {
     /// Walls and portals.
     walls: Bvh,
     corners: Vec<Corner>,
-    /// From corner to corner, row by row.
+    /// Lengths between `Corner`s, row by row.
     lengths: Vec<f32>,
-    /// The next corner on the way.
+    /// The next `Corner` on the path.
     next: Vec<u16>,
-    /// The points of its portals, off these.
+    /// The points of its portals, moved off these.
     points: Vec<DVec3>,
-    /// By point, its length to each corner.
+    /// Per point, its length to each `Corner`.
     of_points: Vec<f32>,
 }
 
 impl Geodesics {
-    /// Of a world, for the points of `ways`, which is given the lengths between them in all concave cells. Milliseconds for a cell with
-    /// tens of corners, a second for one with hundreds.
+    /// Prepares a world, for the points of `ways`, and stores the lengths between them in all concave cells there. Takes milliseconds
+    /// for a cell with tens of `Corner`s, a second for one with hundreds.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, ways: &mut Ways) -> Self {
         let off = OFF.max(8.0 * layout.tolerance());
@@ -70,23 +70,24 @@ impl Geodesics {
         Self { cells, off }
     }
 
-    /// Whether lines between points of a cell may meet its walls, and ways around them are known: not in a cell with more than 2,048 points.
+    /// Returns `true` if lines between points of a cell may meet its walls, and paths around them are known; `false` for a cell with
+    /// more than 2,048 points.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn is_concave(&self, cell: CellId) -> bool {
         self.cells[cell.idx()].is_some()
     }
 
-    /// The lengths from a point in a cell to the [points of its portals](Ways::points_of), for
+    /// Writes the lengths from a point in a cell to the [points of its portals](Ways::points_of), for
     /// [`LengthSearch::run_from`](crate::LengthSearch::run_from) and
-    /// [`arrivals_by`](crate::LengthSearch::arrivals_by). `lengths` is cleared; infinite where no way was found. [Units: wu]
+    /// [`arrivals_by`](crate::LengthSearch::arrivals_by). Clears `lengths` first; infinite where no path was found. [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn lengths_from(&self, ways: &Ways, cell: CellId, p: DVec3, lengths: &mut Vec<f64>) {
         lengths.clear();
         let Some(concave) = &self.cells[cell.idx()] else {
@@ -106,12 +107,12 @@ impl Geodesics {
         }
     }
 
-    /// The shortest way between two points of a cell: its length, and in `bends`, which is cleared, where it bends, each with the edge
-    /// that it bends about; `None` where none was found. A point on a portal is taken a little into the cell. [Units: wu]
+    /// Returns the length of the shortest path between two points of a cell, and writes its bends to `bends` (cleared first), each with
+    /// its edge; `None` if no path was found. A point on a portal is moved a little into the cell. [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn way(
         &self,
         cell: CellId,
@@ -132,7 +133,7 @@ impl Geodesics {
         Some(length)
     }
 
-    /// How far points are taken off walls and portals. [Units: wu]
+    /// Returns the distance by which points are moved off walls and portals. [Units: wu]
     #[must_use]
     pub fn off(&self) -> f64 {
         self.off
@@ -140,7 +141,7 @@ impl Geodesics {
 }
 
 impl Concave {
-    /// `None` for a cell without corners, or with too many points.
+    /// `None` for a cell without `Corner`s, or with too many points.
     fn new(layout: &Layout, world: &World, ways: &Ways, cell: CellId, off: f64) -> Option<Self> {
         if ways.points_of(cell).count() > MAX_POINTS {
             return None;
@@ -173,7 +174,7 @@ impl Concave {
         Some(concave)
     }
 
-    /// The length of the line between two points; infinite where a wall is between them.
+    /// Returns the length of the line between two points; infinite if a wall is between them.
     fn straight(&self, a: DVec3, b: DVec3) -> f64 {
         if self.walls.any_hit(a, b, |_| false) {
             f64::INFINITY
@@ -223,7 +224,7 @@ impl Concave {
         }
     }
 
-    /// Lengths between the points of its portals.
+    /// Returns the lengths between the points of its portals.
     fn between_points(&self) -> Vec<f64> {
         let (n, n_points) = (self.corners.len(), self.points.len());
         let mut lengths = vec![0.0; n_points * n_points];
@@ -232,7 +233,7 @@ impl Concave {
                 let mut least = self.straight(self.points[i], self.points[j]);
                 if least == f64::INFINITY {
                     let [a, b] = [i, j].map(|k| &self.of_points[k * n..][..n]);
-                    // From one point to a corner by its way, and from there to the other by its own.
+                    // From one point to a `Corner` by its path, and from there to the other by its own.
                     let through = a.iter().zip(b).map(|(x, y)| x + y);
                     least = f64::from(through.fold(f32::INFINITY, f32::min));
                 }
@@ -243,11 +244,11 @@ impl Concave {
         lengths
     }
 
-    /// The corners of the shortest way by them.
+    /// Finds the `Corner`s of the shortest path through any.
     fn bend(&self, from: DVec3, to: DVec3, bends: &mut Vec<Corner>) -> Option<()> {
         let n = self.corners.len();
         let mut best = (f64::INFINITY, 0, 0);
-        // What is farther than the best by the line alone needs no line of sight.
+        // One farther than the best by straight lines alone needs no line of sight.
         for (i, a) in self.corners.iter().enumerate() {
             if from.distance(a.at) + a.at.distance(to) >= best.0 {
                 continue;
@@ -272,7 +273,7 @@ impl Concave {
         Some(())
     }
 
-    /// Slides bends along their edges to where the way is shortest, as long as nothing gets between.
+    /// Slides bends along their edges to where the path is shortest, while no wall gets in between.
     fn slide(&self, from: DVec3, to: DVec3, bends: &mut [Corner]) {
         for _ in 0..SLIDES {
             let mut moved = 0.0_f64;
@@ -294,8 +295,8 @@ impl Concave {
     }
 }
 
-/// The point of a segment with the least sum of lengths to two points: with one turned about the segment's line until both are in
-/// one plane, on either side, that of the line between them.
+/// Returns the point of a segment with the least sum of lengths to two points: rotate one about the segment's line until both are
+/// coplanar, on opposite sides; the line between them crosses there.
 fn shortest_about([a, b]: [DVec3; 2], p: DVec3, q: DVec3) -> DVec3 {
     let length = a.distance(b);
     let d = (b - a).normalize_or_zero();
@@ -306,14 +307,14 @@ fn shortest_about([a, b]: [DVec3; 2], p: DVec3, q: DVec3) -> DVec3 {
     a + d * t.clamp(0.0, length)
 }
 
-/// A point of an opening, taken a little into a cell and off the walls at its edges.
+/// Moves a point of an opening a little into a cell and off the walls at its edges.
 fn into_cell(opening: &Opening<'_>, cell: CellId, p: DVec3, off: f64) -> DVec3 {
     let side = if opening.cells()[1] == cell {
         1.0
     } else {
         -1.0
     };
-    // Away from the edges of its own piece: the middle of all may lie in a wall between two.
+    // Away from the edges of its own piece: the common middle may lie in a wall between two.
     let holds = |piece: &&[DVec3]| Winding::new(piece.to_vec()).contains_in_plane(p, 0.1 * off);
     let piece = opening.pieces().find(holds).unwrap_or(&[]);
     let middle = piece.iter().sum::<DVec3>() / piece.len().max(1) as f64;
@@ -325,7 +326,7 @@ fn into_cell(opening: &Opening<'_>, cell: CellId, p: DVec3, off: f64) -> DVec3 {
     p + opening.normal() * side * off + inward.clamp_length_max(off)
 }
 
-/// Leaves out corners near to others, until there are not too many.
+/// Leaves out `Corner`s near to others until there are few enough.
 fn thin_out(corners: &mut Vec<Corner>) {
     let mut near = NEAR;
     loop {

@@ -1,13 +1,13 @@
-//! From any cell to any other: how far, and through which portal next.
+//! Distance and next portal from any cell to any other.
 //!
 //! After Gjørup ("Cell and portal based visibility", 1999, §3.3.4), who keeps a table of distances and next portals between all
-//! pairs of cells, without those of exactly two portals, which are no decisions. Here dead ends are left out, too: what hangs on the
-//! rest by one portal is a tree, and has one way out. What remains are *junctions*, joined by *chains* of two-portal cells; their
-//! table is kept up to date while doors open and close ([`AllPairs`]). A door in a tree or one that is not the only shut one of its
-//! chain changes no more than its tree or chain.
+//! pairs of cells, except those with exactly two portals, which offer no choice. Here dead ends are left out, too: a subgraph that
+//! one portal attaches to the rest is a tree, and has one way out. There remain *junctions*, joined by *chains* of two-portal cells;
+//! their table is maintained while doors open and close ([`AllPairs`]). A door in a tree, or in a chain with another shut door,
+//! changes no more than its tree or chain.
 //!
-//! The length of a step from cell to cell is the caller's; steps are rounded to whole tenths of a millimeter, so that sums are exact
-//! and answers equal to those of a search through all cells. Ways longer than 400 km count as none.
+//! The caller defines the length of a step from cell to cell; steps are rounded to tenths of a millimeter, so that sums are exact
+//! and answers equal those of a search through all cells. Paths longer than 400 km count as none.
 
 use enfilade_cpg::{CellId, PortalId};
 
@@ -15,25 +15,25 @@ use crate::all_pairs::{AllPairs, Edge, FAR, NONE, sum};
 use crate::layout::{Exit, Layout};
 use crate::trees::number_trees;
 
-/// Whole units of length in a meter.
+/// Integer units of length per meter.
 const UNITS: f64 = 1e4;
 
 /// Distances and next portals between all cells.
 #[derive(Clone, Debug)]
 pub struct Hops {
-    /// By portal.
+    /// Per portal.
     steps: Vec<Step>,
-    /// By cell.
+    /// Per cell.
     nodes: Vec<Node>,
-    /// By cell its branches: the cells that hang on it, by the numbers of their trees.
+    /// Per cell its branches: the cells that hang on it, by their indices in the trees.
     first_branch: Vec<u32>,
     branches: Vec<CellId>,
-    /// Cells by their number in the trees, in which all below one follow it.
+    /// Cells by their index in the trees, in which all descendants of a cell follow it.
     by_number: Vec<CellId>,
     chains: Vec<Chain>,
     /// Cells of chains, chain by chain.
     stops: Vec<Stop>,
-    /// Portals of chains, one more than its cells.
+    /// Portals of chains, one more per chain than its cells.
     rails: Vec<PortalId>,
     junctions: AllPairs,
     cell_of_junction: Vec<CellId>,
@@ -47,37 +47,37 @@ struct Step {
     role: Role,
 }
 
-/// What a portal is to the table.
+/// Role of a portal in the table.
 #[derive(Clone, Copy, Debug)]
 enum Role {
     /// Never passed.
     Wall,
     /// The way out of a cell of a tree.
     Branch(CellId),
-    /// Of a chain, at a place.
+    /// A portal of a chain, at a position.
     Rail(u32, u32),
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// Towards the root: the portal, the cell behind it. Itself at the root.
+    /// Towards the root: the portal, and the cell behind it. The root itself at the root.
     up: Exit,
     root: CellId,
-    /// The highest cell that is reached through open portals.
+    /// The highest cell reached through open portals.
     top: CellId,
-    /// To the root, all open.
+    /// Distance to the root with all portals open.
     height: u32,
-    /// Number in its tree, and the first after all below it.
+    /// Index in its tree, and the first one after its descendants.
     below: [u32; 2],
     place: RootPlace,
 }
 
-/// Of a root.
+/// Position of a root.
 #[derive(Clone, Copy, Debug)]
 enum RootPlace {
     Tree,
     Junction(u32),
-    /// A chain, and its place in it.
+    /// A chain, and the position in it.
     Chain(u32, u32),
 }
 
@@ -85,10 +85,10 @@ enum RootPlace {
 struct Chain {
     /// Junctions at its ends.
     ends: [u32; 2],
-    /// Among all stops.
+    /// Index among all stops.
     first_stop: u32,
     n_stops: u32,
-    /// Among all rails.
+    /// Index among all rails.
     first_rail: u32,
     length: u32,
 }
@@ -96,13 +96,13 @@ struct Chain {
 #[derive(Clone, Copy, Debug)]
 struct Stop {
     cell: CellId,
-    /// From the chain's first end.
+    /// Distance from the chain's first end.
     offset: u32,
-    /// Shut portals between it and the first end.
+    /// Number of shut portals between it and the first end.
     n_shut: u32,
 }
 
-/// Where a way out of a core cell leads, and how far.
+/// A way out of a core cell: its junction and its length.
 #[derive(Clone, Copy)]
 struct Out {
     junction: u32,
@@ -112,11 +112,11 @@ struct Out {
 }
 
 impl Hops {
-    /// Of a layout in which a step through a portal, from the middle of one of its cells to that of the other, is so long;
-    /// `None`: it is never passed. All are open. [Units: wu]
+    /// Makes the table for a layout. `step` returns the length of a step through a portal, from the middle of one of its cells to that of
+    /// the other, or `None` if it is never passed. All portals are open at first. [Units: wu]
     ///
     /// O(cells) and, for `n` junctions with `l` chains, `O(n · l · log n)` time and 6 · n² bytes. A length that is not finite or
-    /// below 0 counts as `None`. Panics when a junction has more than 65,535 chains.
+    /// below 0 counts as `None`. Panics if a junction has more than 65,535 chains.
     #[must_use]
     pub fn new(layout: &Layout, mut step: impl FnMut(PortalId) -> Option<f64>) -> Self {
         let steps = (0..layout.n_portals() as u32).map(PortalId).map(|p| {
@@ -131,27 +131,27 @@ impl Hops {
         Core::new(layout, steps.collect()).into_hops()
     }
 
-    /// How many cells are left as junctions: the table has the square of it.
+    /// Returns the number of junctions; the table has its square.
     #[must_use]
     pub fn n_junctions(&self) -> usize {
         self.junctions.n()
     }
 
-    /// Whether a portal is open: all are, at first.
+    /// Returns `true` if a portal is open; all are at first.
     ///
     /// # Panics
     ///
-    /// When there is no such portal.
+    /// If there is no such portal.
     #[must_use]
     pub fn is_open(&self, portal: PortalId) -> bool {
         self.steps[portal.idx()].is_open
     }
 
-    /// Opens or closes a portal. Costs the size of its tree or chain, and in the table the pairs of junctions whose way changes.
+    /// Opens or closes a portal. O(size of its tree or chain), and in the table the pairs of junctions whose path changes.
     ///
     /// # Panics
     ///
-    /// When there is no such portal.
+    /// If there is no such portal.
     pub fn set_open(&mut self, portal: PortalId, is_open: bool) {
         let step = &mut self.steps[portal.idx()];
         if step.is_open == is_open {
@@ -179,14 +179,14 @@ impl Hops {
         }
     }
 
-    /// Sets how high one gets from the cells of a branch.
+    /// Updates the highest cells reached from the cells of a branch.
     fn set_tops(&mut self, cell: CellId) {
         let [first, end] = self.nodes[cell.idx()].below;
         for number in first..end {
             let cell = self.by_number[number as usize];
             let Node { up, .. } = self.nodes[cell.idx()];
             let is_open = self.steps[up.portal.idx()].is_open;
-            // The one above comes first.
+            // The parent comes first.
             self.nodes[cell.idx()].top = if is_open {
                 self.nodes[up.to.idx()].top
             } else {
@@ -195,12 +195,12 @@ impl Hops {
         }
     }
 
-    /// The least length from the middle of a cell to that of another, through open portals; `None` where there is no way.
-    /// O(1), but for the depth of a dead end that both are in. [Units: wu]
+    /// Returns the least length from the middle of a cell to that of another, through open portals; `None` if there is no path.
+    /// O(1), plus the depth of a dead end if both are in it. [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn distance(&self, from: CellId, to: CellId) -> Option<f64> {
         let length = self.length(from, to);
@@ -225,12 +225,12 @@ impl Hops {
         sum(a.height + b.height, self.core_way(a.root, b.root).0)
     }
 
-    /// The portal to take from a cell on the shortest way to another; `None` in the cell itself, and where there is no way.
-    /// O(1), but for a binary search among the dead ends at the cell.
+    /// Returns the first portal on the shortest path from a cell to another; `None` in the cell itself, and if there is no path.
+    /// O(1), plus a binary search among the dead ends at the cell.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn next(&self, from: CellId, to: CellId) -> Option<Exit> {
         let [a, b] = [from, to].map(|c| &self.nodes[c.idx()]);
@@ -253,7 +253,7 @@ impl Hops {
         if let [RootPlace::Junction(x), RootPlace::Junction(y)] =
             [a, b].map(|n| self.nodes[n.root.idx()].place)
         {
-            // What most ask for in a world without chains: no length is needed.
+            // The common case in a world without chains: no length is needed.
             let link = self.junctions.first_link(x, y);
             return (link != NONE).then(|| {
                 if from == a.root {
@@ -276,7 +276,7 @@ impl Hops {
         (first..end).contains(&node.below[0])
     }
 
-    /// The way from a cell to one below it.
+    /// Returns the first step from a cell to one of its descendants.
     fn down(&self, from: CellId, to: CellId) -> Exit {
         let range =
             self.first_branch[from.idx()] as usize..self.first_branch[from.idx() + 1] as usize;
@@ -290,7 +290,7 @@ impl Hops {
         }
     }
 
-    /// Between two roots: the length, and the portal to take first.
+    /// Returns the length between two roots, and the portal to take first.
     fn core_way(&self, from: CellId, to: CellId) -> (u32, Option<Exit>) {
         let (outs, ins) = (self.outs(from), self.outs(to));
         let mut best = self.along_chain(from, to);
@@ -314,7 +314,7 @@ impl Hops {
         best
     }
 
-    /// The ways from a root to junctions: to itself, or to the ends of its chain that are open.
+    /// Returns the ways from a root to junctions: to itself, or to the ends of its chain that are open.
     fn outs(&self, root: CellId) -> [Option<Out>; 2] {
         match self.nodes[root.idx()].place {
             RootPlace::Junction(junction) => {
@@ -337,7 +337,7 @@ impl Hops {
         let (is_open, length) = if end == 0 {
             (stop.n_shut == 0, stop.offset)
         } else {
-            // The last portal has no stop behind it that counts it.
+            // No stop behind the last portal counts it.
             let last = self.rails[(c.first_rail + c.n_stops) as usize];
             let n_shut = stops[stops.len() - 1].n_shut;
             let is_open = n_shut == stop.n_shut && self.steps[last.idx()].is_open;
@@ -350,7 +350,7 @@ impl Hops {
         })
     }
 
-    /// The next portal from a stop of a chain towards an end.
+    /// Returns the next portal from a stop of a chain towards an end.
     fn along(&self, chain: u32, place: u32, end: usize) -> Exit {
         let c = &self.chains[chain as usize];
         let place = place as usize;
@@ -366,7 +366,7 @@ impl Hops {
         }
     }
 
-    /// The first portal of a chain from the junction at one of its ends.
+    /// Returns the first portal of a chain from the junction at one of its ends.
     fn onto(&self, chain: u32, end: usize) -> Exit {
         let c = &self.chains[chain as usize];
         let stops = &self.stops[c.first_stop as usize..][..c.n_stops as usize];
@@ -386,7 +386,7 @@ impl Hops {
         self.onto(chain, usize::from(ends[0] != junction))
     }
 
-    /// From a junction into the chain of a root, whose way out to that junction is given.
+    /// Returns the portal from a junction into the chain of a root, given the root's way out to that junction.
     fn back_in(&self, root: CellId, out: Out) -> Option<Exit> {
         let RootPlace::Chain(chain, place) = self.nodes[root.idx()].place else {
             return None;
@@ -395,7 +395,7 @@ impl Hops {
         Some(self.onto(chain, end))
     }
 
-    /// Between two stops of one chain, without leaving it.
+    /// Returns the path between two stops of one chain, without leaving it.
     fn along_chain(&self, from: CellId, to: CellId) -> (u32, Option<Exit>) {
         let places = [from, to].map(|c| self.nodes[c.idx()].place);
         if let [RootPlace::Chain(chain, i), RootPlace::Chain(other, j)] = places
@@ -412,14 +412,14 @@ impl Hops {
     }
 }
 
-/// What is left when dead ends are taken away.
+/// The graph without its dead ends.
 struct Core<'a> {
     layout: &'a Layout,
     steps: Vec<Step>,
     nodes: Vec<Node>,
-    /// Portals that are left, by cell.
+    /// Number of portals left per cell.
     degree: Vec<u32>,
-    /// Cells of trees, those above after those below.
+    /// Cells of trees, descendants first.
     peeled: Vec<CellId>,
 }
 
@@ -460,7 +460,7 @@ impl<'a> Core<'a> {
         core
     }
 
-    /// Takes a dead end away; the cell behind it, if it is one now.
+    /// Removes a dead end; returns the cell behind it if that is one now.
     fn peel(&mut self, cell: CellId) -> Option<CellId> {
         let up = self.first_left(cell)?;
         self.steps[up.portal.idx()].role = Role::Branch(cell);
@@ -473,7 +473,7 @@ impl<'a> Core<'a> {
         (*degree == 1).then_some(up.to)
     }
 
-    /// The first portal of a cell that no tree and no chain has.
+    /// Returns the first portal of a cell that belongs to no tree and no chain.
     fn first_left(&self, cell: CellId) -> Option<Exit> {
         let is_left = |e: &&Exit| {
             let step = &self.steps[e.portal.idx()];
@@ -507,7 +507,7 @@ impl<'a> Core<'a> {
         for i in 0..hops.cell_of_junction.len() {
             self.follow_chains(&mut hops, i as u32);
         }
-        // What is left are rings of two-portal cells: one of each decides which way round.
+        // Only rings of two-portal cells are left: make one cell of each a junction.
         for &cell in &roots {
             if matches!(self.nodes[cell.idx()].place, RootPlace::Junction(NONE)) {
                 let junction = self.add_junction(&mut hops, cell);
@@ -569,7 +569,7 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Numbers the cells so that all below one follow it. First branches by cell, the branches, the cells by number.
+    /// Numbers the cells so that all descendants of a cell follow it. Returns the first branches per cell, the branches, the cells by number.
     fn number_trees(&mut self) -> (Vec<u32>, Vec<CellId>, Vec<CellId>) {
         let n = self.nodes.len();
         let ups: Vec<[usize; 2]> = (self.peeled.iter())

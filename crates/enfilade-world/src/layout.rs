@@ -1,36 +1,36 @@
-//! Cells and portals as all that walks through them reads them.
+//! Shared cell and portal layout of all queries.
 
 use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, World};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding, world_tolerance};
 
-/// The cells and portals of a world in double precision, side by side.
+/// The cells and portals of a world in double precision, in contiguous arrays.
 ///
-/// Made once. A portal's opening is its convex pieces, not the outline around them: what touches the outline alone does not
+/// Made once. A portal's opening is its convex pieces, not the outline around them: a shape that touches only the outline does not
 /// touch the opening.
 #[derive(Clone, Debug)]
 pub struct Layout {
     cells: Vec<CellShape>,
-    /// By cell its first exit, and the number of all.
+    /// Per cell its first exit, and the number of all.
     first_exit: Vec<u32>,
     exits: Vec<Exit>,
-    /// By exit, around its opening: side by side, for who only wants to know how far off all are.
+    /// Per exit, the box around its opening; contiguous, for distance bounds to all of them.
     exit_bounds: Vec<Aabb>,
     openings: Vec<OpeningShape>,
-    /// By piece its first corner, and the number of all.
+    /// Per piece its first vertex, and the number of all.
     first_corner: Vec<u32>,
     corners: Vec<DVec3>,
     locator: Locator,
     tolerance: f64,
 }
 
-/// A cell by its size.
+/// Extent of a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct CellShape {
-    /// Around it. For outdoors, the scene's padded box. [Units: wu]
+    /// Bounding box. For outdoors, the scene's padded box. [Units: wu]
     pub bounds: Aabb,
-    /// Of the air in it. [Units: wu³]
+    /// Volume of its air. [Units: wu³]
     pub volume: f64,
-    /// Whether it is the space around the building.
+    /// True for the space around the building.
     pub is_outdoor: bool,
 }
 
@@ -63,10 +63,10 @@ pub struct Opening<'a> {
 }
 
 impl Layout {
-    /// Of a world whose graph is [valid](enfilade_cpg::CellPortalGraph::validate). O(cells + corners of portals).
+    /// Makes the layout of a world whose graph is [valid](enfilade_cpg::CellPortalGraph::validate). O(cells + vertices of portals).
     ///
-    /// A piece that has no area, by rounding, is left out; a portal without any other has its outline for an opening, and one
-    /// whose outline is none either has no opening at all: nothing passes it.
+    /// Leaves out pieces without area, by rounding. A portal without any other piece has its outline for an opening; if that has no
+    /// area either, it has no opening at all: nothing passes it.
     #[must_use]
     pub fn new(world: &World) -> Self {
         let graph = &world.graph;
@@ -142,7 +142,7 @@ impl Layout {
         });
     }
 
-    /// Adds a piece that has an area, counter-clockwise about `normal`; its area.
+    /// Adds a piece, counter-clockwise about `normal`, unless it has no area; returns its area.
     fn add_piece(&mut self, corners: &[[f32; 3]], normal: DVec3) -> f64 {
         if corners.iter().flatten().any(|x| !x.is_finite()) || normal == DVec3::ZERO {
             return 0.0;
@@ -160,45 +160,45 @@ impl Layout {
         area
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.cells.len()
     }
 
-    /// How many portals there are.
+    /// Returns the number of portals.
     #[must_use]
     pub fn n_portals(&self) -> usize {
         self.openings.len()
     }
 
-    /// A cell by its size.
+    /// Returns the extent of a cell.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn cell(&self, cell: CellId) -> &CellShape {
         &self.cells[cell.idx()]
     }
 
-    /// The portals of a cell, ascending, each with the cell behind it.
+    /// Returns the portals of a cell, ascending, each with the cell behind it.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn exits(&self, cell: CellId) -> &[Exit] {
         let first = &self.first_exit[cell.idx()..];
         &self.exits[first[0] as usize..first[1] as usize]
     }
 
-    /// How far a point is from the nearest box around an opening of a cell; infinite where the cell has none. O(its openings).
+    /// Returns the distance of a point from the nearest box around an opening of a cell; infinite if the cell has none. O(its openings).
     /// [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn distance_to_exits(&self, cell: CellId, p: DVec3) -> f64 {
         let first = &self.first_exit[cell.idx()..];
@@ -207,11 +207,11 @@ impl Layout {
         squares.fold(f64::INFINITY, f64::min).sqrt()
     }
 
-    /// A portal's opening.
+    /// Returns a portal's opening.
     ///
     /// # Panics
     ///
-    /// When there is no such portal.
+    /// If there is no such portal.
     #[must_use]
     pub fn opening(&self, portal: PortalId) -> Opening<'_> {
         Opening {
@@ -220,20 +220,20 @@ impl Layout {
         }
     }
 
-    /// The cell of a point; `None` in solid matter and for points that are not finite. About 100 ns. [Units: wu]
+    /// Returns the cell of a point; `None` in solid matter and for points that are not finite. Takes about 100 ns. [Units: wu]
     #[must_use]
     pub fn locate(&self, p: DVec3) -> Option<CellId> {
         self.locator.locate(p)
     }
 
-    /// The same, and how far from the point it surely is the same cell. [Units: wu]
+    /// As [`Layout::locate`]; also returns a distance from the point within which the cell is certainly the same. [Units: wu]
     #[must_use]
     pub fn locate_with_room(&self, p: DVec3) -> (Option<CellId>, f64) {
         self.locator.locate_with_room(p)
     }
 
-    /// Adds the cells that the hull of `points` may touch, grown by `margin`, to `cells`, which stays ascending and without
-    /// repeats; `stack` is a buffer to be kept. As [`Locator::cells_near`]. [Units: wu]
+    /// Adds to `cells` those that the hull of `points`, grown by `margin`, may touch; `cells` stays ascending and without repeats.
+    /// `stack` is a buffer to keep between calls. As [`Locator::cells_near`]. [Units: wu]
     pub fn cells_near(
         &self,
         points: &[DVec3],
@@ -244,14 +244,14 @@ impl Layout {
         self.locator.cells_near_with(points, margin, cells, stack);
     }
 
-    /// The cell that is the space around the building, if there is one. O(cells).
+    /// Returns the space around the building, if any. O(cells).
     #[must_use]
     pub fn outdoors(&self) -> Option<CellId> {
         let at = self.cells.iter().position(|c| c.is_outdoor)?;
         Some(CellId(at as u32))
     }
 
-    /// How far what is stored may be off what is true, by rounding. [Units: wu]
+    /// Returns the largest deviation of stored from true geometry by rounding. [Units: wu]
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         self.tolerance
@@ -259,55 +259,55 @@ impl Layout {
 }
 
 impl<'a> Opening<'a> {
-    /// Its two cells; the normal points from the first to the second.
+    /// Returns its two cells; the normal points from the first to the second.
     #[must_use]
     pub fn cells(&self) -> [CellId; 2] {
         self.shape.cells
     }
 
-    /// What kind of opening it is.
+    /// Returns the kind of opening.
     #[must_use]
     pub fn kind(&self) -> PortalKind {
         self.shape.kind
     }
 
-    /// Unit normal, from the first cell to the second.
+    /// Returns the unit normal, from the first cell to the second.
     #[must_use]
     pub fn normal(&self) -> DVec3 {
         self.shape.normal
     }
 
-    /// Signed distance of a point from its plane, above 0 on the side of the second cell. [Units: wu]
+    /// Returns the signed distance of a point from its plane, above 0 on the side of the second cell. [Units: wu]
     #[must_use]
     pub fn height_of(&self, p: DVec3) -> f64 {
         self.shape.normal.dot(p - self.shape.center)
     }
 
-    /// The middle of its box; on its plane but for rounding, not always in the opening. [Units: wu]
+    /// Returns the center of its box; on its plane up to rounding, not always in the opening. [Units: wu]
     #[must_use]
     pub fn center(&self) -> DVec3 {
         self.shape.center
     }
 
-    /// Of the sphere about the center that holds it. [Units: wu]
+    /// Returns the radius of the bounding sphere about the center. [Units: wu]
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.shape.radius
     }
 
-    /// Around it. [Units: wu]
+    /// Returns the bounding box. [Units: wu]
     #[must_use]
     pub fn bounds(&self) -> &'a Aabb {
         &self.shape.bounds
     }
 
-    /// The sum over its pieces. [Units: wu²]
+    /// Returns the total area of its pieces. [Units: wu²]
     #[must_use]
     pub fn area(&self) -> f64 {
         self.shape.area
     }
 
-    /// Its convex pieces, each counter-clockwise seen from the second cell. [Units: wu]
+    /// Returns its convex pieces, each counter-clockwise seen from the second cell. [Units: wu]
     pub fn pieces(&self) -> impl ExactSizeIterator<Item = &'a [DVec3]> + Clone + use<'a> {
         let (layout, [first, end]) = (self.layout, self.shape.pieces);
         (first as usize..end as usize).map(move |i| {

@@ -1,13 +1,13 @@
-//! What lives in a world of cells and portals: what is where, what is touched, lit, heard and reached.
+//! Queries on a living world of cells and portals: positions, contact, light, sound and paths.
 //!
-//! Sight, light, sound, paths and collision are one walk over portals with different *carriers*: what is handed on through a
-//! portal, and when it stops. All of them read one [`Layout`], made once from a world, and one
-//! [`SightState`](enfilade_runtime::SightState), which says how doors stand. None knows another.
+//! Sight, light, sound, paths and collision all walk over portals with different *carriers*: the data passed on through a
+//! portal, and the condition that stops it. All of them read one [`Layout`], made once from a world, and one
+//! [`SightState`](enfilade_runtime::SightState), which holds the state of doors. They do not depend on each other.
 //!
-//! # What is promised
+//! # Guarantees
 //!
-//! - **Nothing is allocated** in a question once the buffers have grown.
-//! - **No clock, no threads, no files**: the same questions in the same order have the same answers.
+//! - **Allocation-free**: a query allocates nothing once the buffers have grown.
+//! - **No clock, no threads, no files**: equal queries in equal order give equal answers.
 
 mod actors;
 mod all_pairs;

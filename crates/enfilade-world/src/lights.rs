@@ -1,10 +1,10 @@
-//! Lamps: what each can light, and which of them matter to a view.
+//! Lamps: the cells that each may light, and the lamps that matter to a view.
 //!
-//! A lamp lights what is within its range and can be seen from it: its light is narrowed by portals just as a view is (Dirkse
-//! 2002, section 5.1.3, figure 39), closed doors stop it, and rooms that move carry it along. So no light shines through a
-//! wall into the next room, and none is switched off while what it lights is in view, wherever the lamp itself is.
+//! A lamp lights everything within its range that can be seen from it: portals narrow its light as they narrow a view (Dirkse
+//! 2002, section 5.1.3, figure 39), closed doors stop it, and moving rooms carry it along. So no light shines through a wall into
+//! the next room, and no lamp is switched off while anything that it lights is in view, wherever the lamp itself is.
 //!
-//! What a lamp lights is found when it is asked for after a change, O(what it lights), and kept.
+//! The lit cells are computed on the first query after a change, O(cells lit), and kept.
 
 use enfilade_geom::DVec3;
 use enfilade_runtime::{SeeOptions, View};
@@ -12,7 +12,7 @@ use enfilade_runtime::{SeeOptions, View};
 use crate::look::{SpaceSeen, SpaceViewer};
 use crate::space::{PartId, Place, Space};
 
-/// Which lamp.
+/// Index of a lamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LampId(pub u32);
 
@@ -21,18 +21,18 @@ pub struct LampId(pub u32);
 pub struct Lamp {
     /// The part in whose frame it stands, and with which it moves.
     pub frame: PartId,
-    /// Where. [Units: wu]
+    /// Position. [Units: wu]
     pub at: [f32; 3],
-    /// How far it shines. [Units: wu] [Limit: above 0]
+    /// Range of its light. [Units: wu] [Limit: above 0]
     pub range: f32,
 }
 
-/// Why there is no such lamp.
+/// Reason why a lamp is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LampError {
-    /// A place that is not finite, or a range that is not above 0.
-    #[error("a lamp's place must be finite, and its range above 0")]
+    /// A position that is not finite, or a range that is not above 0.
+    #[error("a lamp's position must be finite, and its range above 0")]
     NotPositive,
     /// A frame that does not exist.
     #[error("there is no such part")]
@@ -42,11 +42,11 @@ pub enum LampError {
     NoLamp,
 }
 
-/// A cell that a lamp lights, through one part of what it shines through.
+/// A cell that a lamp lights, through one part of an opening.
 #[derive(Clone, Copy, Debug)]
 struct Beam {
     place: Place,
-    /// Of its half-spaces, in the frame of the cell's part.
+    /// Index of the first of its half-spaces, in the frame of the cell's part.
     first_plane: u32,
     n_planes: u32,
 }
@@ -67,11 +67,11 @@ pub struct Lights {
 }
 
 impl Lights {
-    /// No lamps.
+    /// Makes an empty set.
     #[must_use]
     pub fn new(space: &Space) -> Self {
         let options = SeeOptions {
-            // Large polygons inside a cell may hide a part of it from the lamp as they may from an eye.
+            // Large polygons inside a cell hide a part of it from the lamp as from an eye.
             occlusion: true,
             ..SeeOptions::default()
         };
@@ -86,7 +86,7 @@ impl Lights {
     ///
     /// # Errors
     ///
-    /// A place that is not finite, a range that is not above 0, a frame that does not exist.
+    /// If the position is not finite, the range is not above 0, or the frame does not exist.
     pub fn add(&mut self, space: &Space, lamp: Lamp) -> Result<LampId, LampError> {
         check(space, &lamp)?;
         self.lamps.push(Lit {
@@ -102,7 +102,7 @@ impl Lights {
     ///
     /// # Errors
     ///
-    /// As [`Lights::add`], and a lamp that does not exist.
+    /// As [`Lights::add`], and if the lamp does not exist.
     pub fn set(&mut self, space: &Space, id: LampId, lamp: Lamp) -> Result<(), LampError> {
         check(space, &lamp)?;
         let lit = self.lamps.get_mut(id.0 as usize);
@@ -112,7 +112,7 @@ impl Lights {
         Ok(())
     }
 
-    /// To be called after a part has moved: lamps in it, and those whose light may come to it, are looked at anew.
+    /// Call after a part has moved: marks for update the lamps in it, and those whose light may reach it.
     pub fn part_moved(&mut self, space: &Space, part: PartId) {
         let own = &space.parts[part.idx()];
         for lit in &mut self.lamps {
@@ -124,7 +124,7 @@ impl Lights {
         }
     }
 
-    /// To be called after a door has opened, closed or moved: lamps that shine into a cell beside it are looked at anew.
+    /// Call after a door has opened, closed or moved: marks for update the lamps that shine into a cell beside it.
     pub fn door_changed(&mut self, space: &Space, part: PartId, portal: enfilade_cpg::PortalId) {
         let own = &space.parts[part.idx()];
         let cells = own.layout.opening(portal).cells();
@@ -137,7 +137,7 @@ impl Lights {
         }
     }
 
-    /// Brings all that has changed up to date; other questions answer by this. Allocates only while buffers grow.
+    /// Updates everything that has changed; other queries use the result. Allocates only while buffers grow.
     pub fn update(&mut self, space: &Space) {
         for lit in &mut self.lamps {
             if !lit.is_current {
@@ -147,13 +147,13 @@ impl Lights {
         }
     }
 
-    /// The places that a lamp lights, each once or more; none for a lamp that does not exist. None that it lights is missing.
+    /// Returns the places that a lamp lights, each at least once and none missing; none for a lamp that does not exist.
     pub fn lit_by(&self, id: LampId) -> impl Iterator<Item = Place> + use<'_> {
         let lit = self.lamps.get(id.0 as usize);
         lit.into_iter().flat_map(|l| &l.beams).map(|b| b.place)
     }
 
-    /// Whether a lamp may light a point of a place, in the frame of its part. Never false for a point that the lamp does
+    /// Returns `true` if a lamp may light a point of a place, in the frame of its part; never `false` for a point that it does
     /// light.
     #[must_use]
     pub fn may_light(&self, space: &Space, id: LampId, place: Place, p: DVec3) -> bool {
@@ -173,8 +173,8 @@ impl Lights {
             })
     }
 
-    /// The lamps whose light may fall on what a view sees, ascending: those that light a cell that it sees, and whose range
-    /// comes into what it sees of it.
+    /// Returns the lamps whose light may fall on anything in a view, ascending: those that light a cell that it sees, and whose range
+    /// reaches into the visible part of it.
     pub fn that_matter(&mut self, space: &Space, seen: &SpaceSeen) -> &[LampId] {
         self.seen.clear();
         for (id, lit) in (0..).map(LampId).zip(&self.lamps) {

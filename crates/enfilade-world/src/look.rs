@@ -1,16 +1,16 @@
-//! What an eye sees of a world and of the worlds that move in it.
+//! Visibility in a world and in the worlds that move in it.
 //!
-//! Each part is followed by its own [`Viewer`], in its own frame. A view that leaves a part through one of its doors goes on in
-//! the places around that the door leads to, and in the doors that it meets; a view of a cell in which parts stand goes on to
-//! these from outside. The part of the screen is handed on as it is: it depends on the eye alone, not on the frame. Parts take
-//! turns until none has anything new, which ends because each adds only what it had not seen.
+//! Each part is followed by its own [`Viewer`], in its own frame. A view that leaves a part through one of its doors continues in
+//! the surrounding places behind the door, and in the doors that it meets; a view of a cell in which parts stand continues in these
+//! from outside. The part of the screen is passed on unchanged: it depends on the eye alone, not on the frame. Parts take turns
+//! until none has anything new, which ends because each adds only what it had not seen.
 
 use enfilade_cpg::CellId;
 use enfilade_runtime::{Crossing, SeeOptions, Seen, StepQuestion, View, Viewer, Window};
 
 use crate::space::{PartId, Place, Space};
 
-/// Asks what one eye sees of a [`Space`], frame by frame; keeps its buffers.
+/// Queries visibility in a [`Space`] for one eye, frame by frame; keeps its buffers.
 pub struct SpaceViewer {
     parts: Vec<PartView>,
     options: SeeOptions,
@@ -21,20 +21,20 @@ pub struct SpaceViewer {
 
 struct PartView {
     viewer: Viewer,
-    /// In the part's frame; `None` until the part comes into the question.
+    /// In the part's frame; `None` until the query reaches the part.
     view: Option<View>,
-    /// Whether the current face was begun.
+    /// True if the current face was begun.
     is_begun: bool,
 }
 
 impl SpaceViewer {
-    /// A viewer of `space`.
+    /// Makes a viewer of `space` with default options.
     #[must_use]
     pub fn new(space: &Space) -> Self {
         Self::with_options(space, SeeOptions::default())
     }
 
-    /// A viewer of `space` that follows views so.
+    /// Makes a viewer of `space`.
     #[must_use]
     pub fn with_options(space: &Space, options: SeeOptions) -> Self {
         let mut viewer = Self {
@@ -48,7 +48,7 @@ impl SpaceViewer {
         viewer
     }
 
-    /// Room for parts that were added.
+    /// Makes room for added parts.
     fn grow(&mut self, space: &Space) {
         for part in &space.parts[self.parts.len()..] {
             self.parts.push(PartView {
@@ -59,14 +59,14 @@ impl SpaceViewer {
         }
     }
 
-    /// What `view`, which is in the frame of part `frame`, sees. A view given in the frame of the part that the eye is in is
-    /// exact wherever that part is.
+    /// Returns everything that `view`, in the frame of part `frame`, sees. A view in the frame of the part that the eye is in is exact
+    /// wherever that part is.
     ///
-    /// Time grows with what is seen, and a little with the number of parts. Allocates only while buffers grow.
+    /// Time grows with the visible part, and a little with the number of parts. Allocates only while buffers grow.
     ///
     /// # Panics
     ///
-    /// When there is no such part, or `space` is not the one that the viewer was made for.
+    /// If there is no such part, or `space` is not the one that the viewer was made for.
     pub fn see<'a>(&'a mut self, space: &Space, frame: PartId, view: &View) -> SpaceSeen<'a> {
         self.grow(space);
         for id in self.seen.drain(..) {
@@ -92,7 +92,7 @@ impl SpaceViewer {
         face: usize,
         at: Option<Place>,
     ) {
-        // An eye in no cell sees all that is in view, of all parts.
+        // An eye in no cell sees everything in view, of all parts.
         let start = at.map_or(PartId::ROOT, |place| place.part);
         self.begin(space, frame, view, face, start);
         let part = &mut self.parts[start.idx()];
@@ -119,7 +119,7 @@ impl SpaceViewer {
         }
     }
 
-    /// Makes a part ready for a face, if it is not.
+    /// Prepares a part for a face, if necessary.
     fn begin(&mut self, space: &Space, frame: PartId, view: &View, face: usize, id: PartId) {
         let part = &mut self.parts[id.idx()];
         if part.view.is_none() {
@@ -137,7 +137,7 @@ impl SpaceViewer {
         }
     }
 
-    /// Queues what goes on in other parts.
+    /// Queues the continuations in other parts.
     fn hand_on(&mut self, space: &Space, from: PartId) {
         let own = &space.parts[from.idx()];
         let queue = &mut self.queue;
@@ -182,22 +182,22 @@ fn question_of<'a>(space: &'a Space, id: PartId, view: &'a View, face: usize) ->
     }
 }
 
-/// What a view sees, part by part.
+/// The answer to a view, part by part.
 #[derive(Clone, Copy)]
 pub struct SpaceSeen<'a> {
     viewer: &'a SpaceViewer,
 }
 
 impl<'a> SpaceSeen<'a> {
-    /// The parts of which something is seen, ascending, each with what is seen of it, in its own frame: to be drawn at its
-    /// [pose](Space::pose). The cell that is a part's border stands for its outside.
+    /// Returns the visible parts, ascending, each with its visible contents in its own frame: draw them at its [pose](Space::pose). The
+    /// border cell of a part stands for its outside.
     pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
         let viewer = self.viewer;
         let answer = |id: &PartId| (*id, viewer.parts[id.idx()].viewer.answer());
         viewer.seen.iter().map(answer)
     }
 
-    /// What is seen of one part; `None` for nothing.
+    /// Returns the visible contents of one part; `None` if nothing of it is seen.
     #[must_use]
     pub fn of_part(&self, part: PartId) -> Option<Seen<'a>> {
         let is_seen = self.viewer.seen.binary_search(&part).is_ok();

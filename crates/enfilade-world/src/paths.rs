@@ -1,14 +1,14 @@
-//! Paths for walkers: from point to point, any angle, and what is near along ways one can walk.
+//! Paths for walkers: from point to point at any angle, and walking distances.
 //!
 //! Two levels, as in Botea, Müller & Schaeffer ("Near optimal hierarchical path-finding", 2004), but with cells and portals for
-//! clusters and entrances: lengths between the portals of each cell are found once, over its [floors](Floors), so that a wall within
-//! a cell is walked around; a path asks the [length search](LengthSearch) for the best sequences of portals, finds the way over the
-//! floors of their cells only, and pulls it taut: each bend moves straight towards the line between its neighbors as far as the
-//! floors allow, until none moves. Of the best few sequences the shortest is taken.
+//! clusters and entrances. Lengths between the portals of each cell are found once, over its [floors](Floors), so that paths go around
+//! walls within a cell. A query takes the best sequences of portals from the [length search](LengthSearch), finds the path over the
+//! floors of their cells only, and pulls it taut: each bend moves straight towards the line between its neighbors as far as the floors
+//! allow, until none moves. The shortest of the best few sequences wins.
 //!
 //! The path keeps the walker's radius from walls as [floors](Floors) do, and is never shorter than the shortest such path. It may be
-//! longer where it is caught on the other side of something that stands free in a cell, or where two sequences are nearly as short.
-//! O(floors of the cells passed), then milliseconds at most for a storey.
+//! longer if it is caught on the other side of a free-standing obstacle in a cell, or if two sequences are nearly equally short.
+//! O(floors of the cells passed), at most milliseconds for a storey.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
@@ -19,23 +19,23 @@ use crate::pull::{Bend, pull_taut};
 use crate::search::{Arrival, LengthSearch, Ways};
 use crate::strides::{Strides, walk_straight};
 
-/// Where one walker can go in a world. Made once, read by all searches.
+/// Walkable paths of one kind of walker in a world. Made once, read by all searches.
 #[derive(Clone, Debug)]
 pub struct WalkMap {
     floors: Floors,
     ways: Ways,
-    /// By point of the ways, the floors on either side of the portal: in its first cell, in its second.
+    /// Per point of the ways, the floors on either side of the portal: in its first cell, in its second.
     sides: Vec<[u32; 2]>,
 }
 
-/// Points of a portal that walkers cross it at are so far from each other. [Units: wu]
+/// Distance between the points at which walkers cross a portal. [Units: wu]
 ///
-/// In doorways there are two or three; taut paths through a gate of 10 m bend by less than a hundredth more for it.
+/// Doorways have two or three; taut paths through a gate of 10 m bend by less than a hundredth more for it.
 const SPACING: f64 = 1.0;
 
 impl WalkMap {
-    /// Of the structure of a world, without its objects. Seconds for a large building: the floors are laid out in squares of a
-    /// quarter of the walker's radius, and each cell's walked from each of its portals.
+    /// Prepares the structure of a world, without its objects. Takes seconds for a large building: floors are laid out in squares of a
+    /// quarter of the walker's radius, and searched in each cell from each of its portals.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let floors = Floors::new(layout, world, walker);
@@ -80,7 +80,7 @@ impl WalkMap {
         map
     }
 
-    /// Calls `visit` with the points of a cell, in the order of its ways: the floors on its side.
+    /// Calls `visit` with the floors on a cell's side of its points, in the order of its ways.
     fn each_point(&self, layout: &Layout, cell: CellId, mut visit: impl FnMut(u32)) {
         for exit in layout.exits(cell) {
             let side = usize::from(layout.opening(exit.portal).cells()[1] == cell);
@@ -90,26 +90,26 @@ impl WalkMap {
         }
     }
 
-    /// The floors that it is made of.
+    /// Returns its floors.
     #[must_use]
     pub fn floors(&self) -> &Floors {
         &self.floors
     }
 
-    /// Its points and lengths, for searches of one's own.
+    /// Returns its points and lengths, for custom searches.
     #[must_use]
     pub fn ways(&self) -> &Ways {
         &self.ways
     }
 
-    /// Whether the walker fits through a portal: wide and high enough, no window or crack, with floors on both sides.
+    /// Returns `true` if the walker fits through a portal: wide and high enough, not a window or crack, with floors on both sides.
     #[must_use]
     pub fn is_walkable(&self, portal: PortalId) -> bool {
         !self.ways.points(portal).is_empty()
     }
 }
 
-/// Of all steps through a portal, calls `choose` with some.
+/// Calls `choose` with some of all steps through a portal.
 fn choose_points(floors: &Floors, all: &[(PortalId, u32, u32)], mut choose: impl FnMut(u32, u32)) {
     let mut points: Vec<(DVec3, u32, u32)> = (all.iter())
         .map(|&(_, a, b)| ((floors.point(a) + floors.point(b)) * 0.5, a, b))
@@ -143,40 +143,40 @@ fn choose_points(floors: &Floors, all: &[(PortalId, u32, u32)], mut choose: impl
     }
 }
 
-/// A path that was found. Kept to be used again, so that a search need not allocate.
+/// A path found. Reuse it, so that a search need not allocate.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
-    /// Where it bends, in plan or in height: on the floor, from the start to the end. [Units: wu]
+    /// Points where it bends, in plan or in height: on the floor, from the start to the end. [Units: wu]
     pub points: Vec<DVec3>,
     /// The portals that it passes, each with the cell entered.
     pub portals: Vec<Exit>,
-    /// Of the line through the points. [Units: wu]
+    /// Length of the line through the points. [Units: wu]
     pub length: f64,
-    /// The same in plan. [Units: wu]
+    /// Its length in plan. [Units: wu]
     pub length_in_plan: f64,
 }
 
-/// Why there is no path.
+/// Reason why there is no path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoPath {
-    /// The walker cannot stand there.
+    /// The walker cannot stand at the start.
     #[error("no floor for a walker within its height and diameter of the start")]
     NoFloorAtStart,
-    /// The walker cannot stand there.
+    /// The walker cannot stand at the end.
     #[error("no floor for a walker within its height and diameter of the end")]
     NoFloorAtEnd,
-    /// Walls, steps, gaps or closed portals are between them.
+    /// Walls, steps, gaps or closed portals separate them.
     #[error("no way that a walker can go")]
     NoWay,
 }
 
-/// Searches for paths, with buffers that are used again: it allocates nothing once they have grown.
+/// Searches for paths, with reusable buffers: allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct PathSearch {
     search: LengthSearch,
     strides: Strides,
     arrivals: Vec<Arrival>,
-    /// By point of a cell.
+    /// Per point of a cell.
     lengths: Vec<f64>,
     legs: Vec<(u32, u32)>,
     floors: Vec<u32>,
@@ -186,24 +186,24 @@ pub struct PathSearch {
     kept: Vec<(usize, usize)>,
 }
 
-/// Sequences of portals that are pulled taut, at most.
+/// Maximum number of sequences of portals pulled taut.
 const N_SEQUENCES: usize = 4;
-/// No longer than the best by this factor, as found square by square.
+/// Greatest length of these, found square by square, relative to the best.
 const MOST: f64 = 1.06;
 
 impl PathSearch {
-    /// Without buffers yet.
+    /// Makes it without buffers.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Finds the path from one point to another through the portals that `may_pass` lets through: doors that are open, say. Points are at
-    /// the walker's feet, or any height up to its head. [Units: wu]
+    /// Finds the path from one point to another through the portals for which `may_pass` returns `true`, such as open doors. Points are
+    /// at the walker's feet, or any height up to its head. [Units: wu]
     ///
     /// # Errors
     ///
-    /// When the walker cannot stand at an end, or there is no way; `path` is then empty.
+    /// If the walker cannot stand at an end, or there is no path; `path` is then empty.
     pub fn find(
         &mut self,
         map: &WalkMap,
@@ -239,7 +239,7 @@ impl PathSearch {
         Ok(())
     }
 
-    /// Searches from a point as far as `radius`; the floor that it is on.
+    /// Searches from a point up to `radius`; returns the floor that it is on.
     fn within(
         &mut self,
         map: &WalkMap,
@@ -263,12 +263,12 @@ impl PathSearch {
         Ok(start)
     }
 
-    /// Finds what is within `radius` of a point along ways one can walk, for maps and radars: the cells, ascending by the length to
-    /// the nearest portal that leads in, the point's own first. Then ask for the [distances](Self::distance) of things. [Units: wu]
+    /// Finds the cells within walking distance `radius` of a point, for maps and radars, ascending by the length to the nearest portal that
+    /// leads in, the point's own first. Then query the [distances](Self::distance) of things. [Units: wu]
     ///
     /// # Errors
     ///
-    /// When the walker cannot stand there.
+    /// If the walker cannot stand there.
     pub fn cells_within(
         &mut self,
         map: &WalkMap,
@@ -281,8 +281,8 @@ impl PathSearch {
         Ok(self.search.cells())
     }
 
-    /// How far it is to a point from where [`PathSearch::cells_within`] started, along ways that it reached; `None` where the walker
-    /// cannot stand or was not led to. Square by square, so up to 3 % too long. [Units: wu]
+    /// Returns the walking distance of a point from the start of [`PathSearch::cells_within`]; `None` if the walker cannot stand there or
+    /// did not reach it. Square by square, so up to 3 % too long. [Units: wu]
     pub fn distance(&mut self, map: &WalkMap, layout: &Layout, to: DVec3) -> Option<f64> {
         let goal = map.floors.below(to)?;
         let (cell, from) = self.search.start()?;
@@ -294,7 +294,7 @@ impl PathSearch {
         self.arrivals.first().map(|a| a.length)
     }
 
-    /// Lengths from a floor to the points of its cell.
+    /// Computes lengths from a floor to the points of its cell.
     fn measure(&mut self, map: &WalkMap, layout: &Layout, from: u32) {
         let half = 0.5 * map.floors.squares().side;
         self.strides.spread(&map.floors, from, None);
@@ -304,11 +304,11 @@ impl PathSearch {
         });
     }
 
-    /// The best sequences to a floor.
+    /// Finds the best sequences to a floor.
     fn arrive(&mut self, map: &WalkMap, layout: &Layout, start: u32, goal: u32) {
         self.measure(map, layout, goal);
         let cell = map.floors.floor(goal).cell;
-        // For the start, where that is in the same cell.
+        // For the start, if it is in the same cell.
         self.lengths.push(self.strides.length(start));
         let lengths = &self.lengths;
         self.search.arrivals_by(
@@ -322,7 +322,7 @@ impl PathSearch {
         );
     }
 
-    /// The floors of a way, square by square.
+    /// Finds the floors of a path, square by square.
     fn lay_out(
         &mut self,
         map: &WalkMap,
@@ -354,12 +354,12 @@ impl PathSearch {
         }
     }
 
-    /// The bends of the way: all of its floors, less those that straight lines pass over.
+    /// Sets the bends of the path: all of its floors, except those that straight lines can skip.
     fn set_bends(&mut self, floors: &Floors, [first, last]: [Bend; 2]) {
         self.bends.clear();
         let point = |i: usize| (floors.point(self.floors[i]), self.floors[i]);
         self.bends.extend((0..self.floors.len()).map(point));
-        // The ends are where they were asked for, if that is on the floor at all.
+        // The ends are at the given points, if these are on the floor at all.
         for (bend, wanted) in [(0, first), (self.bends.len() - 1, last)] {
             let at = floors.squares().at(wanted.0);
             let is_on = at.is_some_and(|at| {
@@ -402,7 +402,7 @@ impl PathSearch {
         path.length_in_plan = legs().map(|v| v.with_y(0.0).length()).sum();
     }
 
-    /// Adds the points of the profile, but for the first, that are needed for heights exact to `most` (Douglas & Peucker 1973).
+    /// Adds the points of the profile, except the first, needed for heights exact to `most` (Douglas & Peucker 1973).
     fn keep_profile(&mut self, most: f64, points: &mut Vec<DVec3>) {
         self.kept.clear();
         self.kept.push((0, self.profile.len() - 1));

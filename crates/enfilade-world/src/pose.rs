@@ -1,13 +1,13 @@
-//! Rigid motions: where one frame is in another.
+//! Rigid motions between frames.
 
 use enfilade_geom::{DMat3, DMat4, DQuat, DVec3};
 
-/// A rigid motion: turn, then move. Takes points of a frame to the frame in which it stands.
+/// A rigid motion: rotate, then translate. Maps points of a frame to the frame in which it stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// The turn; of unit length.
+    /// The rotation; of unit length.
     pub turn: DQuat,
-    /// Where the frame's origin is. [Units: wu]
+    /// Position of the frame's origin. [Units: wu]
     pub at: DVec3,
 }
 
@@ -18,13 +18,13 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// No motion.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         turn: DQuat::IDENTITY,
         at: DVec3::ZERO,
     };
 
-    /// A move without a turn. [Units: wu]
+    /// Makes a translation. [Units: wu]
     #[must_use]
     pub const fn from_translation(at: DVec3) -> Self {
         Self {
@@ -33,7 +33,7 @@ impl Pose {
         }
     }
 
-    /// A turn about a point. `angle` in radians, counter-clockwise about `axis`, which is of unit length.
+    /// Makes a rotation about a point. `angle` in radians, counter-clockwise about `axis`, which has unit length.
     #[must_use]
     pub fn about(point: DVec3, axis: DVec3, angle: f64) -> Self {
         let turn = DQuat::from_axis_angle(axis, angle);
@@ -43,8 +43,8 @@ impl Pose {
         }
     }
 
-    /// The motion that does `inner` first, and then this one. The turn is made of unit length again, so that errors do not
-    /// grow with the number of motions.
+    /// Returns the motion that applies `inner` first, and then this one. Normalizes the rotation, so that errors do not grow with the
+    /// number of motions.
     #[must_use]
     pub fn after(&self, inner: &Self) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl Pose {
         }
     }
 
-    /// The motion that takes this one back.
+    /// Returns the inverse motion.
     #[must_use]
     pub fn inverse(&self) -> Self {
         let turn = self.turn.conjugate();
@@ -63,41 +63,41 @@ impl Pose {
         }
     }
 
-    /// Where a point goes. [Units: wu]
+    /// Maps a point. [Units: wu]
     #[inline]
     #[must_use]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.turn * p + self.at
     }
 
-    /// Where a point comes from. [Units: wu]
+    /// Maps a point by the inverse. [Units: wu]
     #[inline]
     #[must_use]
     pub fn point_back(&self, p: DVec3) -> DVec3 {
         self.turn.conjugate() * (p - self.at)
     }
 
-    /// Where a direction goes.
+    /// Maps a direction.
     #[inline]
     #[must_use]
     pub fn direction(&self, v: DVec3) -> DVec3 {
         self.turn * v
     }
 
-    /// The turn as a matrix.
+    /// Returns the rotation as a matrix.
     #[must_use]
     pub fn matrix3(&self) -> DMat3 {
         DMat3::from_quat(self.turn)
     }
 
-    /// As a matrix.
+    /// Returns the motion as a matrix.
     #[must_use]
     pub fn matrix(&self) -> DMat4 {
         DMat4::from_rotation_translation(self.turn, self.at)
     }
 
-    /// The pose at a share `t` of the way to `end`: the origin moves in a straight line, while the frame turns evenly by the
-    /// lesser angle. [Limit: `t` from 0 to 1]
+    /// Returns the pose at a fraction `t` of the way to `end`: the origin moves in a straight line, while the frame rotates uniformly by
+    /// the lesser angle. [Limit: `t` from 0 to 1]
     #[must_use]
     pub fn toward(&self, end: &Self, t: f64) -> Self {
         Self {
@@ -106,7 +106,7 @@ impl Pose {
         }
     }
 
-    /// Whether all its numbers are finite and its turn is one.
+    /// Returns `true` if all its numbers are finite and its rotation has unit length.
     #[must_use]
     pub fn is_rigid(&self) -> bool {
         self.at.is_finite() && (self.turn.length_squared() - 1.0).abs() < 1e-6

@@ -1,9 +1,9 @@
-//! Ways over floors, pulled taut.
+//! Paths over floors, pulled taut.
 //!
-//! A way that a search found square by square bends where squares do. Each bend is moved straight towards the line between its
-//! neighbors, as far as floors allow, by halving; where a line is caught on the way, as a string is at a corner, it gets a bend more; what
-//! a straight line passes is taken away. No step makes the way longer, so that it ends; it ends at a way that is the shortest of those
-//! it can be pulled to without leaving the floors. O(rounds · bends · squares along them).
+//! A path found square by square bends where squares do. Each bend moves straight towards the line between its neighbors, as far as
+//! floors allow, by halving; where a line is caught, as a string at a post, it gets another bend; bends that a straight line can
+//! skip are removed. No step makes the path longer, so the process ends, at a path that is the shortest of those it can be pulled to
+//! without leaving the floors. O(rounds · bends · squares along them).
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
@@ -11,16 +11,16 @@ use enfilade_geom::DVec3;
 use crate::floors::Floors;
 use crate::strides::walk_straight;
 
-/// A point of a way, and the floor that it is on.
+/// A point of a path, and its floor.
 pub(crate) type Bend = (DVec3, u32);
 
-/// Rounds of moving bends, at most; most ways are taut after three.
+/// Maximum number of rounds; most paths are taut after three.
 const ROUNDS: usize = 10;
-/// Bends of a way, at most, while it is pulled.
+/// Maximum number of bends of a path while it is pulled.
 const MAX_BENDS: usize = 256;
 
-/// Pulls a way taut: takes away bends that straight lines pass, and moves the others towards the line between their neighbors. What
-/// a line is caught at on the way becomes a bend.
+/// Pulls a path taut: removes bends that straight lines can skip, and moves the others towards the line between their neighbors.
+/// Adds a bend where a line is caught.
 pub(crate) fn pull_taut(
     floors: &Floors,
     bends: &mut Vec<Bend>,
@@ -34,7 +34,7 @@ pub(crate) fn pull_taut(
             shorter += move_bend(floors, bends, i, may_pass);
             i += 1 + catch(floors, bends, i, may_pass);
         }
-        // Between what they are caught at, bends come free.
+        // Between catches, bends come free.
         for i in 1..bends.len().saturating_sub(1) {
             shorter += move_bend(floors, bends, i, may_pass);
         }
@@ -45,7 +45,7 @@ pub(crate) fn pull_taut(
     }
 }
 
-/// Adds bends where the lines to a bend's neighbors are caught if it moves a little on; how many.
+/// Adds bends where the lines to a bend's neighbors would be caught if it moved a little on; returns their number.
 fn catch(
     floors: &Floors,
     bends: &mut Vec<Bend>,
@@ -61,7 +61,7 @@ fn catch(
     }
     let p = b.0.lerp(target, (side / far).min(1.0));
     let mut n = 0;
-    // From either neighbor: the last floor before what is in the way, and the line that is clear of it.
+    // From either neighbor: the last floor before the obstacle, and the line that passes it.
     for (from, at) in [(c, i + 1), (a, i)] {
         let mut last = from.1;
         let end = walk_straight(floors, from, p, may_pass, |_, _, to| last = to);
@@ -83,7 +83,7 @@ fn catch(
     n
 }
 
-/// The point of the line between two, in plan, that is nearest to a third.
+/// Returns the point of the line between two, in plan, that is nearest to a third.
 fn toward(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     let line = (c - a).with_y(0.0);
     let t = (b - a).with_y(0.0).dot(line) / line.length_squared().max(1e-12);
@@ -99,7 +99,7 @@ fn straight(
     walk_straight(floors, from, to, may_pass, |_, _, _| {})
 }
 
-/// Takes away all bends that a straight line passes, from the start on.
+/// Removes all bends that a straight line can skip, from the start on.
 fn drop_bends(floors: &Floors, bends: &mut Vec<Bend>, may_pass: &mut impl FnMut(PortalId) -> bool) {
     let mut n_kept = 1;
     for i in 1..bends.len() {
@@ -115,7 +115,7 @@ fn drop_bends(floors: &Floors, bends: &mut Vec<Bend>, may_pass: &mut impl FnMut(
     bends.truncate(n_kept);
 }
 
-/// Moves a bend as far towards the line between its neighbors as the floors allow; how much shorter the way is then.
+/// Moves a bend as far towards the line between its neighbors as the floors allow; returns the reduction in length.
 fn move_bend(
     floors: &Floors,
     bends: &mut [Bend],
@@ -158,7 +158,7 @@ mod tests {
     use enfilade_geom::scene::Primitive;
 
     #[test]
-    fn a_slack_way_is_pulled_to_the_corner() {
+    fn a_slack_path_is_pulled_to_the_wall_end() {
         let [low, high] = [DVec3::new(0.0, -1.0, 0.0), DVec3::new(10.0, 3.0, 10.0)];
         let floor = Aabb::new(low, high.with_y(0.0));
         let block = Aabb::new(DVec3::new(4.0, 0.0, 0.0), DVec3::new(6.0, 3.0, 4.0));
@@ -191,7 +191,7 @@ mod tests {
         let mut bends = vec![on(2.0, 2.0), on(5.0, 8.0), on(8.0, 2.0)];
         pull_taut(&floors, &mut bends, &mut |_| true);
         let length: f64 = bends.windows(2).map(|w| w[0].0.distance(w[1].0)).sum();
-        // Tangents to circles about both corners, short arcs, and the side between.
+        // Tangents to circles about both wall ends, short arcs, and the side between.
         let least =
             2.0 * (8.0_f64 - 0.09).sqrt() + 2.0 + 2.0 * 0.3 * (45.0_f64.to_radians() + 0.106);
         assert!(

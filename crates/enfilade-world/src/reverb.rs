@@ -1,32 +1,32 @@
-//! Reverberation: how long rooms ring, and how loud their diffuse fields are, coupled through openings.
+//! Reverberation: decay times of rooms, and levels of their diffuse fields, coupled through openings.
 //!
 //! Statistical room acoustics: a cell of volume `V` whose walls absorb like an area `A` (Sabine; Eyring, "Reverberation time in dead
-//! rooms", 1930) loses energy at the rate `c A / 4 V`, and rings `RT60 = 55.3 V / c A` (Kuttruff, "Room Acoustics", §5.1). An opening
-//! of area `S` takes `c S / 4 V` of it and gives that to the cell behind (coupled rooms, §5.9). Of a steady source of power `P` the
-//! fields `w` solve `A w + Σ S (w − w') = 4 P / c`, a symmetric system with a dominant diagonal. `O(portals)` a step of conjugate
-//! gradients, which end by their residue; solved for all cells once for each source.
+//! rooms", 1930) loses energy at the rate `c A / 4 V`, and has `RT60 = 55.3 V / c A` (Kuttruff, "Room Acoustics", §5.1). An opening
+//! of area `S` takes `c S / 4 V` of it to the cell behind (coupled rooms, §5.9). For a steady source of power `P` the fields `w`
+//! solve `A w + Σ S (w − w') = 4 P / c`, a symmetric system with a dominant diagonal. `O(portals)` per step of conjugate gradients,
+//! which end by their residual; one solution for each source covers all cells.
 //!
-//! Rooms are taken for diffuse: within about a tenth for rooms that are not very long or very dead. The system is singular only where
-//! nothing absorbs; absorption is at least a thousandth of the walls.
+//! Rooms are assumed to be diffuse: within about a tenth for rooms that are not very long or very dead. The system is singular only
+//! if nothing absorbs; absorption is at least a thousandth of the walls.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{DVec3, triangle_area_normal};
 
 use crate::layout::Layout;
 
-/// Of sound in air at 20 °C. [Units: wu/s]
+/// Speed of sound in air at 20 °C. [Units: wu/s]
 pub const SPEED_OF_SOUND: f64 = 343.2;
 
-/// By which formula walls' areas and absorption become a rate of decay.
+/// Formula from areas and absorption of walls to a rate of decay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecayLaw {
-    /// Absorbed area is area times coefficient: for live rooms.
+    /// Absorbing area is area times coefficient: for live rooms.
     Sabine,
-    /// Sound loses at each reflection what the mean wall absorbs: for dead rooms too.
+    /// Each reflection loses the mean absorption of the walls: for dead rooms, too.
     Eyring,
 }
 
-/// How much of the sound that falls on a material is absorbed at 500 Hz, 0 to 1, by words in its name; 0.1 where none fits.
+/// Returns the absorption coefficient of a material at 500 Hz, 0 to 1, from words in its name; 0.1 if none matches.
 ///
 /// After the tables of Kuttruff and of Cox & D'Antonio ("Acoustic Absorbers and Diffusers"): mean values of a class.
 #[must_use]
@@ -52,7 +52,7 @@ pub fn absorption_of_name(name: &str) -> f64 {
     class.map_or(0.1, |c| c.1)
 }
 
-/// What each cell holds and absorbs. Made once.
+/// Volume and absorption of each cell. Made once.
 #[derive(Clone, Debug)]
 pub struct Reverb {
     rooms: Vec<Room>,
@@ -65,7 +65,7 @@ pub struct Reverb {
 struct Room {
     volume: f64,
     area: f64,
-    /// Area times coefficient, summed.
+    /// Sum of area times coefficient.
     absorbed: f64,
 }
 
@@ -76,8 +76,8 @@ struct Coupling {
 }
 
 impl Reverb {
-    /// Of a world's structure, with the coefficient of each material by `absorption`: `None` for triangles without one. A wall seen
-    /// from several cells counts in those of its front, by where its triangles face; outdoors absorbs all. O(triangles).
+    /// Computes the rooms of a world's structure. `absorption` returns the coefficient of a material, `None` for triangles without one. A
+    /// wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything. O(triangles).
     #[must_use]
     pub fn new(
         layout: &Layout,
@@ -129,11 +129,11 @@ impl Reverb {
         }
     }
 
-    /// Of rooms given by volume, area of walls and mean coefficient, coupled by the portals of `layout`. [Units: wu³, wu²]
+    /// Makes rooms given by volume, area of walls and mean coefficient, coupled by the portals of `layout`. [Units: wu³, wu²]
     ///
     /// # Panics
     ///
-    /// When there is not one for each cell.
+    /// If there is not one per cell.
     #[must_use]
     pub fn of_rooms(layout: &Layout, law: DecayLaw, rooms: &[(f64, f64, f64)]) -> Self {
         assert_eq!(rooms.len(), layout.n_cells(), "one for each cell");
@@ -148,21 +148,21 @@ impl Reverb {
         reverb
     }
 
-    /// The area of a cell's walls, without openings. [Units: wu²]
+    /// Returns the area of a cell's walls, without openings. [Units: wu²]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn area(&self, cell: CellId) -> f64 {
         self.rooms[cell.idx()].area
     }
 
-    /// The area that absorbs as much as the cell's walls, all that falls on it. [Units: wu²]
+    /// Returns the fully absorbing area equivalent to the cell's walls. [Units: wu²]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     #[must_use]
     pub fn absorbing_area(&self, cell: CellId) -> f64 {
         let room = &self.rooms[cell.idx()];
@@ -175,13 +175,13 @@ impl Reverb {
         }
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.rooms.len()
     }
 
-    /// The total of what a cell's field loses a second, by its energy density. [Units: wu³/s]
+    /// Writes the total loss per second of each cell's field, divided by its energy density. [Units: wu³/s]
     fn losses(&self, open: &[f64], w: &[f64], out: &mut [f64]) {
         for (i, out) in out.iter_mut().enumerate() {
             *out = self.absorbing_area(CellId(i as u32)) * w[i];
@@ -195,12 +195,12 @@ impl Reverb {
     }
 }
 
-/// What a wall's points are moved off it by. [Units: wu]
+/// Distance by which points are moved off a wall. [Units: wu]
 const OFF: f64 = 0.02;
-/// Absorbs all that comes out. [Units: wu²]
+/// Absorbing area of the outdoors, which returns nothing. [Units: wu²]
 const OPEN_AIR: f64 = 1e6;
 
-/// The diffuse fields of all cells, with buffers that are used again: nothing is allocated once they have grown.
+/// The diffuse fields of all cells, with reusable buffers: allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct DiffuseFields {
     open: Vec<f64>,
@@ -213,18 +213,18 @@ pub struct DiffuseFields {
 }
 
 impl DiffuseFields {
-    /// Without buffers yet.
+    /// Makes it without buffers.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Solves for a steady source in `cell`: `open` says of each portal how much of its area lets sound through, 0 to 1.
-    /// O(portals · steps), at most some steps for each cell.
+    /// Solves for a steady source in `cell`. `open` returns the fraction of a portal's area that lets sound through, 0 to 1.
+    /// O(portals · steps), at most some steps per cell.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn solve(&mut self, reverb: &Reverb, cell: CellId, open: impl Fn(PortalId) -> f64) {
         let n = reverb.n_cells();
         self.open.clear();
@@ -235,14 +235,14 @@ impl DiffuseFields {
         self.right[cell.idx()] = 1.0;
         self.balance(reverb);
         std::mem::swap(&mut self.steady, &mut self.level);
-        // The sum over time of what is left after the source stopped solves the same system.
+        // The integral of the decay after the source stops solves the same system.
         for (i, room) in reverb.rooms.iter().enumerate() {
             self.right[i] = room.volume * self.steady[i];
         }
         self.balance(reverb);
     }
 
-    /// Conjugate gradients (Hestenes & Stiefel 1952), scaled by the diagonal: areas are of all sizes.
+    /// Conjugate gradients (Hestenes & Stiefel 1952), scaled by the diagonal, since areas vary widely.
     fn balance(&mut self, reverb: &Reverb) {
         let n = reverb.n_cells();
         let scale = |i: usize| 1.0 / reverb.absorbing_area(CellId(i as u32)).max(1e-6).sqrt();
@@ -284,12 +284,12 @@ impl DiffuseFields {
         }
     }
 
-    /// How long a cell's field takes to fall by 60 dB after the source has stopped, by its mean time of decay: with what other rooms
-    /// give back. 0 where no sound comes. [Units: s]
+    /// Returns the time in which a cell's field falls by 60 dB after the source has stopped, from its mean decay time, including the
+    /// energy that other rooms return. 0 if no sound reaches it. [Units: s]
     ///
     /// # Panics
     ///
-    /// When there is no such cell, or nothing was solved.
+    /// If there is no such cell, or nothing was solved.
     #[must_use]
     pub fn rt60(&self, cell: CellId) -> f64 {
         let steady = self.steady[cell.idx()];
@@ -300,22 +300,22 @@ impl DiffuseFields {
         6.0 * std::f64::consts::LN_10 * mean.max(0.0)
     }
 
-    /// The field of a cell, by that of the source's free field at a distance of 1: its energy is `16 π` times this. The amplitude
-    /// that is heard of the room. Above 0 where any sound comes.
+    /// Returns the amplitude of a cell's field, relative to the source's free field at a distance of 1: its energy is `16 π` times this.
+    /// Above 0 if any sound reaches it.
     ///
     /// # Panics
     ///
-    /// When there is no such cell, or nothing was solved.
+    /// If there is no such cell, or nothing was solved.
     #[must_use]
     pub fn gain(&self, cell: CellId) -> f64 {
         (16.0 * std::f64::consts::PI * self.steady[cell.idx()].max(0.0)).sqrt()
     }
 
-    /// Energy density by the source's power times 4 / c. [Units: 1/wu²]
+    /// Returns the energy density divided by 4 / c times the source's power. [Units: 1/wu²]
     ///
     /// # Panics
     ///
-    /// When there is no such cell, or nothing was solved.
+    /// If there is no such cell, or nothing was solved.
     #[must_use]
     pub fn density(&self, cell: CellId) -> f64 {
         self.steady[cell.idx()]
@@ -338,7 +338,7 @@ mod tests {
         (layout, door)
     }
 
-    /// W11: a room alone is Sabine's.
+    /// W11: a single room follows Sabine.
     #[test]
     fn a_closed_room_rings_as_sabine_says() {
         let (layout, _) = two_rooms();
@@ -355,7 +355,7 @@ mod tests {
         assert_eq!(fields.gain(CellId(1)), 0.0);
     }
 
-    /// W11: two rooms by a door, against the balance of two equations in closed form.
+    /// W11: two rooms and a door, against the balance of two equations in closed form.
     #[test]
     fn coupled_rooms_balance() {
         let (layout, door) = two_rooms();
@@ -382,7 +382,7 @@ mod tests {
         }
     }
 
-    /// W11: the walls of rooms without thickness are found by the cells before them.
+    /// W11: walls without thickness belong to the cells in front of them.
     #[test]
     fn a_rooms_walls_are_its_box_less_its_doors() {
         let world = room_grid(&GridParams::two_rooms());

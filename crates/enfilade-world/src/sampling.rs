@@ -1,15 +1,15 @@
-//! Points that stand for an opening in a search of lengths: its corners, points along its edges, and a lattice in it.
+//! Sample points of an opening for length searches: its vertices, points along its edges, and a lattice in it.
 //!
-//! Ways bend at corners and edges, and cross elsewhere: both are needed. O(points).
+//! Paths bend at vertices and edges, and cross elsewhere: both are needed. O(points).
 
 use enfilade_geom::{DVec3, Winding};
 
-/// Where crossings lie in an opening.
+/// Density of the sample points in an opening.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Between neighboring points, at most. Infinite: one point a piece, its middle. [Units: wu] [Limit: above 0]
+    /// Maximum distance between neighboring points. Infinite: one point per piece, its middle. [Units: wu] [Limit: above 0]
     pub spacing: f64,
-    /// Points of one piece, at most: a larger piece has them farther apart. [Limit: above 0]
+    /// Maximum number of points of one piece: a larger piece has them farther apart. [Limit: above 0]
     pub most: usize,
 }
 
@@ -24,14 +24,14 @@ impl Default for Sampling {
 }
 
 impl Sampling {
-    /// One point a piece: the fastest search, for where a few percent do not matter.
+    /// One point per piece: the fastest search, if a few percent do not matter.
     pub const MIDDLES: Self = Self {
         spacing: f64::INFINITY,
         most: 1,
     };
 }
 
-/// Adds points of a convex piece: its corners, points along its edges, and a lattice in it.
+/// Adds points of a convex piece: its vertices, points along its edges, and a lattice in it.
 pub(crate) fn sample(piece: &[DVec3], sampling: Sampling, points: &mut Vec<DVec3>) {
     let winding = Winding::new(piece.to_vec());
     let first = points.len();
@@ -75,7 +75,7 @@ fn add_lattice(winding: &Winding, spacing: f64, points: &mut Vec<DVec3>) {
     };
     let (u_range, v_range) = (range(u), range(v));
     let n = |(low, high): (f64, f64)| ((high - low) / spacing).ceil().clamp(1.0, 1e3) as usize;
-    // Of a piece narrower than the spacing the edges are enough, but for its middle.
+    // For a piece narrower than the spacing the edges and its middle suffice.
     let [n_u, n_v] = [n(u_range), n(v_range)].map(|n| n.max(2));
     let at = |(low, high): (f64, f64), k: usize, n: usize| low + (high - low) * k as f64 / n as f64;
     let origin = corners[0] - u * corners[0].dot(u) - v * corners[0].dot(v);

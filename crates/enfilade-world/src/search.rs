@@ -1,18 +1,18 @@
-//! Least lengths through portals: the one search that paths, sound and maps share.
+//! Least lengths through portals: the search shared by paths, sound and maps.
 //!
 //! Dijkstra's algorithm ("A note on two problems in connexion with graphs", 1959) over *crossings*: points of a portal's opening,
-//! each once for either side it may be entered from. Portals are areas, and no one point of one stands for it: lengths through
+//! each once per side from which it may be entered. Portals are areas, and no single point can represent one: lengths through
 //! middles are too long at wide portals, lengths between nearest points too short. So each opening has several points
 //! ([`Sampling`]), and every length is that of a true walk from point to point: never less than the shortest. `O(e log e)` for `e`
 //! pairs of points of one cell that are reached.
 //!
-//! **How good it is.** Let the shortest walk cross each portal at most `d` from one of its points. Moving the crossings there makes
-//! it longer by about `d² / l` a portal, for legs of length `l` between portals. The route found is no longer than that, and pulled
-//! taut it is shorter than found. `d` is at most `0.71 · spacing`, and nil where the walk bends about corners. Where two routes are
-//! nearly as short, [`LengthSearch::arrivals`] has both: pull each taut and take the shorter.
+//! **Accuracy.** Let the shortest walk cross each portal at most `d` from one of its points. Moving the crossings there makes it
+//! longer by about `d² / l` per portal, for legs of length `l` between portals. The route found is no longer than that, and shorter
+//! once pulled taut. `d` is at most `0.71 · spacing`, and 0 where the walk bends about vertices. If two routes are nearly equally
+//! short, [`LengthSearch::arrivals`] has both: pull each taut and take the shorter.
 //!
-//! Sums of lengths round. Of two routes to a crossing that are equally long, to the last bit, the one found first is kept: the same
-//! questions have the same answers.
+//! Sums of lengths round. Of two routes to a crossing that are equally long, to the last bit, the one found first is kept: equal
+//! queries have equal answers.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -23,28 +23,28 @@ use enfilade_geom::DVec3;
 use crate::layout::{Exit, Layout};
 use crate::sampling::{Sampling, sample};
 
-/// What a search walks: crossings, and how long it is from one to the other within a cell. Made once, read by all searches.
+/// The graph of a search: crossings, and the lengths between them within each cell. Made once, read by all searches.
 #[derive(Clone, Debug)]
 pub struct Ways {
-    /// By portal its first point, and the number of all.
+    /// Per portal its first point, and the number of all.
     first_point: Vec<u32>,
     points: Vec<DVec3>,
     /// The portal of each point.
     portal: Vec<u32>,
     cells: Vec<[CellId; 2]>,
-    /// By cell its first exit, and the number of all.
+    /// Per cell its first exit, and the number of all.
     first_exit: Vec<u32>,
     exits: Vec<Exit>,
-    /// By portal, its first point's place among the points of either of its cells.
+    /// Per portal, the index of its first point among the points of either of its cells.
     place: Vec<[u32; 2]>,
-    /// By cell the number of its points.
+    /// Per cell the number of its points.
     n_points: Vec<u32>,
-    /// By cell, lengths between its points, row by row; empty where they are straight.
+    /// Per cell, lengths between its points, row by row; empty if they are straight.
     bent: Vec<Vec<f64>>,
 }
 
 impl Ways {
-    /// Of a layout: points of all openings, straight lines within cells.
+    /// Makes it from a layout: points of all openings, straight lines within cells.
     #[must_use]
     pub fn new(layout: &Layout, sampling: Sampling) -> Self {
         Self::with_points(layout, |portal, points| {
@@ -54,7 +54,7 @@ impl Ways {
         })
     }
 
-    /// With points of the caller's: `choose` adds those of a portal. A portal without any is never passed.
+    /// Makes it with the caller's points: `choose` adds those of a portal. A portal without any is never passed.
     #[must_use]
     pub fn with_points(layout: &Layout, mut choose: impl FnMut(PortalId, &mut Vec<DVec3>)) -> Self {
         let (mut first_point, mut points, mut portal) = (vec![0], Vec::new(), Vec::new());
@@ -91,19 +91,19 @@ impl Ways {
         }
     }
 
-    /// Lengths within a cell where straight lines are too short: `lengths` has a row for each of its
-    /// [points](Self::points_of), a number for each; infinite where there is no way within the cell. [Units: wu]
+    /// Sets the lengths within a cell where straight lines are too short. `lengths` has a row for each of its
+    /// [points](Self::points_of), with a length to each; infinite if there is no path within the cell. [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there are more or fewer lengths than pairs of points.
+    /// If the number of lengths is not that of pairs of points.
     pub fn set_lengths(&mut self, cell: CellId, lengths: Vec<f64>) {
         let n = self.n_points[cell.idx()] as usize;
         assert_eq!(lengths.len(), n * n, "a length for each pair of points");
         self.bent[cell.idx()] = lengths;
     }
 
-    /// The points of a cell's portals, in the order of its exits: each with its portal. [Units: wu]
+    /// Returns the points of a cell's portals, in the order of its exits, each with its portal. [Units: wu]
     pub fn points_of(&self, cell: CellId) -> impl Iterator<Item = (PortalId, DVec3)> + Clone {
         self.exits_of(cell).iter().flat_map(|exit| {
             let points = self.range(exit.portal);
@@ -111,14 +111,14 @@ impl Ways {
         })
     }
 
-    /// The points of a portal. [Units: wu]
+    /// Returns the points of a portal. [Units: wu]
     #[must_use]
     pub fn points(&self, portal: PortalId) -> &[DVec3] {
         let range = self.range(portal);
         &self.points[range.start as usize..range.end as usize]
     }
 
-    /// The numbers of a portal's points among those of all.
+    /// Returns the indices of a portal's points among all points.
     pub(crate) fn range(&self, portal: PortalId) -> std::ops::Range<u32> {
         self.first_point[portal.idx()]..self.first_point[portal.idx() + 1]
     }
@@ -128,11 +128,11 @@ impl Ways {
         &self.exits[first[0] as usize..first[1] as usize]
     }
 
-    /// The length between two points of a cell, by their places among [those of the cell](Self::points_of). [Units: wu]
+    /// Returns the length between two points of a cell, by their indices among [those of the cell](Self::points_of). [Units: wu]
     ///
     /// # Panics
     ///
-    /// When the cell has no such points.
+    /// If the cell has no such points.
     #[must_use]
     pub fn length(&self, cell: CellId, from: usize, to: usize) -> f64 {
         let n = self.n_points[cell.idx()] as usize;
@@ -142,7 +142,7 @@ impl Ways {
             .unwrap_or_else(|| point(from).distance(point(to)))
     }
 
-    /// From one point of a cell to those of one of its portals, which come in their order.
+    /// Returns the lengths from one point of a cell to those of one of its portals, in order.
     fn lengths(&self, cell: CellId, from: u32, to: PortalId) -> impl Iterator<Item = f64> + '_ {
         let table = &self.bent[cell.idx()];
         let portal = self.portal[from as usize] as usize;
@@ -178,26 +178,26 @@ fn side(cells: [CellId; 2], cell: CellId) -> usize {
     usize::from(cells[1] == cell)
 }
 
-/// A way to a place that a search found.
+/// A path to a place, found by a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrival {
-    /// From the start, through points of portals, extra costs included. [Units: wu]
+    /// Length from the start, through points of portals, extra costs included. [Units: wu]
     pub length: f64,
-    /// Where the last portal was passed; `None` where no portal was.
+    /// The last crossing; `None` if no portal is passed.
     node: Option<u32>,
-    /// Tells sequences of portals apart.
+    /// Hash of the sequence of portals.
     sequence: u64,
 }
 
 impl Arrival {
-    /// Whether no portal is passed: start and end are in one cell.
+    /// Returns `true` if no portal is passed: start and end are in one cell.
     #[must_use]
     pub fn is_direct(&self) -> bool {
         self.node.is_none()
     }
 }
 
-/// A portal that a search passed.
+/// A portal passed by a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassedPortal {
     /// The portal, and the cell entered through it.
@@ -211,7 +211,7 @@ struct Label {
     length: f64,
     sequence: u64,
     before: u32,
-    /// The search that it is of.
+    /// The search to which it belongs.
     stamp: u32,
     is_settled: bool,
 }
@@ -225,13 +225,13 @@ struct Toll {
 
 const START: u32 = u32::MAX;
 
-/// The search, with buffers that are used again: it allocates nothing once they have grown.
+/// The search, with reusable buffers: allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct LengthSearch {
     labels: Vec<Label>,
-    /// By portal and side.
+    /// Per portal and side.
     tolls: Vec<Toll>,
-    /// By cell, the last search that entered it.
+    /// Per cell, the last search that entered it.
     entered: Vec<u32>,
     stamp: u32,
     heap: BinaryHeap<Reverse<(u64, u32)>>,
@@ -241,7 +241,7 @@ pub struct LengthSearch {
 }
 
 impl LengthSearch {
-    /// Without buffers yet.
+    /// Makes it without buffers.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -249,12 +249,12 @@ impl LengthSearch {
 
     /// Finds least lengths from a point in `cell` to all portals that can be passed, up to `radius` (infinite: all). [Units: wu]
     ///
-    /// `pass` says at which extra cost (`Some(0.0)`: none) a portal may be passed into the cell behind it, `None`: not. It is
-    /// asked at most once a search for each portal and side. Costs below 0 count as 0.
+    /// `pass` returns the extra cost (`Some(0.0)`: none) of passing a portal into the cell behind it, `None` if it cannot be passed. It is
+    /// called at most once per search for each portal and side. Costs below 0 count as 0.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn run(
         &mut self,
         ways: &Ways,
@@ -267,12 +267,12 @@ impl LengthSearch {
         self.run_from(ways, cell, from, straight, radius, pass);
     }
 
-    /// The same, with the lengths from the start to the points of its cell given: `first` is asked with each one's place among
+    /// As [`LengthSearch::run`], with given lengths from the start to the points of its cell: `first` is called with each one's index among
     /// [those of the cell](Ways::points_of). For cells where straight lines are too short.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn run_from(
         &mut self,
         ways: &Ways,
@@ -391,28 +391,28 @@ impl LengthSearch {
         self.heap.push(Reverse((length.to_bits(), node)));
     }
 
-    /// The portals passed, ascending by length.
+    /// Returns the portals passed, ascending by length.
     #[must_use]
     pub fn reached(&self) -> &[PassedPortal] {
         &self.reached
     }
 
-    /// The cells entered, ascending by the length to the nearest portal that leads in; the start's cell first, at 0. [Units: wu]
+    /// Returns the cells entered, ascending by the length to the nearest portal that leads in; the start's cell first, at 0. [Units: wu]
     #[must_use]
     pub fn cells(&self) -> &[(CellId, f64)] {
         &self.cells
     }
 
-    /// Where it started; `None` before the first search. [Units: wu]
+    /// Returns the start; `None` before the first search. [Units: wu]
     #[must_use]
     pub fn start(&self) -> Option<(CellId, DVec3)> {
         self.start
     }
 
-    /// The ways to a point in `cell`, the shortest first: each with its own sequence of portals, none longer than `most` times
-    /// the shortest, at most `n`. Straight lines from the last portal to the point. `arrivals` is cleared. [Units: wu]
+    /// Writes the paths to a point in `cell`, the shortest first: each with its own sequence of portals, none longer than `most` times
+    /// the shortest, at most `n`. Straight lines from the last portal to the point. Clears `arrivals` first. [Units: wu]
     ///
-    /// Those are not all sequences: of several to one point of a portal the search keeps the shortest.
+    /// These are not all sequences: of several to one point of a portal the search keeps the shortest.
     pub fn arrivals(
         &self,
         ways: &Ways,
@@ -426,8 +426,8 @@ impl LengthSearch {
         self.arrivals_by(ways, cell, to, straight, most, n, arrivals);
     }
 
-    /// The same, with the lengths from the points of the cell to the end given, as for [`LengthSearch::run_from`]; `direct` is
-    /// asked for the length to the start where that is in the same cell, with a place after those of all points.
+    /// As [`LengthSearch::arrivals`], with given lengths from the points of the cell to the end, as for [`LengthSearch::run_from`];
+    /// `direct` is called for the length to the start if that is in the same cell, with an index after those of all points.
     #[expect(
         clippy::too_many_arguments,
         reason = "two limits and a buffer more than a way has ends"
@@ -485,8 +485,8 @@ impl LengthSearch {
         arrivals.truncate(n_kept);
     }
 
-    /// The portals of a way, from the start on, each with the cell entered through it and the point where it is crossed.
-    /// `crossings` is cleared. [Units: wu]
+    /// Writes the portals of a path, from the start on, each with the cell entered through it and the point of crossing. Clears
+    /// `crossings` first. [Units: wu]
     pub fn crossings(&self, ways: &Ways, arrival: &Arrival, crossings: &mut Vec<(Exit, DVec3)>) {
         crossings.clear();
         let back = self.back(ways, arrival);
@@ -494,7 +494,7 @@ impl LengthSearch {
         crossings.reverse();
     }
 
-    /// The portals of a way from its end to the start, each with the number of the point among those of all portals.
+    /// Returns the portals of a path from its end to the start, each with the index of the point among all points.
     pub(crate) fn back(&self, ways: &Ways, arrival: &Arrival) -> impl Iterator<Item = (Exit, u32)> {
         let mut at = arrival.node.unwrap_or(START);
         std::iter::from_fn(move || {
@@ -511,7 +511,7 @@ fn grow<T: Clone + Default>(buffer: &mut Vec<T>, n: usize) {
     }
 }
 
-/// The number of a sequence, longer by one portal: two sequences have the same by a chance of 2⁻⁶⁴.
+/// Returns the hash of a sequence extended by one portal; two sequences collide with probability 2⁻⁶⁴.
 fn mixed(sequence: u64, exit: Exit) -> u64 {
     // The finalizer of SplitMix64.
     let mut x = sequence ^ (u64::from(exit.portal.0) << 32 | u64::from(exit.to.0));

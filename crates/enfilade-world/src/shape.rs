@@ -1,26 +1,26 @@
-//! Convex shapes, and whether they meet an opening.
+//! Convex shapes, and their contact with openings.
 //!
-//! A shape is the hull of a few points, and all within a radius of it: a sphere is one point, a capsule two, a box eight. It
-//! meets a convex polygon where the two hulls are no farther apart than the radius. The distance is found by the algorithm of
-//! Gilbert, Johnson & Keerthi ("A fast procedure for computing the distance between complex objects", 1988), which needs of
-//! a hull only its farthest point in a direction: O(points) a step, a handful of steps. A bound from below ends it as soon as
-//! the two are known to be apart. Where rounding stops it from getting nearer, they count as meeting: within the tolerance.
+//! A shape is the hull of a few points, grown by a radius: a sphere is one point, a capsule two, a box eight. It meets a convex
+//! polygon if the distance of the two hulls is at most the radius. The distance is computed by the algorithm of Gilbert, Johnson &
+//! Keerthi ("A fast procedure for computing the distance between complex objects", 1988), which needs only the farthest point of a
+//! hull in a direction: O(points) per step, a handful of steps. A lower bound ends it as soon as the two are certainly apart. If
+//! rounding stops its progress, they count as meeting: within the tolerance.
 
 use enfilade_geom::{Aabb, DVec3};
 
 use crate::pose::Pose;
 
-/// Steps at most; each ends nearer by more than rounding, and a dozen do for bodies as they are.
+/// Maximum number of steps; each gets nearer by more than rounding, and a dozen suffice for ordinary bodies.
 const MAX_STEPS: usize = 64;
 
-/// The hull of some points, and all that is within `radius` of it. In a frame of its own, about its origin.
+/// The hull of some points, grown by `radius`. In a frame of its own, about its origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
     points: Vec<DVec3>,
     radius: f64,
 }
 
-/// Why there is no such shape.
+/// Reason why a shape is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeError {
@@ -33,11 +33,11 @@ pub enum ShapeError {
 }
 
 impl Shape {
-    /// The hull of `points`, grown by `radius`. [Units: wu] Points inside the hull cost time and change nothing.
+    /// Makes the hull of `points`, grown by `radius`. [Units: wu] Points inside the hull only cost time.
     ///
     /// # Errors
     ///
-    /// No points; what is not finite; a radius below 0.
+    /// If there are no points, a value is not finite, or the radius is below 0.
     pub fn hull(points: Vec<DVec3>, radius: f64) -> Result<Self, ShapeError> {
         if points.is_empty() {
             return Err(ShapeError::NoPoints);
@@ -49,66 +49,66 @@ impl Shape {
         Ok(Self { points, radius })
     }
 
-    /// A ball about the origin: what a lamp lights, how far a sound is heard. [Units: wu]
+    /// Makes a ball about the origin, such as the range of a lamp or of a sound. [Units: wu]
     ///
     /// # Errors
     ///
-    /// A radius that is not finite, or below 0.
+    /// If the radius is not finite, or below 0.
     pub fn sphere(radius: f64) -> Result<Self, ShapeError> {
         Self::hull(vec![DVec3::ZERO], radius)
     }
 
-    /// All within `radius` of the line from `a` to `b`. [Units: wu]
+    /// Makes the set of points within `radius` of the segment from `a` to `b`. [Units: wu]
     ///
     /// # Errors
     ///
-    /// What is not finite; a radius below 0.
+    /// If a value is not finite, or the radius is below 0.
     pub fn capsule(a: DVec3, b: DVec3, radius: f64) -> Result<Self, ShapeError> {
         Self::hull(vec![a, b], radius)
     }
 
-    /// A box. [Units: wu]
+    /// Makes a box. [Units: wu]
     ///
     /// # Errors
     ///
-    /// What is not finite, or an empty box.
+    /// If a value is not finite, or the box is empty.
     pub fn block(bounds: &Aabb) -> Result<Self, ShapeError> {
         Self::hull(bounds.corners().to_vec(), 0.0)
     }
 
-    /// The points.
+    /// Returns the points.
     #[must_use]
     pub fn points(&self) -> &[DVec3] {
         &self.points
     }
 
-    /// By how much their hull is grown. [Units: wu]
+    /// Returns the growth of their hull. [Units: wu]
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// How far it reaches from its origin. [Units: wu]
+    /// Returns its greatest distance from its origin. [Units: wu]
     #[must_use]
     pub fn reach(&self) -> f64 {
         let far = self.points.iter().map(|p| p.length());
         far.fold(0.0, f64::max) + self.radius
     }
 
-    /// Writes where its points are once it is posed into `into`.
+    /// Writes the positions of its points in `pose` into `into`.
     pub fn place(&self, pose: &Pose, into: &mut Vec<DVec3>) {
         into.clear();
         into.extend(self.points.iter().map(|p| pose.point(*p)));
     }
 }
 
-/// Whether the hulls of two sets of points are no farther apart than `reach`. What is within rounding of that counts as near.
+/// Returns `true` if the distance between the hulls of two sets of points is at most `reach`, up to rounding.
 #[must_use]
 pub(crate) fn is_near(a: &[DVec3], b: &[DVec3], reach: f64) -> bool {
     let (Some(first_a), Some(first_b)) = (a.first(), b.first()) else {
         return false;
     };
-    // Differences of points of either; the distance is that of their hull from the origin.
+    // Differences of points of both; the distance is that of their hull from the origin.
     let mut simplex = Simplex::default();
     let mut nearest = *first_a - *first_b;
     simplex.add(nearest);
@@ -136,7 +136,7 @@ pub(crate) fn is_near(a: &[DVec3], b: &[DVec3], reach: f64) -> bool {
     true
 }
 
-/// The point farthest along a direction; the first of several.
+/// Returns the point farthest along a direction; the first of several.
 fn farthest(points: &[DVec3], along: DVec3) -> DVec3 {
     let mut best = (f64::NEG_INFINITY, DVec3::ZERO);
     for &p in points {
@@ -161,14 +161,14 @@ impl Simplex {
         self.len += 1;
     }
 
-    /// The point of the simplex nearest to the origin; keeps only the corners that it lies between, three at most unless the
-    /// origin is inside.
+    /// Returns the point of the simplex nearest to the origin; keeps only the vertices of the face that contains it, three at most unless
+    /// the origin is inside.
     fn nearest_to_origin(&mut self) -> DVec3 {
         if self.len == 4 && self.holds_origin() {
             return DVec3::ZERO;
         }
         let mut best = (f64::INFINITY, DVec3::ZERO, 0);
-        // Each corner, edge and face, by the bits of its corners.
+        // Each vertex, edge and face, as a set of bits.
         for bits in 1_u8..1 << self.len {
             if let Some(p) = self.nearest_of(bits) {
                 let square = p.length_squared();
@@ -188,7 +188,7 @@ impl Simplex {
         best.1
     }
 
-    /// The point nearest to the origin on the flat through some corners, if it lies between them.
+    /// Returns the point nearest to the origin on the flat through some vertices, if it lies between them.
     fn nearest_of(&self, bits: u8) -> Option<DVec3> {
         let mut p = [DVec3::ZERO; 3];
         let mut n = 0;
@@ -214,7 +214,7 @@ impl Simplex {
         }
     }
 
-    /// Whether the origin is inside the tetrahedron, on the inner side of each face.
+    /// Returns `true` if the origin is inside the tetrahedron, on the inner side of each face.
     fn holds_origin(&self) -> bool {
         let p = self.points;
         (0..4).all(|i| {
@@ -236,10 +236,10 @@ mod tests {
         DVec3::from_array([0, 1, 2].map(|_| rng.range(-reach, reach)))
     }
 
-    /// The least distance between hulls of few points: between corners and faces, and between edges.
+    /// Least distance between hulls of few points: between vertices and faces, and between edges.
     fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
-        // Sampled support gaps from all candidate directions: faces' normals and crossed edges. The hulls are apart by the
-        // greatest gap along a direction; where none is positive they meet.
+        // Support gaps along all candidate directions: normals of faces and cross products of edges. The hulls are apart by the
+        // greatest gap along a direction; if none is positive they meet.
         let mut directions = Vec::new();
         let edges = |p: &[DVec3]| -> Vec<DVec3> {
             (0..p.len())
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn hulls_meet_where_no_plane_parts_them() {
+    fn hulls_meet_where_no_plane_separates_them() {
         let mut rng = Rng::new(5);
         let mut n_near = 0;
         for _ in 0..3000 {

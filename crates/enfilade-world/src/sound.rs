@@ -1,19 +1,20 @@
-//! What a listener hears of sources: how far sound goes through openings, from where it comes, and how loud.
+//! Sound of sources as a listener hears it: direction, distance and level of the paths through openings.
 //!
-//! One [length search](LengthSearch) from the listener answers all sources: the best few sequences of portals for each, any number deep,
-//! [pulled taut](TautString). Along a string a portal takes of the level
+//! One [length search](LengthSearch) from the listener serves all sources: the best few sequences of portals for each, any number
+//! deep, [pulled taut](TautString). Along a string each portal reduces the level by
 //!
-//! - what its edge diffracts: Maekawa ("Noise reduction by screens", 1968) in the closed form of Kurze & Anderson ("Sound attenuation by
+//! - diffraction at its edge: Maekawa ("Noise reduction by screens", 1968) in the closed form of Kurze & Anderson ("Sound attenuation by
 //!   barriers", 1971) by the Fresnel number of the detour over the edge, below 0 on the bright side: 5 dB at grazing, none in the clear;
-//! - what its area lets through: the share of the first Fresnel zone that is open (Born & Wolf, "Principles of Optics", §8.2);
-//! - what a leaf or pane holds back, by [kind](Transmission), where it is shut, and by the share that is open where it is not.
+//! - its limited area: the share of the first Fresnel zone that is open (Born & Wolf, "Principles of Optics", §8.2);
+//! - the transmission loss of a leaf or pane, by [kind](Transmission), where it is shut, and by the open share where it is not.
 //!
 //! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, so that none
-//! comes or goes at once; and as a search may still give up one sequence for another that is as long, and louder or not, levels follow
-//! by 0.4 dB at most for each centimeter walked. All of it is for one wavelength, that of 500 Hz. O(portals of a sequence) a source.
+//! appears or vanishes abruptly. The search may still replace a sequence by another of equal length but different level, so levels
+//! change by at most 0.4 dB per centimeter walked. All of this is for one wavelength, that of 500 Hz. O(portals of a sequence) per
+//! source.
 //!
 //! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.7 m. Within a concave cell strings are
-//! straight, too short where a wall of the cell is between.
+//! straight, too short where a wall of the cell is in between.
 
 use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
 use enfilade_geom::{DVec3, Winding};
@@ -24,14 +25,14 @@ use crate::sampling::Sampling;
 use crate::search::{Arrival, LengthSearch, Ways};
 use crate::taut::{TautString, best_on_edge};
 
-/// How much shut openings take of the level. [Units: dB] [Limit: ≥ 0]
+/// Transmission loss of shut openings. [Units: dB] [Limit: ≥ 0]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
     /// Leaves of doors.
     pub door: f64,
     /// Panes and shut windows.
     pub window: f64,
-    /// What shuts openings of other kinds.
+    /// Closures of other openings.
     pub other: f64,
 }
 
@@ -46,34 +47,34 @@ impl Default for Transmission {
     }
 }
 
-/// What sound goes through in a world. Made once, read by all listeners.
+/// Acoustic data of a world. Made once, read by all listeners.
 #[derive(Clone, Debug)]
 pub struct Acoustics {
     ways: Ways,
-    /// By portal, edges that have wall beside them, and the number of all.
+    /// Per portal, edges with wall beside them, and the number of all.
     first_rim: Vec<u32>,
     rims: Vec<[DVec3; 2]>,
-    /// By portal, the energy that passes it where it is shut.
+    /// Per portal, the energy that passes it while shut.
     shut: Vec<f64>,
     has_pane: Vec<bool>,
 }
 
 /// Wavelength of 500 Hz. [Units: wu]
 const WAVELENGTH: f64 = 0.686;
-/// Sequences of a source that count, and how much longer than the best they may be.
+/// Maximum number of sequences per source, and how much longer than the best they may be.
 const N_ROUTES: usize = 4;
 const LONGEST: f64 = 1.5;
 /// A listener or source that has moved by less keeps its sequences. [Units: wu]
 const KEPT: f64 = 0.25;
-/// The most that one edge takes. [Units: dB]
+/// Maximum loss at one edge. [Units: dB]
 const MOST_LOSS: f64 = 24.0;
-/// Levels follow what is found by so much for each meter that listener and source move. [Units: dB]
+/// Maximum change of levels per meter that listener and source move. [Units: dB]
 const SLEW: f64 = 40.0;
-/// Who moves farther at once was put there, and levels follow at once. [Units: wu]
+/// Larger jumps count as teleports, at which levels change at once. [Units: wu]
 const TELEPORT: f64 = 0.5;
 
 impl Acoustics {
-    /// Of a world. O(portals).
+    /// Prepares a world. O(portals).
     #[must_use]
     pub fn new(layout: &Layout, world: &World, transmission: &Transmission) -> Self {
         Self::with_ways(
@@ -84,7 +85,7 @@ impl Acoustics {
         )
     }
 
-    /// With the lengths within cells that the caller knows better, as [`Geodesics`](crate::Geodesics) does.
+    /// As [`Acoustics::new`], with more exact lengths within cells, such as those of [`Geodesics`](crate::Geodesics).
     #[must_use]
     pub fn with_ways(
         layout: &Layout,
@@ -114,11 +115,11 @@ impl Acoustics {
         }
     }
 
-    /// The share of a portal's opening that lets sound pass freely, 0 to 1: by its leaves, none behind a pane.
+    /// Returns the fraction of a portal's opening that lets sound pass freely, 0 to 1, from the pose of its leaves; 0 behind a pane.
     ///
     /// # Panics
     ///
-    /// When there is no such portal.
+    /// If there is no such portal.
     #[must_use]
     pub fn open_share(&self, state: &SightState, portal: PortalId) -> f64 {
         if self.has_pane[portal.idx()] || !state.is_open(portal) {
@@ -127,11 +128,11 @@ impl Acoustics {
         f64::from(state.leaves(portal).unwrap_or(1.0))
     }
 
-    /// The share of energy that a portal lets through, above 0.
+    /// Returns the fraction of energy that a portal lets through, above 0.
     ///
     /// # Panics
     ///
-    /// When there is no such portal.
+    /// If there is no such portal.
     #[must_use]
     pub fn transmitted(&self, state: &SightState, portal: PortalId) -> f64 {
         let open = self.open_share(state, portal);
@@ -144,7 +145,7 @@ impl Acoustics {
     }
 }
 
-/// Adds the edges of an opening's pieces that no other piece lies behind.
+/// Adds the edges of an opening's pieces with no other piece behind them.
 fn add_rims(layout: &Layout, portal: PortalId, rims: &mut Vec<[DVec3; 2]>) {
     let opening = layout.opening(portal);
     let hulls: Vec<Winding> = opening.pieces().map(|p| Winding::new(p.to_vec())).collect();
@@ -161,30 +162,30 @@ fn add_rims(layout: &Layout, portal: PortalId, rims: &mut Vec<[DVec3; 2]>) {
     }
 }
 
-/// What is heard of a source.
+/// A source as heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// Of the shortest way. [Units: wu]
+    /// Length of the shortest path. [Units: wu]
     pub length: f64,
-    /// Unit vector to where the shortest way comes from: its last bend. Nil where the source is at the listener.
+    /// Unit vector towards the last bend of the shortest path; zero if the source is at the listener.
     pub nearest: DVec3,
-    /// Unit vector to where the sound comes from, of all ways by energy.
+    /// Unit vector towards the sound, averaged over all paths by energy.
     pub direction: DVec3,
-    /// Amplitude by that at a meter in the open: without the room's reverberation.
+    /// Amplitude relative to that at one meter in the open, without the room's reverberation.
     pub gain: f64,
-    /// How many ways were counted.
+    /// Number of paths counted.
     pub n_ways: u32,
 }
 
 #[derive(Clone, Debug, Default)]
 struct Source {
-    /// The search that the routes are of.
+    /// The search that found the routes.
     search: u64,
     cell: Option<CellId>,
     at: DVec3,
     routes: Vec<Route>,
     portals: Vec<PortalId>,
-    /// Where strings crossed when last pulled.
+    /// Crossings of the strings when last pulled.
     points: Vec<DVec3>,
     last: Option<LastHeard>,
 }
@@ -201,21 +202,21 @@ struct LastHeard {
 struct Route {
     first: u32,
     n: u32,
-    /// What shut portals add to the length when routes are compared. [Units: wu]
+    /// Length added for shut portals when routes are compared. [Units: wu]
     toll: f64,
     length: f64,
     toward: DVec3,
 }
 
-/// One pair of ears, with buffers that are used again: nothing is allocated once they have grown.
+/// A pair of ears, with reusable buffers: allocates nothing once they have grown.
 ///
-/// Sequences are searched again when the listener enters a cell or has moved by a quarter of a meter, and when doors moved; strings are
-/// pulled at each question.
+/// Searches sequences again when the listener enters a cell or has moved by a quarter of a meter, and when doors moved; pulls strings at
+/// each query.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     search: LengthSearch,
     n_searches: u64,
-    /// How often doors have moved.
+    /// Number of times that doors have moved.
     doors: u64,
     place: Option<(CellId, DVec3)>,
     at: DVec3,
@@ -228,17 +229,17 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Without buffers yet.
+    /// Makes it without buffers.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Sets where the ears are, in `cell`, and how doors stand. O(portals); the search from time to time. [Units: wu]
+    /// Sets the position of the ears, in `cell`, and the state of doors. O(portals), plus an occasional search. [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn listen(&mut self, acoustics: &Acoustics, state: &SightState, cell: CellId, at: DVec3) {
         self.at = at;
         let n = acoustics.shut.len();
@@ -266,18 +267,18 @@ impl Listener {
             });
     }
 
-    /// How often sequences were searched: for those who count costs.
+    /// Returns the number of searches of sequences, for cost statistics.
     #[must_use]
     pub fn n_searches(&self) -> u64 {
         self.n_searches
     }
 
-    /// What is heard of a source in `cell`; `id` numbers sources from 0, without large gaps. `None` before anything was listened to,
-    /// and where no way leads. [Units: wu]
+    /// Returns a source in `cell` as heard. `id` numbers sources from 0, without large gaps. `None` before the first [`Listener::listen`],
+    /// and if no path exists. [Units: wu]
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn hear(
         &mut self,
         acoustics: &Acoustics,
@@ -347,7 +348,7 @@ impl Listener {
         }
     }
 
-    /// Pulls the string of a source's route taut, from where it was last.
+    /// Pulls the string of a source's route taut, starting from its last position.
     fn pull(&mut self, layout: &Layout, id: usize, route: usize, at: DVec3) {
         let source = &mut self.sources[id];
         let route = &mut source.routes[route];
@@ -399,7 +400,7 @@ impl Listener {
         Some(heard)
     }
 
-    /// Amplitude that comes along a route.
+    /// Returns the amplitude along a route.
     fn route_gain(
         &self,
         acoustics: &Acoustics,
@@ -416,7 +417,7 @@ impl Listener {
             let after = points.get(i + 1).copied().unwrap_or(at);
             let transmitted = self.transmitted[portal.idx()];
             let area = layout.opening(portal).area() * self.open[portal.idx()];
-            // What comes through the leaf comes through all of it.
+            // Sound through the leaf passes its whole area.
             let leaf = (transmitted - self.open[portal.idx()]).max(0.0);
             let free =
                 self.open[portal.idx()] * through_area(area, before, points[i], after).powi(2);
@@ -428,21 +429,21 @@ impl Listener {
     }
 }
 
-/// A shut portal counts as so much farther when sequences are compared: a meter for each decibel. [Units: wu]
+/// Extra length of a shut portal in comparisons of sequences: a meter for each decibel. [Units: wu]
 fn toll(transmitted: f64) -> f64 {
     -10.0 * transmitted.max(1e-12).log10()
 }
 
-/// Amplitude that passes an area on the way between two points, by what passes a large one.
+/// Returns the amplitude that passes an area on the way between two points, relative to a large area.
 fn through_area(area: f64, before: DVec3, at: DVec3, after: DVec3) -> f64 {
     let (d1, d2) = (before.distance(at), after.distance(at));
-    // Parts of the first Fresnel zone times π; nothing of it at the opening itself.
+    // Number of first Fresnel zones in the area, times π; the zone vanishes at the opening itself.
     let zone = WAVELENGTH * d1 * d2 / (d1 + d2).max(1e-9);
     area / area.hypot(zone).max(1e-12)
 }
 
-/// How much longer it is over the nearest edge than straight: above 0 where the string bends about it, below 0 where it passes in the
-/// clear. [Units: wu]
+/// Returns the extra length over the nearest edge: above 0 where the string bends about it, below 0 where it passes in the clear.
+/// [Units: wu]
 fn detour(rims: &[[DVec3; 2]], before: DVec3, at: DVec3, after: DVec3) -> f64 {
     let straight = before.distance(after);
     let bent = before.distance(at) + at.distance(after) - straight;
@@ -456,7 +457,7 @@ fn detour(rims: &[[DVec3; 2]], before: DVec3, at: DVec3, after: DVec3) -> f64 {
     -over.fold(f64::INFINITY, f64::min).max(0.0)
 }
 
-/// What an edge takes, by the Fresnel number of the detour over it. [Units: dB]
+/// Returns the loss at an edge, by the Fresnel number of the detour over it. [Units: dB]
 fn edge_loss(fresnel: f64) -> f64 {
     let x = (std::f64::consts::TAU * fresnel.abs()).sqrt();
     if x < 1e-6 {

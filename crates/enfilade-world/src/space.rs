@@ -2,12 +2,12 @@
 //! and 5.5.4).
 //!
 //! Each *part* is a world with cells and portals of its own, in a frame of its own: a tree of rigid motions, the first part at
-//! its root. A part stands in cells of the part above it, its *host*. What is outdoors to it, its *border*, is no place: it
-//! stands for whatever is around, so a portal to it leads into the host's cells that its opening touches where it is now. So
-//! doors that meet lead from one to the other, doors that part lead into the air between them, and a door before a wall
-//! leads nowhere, without a rule for each.
+//! its root. A part stands in cells of its parent, its *host*. Its outdoor cell, its *border*, is not a place: it stands for the
+//! surroundings, so a portal to it leads into the host's cells that its opening currently touches. So doors that meet lead from
+//! one to the other, doors that separate lead into the air between them, and a door in front of a wall leads nowhere, without a
+//! rule for each case.
 //!
-//! Coordinates are a part's own; poses are in `f64`, so that a part ten kilometers away is as exact as a near one.
+//! Coordinates are relative to a part; poses are in `f64`, so that a part ten kilometers away is as exact as a near one.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Aabb, DVec3};
@@ -17,12 +17,12 @@ use crate::layout::Layout;
 use crate::pose::Pose;
 use crate::shape::is_near;
 
-/// Which part of a [`Space`].
+/// Index of a part of a [`Space`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PartId(pub u32);
 
 impl PartId {
-    /// The part that does not move and holds all others.
+    /// The part at rest that contains all others.
     pub const ROOT: Self = Self(0);
 
     pub(crate) fn idx(self) -> usize {
@@ -39,35 +39,35 @@ pub struct Place {
     pub cell: CellId,
 }
 
-/// Why a part cannot be added or moved.
+/// Reason why a part cannot be added or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpaceError {
-    /// A world that cannot be looked at.
+    /// A world that [`Sight::build`] rejects.
     #[error("part {part}: {source}")]
     Sight {
-        /// Its number.
+        /// Its index.
         part: u32,
-        /// Why.
+        /// The reason.
         source: SightError,
     },
     /// There is no such part.
     #[error("there is no part {part}; there are {n_parts}")]
     NoPart {
-        /// The number asked for.
+        /// The requested index.
         part: u32,
-        /// How many there are.
+        /// The number of parts.
         n_parts: usize,
     },
-    /// A pose with a number that is not finite, or whose turn is none.
+    /// A pose that is not finite, or whose rotation does not have unit length.
     #[error(
-        "the pose of part {part} is no rigid motion: its numbers must be finite and its turn of unit length"
+        "the pose of part {part} is not a rigid motion: its numbers must be finite and its rotation of unit length"
     )]
     NotRigid {
-        /// Its number.
+        /// Its index.
         part: u32,
     },
-    /// The root stands still.
+    /// The root cannot move.
     #[error("part 0 is the world that all others move in; it cannot be moved")]
     RootMoved,
 }
@@ -77,32 +77,32 @@ pub(crate) struct Part {
     pub(crate) layout: Layout,
     pub(crate) sight: Sight,
     pub(crate) state: SightState,
-    /// What stands for the surroundings.
+    /// The cell that stands for the surroundings.
     pub(crate) border: Option<CellId>,
     pub(crate) host: PartId,
     pub(crate) children: Vec<PartId>,
-    /// To the host's frame, and to the root's.
+    /// Poses in the host's frame, and in the root's.
     pub(crate) local: Pose,
     pub(crate) pose: Pose,
-    /// Around all that is in it, in its own frame.
+    /// Bounding box of everything in it, in its own frame.
     pub(crate) hull: Aabb,
     /// The portals to the border.
     pub(crate) doors: Vec<BorderDoor>,
-    /// Where it stands.
+    /// Places where it stands.
     pub(crate) stands_in: Vec<Place>,
-    /// By cell the parts that stand in it, ascending.
+    /// Per cell the parts that stand in it, ascending.
     pub(crate) guests: Vec<Vec<PartId>>,
     pub(crate) has_guests: Vec<bool>,
-    /// Of its cells among those of all parts.
+    /// Index of its first cell among those of all parts.
     pub(crate) first_cell: u32,
 }
 
-/// A portal from a part to what is around it.
+/// A portal from a part to its surroundings.
 pub(crate) struct BorderDoor {
     pub(crate) portal: PortalId,
-    /// The cell within.
+    /// The cell inside.
     pub(crate) inner: CellId,
-    /// The places around that its opening touches.
+    /// The surrounding places that its opening touches.
     pub(crate) leads_to: Vec<Place>,
     /// Doors of other parts that it meets.
     pub(crate) meets: Vec<(PartId, PortalId)>,
@@ -125,11 +125,11 @@ struct Buffers {
 }
 
 impl Space {
-    /// A world in which nothing moves yet.
+    /// Makes a space of one world without moving parts.
     ///
     /// # Errors
     ///
-    /// When it cannot be looked at ([`Sight::build`]).
+    /// If [`Sight::build`] rejects the world.
     pub fn new(world: &World) -> Result<Self, SpaceError> {
         let mut space = Self {
             parts: Vec::new(),
@@ -140,12 +140,12 @@ impl Space {
         Ok(space)
     }
 
-    /// Adds a world that stands in another, with its pose in that one's frame. Its outdoors stands for what is around it; a
-    /// world without one is closed: nobody looks in or out. O(its size).
+    /// Adds a world that stands in another, at a pose in the host's frame. Its outdoors stands for its surroundings; a world without
+    /// outdoors is closed to sight both ways. O(its size).
     ///
     /// # Errors
     ///
-    /// A world that cannot be looked at, a host that does not exist, a pose that is no rigid motion.
+    /// If [`Sight::build`] rejects the world, the host does not exist, or the pose is not a rigid motion.
     pub fn add_part(
         &mut self,
         world: &World,
@@ -199,12 +199,12 @@ impl Space {
         Ok(())
     }
 
-    /// Moves a part, and all that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they touch).
+    /// Moves a part, and everything that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they touch).
     /// Allocates nothing once its lists have grown.
     ///
     /// # Errors
     ///
-    /// A part that does not exist, or is the root; a pose that is no rigid motion.
+    /// If the part does not exist, or is the root, or the pose is not a rigid motion.
     pub fn set_pose(&mut self, part: PartId, pose: Pose) -> Result<(), SpaceError> {
         self.check(part)?;
         if part == PartId::ROOT {
@@ -225,7 +225,7 @@ impl Space {
             let own = &mut self.parts[moved.idx()];
             own.pose = host_pose.after(&own.local);
             buffers.order.extend_from_slice(&own.children);
-            // What stands wholly within its host has moved with it.
+            // Parts that stand entirely within their host have moved with it.
             let is_within = own.stands_in.iter().all(|p| p.part == host);
             if moved == part || !is_within {
                 self.settle(moved, &mut buffers);
@@ -235,7 +235,7 @@ impl Space {
         Ok(())
     }
 
-    /// Finds out where a part stands now, and where its doors lead.
+    /// Updates the places where a part stands, and those to which its doors lead.
     fn settle(&mut self, id: PartId, buffers: &mut Buffers) {
         let mut stands_in = std::mem::take(&mut self.parts[id.idx()].stands_in);
         for place in stands_in.drain(..) {
@@ -303,7 +303,7 @@ impl Space {
         }
     }
 
-    /// Finds out which doors of other parts the doors of a part meet, both ways.
+    /// Updates the doors of other parts that the doors of a part meet, both ways.
     fn meet(&mut self, id: PartId, buffers: &mut Buffers) {
         let n_parts = self.parts.len();
         for other in (1..n_parts as u32).map(PartId).filter(|p| *p != id) {
@@ -333,7 +333,7 @@ impl Space {
         }
     }
 
-    /// Whether the hulls of two parts may touch.
+    /// Returns `true` if the hulls of two parts may touch.
     fn are_near(&self, a: PartId, b: PartId) -> bool {
         let [a, b] = [a, b].map(|p| &self.parts[p.idx()]);
         if a.hull.is_empty() || b.hull.is_empty() {
@@ -356,64 +356,64 @@ impl Space {
         }
     }
 
-    /// How many parts there are, the root included.
+    /// Returns the number of parts, the root included.
     #[must_use]
     pub fn n_parts(&self) -> usize {
         self.parts.len()
     }
 
-    /// How many cells all parts have.
+    /// Returns the number of cells of all parts.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.n_cells
     }
 
-    /// The cells and portals of a part.
+    /// Returns the cells and portals of a part.
     ///
     /// # Panics
     ///
-    /// When there is no such part; so all questions about one.
+    /// If there is no such part; likewise in all queries of one.
     #[must_use]
     pub fn layout(&self, part: PartId) -> &Layout {
         &self.parts[part.idx()].layout
     }
 
-    /// What is seen in a part.
+    /// Returns the prepared visibility of a part.
     #[must_use]
     pub fn sight(&self, part: PartId) -> &Sight {
         &self.parts[part.idx()].sight
     }
 
-    /// How the doors of a part stand.
+    /// Returns the state of a part's doors.
     #[must_use]
     pub fn state(&self, part: PartId) -> &SightState {
         &self.parts[part.idx()].state
     }
 
-    /// The same, to open and close them.
+    /// Returns the state of a part's doors, to open and close them.
     pub fn state_mut(&mut self, part: PartId) -> &mut SightState {
         &mut self.parts[part.idx()].state
     }
 
-    /// Where a part is in the root's frame.
+    /// Returns the pose of a part in the root's frame.
     #[must_use]
     pub fn pose(&self, part: PartId) -> &Pose {
         &self.parts[part.idx()].pose
     }
 
-    /// Where it is in its host's frame.
+    /// Returns the pose of a part in its host's frame.
     #[must_use]
     pub fn local_pose(&self, part: PartId) -> &Pose {
         &self.parts[part.idx()].local
     }
 
-    /// The part that it stands in; the root for the root.
+    /// Returns the part in which it stands; the root for the root.
     #[must_use]
     pub fn host(&self, part: PartId) -> PartId {
         self.parts[part.idx()].host
     }
 
-    /// The motion that takes points of one part's frame to another's.
+    /// Returns the motion that maps points of one part's frame to another's.
     #[must_use]
     pub fn between(&self, from: PartId, to: PartId) -> Pose {
         if from == to {
@@ -422,13 +422,13 @@ impl Space {
         self.pose(to).inverse().after(self.pose(from))
     }
 
-    /// The parts that stand in a cell, ascending.
+    /// Returns the parts that stand in a cell, ascending.
     #[must_use]
     pub fn guests(&self, place: Place) -> &[PartId] {
         &self.parts[place.part.idx()].guests[place.cell.idx()]
     }
 
-    /// The doors of other parts that a part's door meets now.
+    /// Returns the doors of other parts that a part's door currently meets.
     #[must_use]
     pub fn meets(&self, part: PartId, portal: PortalId) -> &[(PartId, PortalId)] {
         let doors = &self.parts[part.idx()].doors;
@@ -436,7 +436,7 @@ impl Space {
         door.map_or(&[], |d| &d.meets)
     }
 
-    /// The places around a part that one of its doors leads to now; none before a wall, and for portals within it.
+    /// Returns the places around a part to which one of its doors currently leads; none in front of a wall, and for inner portals.
     #[must_use]
     pub fn leads_to(&self, part: PartId, portal: PortalId) -> &[Place] {
         let doors = &self.parts[part.idx()].doors;
@@ -444,9 +444,8 @@ impl Space {
         door.map_or(&[], |d| &d.leads_to)
     }
 
-    /// The place of a point of a part's frame: a cell of the innermost part that holds it; `None` in solid matter of all.
-    /// O(depth of the locators), and for each part that stands where the point is. A point in the walls of a part counts as
-    /// in what is around that part.
+    /// Returns the place of a point of a part's frame: a cell of the innermost part that contains it; `None` in solid matter of all.
+    /// O(depth of the locators), for each part at the point. A point in the walls of a part counts as in that part's surroundings.
     #[must_use]
     pub fn locate(&self, frame: PartId, p: DVec3) -> Option<Place> {
         let p = if frame == PartId::ROOT {
@@ -457,7 +456,7 @@ impl Space {
         self.locate_within(PartId::ROOT, p, p)
     }
 
-    /// Within a part or what stands in it. `own` is `p`, of the root's frame, in the part's frame.
+    /// Locates a point in a part or in parts that stand in it. `own` is `p`, of the root's frame, in the part's frame.
     fn locate_within(&self, id: PartId, p: DVec3, own: DVec3) -> Option<Place> {
         let part = &self.parts[id.idx()];
         let cell = part.layout.locate(own).filter(|c| part.border != Some(*c));
@@ -479,7 +478,7 @@ impl Space {
     }
 }
 
-/// Whether openings of two parts touch; `between` takes points of the second to the frame of the first.
+/// Returns `true` if openings of two parts touch; `between` maps points of the second to the frame of the first.
 fn is_met(
     parts: [&Part; 2],
     portals: [PortalId; 2],
@@ -499,7 +498,7 @@ fn is_met(
         })
 }
 
-/// Around all cells but the outdoors, and all triangles.
+/// Returns the box around all cells but the outdoors, and all triangles.
 fn hull_of(world: &World, layout: &Layout) -> Aabb {
     let point = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
     let mut hull = Aabb::EMPTY;

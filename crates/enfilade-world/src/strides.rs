@@ -1,8 +1,8 @@
 //! Shortest ways over floors, square by square, and straight lines over them.
 //!
-//! Dijkstra's algorithm, and A* (Hart, Nilsson & Raphael, "A formal basis for the heuristic determination of minimum cost paths",
-//! 1968) where there is one goal, over 16 directions: along the squares, the diagonals, and the knight's moves between. Ways are so
-//! at most 2.8 % longer than the shortest on the squares, and pulled taut afterwards. O(floors · log) of the cell. Lengths are
+//! Dijkstra's algorithm, or A* (Hart, Nilsson & Raphael, "A formal basis for the heuristic determination of minimum cost paths",
+//! 1968) for a single goal, over 16 directions: along the squares, the diagonals, and the knight's moves between. So paths are at
+//! most 2.8 % longer than the shortest on the squares, and are pulled taut afterwards. O(floors · log) of the cell. Lengths are
 //! `f32`: exact to a hundredth of a millimeter in a kilometer-wide cell.
 
 use std::cmp::Reverse;
@@ -13,7 +13,7 @@ use enfilade_geom::DVec3;
 
 use crate::floors::{Floors, NONE};
 
-/// A search over the floors of one cell, with buffers that are used again.
+/// A search over the floors of one cell, with reusable buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Strides {
     labels: Vec<Footprint>,
@@ -29,7 +29,7 @@ struct Footprint {
 }
 
 impl Strides {
-    /// Finds the ways from a floor to all of its cell, or until `goal` is reached. No portal is passed.
+    /// Finds the paths from a floor to all others of its cell, or until `goal` is reached. Passes no portal.
     pub(crate) fn spread(&mut self, floors: &Floors, start: u32, goal: Option<u32>) {
         self.stamp = self.stamp.wrapping_add(1);
         if self.stamp == 0 {
@@ -53,7 +53,7 @@ impl Strides {
                 break;
             }
             let length = self.labels[at as usize].length;
-            // Rounded as when it was put in.
+            // Rounded as on insertion.
             if f32::from_bits(bits) > length + ahead(at) {
                 continue;
             }
@@ -74,15 +74,15 @@ impl Strides {
         }
     }
 
-    /// The length to a floor; infinite where no way was found. After a search for one goal, only that of the goal is known to be
-    /// the least. [Units: wu]
+    /// Returns the length to a floor; infinite if no path was found. After a search for one goal, only that of the goal is certainly the
+    /// least. [Units: wu]
     pub(crate) fn length(&self, to: u32) -> f64 {
         let label = self.labels.get(to as usize);
         let known = label.filter(|l| l.stamp == self.stamp);
         known.map_or(f64::INFINITY, |l| f64::from(l.length))
     }
 
-    /// The floors of the way to one, from its end to the start, which is left out.
+    /// Returns the floors of the path to one, from its end back to the start, which is left out.
     pub(crate) fn back(&self, to: u32) -> impl Iterator<Item = u32> {
         let mut at = to;
         std::iter::from_fn(move || {
@@ -101,7 +101,7 @@ fn each_move(floors: &Floors, at: u32, mut visit: impl FnMut(u32)) {
         let (Some(a), Some(b)) = (beside[d], beside[(d + 1) % 4]) else {
             continue;
         };
-        // Both ways around must lead there: no corner is cut.
+        // Both ways around must lead there, so that the diagonal does not cut across a gap.
         let Some(corner) = step(a, d + 1).filter(|&c| step(b, d) == Some(c)) else {
             continue;
         };
@@ -116,8 +116,8 @@ fn each_move(floors: &Floors, at: u32, mut visit: impl FnMut(u32)) {
     beside.into_iter().flatten().for_each(visit);
 }
 
-/// Walks straight, in plan, from a point of a floor to another point: calls `visit` with each floor stepped on, with the portal if
-/// it is in another cell. The floor at the end; `None` where the way is blocked, or a portal that `may_pass` does not let through.
+/// Walks straight, in plan, from a point of a floor to another point. Calls `visit` with each floor stepped on, and the portal if
+/// it is in another cell. Returns the floor at the end; `None` if blocked, or at a portal that `may_pass` rejects.
 pub(crate) fn walk_straight(
     floors: &Floors,
     (from, start): (DVec3, u32),
@@ -131,7 +131,7 @@ pub(crate) fn walk_straight(
     let mut floor = start;
     let delta = [0, 1].map(|k| b[k] - a[k]);
     let sign = delta.map(f64::signum);
-    // Where along the line the next square begins, by axis.
+    // Start of the next square along the line, by axis.
     let next = |k: usize, at: f64| {
         if at == end[k] {
             return f64::INFINITY;

@@ -1,10 +1,10 @@
-//! When a door that moves passes over a point that stands still.
+//! Passage of a moving door over a point at rest.
 //!
-//! In the frame of the part that moves, the point moves along a curve (Dirkse 2002, section 3.2.2: portals are tested in portal
-//! space). Its height over the opening's plane is zero where it passes; a straight line between the two ends of a step, as
-//! there, misses what the curve passes, and finds what it does not. Here time advances by no more than the height divided by
-//! the greatest speed (conservative advancement, Mirtich 1996), so no side is skipped; a change of side is then bisected.
-//! O(log) steps a crossing where the curve meets the plane at an angle; bounded by [`SHORTEST`] where it runs along it.
+//! In the frame of the moving part, the point moves along a curve (Dirkse 2002, section 3.2.2: portals are tested in portal space).
+//! Its height over the opening's plane is zero at a passage; a straight line between the two ends of a step, as used there, misses
+//! passages of the curve and finds false ones. Here time advances by at most the height divided by the greatest speed (conservative
+//! advancement, Mirtich 1996), so no side is skipped; a change of side is then bisected. O(log) steps per crossing where the curve
+//! meets the plane at an angle; bounded by [`SHORTEST`] where it runs along it.
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
@@ -13,28 +13,28 @@ use crate::layout::Opening;
 use crate::pose::Pose;
 use crate::space::{PartId, Space};
 
-/// The least step in time, as a share of the motion: what passes and returns within it has not passed.
+/// Least step in time, as a fraction of the motion: a passage that reverses within it does not count.
 const SHORTEST: f64 = 1.0 / 16_384.0;
 
-/// Halvings of the interval in which the side changes.
+/// Bisections of the interval in which the side changes.
 const HALVINGS: u32 = 40;
 
-/// A point and a door have passed each other.
+/// Passage of a door over a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passing {
-    /// When, as a share of the motion.
+    /// Time, as a fraction of the motion.
     pub at: f64,
-    /// The door, of the part that moved.
+    /// The door of the part that moved.
     pub portal: PortalId,
-    /// Whether the point came into the part.
+    /// True if the point entered the part.
     pub is_inward: bool,
 }
 
 impl Space {
-    /// The doors of `part` that pass over a point as the part moves from one pose to another, in the order in which they do,
-    /// at the end of `into`. The poses are in the host's frame, in between as [`Pose::toward`] has it; so is the point.
+    /// Appends to `into` the doors of `part` that pass over a point as the part moves from one pose to another, in order of time. The
+    /// poses and the point are in the host's frame; the motion between is [`Pose::toward`].
     ///
-    /// What passes within the part's tolerance of an opening's rim counts as passing through it.
+    /// A passage within the part's tolerance of an opening's rim counts.
     pub fn passings(
         &self,
         part: PartId,
@@ -47,7 +47,7 @@ impl Space {
         let [start, end] = motion;
         let angle = start.turn.angle_between(end.turn);
         let far = point.distance(start.at).max(point.distance(end.at));
-        // Of the point in the part's frame, for each unit of time.
+        // Speed bound of the point in the part's frame, per unit of time.
         let speed = angle * far + start.at.distance(end.at);
         let place = |t: f64| start.toward(end, t).point_back(point);
         for door in &own.doors {
@@ -67,7 +67,7 @@ impl Space {
     }
 }
 
-/// Calls `found` with the time of each change of side through an opening, and whether it is to the side of its normal. A point
+/// Calls `found` with the time of each change of side through an opening, and `true` if it is to the side of its normal. A point
 /// on the plane is on the lower side.
 fn each_crossing(
     opening: &Opening,
@@ -100,7 +100,7 @@ fn each_crossing(
     }
 }
 
-/// Whether a point of an opening's plane is in one of its pieces, or within `margin` of each of its edges' lines.
+/// Returns `true` if a point of an opening's plane is in one of its pieces, or within `margin` of the line of each edge.
 fn is_in(opening: &Opening, p: DVec3, margin: f64) -> bool {
     let normal = opening.normal();
     opening.pieces().any(|piece| {

@@ -1,40 +1,40 @@
 //! The shortest string from a point through a sequence of openings to a point.
 //!
-//! Minimize `Σ |xᵢ₊₁ − xᵢ|` with each `xᵢ` in its opening: a convex problem where openings are convex (a second-order cone programme;
-//! Lobo, Vandenberghe, Boyd & Lebret, "Applications of second-order cone programming", 1998, §2). Three steps take turns:
+//! Minimizes `Σ |xᵢ₊₁ − xᵢ|` with each `xᵢ` in its opening: a convex problem if openings are convex (a second-order cone program;
+//! Lobo, Vandenberghe, Boyd & Lebret, "Applications of second-order cone programming", 1998, §2). Three methods take turns:
 //!
 //! 1. *Sweeps*: each point moves to its best place between its neighbors, which has a closed form: reflection at the plane, then
-//!    unfolding about an edge. They find which points hang at which edges and corners.
+//!    unfolding about an edge. They find the edges and vertices at which points are caught.
 //! 2. *Newton's method* on the faces found, a block tridiagonal system of 2 × 2 blocks: a few steps where sweeps would need hundreds.
-//! 3. Where points of neighboring openings fall on one another, and both stall, an *interior-point method* with logarithmic barriers
-//!    (Boyd & Vandenberghe, "Convex Optimization", 2004, §11.3) and lengths rounded off at nil: its gap shrinks by a constant factor a
+//! 3. Where points of neighboring openings coincide, and both stall, an *interior-point method* with logarithmic barriers
+//!    (Boyd & Vandenberghe, "Convex Optimization", 2004, §11.3) and lengths smoothed at zero: its gap shrinks by a constant factor per
 //!    step, whatever the openings.
 //!
-//! Each ends by the same test. For any vectors `uᵢ` of length 1 or less, one a leg, `uₙ·b − u₀·a + Σᵢ min over opening i of
-//! (uᵢ₋₁ − uᵢ)·x` is no longer than any string (the dual problem): with the legs' directions for `u` it is the string's own length
-//! at the optimum, and its distance from that length bounds the error everywhere else. O(corners) a step.
+//! All end by the same test. For any vectors `uᵢ` of length 1 or less, one per leg, `uₙ·b − u₀·a + Σᵢ min over opening i of
+//! (uᵢ₋₁ − uᵢ)·x` is at most the length of any string (the dual problem): with the legs' directions for `u` it equals the string's
+//! length at the optimum, and elsewhere its distance from that length bounds the error. O(vertices) per step.
 //!
-//! Numerically: legs of no length have no direction, so these end with step 3; slivers of openings have barriers of great condition,
-//! so a step that does not shorten is not taken.
+//! Numerically: legs of zero length have no direction, so these end with step 3; slivers of openings have ill-conditioned barriers,
+//! so a step that does not shorten is rejected.
 
 use enfilade_geom::DVec3;
 
 use crate::blocks::{Block, solve};
 
-/// How far a string may be from the shortest, by its length: the gap that ends the search.
+/// Relative gap between the length and its lower bound that ends the search.
 const GAP: f64 = 1e-6;
 /// Rounds of sweeps and Newton before the interior-point method.
 const ROUNDS: usize = 12;
-/// Steps of the interior-point method, at most.
+/// Maximum number of steps of the interior-point method.
 const STEPS: usize = 200;
 
-/// A string pulled taut, with buffers that are used again: nothing is allocated once they have grown.
+/// A string pulled taut, with reusable buffers: allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct TautString {
     /// Both ends, and a point in each opening between.
     points: Vec<DVec3>,
     next: Vec<DVec3>,
-    /// By inner point, what it may move along: nil vectors where it may not.
+    /// Per inner point, the directions in which it may move: zero vectors if it may not.
     axes: Vec<[DVec3; 2]>,
     blocks: Vec<Block>,
     pieces: Vec<u32>,
@@ -44,17 +44,17 @@ pub struct TautString {
 }
 
 impl TautString {
-    /// Without buffers yet.
+    /// Makes it without buffers.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Pulls the string taut from `from` through `n` openings to `to`; `pieces(i)` has the convex planar polygons of opening `i`,
-    /// at least one, each with an area. Its length. [Units: wu]
+    /// Pulls the string taut from `from` through `n` openings to `to`, and returns its length. `pieces(i)` returns the convex planar
+    /// polygons of opening `i`, at least one, each with an area. [Units: wu]
     ///
-    /// Starts at the openings' middles; O(corners) a step, about ten steps, rarely a hundred. An opening whose pieces together are
-    /// not convex has the best place near the one that was found, and [`TautString::bound`] is that of its hull.
+    /// Starts at the middles of openings; O(vertices) per step, about ten steps, rarely a hundred. If the pieces of an opening together
+    /// are not convex, the result is a local optimum, and [`TautString::bound`] is that of its hull.
     pub fn pull<'a, I>(
         &mut self,
         from: DVec3,
@@ -75,7 +75,7 @@ impl TautString {
         self.tighten(pieces)
     }
 
-    /// The same from a string near the shortest: `start(i)` is a point near opening `i`.
+    /// As [`TautString::pull`], from a string near the shortest: `start(i)` is a point near opening `i`.
     pub fn pull_from<'a, I>(
         &mut self,
         from: DVec3,
@@ -93,32 +93,32 @@ impl TautString {
         self.tighten(pieces)
     }
 
-    /// Both ends, and a point in each opening between them. [Units: wu]
+    /// Returns both ends, and a point in each opening between them. [Units: wu]
     #[must_use]
     pub fn points(&self) -> &[DVec3] {
         &self.points
     }
 
-    /// Of the string. [Units: wu]
+    /// Returns the length of the string. [Units: wu]
     #[must_use]
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// No string through these openings is shorter than this. [Units: wu]
+    /// Returns a lower bound of the length of any string through these openings. [Units: wu]
     #[must_use]
     pub fn bound(&self) -> f64 {
         self.bound
     }
 
-    /// Unit vector in which the string leaves its start: to the first point that lies apart from it; nil if none does.
+    /// Returns the unit vector in which the string leaves its start, towards the first distinct point; zero if there is none.
     #[must_use]
     pub fn departure(&self) -> DVec3 {
         let from = self.points.first().copied().unwrap_or_default();
         away(from, self.points.iter().copied(), self.length)
     }
 
-    /// Unit vector from the end to where the string comes from: to the last point that lies apart from it; nil if none does.
+    /// Returns the unit vector from the end back along the string, towards the last distinct point; zero if there is none.
     #[must_use]
     pub fn arrival(&self) -> DVec3 {
         let to = self.points.last().copied().unwrap_or_default();
@@ -158,7 +158,7 @@ impl TautString {
         self.length
     }
 
-    /// Moves each point to its best place between its neighbors; back as well as forth if asked.
+    /// Moves each point to its best place between its neighbors; forth, and back if `both`.
     fn sweep<'a, I>(&mut self, n: usize, pieces: &impl Fn(usize) -> I, both: bool)
     where
         I: Iterator<Item = &'a [DVec3]>,
@@ -182,7 +182,7 @@ impl TautString {
         }
     }
 
-    /// Whether the string is the shortest but for the gap; sets length and bound.
+    /// Returns `true` if the string is the shortest up to the gap; sets length and bound.
     fn is_short<'a, I>(&mut self, pieces: &impl Fn(usize) -> I) -> bool
     where
         I: Iterator<Item = &'a [DVec3]>,
@@ -196,13 +196,13 @@ impl TautString {
         self.length - self.bound <= GAP * self.length
     }
 
-    /// Raises the bound to that of the directions.
+    /// Raises the bound to that of the current directions.
     fn lift_bound<'a, I>(&mut self, pieces: &impl Fn(usize) -> I)
     where
         I: Iterator<Item = &'a [DVec3]>,
     {
         let n = self.points.len() - 2;
-        // Measured from the start, for the sake of digits.
+        // Relative to the start, for precision.
         let from = self.points[0];
         let mut bound = self.directions[n].dot(self.points[n + 1] - from);
         for i in 0..n {
@@ -213,7 +213,7 @@ impl TautString {
         self.bound = self.bound.max(bound);
     }
 
-    /// A step of Newton's method along the faces that points hang at, as far as it shortens.
+    /// Takes a step of Newton's method along the faces at which points are caught, as far as it shortens.
     fn newton<'a, I>(&mut self, pieces: &impl Fn(usize) -> I)
     where
         I: Iterator<Item = &'a [DVec3]>,
@@ -255,7 +255,7 @@ impl TautString {
         self.next.push(self.points[self.axes.len() + 1]);
     }
 
-    /// The interior-point method, through the pieces that points are in, from their middles.
+    /// The interior-point method, through the pieces that contain the points, from their middles.
     fn interior<'a, I>(&mut self, pieces: &impl Fn(usize) -> I)
     where
         I: Iterator<Item = &'a [DVec3]>,
@@ -290,7 +290,7 @@ impl TautString {
             let mut share: f64 = 1.0;
             for i in 0..n {
                 let room = room(self.points[i + 1], self.step(i), piece(&self.pieces, i));
-                // Not onto an edge.
+                // Stop short of an edge.
                 share = share.min(if room < 1.0 { 0.95 * room } else { 1.0 });
             }
             let value = |points: &[DVec3], chosen: &[u32]| {
@@ -321,8 +321,8 @@ impl TautString {
         }
     }
 
-    /// The legs' directions after the step that was solved for, by their derivatives: with these the dual problem's constraints hold
-    /// exactly, while directions of legs of hardly any length are off by much.
+    /// Sets the legs' directions after the solved step, from their derivatives: these satisfy the constraints of the dual problem exactly,
+    /// while the directions of almost zero legs are far off.
     fn set_newton_directions(&mut self, round: f64) {
         self.directions.clear();
         let n = self.axes.len();
@@ -339,9 +339,9 @@ impl TautString {
     }
 }
 
-/// A length with the barrier of its cone: the least over `t` of `t − round · log(t² − length²)`.
+/// A length with the barrier of its cone: the minimum over `t` of `t − round · log(t² − length²)`.
 ///
-/// Self-concordant as the barrier is, so that Newton's method needs no more steps where lengths vanish.
+/// Self-concordant like the barrier, so that Newton's method needs no more steps where lengths vanish.
 fn rounded(length: f64, round: f64) -> f64 {
     let t = round + length.hypot(round);
     t - round * (2.0 * round * t).ln()
@@ -360,7 +360,7 @@ fn middle(corners: &[DVec3]) -> DVec3 {
     corners.iter().sum::<DVec3>() / corners.len().max(1) as f64
 }
 
-/// Twice the area, along the normal.
+/// Returns the normal with twice the area as length.
 fn area_normal(corners: &[DVec3]) -> DVec3 {
     let Some((&first, rest)) = corners.split_first() else {
         return DVec3::ZERO;
@@ -383,7 +383,7 @@ fn edges(corners: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
     corners.iter().zip(nexts).map(|(a, b)| (*a, *b))
 }
 
-/// The point of a polygon whose distances from `a` and `b` have the least sum, and what it may move along.
+/// Returns the point of a polygon whose distances from `a` and `b` have the least sum, and the directions in which it may move.
 fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
     let normal = area_normal(corners).normalize_or_zero();
     let Some(&first) = corners.first() else {
@@ -423,7 +423,7 @@ fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
     best
 }
 
-/// The same on an edge: the triangles that `a` and `b` make with its line are unfolded into one plane.
+/// As [`best_place`], on an edge: unfolds the triangles of `a` and of `b` with its line into one plane.
 pub(crate) fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
     let length = from.distance(to);
     if length == 0.0 {
@@ -447,14 +447,14 @@ pub(crate) fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3
     }
 }
 
-/// The share of a step, at most 1, that a point of a polygon can take within it.
+/// Returns the fraction of a step, at most 1, that keeps a point within a polygon.
 fn room(at: DVec3, step: DVec3, corners: &[DVec3]) -> f64 {
     let normal = area_normal(corners).normalize_or_zero();
     let mut share: f64 = 1.0;
     for (from, to) in edges(corners) {
         let inward = normal.cross(to - from).normalize_or_zero();
         let (depth, toward) = (inward.dot(at - from), -inward.dot(step));
-        // Along the edge that it hangs at, rounding is no motion.
+        // Along the edge at which it is caught, rounding does not count as motion.
         if toward > 1e-12 * step.length() && toward * share > depth {
             share = (depth / toward).max(0.0);
         }
@@ -462,12 +462,12 @@ fn room(at: DVec3, step: DVec3, corners: &[DVec3]) -> f64 {
     share
 }
 
-/// The system of Newton's method for the sum of lengths, each [rounded off](rounded) at `round`.
+/// Assembles the system of Newton's method for the sum of lengths, each [smoothed](rounded) at `round`.
 fn assemble(points: &[DVec3], axes: &[[DVec3; 2]], round: f64, blocks: &mut [Block]) {
     for (block, axes) in blocks.iter_mut().zip(axes) {
         *block = Block::default();
         for (k, axis) in axes.iter().enumerate() {
-            // A place that cannot move is a row of its own.
+            // A point that cannot move is a row of its own.
             block.diagonal[k][k] = if *axis == DVec3::ZERO { 1.0 } else { 0.0 };
         }
     }
@@ -496,7 +496,7 @@ fn assemble(points: &[DVec3], axes: &[[DVec3; 2]], round: f64, blocks: &mut [Blo
     }
 }
 
-/// Minus the logarithms of the distances from a polygon's edges; infinite on them and outside.
+/// Returns minus the sum of logarithms of the distances from a polygon's edges; infinite on them and outside.
 fn barrier(at: DVec3, corners: &[DVec3]) -> f64 {
     let normal = area_normal(corners).normalize_or_zero();
     let depths = edges(corners).map(|(a, b)| normal.cross(b - a).normalize_or_zero().dot(at - a));

@@ -1,8 +1,8 @@
-//! Things that stand and move in cells: in which cells each is, and which of them a view sees.
+//! Things that stand and move in cells: the cells of each, and the things in a view.
 //!
 //! After Dirkse 2002, chapter 5: every cell that a thing reaches into refers to it, so that it is found where it sticks out of
-//! the cell that it belongs to. A thing is in the cell of its origin; as it moves it changes over, and the cells that refer
-//! to it with it. What a thing moves along with is its [`Tie`].
+//! its own cell. A thing is in the cell of its origin; as it moves, its cell and the cells that refer to it change. Its [`Tie`]
+//! determines its frame of motion.
 //!
 //! References are links in two lists at once, of a thing and of a cell, taken from one pool: a move is O(cells reached), and
 //! allocates nothing once the pool has grown.
@@ -20,47 +20,49 @@ use crate::shape::Shape;
 use crate::space::{PartId, Place, Space};
 use links::{Links, NONE};
 
-/// Which thing. Never that of another, even after the thing is removed.
+/// Id of a thing. Never reused, even after the thing is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ThingId {
     index: u32,
     generation: u32,
 }
 
-/// What a thing moves along with.
+/// The frame with which a thing moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tie {
-    /// With the part that its origin is in, as who steps on a boat rocks with it: Dirkse's slave object.
+    /// The part that its origin is in, such as a boat for a person on deck: Dirkse's slave object.
     Carried,
-    /// With nothing, as a bird in a tunnel of a ship: Dirkse's free object.
+    /// None, as for a bird in a tunnel of a ship: Dirkse's free object.
     Free,
-    /// With another thing, its pose being relative to that one's.
+    /// Another thing, with a pose relative to it.
     Child(ThingId),
-    /// It is nowhere, and seen in each frame, like a sun or what a screen shows.
+    /// Nowhere, and seen in each frame, like a sun or an overlay.
     Global,
 }
 
-/// Why a thing cannot be added or moved.
+/// Reason why a thing cannot be added or moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ThingError {
-    /// It was removed, or never there.
+    /// It was removed, or never existed.
     #[error("there is no such thing: it was removed, or belongs to another registry")]
     NoThing,
-    /// A pose with a number that is not finite, or whose turn is none.
-    #[error("the pose is no rigid motion: its numbers must be finite and its turn of unit length")]
+    /// A pose that is not finite, or whose rotation does not have unit length.
+    #[error(
+        "the pose is not a rigid motion: its numbers must be finite and its rotation of unit length"
+    )]
     NotRigid,
     /// A frame that does not exist.
     #[error("there is no such part")]
     NoPart,
 }
 
-/// From where to where a thing has moved.
+/// Movement of a thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moved {
-    /// Where its origin was; `None` in solid matter.
+    /// Place of its origin before; `None` in solid matter.
     pub from: Option<Place>,
-    /// Where it is. While in solid matter it stays listed where it was last.
+    /// Place afterwards. While in solid matter it stays listed where it was last.
     pub to: Option<Place>,
 }
 
@@ -81,10 +83,10 @@ struct Thing {
     placed: Pose,
     frame: PartId,
     place: Option<Place>,
-    /// Where its origin was when its cells were last looked for, and how far it may go until they are again.
+    /// Origin at the last search for its cells, and the distance that it may move until the next.
     settled_at: DVec3,
     clearance: f64,
-    /// Where it was when its place was last looked for, and how far it may go until it is again.
+    /// Position at the last search for its place, and the distance that it may move until the next.
     located_at: DVec3,
     room: f64,
     first_link: u32,
@@ -110,18 +112,18 @@ pub struct Things {
 }
 
 impl Things {
-    /// No things.
+    /// Makes an empty registry.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a thing at a pose in the frame of a part; that of a [child](Tie::Child) is relative to the thing that it is a child
-    /// of, and `frame` does not matter. Allocates where lists grow.
+    /// Adds a thing at a pose in the frame of a part; that of a [child](Tie::Child) is relative to its parent, and `frame` is ignored.
+    /// Allocates while lists grow.
     ///
     /// # Errors
     ///
-    /// A pose that is no rigid motion, a part or parent that does not exist.
+    /// If the pose is not a rigid motion, or the part or parent does not exist.
     pub fn add(
         &mut self,
         space: &Space,
@@ -181,7 +183,7 @@ impl Things {
     ///
     /// # Errors
     ///
-    /// A thing that does not exist.
+    /// If the thing does not exist.
     pub fn remove(&mut self, id: ThingId) -> Result<(), ThingError> {
         let thing = self.thing(id)?;
         let (tie, mut child) = (thing.tie, thing.first_child);
@@ -204,12 +206,12 @@ impl Things {
         Ok(())
     }
 
-    /// Moves a thing, and its children with it, to a pose in the frame of a part; that of a child is relative to the thing that
-    /// it is a child of. O(openings of the cells that it reaches) where it comes near one, about 100 ns where it does not.
+    /// Moves a thing, and its children with it, to a pose in the frame of a part; that of a child is relative to its parent.
+    /// O(openings of the cells that it reaches) if it comes near one, otherwise about 100 ns.
     ///
     /// # Errors
     ///
-    /// A thing or part that does not exist, a pose that is no rigid motion.
+    /// If the thing or part does not exist, or the pose is not a rigid motion.
     pub fn set_pose(
         &mut self,
         space: &Space,
@@ -234,9 +236,9 @@ impl Things {
         Ok(Moved { from, to })
     }
 
-    /// To be called after a part has moved ([`Space::set_pose`]), and after doors of parts came to meet or part: things that
-    /// stand around it, that stick out of it, or that a door of it has passed over, change over. O(things in the cells that the
-    /// part stands in, and has).
+    /// Call after a part has moved ([`Space::set_pose`]), and after doors of parts have met or separated: updates the cells of things
+    /// that stand around it, that stick out of it, or that one of its doors has passed over. O(things in the cells of the part, and in
+    /// those in which it stands).
     pub fn part_moved(&mut self, space: &Space, part: PartId) {
         let mut affected = std::mem::take(&mut self.affected);
         affected.clear();
@@ -269,26 +271,26 @@ impl Things {
         self.affected = affected;
     }
 
-    /// Where a thing is, in the frame of a part.
+    /// Returns the pose of a thing in the frame of a part.
     ///
     /// # Errors
     ///
-    /// A thing that does not exist.
+    /// If the thing does not exist.
     pub fn pose(&self, id: ThingId) -> Result<(PartId, Pose), ThingError> {
         let thing = self.thing(id)?;
         Ok((thing.frame, thing.placed))
     }
 
-    /// The place of its origin; `None` for what is in solid matter or global.
+    /// Returns the place of its origin; `None` if it is in solid matter or global.
     ///
     /// # Errors
     ///
-    /// A thing that does not exist.
+    /// If the thing does not exist.
     pub fn place(&self, id: ThingId) -> Result<Option<Place>, ThingError> {
         Ok(self.thing(id)?.place)
     }
 
-    /// The places that it reaches into, in no order. A thing in solid matter is where it was last.
+    /// Returns the places that it reaches into, in arbitrary order. A thing in solid matter keeps its last ones.
     pub fn places<'a>(
         &'a self,
         space: &'a Space,
@@ -299,7 +301,7 @@ impl Things {
         cells.map(|cell| place_of(space, cell))
     }
 
-    /// The things that reach into a cell, in no order.
+    /// Returns the things that reach into a cell, in arbitrary order.
     pub fn things_in<'a>(
         &'a self,
         space: &Space,
@@ -308,8 +310,8 @@ impl Things {
         self.in_cell(Self::cell_index(space, place))
     }
 
-    /// The things that a view sees, ascending, each once: those whose shape comes into what the view sees of a cell that they
-    /// are in, and all that are global. No thing that is seen is missing.
+    /// Returns the things in a view, ascending, each once: those whose shape meets the visible part of a cell that they are in, and all
+    /// global ones. No visible thing is missing.
     pub fn see(&mut self, space: &Space, seen: &SpaceSeen) -> &[ThingId] {
         self.seen.clear();
         self.seen.extend_from_slice(&self.globals);
@@ -384,7 +386,7 @@ impl Things {
             .ok_or(ThingError::NoThing)
     }
 
-    /// A thing that is there, by its slot.
+    /// Returns an existing thing by its slot.
     fn at(&self, index: u32) -> &Thing {
         let thing = self.slots[index as usize].thing.as_ref();
         thing.expect("lists hold no removed things")
@@ -410,7 +412,7 @@ impl Things {
         into.extend(self.in_cell(cell).map(|id| id.index));
     }
 
-    /// Puts a child where its parent has it.
+    /// Moves a child to its pose relative to its parent.
     fn follow_parent(&mut self, space: &Space, index: u32) {
         let Tie::Child(parent) = self.at(index).tie else {
             return;
@@ -451,7 +453,7 @@ impl Things {
         }
     }
 
-    /// Finds out where a thing is, and what it reaches into.
+    /// Updates the place of a thing, and the places that it reaches into.
     fn settle(&mut self, space: &Space, index: u32) {
         let thing = self.at(index);
         if thing.tie == Tie::Global {
@@ -496,7 +498,7 @@ impl Things {
             frame: thing.frame,
             pose: &thing.placed,
         };
-        // A portal that is shut does not cut what stands in it in two.
+        // A shut portal does not cut a thing that stands in it.
         let all = |_: PartId, _: PortalId| true;
         let places = flood.reach(space, place, &posted, all);
         self.relink(space, index, places);
@@ -511,7 +513,7 @@ impl Things {
         thing.clearance = clearance;
     }
 
-    /// Makes the cells that refer to a thing those that it reaches.
+    /// Replaces the cells that refer to a thing by those that it reaches.
     fn relink(&mut self, space: &Space, index: u32, places: &[Place]) {
         self.links.grow(space.n_cells());
         let cells = places.iter().map(|p| Self::cell_index(space, *p));
@@ -538,7 +540,7 @@ impl Things {
     }
 }
 
-/// Where a thing is, where that was looked for, and how far from there it is the same.
+/// Returns the place of a thing, the point of the search, and a distance from there within which the place is the same.
 fn locate(space: &Space, thing: &Thing) -> (Option<Place>, DVec3, f64) {
     let at = thing.placed.at;
     if let Some(place) = thing.place
@@ -548,7 +550,7 @@ fn locate(space: &Space, thing: &Thing) -> (Option<Place>, DVec3, f64) {
     {
         return (thing.place, thing.located_at, thing.room);
     }
-    // In the root alone, so that what is found is what `Space::locate` finds.
+    // In the root alone, so that the result equals that of `Space::locate`.
     if thing.frame == PartId::ROOT {
         let root = &space.parts[0];
         let (cell, room) = root.layout.locate_with_room(at);
@@ -560,8 +562,8 @@ fn locate(space: &Space, thing: &Thing) -> (Option<Place>, DVec3, f64) {
     (space.locate(thing.frame, at), at, 0.0)
 }
 
-/// How far a thing in a place may move without meeting an opening of its cell; not above 0 where it may meet one now, where
-/// other rooms stand in the cell, and where the thing is in the frame of another part. [Units: wu]
+/// Returns the distance by which a thing in a place may move without meeting an opening of its cell; not above 0 if it may meet one
+/// now, if other parts stand in the cell, or if the thing is in the frame of another part. [Units: wu]
 fn clearance_in(space: &Space, place: Place, thing: &Thing) -> f64 {
     let part = &space.parts[place.part.idx()];
     if place.part != thing.frame || part.has_guests[place.cell.idx()] {
@@ -571,7 +573,7 @@ fn clearance_in(space: &Space, place: Place, thing: &Thing) -> f64 {
     distance - thing.reach - part.layout.tolerance()
 }
 
-/// The place of a cell among those of all parts. O(log parts).
+/// Returns the place of a cell, given its index among those of all parts. O(log parts).
 fn place_of(space: &Space, cell: u32) -> Place {
     let part = space.parts.partition_point(|p| p.first_cell <= cell) - 1;
     let local = cell - space.parts[part].first_cell;

@@ -1,7 +1,7 @@
-//! Nodes of trees, numbered so that all below one follow it: whether one is below another is then a comparison.
+//! Preorder numbers of trees: all descendants of a node follow it, so a comparison decides descent.
 
-/// By node its own number, and the first after all below it. `ups` has each node that hangs on another with that one, those
-/// below before those above; all others are roots. O(n).
+/// Returns per node its own number, and the first one after its descendants. `ups` has each node with a parent, and that parent,
+/// descendants first; all others are roots. O(n).
 pub(crate) fn number_trees(n: usize, ups: &[[usize; 2]]) -> Vec<[u32; 2]> {
     let (mut size, mut is_root) = (vec![1; n], vec![true; n]);
     for &[node, up] in ups {
@@ -14,7 +14,7 @@ pub(crate) fn number_trees(n: usize, ups: &[[usize; 2]]) -> Vec<[u32; 2]> {
         below[root] = [next_number, next_number + size[root]];
         next_number += size[root];
     }
-    // By node the number of the next one below it.
+    // Number of the next child, per node.
     let mut next: Vec<u32> = below.iter().map(|b| b[0] + 1).collect();
     for &[node, up] in ups.iter().rev() {
         below[node] = [next[up], next[up] + size[node]];
@@ -30,7 +30,7 @@ mod tests {
 
     #[test]
     fn all_below_a_node_follow_it() {
-        // 3 and 4 hang on 1, 1 and 2 on 0; 5 is a root.
+        // 3 and 4 are children of 1, 1 and 2 of 0; 5 is a root.
         let below = number_trees(6, &[[3, 1], [4, 1], [1, 0], [2, 0]]);
         let is_below = |a: usize, b: usize| (below[b][0]..below[b][1]).contains(&below[a][0]);
         let pairs: Vec<_> = (0..6).flat_map(|a| (0..6).map(move |b| (a, b))).collect();

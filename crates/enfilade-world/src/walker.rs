@@ -1,12 +1,12 @@
-//! Somebody who walks: gravity, steps, and what is in the way.
+//! A walker with gravity, steps, and collisions.
 //!
-//! Collide and slide (Fauerby, *Improved collision detection and response*, 2003), with a capsule that begins above a step's height: it
-//! moves by casts, loses of its motion what leads into what it meets, and goes on, a few times. So it is not stopped by what it
-//! can step over, and the floor is found apart from that, straight below. What has moved into it meanwhile, as leaves of doors
-//! do, pushes it out. Two to five casts a step.
+//! Collide and slide (Fauerby, *Improved collision detection and response*, 2003), with a capsule that begins above the height of a
+//! step: it moves by casts, loses the component of its motion into an obstacle, and goes on, a few times. So it passes over
+//! low obstacles, and the floor is found separately, straight below. Objects that have moved into it meanwhile, such as leaves of
+//! doors, push it out. Two to five casts per step.
 //!
-//! A gap is kept to all that is met ([`GAP`]); without it, rounding decides at seams of walls. Motion is level, so normals count by
-//! their level parts.
+//! It keeps a gap to all obstacles ([`GAP`]); without it, rounding decides at seams of walls. Motion is level, so only the level
+//! parts of normals count.
 
 use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
@@ -15,32 +15,32 @@ use enfilade_runtime::SightState;
 use crate::contacts::{Body, Cast, Caster, Contacts};
 use crate::layout::Layout;
 
-/// Kept to walls. [Units: wu]
+/// Gap kept to walls. [Units: wu]
 const GAP: f64 = 0.005;
-/// How often one goes on in another direction in a step: along a wall, then along the next one of a corner.
+/// Maximum number of changes of direction in a step: along a wall, then along the next one where two meet.
 const SLIDES: usize = 4;
-/// How far down one looks for a floor. [Units: wu]
+/// Depth of the search for a floor. [Units: wu]
 const FAR: f64 = 500.0;
-/// Longest step of time. [Units: s]
+/// Longest time step. [Units: s]
 const LONGEST: f64 = 0.1;
-/// [Units: wu/s²]
+/// Acceleration. [Units: wu/s²]
 const GRAVITY: f64 = 9.81;
 
-/// How somebody is built.
+/// Dimensions of a walker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
-    /// Half the breadth. [Units: wu] [Limit: > 0.01]
+    /// Half the width. [Units: wu] [Limit: > 0.01]
     pub radius: f64,
-    /// From the floor to the eye. [Units: wu] [Limit: > step + radius]
+    /// Height of the eye above the floor. [Units: wu] [Limit: > step + radius]
     pub eye: f64,
-    /// What is no higher is stepped onto or over. [Units: wu] [Limit: >= 0]
+    /// Greatest height stepped onto or over. [Units: wu] [Limit: >= 0]
     pub step: f64,
-    /// How fast one rises when climbing. [Units: wu/s] [Limit: above 0]
+    /// Speed of rising when climbing. [Units: wu/s] [Limit: above 0]
     pub climb: f64,
 }
 
 impl Default for Build {
-    /// A grown person: 44 cm broad, eyes at 1.6 m, steps of 30 cm.
+    /// An adult: 44 cm wide, eyes at 1.6 m, steps of 30 cm.
     fn default() -> Self {
         Self {
             radius: 0.22,
@@ -51,21 +51,21 @@ impl Default for Build {
     }
 }
 
-/// Somebody who walks in a world. Nothing is allocated once the buffers have grown.
+/// A person who walks in a world. Allocates nothing once the buffers have grown.
 #[derive(Clone, Debug)]
 pub struct Walker {
-    /// Where the eye is; may be set. [Units: wu]
+    /// Position of the eye; may be set. [Units: wu]
     pub eye: DVec3,
     build: Build,
-    /// Downwards. [Units: wu/s]
+    /// Downward speed. [Units: wu/s]
     falling: f64,
-    /// The last one that it was in.
+    /// The last cell that it was in.
     cell: Option<CellId>,
     caster: Caster,
 }
 
 impl Walker {
-    /// Somebody whose eye is at a point, at rest.
+    /// Makes a walker at rest with its eye at a point.
     #[must_use]
     pub fn new(contacts: &Contacts, build: Build, eye: DVec3) -> Self {
         Self {
@@ -77,19 +77,19 @@ impl Walker {
         }
     }
 
-    /// The cell that it is in, or was in last; `None` before the first step, and for one that was never in any.
+    /// Returns the cell that it is in, or was in last; `None` before the first step, and if it was never in one.
     #[must_use]
     pub fn cell(&self) -> Option<CellId> {
         self.cell
     }
 
-    /// Walks by `wish`, of which the level part counts, for some seconds, at most a tenth: stopped by walls, objects, leaves of
-    /// doors as `state` has them and openings that it shuts; falls, and climbs what is no higher than a step. In no
-    /// cell, nothing stops it and it does not fall. [Units: wu/s, s]
+    /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors where `state` puts
+    /// them and openings that `state` shuts; falls, and climbs up to the height of a step. In no cell, nothing stops it and it does not
+    /// fall. [Units: wu/s, s]
     ///
     /// # Panics
     ///
-    /// When `contacts` and `layout` are not of one world.
+    /// If `contacts` and `layout` are not of one world.
     pub fn step(
         &mut self,
         contacts: &Contacts,
@@ -108,7 +108,7 @@ impl Walker {
         self.stand(contacts, layout, state, seconds);
     }
 
-    /// From a step's height up to the eye, and where its center is below the eye.
+    /// Returns the capsule from a step's height up to the eye, and the depth of its center below the eye.
     fn body(&self) -> (Body, DVec3) {
         let Build {
             radius, eye, step, ..
@@ -117,7 +117,7 @@ impl Walker {
         (Body::Capsule { half, radius }, -half)
     }
 
-    /// The cell of a point of it; where that is matter, the last one.
+    /// Returns the cell of a point of it; in solid matter, the last one.
     fn locate(&mut self, layout: &Layout, p: DVec3) -> Option<CellId> {
         self.cell = layout.locate(p).or(self.cell);
         self.cell
@@ -133,7 +133,7 @@ impl Walker {
                 self.eye += left;
                 return;
             };
-            // Farther by what the gap may take of it where it is met at a slant.
+            // Farther by as much as the gap may take of it at a slanted obstacle.
             let direction = left / length;
             let cast = Cast {
                 body: &body,
@@ -157,7 +157,7 @@ impl Walker {
         }
     }
 
-    /// Out of what it is in, deepest first.
+    /// Moves out of obstacles, deepest first.
     fn push_out(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState) {
         let (body, below) = self.body();
         for _ in 0..SLIDES {
@@ -183,7 +183,7 @@ impl Walker {
         }
     }
 
-    /// Onto the floor, or towards it.
+    /// Moves onto the floor, or towards it.
     fn stand(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, seconds: f64) {
         let Build {
             eye, step, climb, ..
@@ -200,7 +200,7 @@ impl Walker {
             self.caster.cast(contacts, state, &cast)
         });
         let Some(floor) = floor else {
-            // Nothing below: there is nothing to fall onto.
+            // No floor below: do not fall.
             self.falling = 0.0;
             return;
         };
@@ -284,9 +284,9 @@ mod tests {
         });
     }
 
-    /// Covers W12: nobody gets through a wall, however he runs and turns, or deep into one.
+    /// Covers W12: a walker never gets through a wall, or deep into one, however it runs and turns.
     #[test]
-    fn walls_and_furniture_hold_whoever_runs_about() {
+    fn walls_and_furniture_stop_a_running_walker() {
         let world = room_grid(&GridParams {
             outdoors: false,
             doors: 0.0,
@@ -324,9 +324,9 @@ mod tests {
         assert_eq!(site.walker.cell(), Some(CellId(0)));
     }
 
-    /// Covers W12: along a wall one slides at the speed that is left, and in a corner one stands still.
+    /// Covers W12: a walker slides along a wall at the speed that is left, and stands still where two walls meet.
     #[test]
-    fn who_runs_into_a_wall_slides_along_it() {
+    fn a_walker_slides_along_a_wall() {
         let world = room_grid(&GridParams {
             size: [1, 1, 1],
             doors: 0.0,
@@ -346,7 +346,7 @@ mod tests {
         assert!(site.walker.eye.distance(corner) < 1e-3);
     }
 
-    /// Covers W12: what is low is climbed, what is high stops, and over an edge one falls.
+    /// Covers W12: low obstacles are climbed, high ones stop, and beyond an edge the walker falls.
     #[test]
     fn steps_are_climbed_and_tables_stop() {
         for (height, is_stopped) in [(0.75, true), (0.28, false)] {
@@ -379,9 +379,9 @@ mod tests {
         }
     }
 
-    /// Covers W12: a leaf that swings shut takes whoever stands in its way along, and does not pass him.
+    /// Covers W12: a leaf that swings shut pushes a walker in its way along, and does not pass it.
     #[test]
-    fn a_leaf_pushes_whoever_is_in_its_way() {
+    fn a_leaf_pushes_a_walker_in_its_way() {
         let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
         let door = Layout::new(&world).opening(PortalId(0)).center();
         let mut site = Site::new(&world, middle(&world));
@@ -404,7 +404,7 @@ mod tests {
         );
     }
 
-    /// Covers W12: through a hole in the floor one falls into the room below, whose cell is another.
+    /// Covers W12: a hole in the floor leads into the room below, another cell.
     #[test]
     fn holes_in_floors_lead_down() {
         let world = room_grid(&GridParams {

@@ -1,4 +1,4 @@
-//! Ways through the air of concave cells against plain geometry.
+//! Shortest paths through the air of concave cells, against plane geometry.
 //!
 //! Covers W10.
 
@@ -47,7 +47,7 @@ fn points_in(layout: &Layout, cell: CellId, rng: &mut Rng) -> [DVec3; 2] {
     })
 }
 
-/// Ends of the walls of a cell in plan, where a shortest way may bend: all of them.
+/// Ends of the walls of a cell in plan: all points where a shortest path may bend.
 fn corners_in_plan(walls: &[Triangle]) -> Vec<DVec3> {
     let mut corners: Vec<DVec3> = walls.iter().flatten().map(|p| p.with_y(0.0)).collect();
     corners.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.z.total_cmp(&b.z)));
@@ -55,8 +55,8 @@ fn corners_in_plan(walls: &[Triangle]) -> Vec<DVec3> {
     corners
 }
 
-/// The shortest way in plan within one cell, by a graph of all corners that see each other: ways about vertical edges are as long as
-/// those in plan, unrolled.
+/// The shortest path in plan within one cell, by a graph of all wall ends that see each other: paths about vertical edges are as long
+/// as those in plan, unrolled.
 fn by_visibility(
     layout: &Layout,
     cell: CellId,
@@ -101,7 +101,7 @@ fn by_visibility(
     }
 }
 
-/// W10: ways within concave cells are as long as the shortest about vertical edges, to a thousandth, and meet no wall.
+/// W10: paths within concave cells are as long as the shortest about vertical edges, to a thousandth, and meet no wall.
 #[test]
 fn ways_within_a_cell_bend_about_its_edges() {
     let (mut bends, mut n_bent, mut n_cells) = (Vec::new(), 0, 0);
@@ -153,7 +153,7 @@ fn boxes_are_not_concave() {
     }
 }
 
-/// W10: the search takes the lengths within concave cells, from and to points in them, too.
+/// W10: the search uses the lengths within concave cells, also from and to points in them.
 #[test]
 fn searches_walk_around_walls_of_a_cell() {
     let (mut search, mut arrivals, mut lengths) = (LengthSearch::new(), Vec::new(), Vec::new());
@@ -171,7 +171,7 @@ fn searches_walk_around_walls_of_a_cell() {
             }
             let first = |place: usize, _| lengths[place];
             search.run_from(&ways, cell, from, first, f64::INFINITY, |_| Some(0.0));
-            // Each portal of the cell is reached from its own side at most at the length that was given.
+            // Each portal of the cell is reached from its own side at no more than the given length.
             for exit in layout.exits(cell) {
                 let own = search.reached().iter().find(|r| r.exit == *exit).unwrap();
                 let of_portal = ways

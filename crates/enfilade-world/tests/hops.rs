@@ -9,7 +9,7 @@ use enfilade_cpg::{Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, 
 use enfilade_testkit::{GridParams, Rng, room_grid};
 use enfilade_world::{Exit, Hops, Layout};
 
-/// Cells joined by chance: trees, rings, chains, cells joined twice, cells on their own.
+/// Randomly joined cells: trees, rings, chains, cells joined twice, isolated cells.
 fn graph_by_chance(n: usize, n_links: usize, seed: u64) -> Layout {
     let mut rng = Rng::new(seed);
     let mut cells: Vec<Cell> = (0..n).map(|_| Cell::default()).collect();
@@ -60,7 +60,7 @@ fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -
     lengths
 }
 
-/// Flips portals by chance and compares all pairs.
+/// Flips random portals and compares all pairs.
 fn check(layout: &Layout, seed: u64, n_flips: usize) -> Hops {
     let mut rng = Rng::new(seed);
     let steps: Vec<Option<f64>> = (0..layout.n_portals())
@@ -81,7 +81,7 @@ fn check(layout: &Layout, seed: u64, n_flips: usize) -> Hops {
                 assert_eq!(own, least, "seed {seed} flip {flip}: {from} to {to}");
                 let next = hops.next(from, to);
                 assert_eq!(next.is_some(), from != to && least.is_some());
-                // The rest of the way is what is left: so following ends at the cell.
+                // The rest of the path has the remaining length, so following it ends at the cell.
                 if let Some(exit) = next {
                     assert!(layout.exits(from).contains(&exit));
                     let left = hops.distance(exit.to, to).map(|d| (d * 1e4).round() as u64);
@@ -97,7 +97,7 @@ fn check(layout: &Layout, seed: u64, n_flips: usize) -> Hops {
     hops
 }
 
-/// W10: on graphs by chance, with doors flipped by chance, every distance and next portal is that of a search of all cells.
+/// W10: on random graphs with random doors flipped, every distance and next portal equals that of a search of all cells.
 #[test]
 fn distances_are_those_of_a_search_of_all_cells() {
     for seed in 0..60 {
@@ -107,7 +107,7 @@ fn distances_are_those_of_a_search_of_all_cells() {
     }
 }
 
-/// W10: the same of rooms on a grid.
+/// W10: the same for rooms on a grid.
 #[test]
 fn distances_in_rooms_are_those_of_a_search_of_all_cells() {
     let layout = Layout::new(&room_grid(&GridParams::offices(60, 5)));
@@ -132,7 +132,7 @@ fn two_portal_cells_and_dead_ends_leave_the_table() {
     }
 }
 
-/// W10: a flip and an answer allocate nothing once the buffers have grown.
+/// W10: a flip and a query allocate nothing once the buffers have grown.
 #[test]
 fn a_flip_allocates_nothing() {
     let layout = Layout::new(&room_grid(&GridParams::offices(100, 2)));

@@ -1,4 +1,4 @@
-//! The layout says of each cell and portal what the graph says.
+//! The layout agrees with the graph about each cell and portal.
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;

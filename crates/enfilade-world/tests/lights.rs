@@ -1,4 +1,4 @@
-//! What a lamp lights is known to it, through portals and moving rooms, and nothing behind walls. Covers W3.
+//! Lamps list everything that they light, through portals and moving rooms, and nothing behind walls. Covers W3.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;

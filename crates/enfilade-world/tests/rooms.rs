@@ -1,4 +1,4 @@
-//! Rooms that move within rooms: what rays hit at a pose is in the answer, and nothing is where it is not. Covers W5.
+//! Rooms that move within rooms: everything that rays hit at a pose is in the answer, and nothing is out of place. Covers W5.
 
 use std::collections::HashSet;
 
@@ -83,7 +83,7 @@ impl Model {
     }
 }
 
-/// An eye somewhere, in the frame of a part, and what it sees against what rays of the model hit first. How many rays hit.
+/// Compares the view of a random eye in the frame of a part with the first hits of rays in the model; returns the number of hits.
 fn check_view(
     space: &Space,
     model: &Model,
@@ -146,7 +146,7 @@ fn random_in(space: &Space, part: PartId, rng: &mut Rng) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|k| rng.range(b.min[k], b.max[k])))
 }
 
-/// A small motion about the middle of where a cabin of one size stands in one that is `ratio` times as large.
+/// A small motion about the middle of a cabin's position, where the cabin of one size stands in one `ratio` times as large.
 fn pose_within(rng: &mut Rng, own: &World, host: &World) -> Pose {
     let middle = |w: &World| {
         let b = w.graph.cells[0].aabb.map(point);
@@ -164,7 +164,7 @@ fn pose_within(rng: &mut Rng, own: &World, host: &World) -> Pose {
     Pose { turn, at }
 }
 
-/// Cabins each in the next, the least a room of 4 m.
+/// Nested cabins, the smallest a room of 4 m.
 fn nested(depth: usize) -> Vec<World> {
     let size = |k: usize| 1.6_f32.powi((depth - k) as i32);
     // Furniture would stand in the way of the next.

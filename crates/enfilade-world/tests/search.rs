@@ -23,7 +23,7 @@ fn point_in(layout: &Layout, rng: &mut Rng) -> (CellId, DVec3) {
     }
 }
 
-/// Bellman–Ford over all pairs of points of one cell: as slow and as plain as can be.
+/// Bellman–Ford over all pairs of points of one cell: slow and plain.
 fn lengths_by_sweeps(
     layout: &Layout,
     ways: &Ways,
@@ -65,7 +65,7 @@ fn lengths_by_sweeps(
     }
 }
 
-/// W10: the search settles every portal at the length that plain sweeps over all pairs give, closed ones and costs included.
+/// W10: the search settles every portal at the length found by plain sweeps over all pairs, with closed portals and costs.
 #[test]
 fn lengths_are_those_of_sweeps_over_all_pairs() {
     let mut search = LengthSearch::new();
@@ -109,7 +109,7 @@ fn lengths_are_those_of_sweeps_over_all_pairs() {
     }
 }
 
-/// W10: a way read back is a walk from the start to the end through open portals, as long as was said.
+/// W10: a path read back is a walk from the start to the end through open portals, of the reported length.
 #[test]
 fn a_way_read_back_is_as_long_as_was_said() {
     let (layout, mut rng) = (layout(7), Rng::new(7));
@@ -144,7 +144,7 @@ fn a_way_read_back_is_as_long_as_was_said() {
     assert!(n_many > 10, "alternatives are found");
 }
 
-/// W10: with a radius, what is farther is not reached, and all else at the same lengths.
+/// W10: a radius excludes everything farther, and leaves all other lengths unchanged.
 #[test]
 fn a_radius_ends_the_search() {
     let params = GridParams {
@@ -165,7 +165,7 @@ fn a_radius_ends_the_search() {
     assert_eq!(near.cells()[0], (cell, 0.0));
 }
 
-/// W10: more points an opening make lengths shorter, never longer than with a part of them by more than the bound says.
+/// W10: more points per opening make lengths shorter, by at most the bound.
 #[test]
 fn finer_samples_come_closer_to_the_shortest() {
     let (layout, mut rng) = (layout(11), Rng::new(11));

@@ -1,4 +1,4 @@
-//! What listeners hear. Covers W11.
+//! Sources as listeners hear them. Covers W11.
 
 mod cone;
 
@@ -58,8 +58,8 @@ impl Site {
         ears.hear(&self.acoustics, &self.layout, 0, source.0, source.1)
     }
 
-    /// The least length over all sequences of at most `most` portals, and that sequence: depth first, cut off where the string through
-    /// the portals so far, straight on to the end, is no shorter than the best.
+    /// The least length over all sequences of at most `most` portals, and that sequence: depth first, cut off if the string through
+    /// the portals so far, straight on to the end, is at least as long as the best.
     fn least(
         &self,
         from: (CellId, DVec3),
@@ -106,7 +106,7 @@ impl Site {
     }
 }
 
-/// W11: length ≤ 1.001 × the least over all sequences, and arrival from where that string comes.
+/// W11: length ≤ 1.001 × the least over all sequences, and arrival from the direction of that string.
 #[test]
 fn the_shortest_of_all_sequences_is_found() {
     let mut rng = Rng::new(4);
@@ -137,7 +137,7 @@ fn the_shortest_of_all_sequences_is_found() {
     assert!(n_checked > 50, "{n_checked}");
 }
 
-/// W11: on a walk through each doorway the level changes by 0.5 dB a centimeter at most.
+/// W11: on a walk through each doorway the level changes by at most 0.5 dB per centimeter.
 #[test]
 fn walking_through_doorways_changes_the_level_little_by_little() {
     let mut rng = Rng::new(9);
@@ -187,7 +187,7 @@ fn a_door_that_shuts_takes_its_loss() {
     assert!((27.0..=30.5).contains(&loss), "{loss} dB of {kind:?}");
 }
 
-/// W11: a listener that walks allocates nothing once its buffers have grown.
+/// W11: a walking listener allocates nothing once its buffers have grown.
 #[test]
 fn hearing_allocates_nothing_once_warm() {
     let site = site(&rooms(36, 3));

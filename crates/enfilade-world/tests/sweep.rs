@@ -1,4 +1,4 @@
-//! A door that moves passes over what stands still. Covers W5.
+//! Passages of a moving door over a point at rest. Covers W5.
 
 use enfilade_cpg::World;
 use enfilade_geom::{DQuat, DVec3};
@@ -13,7 +13,7 @@ fn cabin() -> World {
     })
 }
 
-/// The passings by straight lines between so many poses on the way.
+/// Passages by straight lines between a number of poses on the way.
 fn by_steps(
     space: &Space,
     world: &World,
@@ -109,14 +109,14 @@ fn an_arc_is_not_its_chord() {
     let hinge = center + normal.cross(DVec3::Y) * 30.0;
     let at = |angle: f64| Pose::about(hinge, DVec3::Y, angle);
     let end = at(0.5);
-    // Where the window's middle is half way, by the motion between the two poses.
+    // Half way, at the window's middle, by the motion between the two poses.
     let p = Pose::IDENTITY.toward(&end, 0.5).point(center);
     let mut passings = Vec::new();
     space.passings(part, [&Pose::IDENTITY, &end], p, &mut passings);
     let own: Vec<_> = passings.iter().filter(|x| x.portal.0 == 0).collect();
     assert_eq!(own.len(), 1, "{passings:?}");
     assert!((own[0].at - 0.5).abs() < 1e-6);
-    // Who asks for the straight line alone does not find it.
+    // A straight line alone misses it.
     let first = by_steps(&space, &world, part, [&Pose::IDENTITY, &end], p, 1);
     assert!(first.iter().all(|x| x.0 != 0), "{first:?}");
 }

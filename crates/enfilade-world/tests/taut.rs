@@ -1,4 +1,4 @@
-//! Taut strings, against a second-order cone programme.
+//! Taut strings, against a second-order cone program.
 
 mod cone;
 
@@ -7,7 +7,7 @@ use enfilade_geom::DVec3;
 use enfilade_testkit::Rng;
 use enfilade_world::TautString;
 
-/// A convex polygon of 3 to 6 corners about `center`.
+/// A convex polygon of 3 to 6 vertices about `center`.
 fn polygon(rng: &mut Rng, center: DVec3) -> Vec<DVec3> {
     let normal = direction(rng);
     let (u, v) = normal.any_orthonormal_pair();
@@ -58,7 +58,7 @@ fn check(from: DVec3, to: DVec3, polygons: &[Vec<DVec3>], string: &mut TautStrin
     }
 }
 
-/// W11: lengths and bounds, in chains of polygons that lie anyhow.
+/// W11: lengths and bounds, in chains of polygons at random poses.
 #[test]
 fn strings_are_as_short_as_cone_programmes_find() {
     let mut rng = Rng::new(5);
@@ -80,7 +80,7 @@ fn strings_are_as_short_as_cone_programmes_find() {
     }
 }
 
-/// W11: doorways that share jambs or corners, doorways back and forth, a start in an opening: where legs have no length.
+/// W11: doorways that share jambs or vertices, doorways back and forth, a start in an opening: legs of zero length.
 #[test]
 fn strings_that_bend_where_openings_meet_are_as_short() {
     let mut rng = Rng::new(8);
@@ -125,7 +125,7 @@ fn pulling_allocates_nothing_once_warm() {
     assert_eq!(counted.count_total, 0);
 }
 
-/// W11: an opening of two pieces is as one.
+/// W11: an opening of two pieces acts as one.
 #[test]
 fn a_string_finds_the_piece_it_passes() {
     let whole = [(0.0, 4.0)].map(|(low, high)| doorway(low, high));

@@ -53,7 +53,7 @@ fn random_indoors(space: &Space, rng: &mut Rng) -> DVec3 {
     }
 }
 
-/// Whether a turned box meets a polygon: something is left of it between the box's sides.
+/// True if a rotated box meets a polygon: a part of it lies between the box's sides.
 fn box_meets(half: DVec3, pose: &Pose, piece: &[DVec3]) -> bool {
     let mut left = Some(Winding::new(piece.to_vec()));
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -65,7 +65,7 @@ fn box_meets(half: DVec3, pose: &Pose, piece: &[DVec3]) -> bool {
     left.is_some()
 }
 
-/// Whether a ball meets a polygon, by its triangles.
+/// True if a ball meets a polygon, by its triangles.
 fn ball_meets(radius: f64, center: DVec3, piece: &[DVec3]) -> bool {
     (2..piece.len()).any(|i| {
         let triangle = [piece[0], piece[i - 1], piece[i]];
@@ -139,7 +139,7 @@ fn a_flood_stops_where_it_may_not_pass() {
     assert_eq!(flood.reach(&space, start, &posted, |_, _| false), [start]);
 }
 
-/// Each list says what the other says, and the flood.
+/// Both lists agree with each other, and with the flood.
 fn check_lists(space: &Space, things: &Things, ids: &[ThingId]) {
     let mut by_thing = BTreeSet::new();
     for &id in ids {
@@ -234,7 +234,7 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
     let (inside, sea) = (Some(cabin_place), Some(sea_place));
     let places = |things: &Things| [man, bird, hat, buoy].map(|id| things.place(id).unwrap());
     assert_eq!(places(&things), [inside, inside, inside, sea]);
-    // Who leans out of a window is at sea, too.
+    // A man who leans out of a window is at sea, too.
     let window = space.layout(ship).opening(PortalId(0)).center();
     let lean = things.add(
         &space,
@@ -251,7 +251,7 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
         both
     );
     things.remove(lean.unwrap()).unwrap();
-    // The ship sails on: who stands on it comes along, the bird is left behind, and the buoy, which did not move, is inside.
+    // The ship sails on: the man on deck comes along, the bird is left behind, and the buoy, which did not move, is inside.
     let on = Pose::from_translation(DVec3::new(-40.0, 0.0, 0.0));
     space.set_pose(ship, on).unwrap();
     things.part_moved(&space, ship);
@@ -263,7 +263,7 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
     assert!(in_root(man).distance(on.point(middle.at)) < 1e-9);
     assert!(in_root(hat).distance(on.point(middle.at) + DVec3::Y * 0.5) < 1e-9);
     assert!(in_root(bird).distance(away.point(middle.at)) < 1e-9);
-    // Who is gone leaves its hat where it was.
+    // A removed thing leaves its child where it was.
     things.remove(man).unwrap();
     assert_eq!(things.place(hat).unwrap(), inside);
     check_lists(&space, &things, &[bird, hat, buoy]);
@@ -308,7 +308,7 @@ fn who_stands_in_a_door_between_rooms_is_in_both_until_they_part() {
 #[test]
 fn a_thing_that_can_be_seen_is_in_the_answer() {
     let mut world = offices(5);
-    // Furniture may hide a thing; it is no matter here.
+    // Furniture may hide a thing; it does not matter here.
     world.details.clear();
     let space = Space::new(&world).unwrap();
     let lines = Sightlines::build(&world);
@@ -337,7 +337,7 @@ fn a_thing_that_can_be_seen_is_in_the_answer() {
         assert!(seen.contains(&balls[0].0), "what is global is always there");
         n_seen += seen.len();
         for &(id, center, radius) in &balls[1..] {
-            // A point of the ball that its cell's air reaches, and the eye sees.
+            // A point of the ball in reach of its cell's air that the eye sees.
             let p = center + random_turn(&mut rng) * DVec3::X * radius * rng.unit();
             let to = p - eye.as_dvec3();
             let forward = toward.normalize();
@@ -376,7 +376,7 @@ fn what_is_no_motion_and_what_is_gone_is_refused() {
     things.remove(id).unwrap();
     let child = things.add(&space, ball(), root, Pose::IDENTITY, Tie::Child(id));
     assert_eq!(child, Err(ThingError::NoThing));
-    // Its number is used again, and does not mean it.
+    // Its slot is reused, but its id does not refer to the new thing.
     let other = things.add(&space, ball(), root, Pose::IDENTITY, Tie::Free);
     assert_ne!(other, Ok(id));
     let moved = things.set_pose(&space, id, root, Pose::IDENTITY);

@@ -1,6 +1,6 @@
-//! A scene becomes a world: `cargo run --release -p enfilade --example bake_a_file [SCENE [WORLD.glb]]`.
+//! Bakes a scene into a world: `cargo run --release -p enfilade --example bake_a_file [SCENE [WORLD.glb]]`.
 //!
-//! Without a scene, a furnished house that the test kit makes.
+//! Without a scene, bakes a furnished house from the test kit.
 
 #![allow(clippy::print_stdout)]
 
@@ -30,7 +30,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         }
     };
 
-    // Meters and +Y up are what the options are for; roles (wall or furniture) are found by itself.
+    // The options convert to meters and +Y up; roles (wall or furniture) are found automatically.
     let imported = import(&[scene_path], &[], &ImportOptions::default())?;
     let output = bake(
         &imported.scene,

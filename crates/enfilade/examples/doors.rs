@@ -1,4 +1,4 @@
-//! Doors that close, slide, turn and are picked: `cargo run --release -p enfilade --example doors`.
+//! Closes, slides, turns and picks doors: `cargo run --release -p enfilade --example doors`.
 
 #![allow(clippy::print_stdout)]
 
@@ -15,7 +15,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let mut state = SightState::new(&sight);
     let mut viewer = Viewer::new(&sight);
 
-    // Somebody stands a meter before the middle of the doorway and looks through it, to a meter behind.
+    // Stand a meter in front of the middle of the doorway and look through it, to a meter behind.
     let door = PortalId(0);
     let portal = &world.graph[door];
     let middle = portal.center();
@@ -32,14 +32,14 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     assert!(viewer.see(&sight, &state, &view).cells().contains(&behind));
     assert!(lines.is_clear(&state, eye, target));
 
-    // It falls shut: the room behind is not drawn, and a click meets the door.
+    // Close it: the room behind is not drawn, and a click hits the door.
     state.close(door);
     assert!(!viewer.see(&sight, &state, &view).cells().contains(&behind));
     let hit = lines.pick(&state, eye, target)?.ok_or("nothing was hit")?;
     assert_eq!(hit.target, Target::Portal(door));
-    println!("shut: the click meets the door at {:?}", hit.position);
+    println!("shut: the click hits the door at {:?}", hit.position);
 
-    // It slides open by a quarter: open on one side of a plane across the opening. The middle is still shut.
+    // Slide it open by a quarter: open on one side of a plane across the opening. The middle is still shut.
     let [x, _, z] = portal.normal;
     let side = [z, 0.0, -x];
     let reach = portal
@@ -62,7 +62,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     assert!(viewer.see(&sight, &state, &view).cells().contains(&behind));
     println!("a quarter open: one looks past the leaf, not through it");
 
-    // Beside the doorway there is the wall.
+    // Beside the doorway is the wall.
     let aside = [0, 1, 2].map(|k| target[k] + side[k] * 4.0 * half_width);
     let hit = lines.pick(&state, eye, aside)?.ok_or("nothing was hit")?;
     assert!(matches!(hit.target, Target::Wall { .. }) && hit.cell == Some(here));
@@ -73,7 +73,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     turn(&with_doors(world, |_| false), door)
 }
 
-/// The same doorway with a leaf in it, as a bake finds them.
+/// Turns a leaf in the same doorway, as a bake finds them.
 fn turn(world: &World, door: PortalId) -> Result<(), Box<dyn Error>> {
     let sight = Sight::build(world)?;
     let lines = Sightlines::build(world);
@@ -86,8 +86,8 @@ fn turn(world: &World, door: PortalId) -> Result<(), Box<dyn Error>> {
     let hit = lines.pick(&state, at(-1.0), at(1.0))?;
     let met = hit.ok_or("nothing was hit")?.target;
     assert!(matches!(met, Target::Detail { detail, .. } if detail == leaf));
-    println!("shut: the click meets {}", world[leaf].name);
-    // A game does this frame by frame, and draws the leaf by its own transform, and this one after it.
+    println!("shut: the click hits {}", world[leaf].name);
+    // A game does this frame by frame, and draws the leaf with its own transform followed by this one.
     state.set_leaves(door, 1.0);
     let moved = state.pose(leaf).ok_or("it has not moved")?;
     assert_eq!(lines.pick(&state, at(-1.0), at(1.0))?, None);

@@ -1,6 +1,6 @@
-//! What a game does each frame: `cargo run --release -p enfilade --example game_loop [WORLD.glb]`.
+//! The work of a game in each frame: `cargo run --release -p enfilade --example game_loop [WORLD.glb]`.
 //!
-//! A camera walks from doorway to doorway; each frame is a short list of draws. Without a world, a storey of offices.
+//! A camera walks from doorway to doorway; each frame is a short list of draws. Without a world, uses a storey of offices.
 
 #![allow(clippy::print_stdout)]
 
@@ -34,7 +34,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         for i in 1..=FRAMES_A_STRETCH {
             let t = i as f32 / FRAMES_A_STRETCH as f32;
             let eye = [0, 1, 2].map(|k| from[k] + toward[k] * t);
-            // Which room it is in, for sound and streaming.
+            // Its room, for sound and streaming.
             if camera.step(&sight, eye) == Step::Crossed
                 && let Some(cell) = camera.cell()
             {
@@ -69,7 +69,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Points on a way through `n` doorways, always to the room visited least.
+/// Points on a path through `n` doorways, always to the room visited least.
 fn walk(world: &World, n: usize) -> Vec<[f32; 3]> {
     let graph = &world.graph;
     let middle = |[low, high]: [[f32; 3]; 2]| [0, 1, 2].map(|k| low[k].midpoint(high[k]));

@@ -1,7 +1,7 @@
 //! A world without a bake: `cargo run -p enfilade --example own_builder`.
 //!
-//! A level editor that knows its rooms makes the graph itself. Here: rooms of 4 × 3 × 5 m in a row, a doorway from each to the
-//! next. The file checks every invariant, whoever made the graph.
+//! A level editor that knows its rooms builds the graph itself. Here: rooms of 4 × 3 × 5 m in a row, a doorway from each to the
+//! next. Decoding the file checks every invariant, whatever built the graph.
 
 #![allow(clippy::print_stdout)]
 
@@ -38,7 +38,7 @@ fn rooms(n: u32) -> World {
         aabb: [[x(i), 0.0, 0.0], [x(i + 1), SIZE[1], SIZE[2]]],
         volume: SIZE.iter().product(),
         n_triangles: 2,
-        // To the room before, to the room after.
+        // To the room before, and to the room after.
         portals: (i.saturating_sub(1)..(i + 1).min(n - 1))
             .map(PortalId)
             .collect(),
@@ -52,18 +52,18 @@ fn rooms(n: u32) -> World {
     };
     World {
         graph,
-        // What is seen from each room: its floor.
+        // The triangles seen from each room: its floor.
         batches: (0..n).map(floor).collect(),
         ..World::default()
     }
 }
 
-/// Where room `i` begins.
+/// Start of room `i` along x.
 fn x(i: u32) -> f32 {
     i as f32 * SIZE[0]
 }
 
-/// Into room `i` from the one before.
+/// The doorway from the room before into room `i`.
 fn doorway(i: u32) -> Portal {
     // Counter-clockwise seen from the second cell, which the normal points to.
     let outline: Vec<[f32; 3]> = [[0.0, 2.0], [2.1, 2.0], [2.1, 3.0], [0.0, 3.0]]
@@ -98,7 +98,7 @@ fn floor(i: u32) -> Batch {
     }
 }
 
-/// A plane between each two rooms: the first child for what is beyond it, the second for what is before.
+/// Planes between neighboring rooms: the first child is beyond the plane, the second in front of it.
 fn locator(n: u32) -> Locator {
     let leaf = |i| Locator::leaf(Some(CellId(i)));
     let nodes = (1..n).map(|i| LocatorNode {

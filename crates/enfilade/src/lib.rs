@@ -1,5 +1,5 @@
-//! `enfilade` finds the rooms (cells) and doorways (portals) of a 3D scene by itself, and answers
-//! from then on what can be seen and reached from where.
+//! `enfilade` finds the rooms (cells) and doorways (portals) of a 3D scene automatically, and then answers
+//! queries of visibility and paths between them.
 //!
 //! ```text
 //! scene ──► bake ──► cell-and-portal graph ──► world file (.glb) ──► your program
@@ -7,8 +7,8 @@
 //!
 //! # From a file to a frame
 //!
-//! A scene becomes a world once, by the command `enfilade bake house.glb -o world.glb` or in code (features `import` and
-//! `bake`). Here the scene is a house that the test kit makes:
+//! Bake a scene into a world once, with the command `enfilade bake house.glb -o world.glb` or in code (features `import` and
+//! `bake`). This scene is a house from the test kit:
 #![cfg_attr(all(feature = "import", feature = "bake"), doc = "```")]
 #![cfg_attr(not(all(feature = "import", feature = "bake")), doc = "```ignore")]
 //! use enfilade::bake::{BakeConfig, BakeContext, bake};
@@ -42,18 +42,18 @@
 //! }
 //! ```
 //!
-//! A frame: a [`Sight`] is made once; a [`Viewer`] (one a camera) answers what a [`View`] sees; a [`DrawList`] is that as
-//! few ranges of triangles.
+//! Each frame: build a [`Sight`] once, and query a [`Viewer`] (one per camera) for everything that a [`View`] sees; a
+//! [`DrawList`] turns the answer into few ranges of triangles.
 //!
 //! ```
 //! use enfilade::{DrawList, Sight, SightState, View, Viewer};
 //! # let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::offices(24, 1));
 //!
 //! let sight = Sight::build(&world)?;
-//! let mut state = SightState::new(&sight); // which doors are open; all
+//! let mut state = SightState::new(&sight); // the state of doors; all are open
 //! let (mut viewer, mut list) = (Viewer::new(&sight), DrawList::new());
 //!
-//! // Every frame, nothing of which allocates once it is warm:
+//! // Every frame; allocates nothing once warm.
 //! let view = View::perspective([2.0, 1.6, 2.0], [1.0, 0.0, 0.3], [0.0, 1.0, 0.0], 1.0, 16.0 / 9.0)?;
 //! let seen = viewer.see(&sight, &state, &view);
 //! list.fill(&sight, &seen);
@@ -72,7 +72,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Doors, picking and lines of sight: a portal that is closed hides what is behind it and stops a line.
+//! Doors, picking and lines of sight: a closed portal hides everything behind it and stops a line.
 //!
 //! ```
 //! use enfilade::{Sight, Sightlines, SightState, Target};
@@ -102,31 +102,31 @@
 //!
 //! # Features
 //!
-//! | feature | module | does |
+//! | feature | module | contents |
 //! | --- | --- | --- |
 //! | always | [`cpg`] | the graph, its invariants, the locator, and the file ([`cpg::wire`]) |
-//! | always | [`runtime`] | questions per frame |
-//! | always | [`whole`] | files that are written whole or not at all |
+//! | always | [`runtime`] | visibility queries per frame |
+//! | always | [`whole`] | atomic writing of files |
 //! | always | [`geom`] | boxes, planes, windings, the scene, the bounding volume hierarchy |
 //! | `import` | `import` | reads glTF, OBJ, PLY and STL into one [`Scene`](geom::scene::Scene) |
 //! | `bake` | `bake` | scene → [`World`]: finds cells and portals |
-//! | `vis` | `vis` | what can be seen from each cell, before run-time |
+//! | `vis` | `vis` | visibility from each cell, precomputed |
 //! | `render` | `render` | pictures of a world with wgpu |
-//! | `verify` | `verify` | tests the promises of a world |
-//! | `world` | `world` | what lives in a world: things, paths, sound, contacts, moving rooms |
+//! | `verify` | `verify` | checks the promises of a world |
+//! | `world` | `world` | queries of a living world: things, paths, sound, contacts, moving rooms |
 //!
-//! None is on by default: a game that reads worlds and asks them links neither importers nor builders.
+//! None is on by default: a game that only loads and queries worlds links neither importers nor builders.
 //!
 //! # Conventions, everywhere
 //!
-//! Right-handed, +Y up, meters; front faces are counter-clockwise; ranges are half-open; building
-//! computes in `f64`, files hold `f32`; ids are positions in lists. Points and directions that go into a question of the
-//! run-time or come out of it are `[f32; 3]`, as in the file.
+//! Right-handed, +Y up, meters; front faces are counter-clockwise; ranges are half-open; builders
+//! compute in `f64`, files hold `f32`; ids are indices into lists. Points and directions in run-time queries and their
+//! answers are `[f32; 3]`, as in the file.
 //!
-//! # What is not promised
+//! # Limits
 //!
-//! Cells need not be convex, and a scene without rooms has none but the outdoors. Geometry that
-//! moves (door leaves, furniture) is detail: it bounds no cell.
+//! Cells need not be convex, and a scene without rooms has only the outdoor cell. Moving geometry (door leaves,
+//! furniture) is detail: it bounds no cell.
 
 mod file;
 pub mod whole;

@@ -1,4 +1,4 @@
-//! The examples run, and hold what they assert.
+//! Runs the examples, which check their own assertions.
 
 #[path = "../examples/bake_a_file.rs"]
 mod bake_a_file;

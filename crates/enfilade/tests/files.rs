@@ -1,4 +1,4 @@
-//! Worlds by path.
+//! Worlds opened and saved by path.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -17,11 +17,11 @@ fn what_is_saved_is_opened_again_and_nothing_else_is_left() {
     let folder = folder("saved");
     let path = folder.join("world.glb");
     let mut world = room_grid(&GridParams::offices(12, 1));
-    // What a run left that was killed while it saved.
+    // A leftover of a run killed while saving.
     std::fs::write(folder.join(".world.glb.4000000-1.tmp"), "half").unwrap();
     enfilade::save(&path, &world).unwrap();
     assert_eq!(enfilade::open(&path).unwrap().graph, world.graph);
-    // A broken world is refused, and the file stays as it was.
+    // A broken world is refused, and the file stays unchanged.
     let before = std::fs::read(&path).unwrap();
     world.graph.portals[0].cells[0] = enfilade::CellId(99);
     assert!(matches!(

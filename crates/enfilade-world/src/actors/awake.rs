@@ -1,15 +1,15 @@
-//! Which cells are awake: seen or heard, or were a short while ago.
+//! Awake cells: seen or heard, or recently so.
 //!
-//! What stands in a cell and only shows (a fountain, a lift without a rider, a radio) asks [`AwakeCells::is_awake`] and does nothing
-//! where it is not (Gjørup 1999, section 3.3.4). A cell is potentially visible before what is in it is seen, so that there is time to
-//! start. O(cells seen or heard + cells awake); errs to awake.
+//! An effect that stands in a cell (a fountain, a lift without a rider, a radio) queries [`AwakeCells::is_awake`] and does
+//! nothing in a sleeping cell (Gjørup 1999, section 3.3.4). A cell is potentially visible before its contents are seen, so there
+//! is time to start. O(cells seen or heard + cells awake); errs to awake.
 
 use enfilade_cpg::CellId;
 
 /// The cells that are seen or heard, or were in the last few seconds.
 #[derive(Clone, Debug)]
 pub struct AwakeCells {
-    /// By cell; -∞ where never. [Units: s]
+    /// Last time per cell; -∞ if never. [Units: s]
     last: Vec<f64>,
     awake: Vec<CellId>,
     linger: f64,
@@ -17,7 +17,7 @@ pub struct AwakeCells {
 }
 
 impl AwakeCells {
-    /// All asleep. Cells stay awake for `linger` seconds after they were last seen or heard.
+    /// Makes all cells asleep. A cell stays awake for `linger` seconds after it was last seen or heard.
     #[must_use]
     pub fn new(n_cells: usize, linger: f64) -> Self {
         Self {
@@ -29,8 +29,8 @@ impl AwakeCells {
     }
 
     /// Wakes cells that may be seen or heard now: those of a [`Pvs`](enfilade_cpg::Pvs) from each eye's cell
-    /// ([`Pvs::visible_from`](enfilade_cpg::Pvs::visible_from)), or of a view, and those from which sound reaches a listener. Cells that
-    /// do not exist are passed over. Puts to sleep those whose time is over.
+    /// ([`Pvs::visible_from`](enfilade_cpg::Pvs::visible_from)), or of a view, and those from which sound reaches a listener. Ignores
+    /// cells that do not exist. Puts cells to sleep when their time is over.
     pub fn update(&mut self, now: f64, perceived: impl IntoIterator<Item = CellId>) {
         self.now = now;
         for cell in perceived {
@@ -52,14 +52,14 @@ impl AwakeCells {
         });
     }
 
-    /// Whether what is in a cell is to be simulated.
+    /// Returns `true` if the contents of a cell should be simulated.
     #[must_use]
     pub fn is_awake(&self, cell: CellId) -> bool {
         let last = self.last.get(cell.idx());
         last.is_some_and(|&last| self.now - last <= self.linger)
     }
 
-    /// All cells that are awake, in no order that means anything.
+    /// Returns all awake cells, in arbitrary order.
     #[must_use]
     pub fn cells(&self) -> &[CellId] {
         &self.awake

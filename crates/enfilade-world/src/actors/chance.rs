@@ -1,7 +1,7 @@
-//! Chance that a seed, an actor and an event decide, and nothing else.
+//! Random numbers determined by a seed, an actor and an event alone.
 //!
 //! The mixing function of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014) over a
-//! state that steps by their odd constant. O(1); integers alone, so the same on every machine.
+//! state that advances by their odd constant. O(1); integers only, so equal on every machine.
 
 /// Random numbers of one event of one actor.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ fn mixed(mut x: u64) -> u64 {
 }
 
 impl Chance {
-    /// Of a world's seed, an actor's number and its event's number.
+    /// Makes the generator from a world's seed, an actor's index and its event's index.
     #[must_use]
     pub fn new(seed: u64, actor: u32, event: u32) -> Self {
         let both = u64::from(actor) << 32 | u64::from(event);
@@ -27,23 +27,23 @@ impl Chance {
         }
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(STEP);
         mixed(self.state)
     }
 
-    /// From 0 up to, not including, 1.
+    /// Returns a number from 0 up to, not including, 1.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// From the first up to the second.
+    /// Returns a number from the first up to the second.
     pub fn range(&mut self, [low, high]: [f64; 2]) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// A number below `n`; 0 where that is 0. Even but for 1 in 2³² of `n`.
+    /// Returns an integer below `n`; 0 if `n` is 0. Uniform up to `n` in 2³².
     pub fn below(&mut self, n: u32) -> u32 {
         ((u64::from(n) * (self.bits() >> 32)) >> 32) as u32
     }
@@ -53,7 +53,7 @@ impl Chance {
 mod tests {
     use super::*;
 
-    /// Covers W13: neither neighbors in actor nor in event are alike, and all numbers come up.
+    /// Covers W13: neighboring actors and events are uncorrelated, and all numbers occur.
     #[test]
     fn chance_is_spread_and_decided_by_seed_actor_and_event() {
         let first = |seed, actor, event| Chance::new(seed, actor, event).bits();

@@ -1,14 +1,14 @@
-//! Plans of those who go somewhere, stay a while, and go on. O(points of the way).
+//! Plans that go somewhere, stay a while, and go on. O(points of the path).
 
 use crate::actors::chance::Chance;
 use crate::actors::plan::{PlanDraft, WayPoint};
 
-/// Going from room to room: how fast, and how long one stays.
+/// Errands from room to room: speed and length of stay.
 #[derive(Clone, Debug)]
 pub struct Errands {
-    /// Least and greatest speed; each errand has its own. [Units: wu/s] [Limit: above 0]
+    /// Minimum and maximum speed; each errand has its own. [Units: wu/s] [Limit: above 0]
     pub speed: [f64; 2],
-    /// Least and greatest stay at the end of a way. [Units: s] [Limit: >= 0]
+    /// Minimum and maximum stay at the end of a path. [Units: s] [Limit: >= 0]
     pub stay: [f64; 2],
     way: Vec<WayPoint>,
 }
@@ -25,11 +25,10 @@ impl Default for Errands {
 }
 
 impl Errands {
-    /// Plans one errand: to one of `n_places`, by the way that `way` finds, which it adds to an empty list: the points after the
-    /// start, each with the cell on the way to it. Where it adds none, the actor stays. Nothing is allocated once the list has
-    /// grown.
+    /// Plans one errand to one of `n_places`. `way` finds the path and adds it to an empty list: the points after the start, each with
+    /// the cell on the way to it. If it adds none, the actor stays. Allocates nothing once the list has grown.
     ///
-    /// `way` must say the same whenever it is asked the same, or what an actor does depends on when it was asked.
+    /// `way` must be deterministic, or the actor's behavior depends on the times of queries.
     pub fn plan(
         &mut self,
         chance: &mut Chance,

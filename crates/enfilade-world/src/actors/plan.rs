@@ -1,28 +1,28 @@
-//! Plans: places with times, straight lines between them.
+//! Plans: points with times, straight lines between them.
 //!
-//! Evaluating one is a search by halving for the time, and one interpolation: O(log places). The share of a line is computed from
-//! its ends, not summed up, so that rounding does not depend on when one asks.
+//! Evaluating one is a binary search for the time, and one interpolation: O(log points). A position on a line is computed from
+//! its ends, not accumulated, so that rounding does not depend on the times of queries.
 
 use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
 
-/// A point of a way, and the cell that one walks through to get there from the point before.
+/// A point of a path, and the cell crossed on the way there from the point before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WayPoint {
-    /// Where. [Units: wu]
+    /// Position. [Units: wu]
     pub at: DVec3,
     /// The cell on the way to it.
     pub cell: CellId,
 }
 
-/// When an actor is at a point of its plan; from then until the next one it is in `cell`. Points stand apart: few ask for them.
+/// Time of a point of a plan; from then until the next one the actor is in `cell`. Points are stored apart: few queries need them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Knot {
     pub(super) time: f64,
     pub(super) cell: CellId,
 }
 
-/// A plan being made: it starts where and when its event is, and goes on with each call.
+/// A plan under construction: it starts at the place and time of its event, and each call extends it.
 #[derive(Debug)]
 pub struct PlanDraft<'a> {
     knots: &'a mut Vec<Knot>,
@@ -30,7 +30,7 @@ pub struct PlanDraft<'a> {
 }
 
 impl<'a> PlanDraft<'a> {
-    /// From one place on, in place of what was.
+    /// Starts at a place, replacing the old plan.
     pub(super) fn new(
         (knots, points): (&'a mut Vec<Knot>, &'a mut Vec<DVec3>),
         start: Knot,
@@ -48,7 +48,7 @@ impl<'a> PlanDraft<'a> {
         (&mut self.knots[last], &mut self.points[last])
     }
 
-    /// Stays for some seconds; for ever where that is infinite. What is no time, or below 0, is passed over.
+    /// Stays for some seconds; for ever if infinite. Ignores NaN and negative times.
     pub fn wait(&mut self, seconds: f64) {
         if seconds > 0.0 {
             let (&mut last, &mut at) = self.last();
@@ -60,7 +60,7 @@ impl<'a> PlanDraft<'a> {
         }
     }
 
-    /// Walks straight to a point. What is not finite, and speeds not above 0, are passed over. [Units: wu, wu/s]
+    /// Walks straight to a point. Ignores points that are not finite, and speeds not above 0. [Units: wu, wu/s]
     pub fn walk(&mut self, to: WayPoint, speed: f64) {
         let (last, at) = self.last();
         let seconds = at.distance(to.at) / speed;
@@ -69,7 +69,7 @@ impl<'a> PlanDraft<'a> {
         }
         last.cell = to.cell;
         let time = last.time + seconds;
-        // What takes no time has been done.
+        // Skip a walk that takes no time.
         if time > last.time {
             let cell = to.cell;
             self.knots.push(Knot { time, cell });
@@ -79,13 +79,13 @@ impl<'a> PlanDraft<'a> {
         }
     }
 
-    /// When the plan is at its end so far. [Units: s]
+    /// Returns the end of the plan so far. [Units: s]
     #[must_use]
     pub fn end(&self) -> f64 {
         self.knots.last().map_or(0.0, |k| k.time)
     }
 
-    /// Draws a plan that takes any time out to a least time, so that events cannot be without end.
+    /// Stretches a plan to a least duration, which bounds the number of events.
     pub(super) fn take_at_least(&mut self, start: f64, seconds: f64) {
         let rest = seconds - (self.end() - start);
         if rest > 0.0 && self.knots.len() > 1 {
@@ -94,7 +94,7 @@ impl<'a> PlanDraft<'a> {
     }
 }
 
-/// The part of a plan that a time is in: its number, which is not before `from`. O(1) for the next few, O(log parts) for others.
+/// Returns the index, at least `from`, of the part of a plan at a time. O(1) for the next few, O(log parts) for others.
 pub(super) fn part_at(knots: &[Knot], from: usize, time: f64) -> usize {
     for i in from..from + 4 {
         if knots.get(i + 1).is_none_or(|k| k.time > time) {
@@ -104,7 +104,7 @@ pub(super) fn part_at(knots: &[Knot], from: usize, time: f64) -> usize {
     from + knots[from..].partition_point(|k| k.time <= time) - 1
 }
 
-/// Where a plan is at a time in one of its parts, and which way it goes, at which speed. [Units: wu, wu/s]
+/// Returns the position and velocity of a plan at a time in one of its parts. [Units: wu, wu/s]
 pub(super) fn place_at(
     (knots, points): (&[Knot], &[DVec3]),
     part: usize,
@@ -120,7 +120,7 @@ pub(super) fn place_at(
     (at + by * share, by / seconds)
 }
 
-/// When a plan changes its cell next after one of its parts, or is at its end.
+/// Returns the time of the first change of cell after a part, or the end of the plan.
 pub(super) fn next_change(knots: &[Knot], part: usize) -> f64 {
     let later = &knots[part + 1..];
     let change = later.iter().find(|k| k.cell != knots[part].cell);

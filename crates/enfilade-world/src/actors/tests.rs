@@ -1,4 +1,4 @@
-//! Covers W13: who is where at a time depends on seed and events alone, and is what stepping everybody through every frame gives.
+//! Covers W13: positions at a time depend on seed and events alone, and equal those of stepping every actor through every frame.
 
 use std::collections::VecDeque;
 
@@ -11,10 +11,10 @@ use crate::layout::Layout;
 
 const SEED: u64 = 42;
 
-/// Rooms and the ways between all of them, by the middles of openings.
+/// Rooms and the paths between all of them, through the middles of openings.
 struct Town {
     layout: Layout,
-    /// By destination and cell: the exit towards it.
+    /// Per destination and cell: the exit towards it.
     next: Vec<Vec<Option<usize>>>,
     pvs: Pvs,
 }
@@ -75,7 +75,7 @@ impl Town {
     ) {
         let n = self.layout.n_cells() as u32;
         if let Cause::Told(place) = event.cause {
-            // At a run.
+            // At a running pace.
             let mut way = Vec::new();
             self.way(event.cell, place % n, &mut way);
             way.iter().for_each(|&p| plan.walk(p, 4.0));
@@ -112,7 +112,7 @@ fn errands() -> Errands {
     errands
 }
 
-/// Of all places, to the bit.
+/// Hash of all positions, to the bit.
 fn hash(actors: &Actors) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut add = |x: u64| hash = (hash ^ x).wrapping_mul(0x0100_0000_01b3).rotate_left(17);
@@ -170,7 +170,7 @@ fn the_state_at_a_time_is_the_same_however_a_camera_walked() {
 struct Stepped {
     at: DVec3,
     cell: CellId,
-    /// Where it is on its way since when, and what comes.
+    /// Start of the current leg with its time, and the legs to come.
     from: (f64, DVec3),
     then: VecDeque<(f64, WayPoint)>,
     n_events: u32,
@@ -189,7 +189,7 @@ impl Stepped {
                 self.from = (time, to.at);
                 self.then.pop_front();
             }
-            // As an errand is told to be: where to, how fast, how long.
+            // As an errand is planned: destination, speed, stay.
             let mut chance = Chance::new(SEED, id, self.n_events);
             self.n_events += 1;
             let to = chance.below(town.layout.n_cells() as u32);
@@ -214,7 +214,7 @@ impl Stepped {
 }
 
 #[test]
-fn actors_are_where_stepping_everybody_through_every_frame_takes_them() {
+fn actors_equal_those_stepped_through_every_frame() {
     let town = Town::new(30);
     let n = 150;
     let mut actors = town.populate(n);
@@ -235,7 +235,7 @@ fn actors_are_where_stepping_everybody_through_every_frame_takes_them() {
         for (id, actor) in (0..).zip(&mut stepped) {
             actor.step(&town, id, now);
         }
-        // Looked at seldom, and at odd times.
+        // Queried seldom, and at odd times.
         if frame % 997 != 0 {
             continue;
         }
@@ -278,7 +278,7 @@ fn velocities_are_those_of_the_places() {
 }
 
 #[test]
-fn only_those_who_change_their_cell_are_looked_at() {
+fn only_actors_that_change_their_cell_are_updated() {
     let town = Town::new(60);
     let mut actors = town.populate(5000);
     let mut sum = 0;
@@ -289,7 +289,7 @@ fn only_those_who_change_their_cell_are_looked_at() {
     assert!(sum > 0 && sum < 5000 * 600 / 60, "{sum}");
 }
 
-/// Cells 0 and 1; who is told something goes from one to the other in a second and stays.
+/// Cells 0 and 1: an actor that receives a message walks to the other one in a second and stays.
 fn across(event: &ActorEvent, plan: &mut PlanDraft<'_>) {
     if let Cause::Told(_) = event.cause {
         let to = CellId(1 - event.cell.0);
@@ -312,7 +312,7 @@ fn across(event: &ActorEvent, plan: &mut PlanDraft<'_>) {
 }
 
 #[test]
-fn what_is_told_happens_at_its_own_time_and_those_who_are_gone_are_nowhere() {
+fn messages_arrive_at_their_own_time_and_removed_actors_are_nowhere() {
     let mut actors = Actors::new(2, 1);
     let mut causes = Vec::new();
     let a = actors.add(DVec3::ZERO, CellId(0), |e, _, _| {
@@ -336,7 +336,7 @@ fn what_is_told_happens_at_its_own_time_and_those_who_are_gone_are_nowhere() {
     let there = |actors: &Actors, id| actors.place(id).map(|p| (p.at.x, p.cell.0));
     assert_eq!(there(&actors, b), Some((2.0, 1)));
     assert_eq!(there(&actors, a), Some((0.0, 0)));
-    // Told at 10, on its way at 10.75, though looked at only then.
+    // Message at 10, on its way at 10.75, though updated only then.
     assert_eq!(advance(&mut actors, 10.75), [(a, 10.0, Cause::Told(7))]);
     assert_eq!(there(&actors, a), Some((1.5, 1)));
     let events = advance(&mut actors, 30.0);

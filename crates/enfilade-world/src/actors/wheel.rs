@@ -1,21 +1,21 @@
-//! Who is due when: a hashed timing wheel.
+//! A hashed timing wheel of due actors.
 //!
-//! After Varghese and Lauck, "Hashed and hierarchical timing wheels" (SOSP 1987), scheme 6: a slot for each tick, the ticks modulo the
-//! number of slots; entries of later rounds stay where they are. Slots are chains of blocks of a cache line, out of one
-//! pool: linked actors would cost a wait for memory each, one after another. What is set anew leaves its old entry behind, which is dropped
-//! when its slot comes up. O(1) to set, and for each tick that passes O(entries of its slot); whatever time goes by, no more
-//! than all entries once.
+//! After Varghese and Lauck, "Hashed and hierarchical timing wheels" (SOSP 1987), scheme 6: a slot for each tick, the ticks modulo
+//! the number of slots; entries of later rounds stay where they are. Slots are chains of blocks of one cache line, from one pool:
+//! linked actors would cost a cache miss each, one after another. Setting a new time leaves the old entry behind, which is dropped
+//! when its slot comes up. O(1) to set, and O(entries of its slot) for each tick that passes; at most all entries once, however much
+//! time passes.
 
-/// Ticks in a second; each has a slot.
+/// Ticks per second; each has a slot.
 const TICKS: f64 = 64.0;
-/// Slots: a round is 256 seconds, longer than most stays.
+/// Number of slots: a round is 256 seconds, longer than most stays.
 const SLOTS: usize = 16_384;
-/// Of no block.
+/// Stands for no block.
 const NONE: u32 = u32::MAX;
-/// Entries of a block: with their number and the next block, 64 bytes.
+/// Entries per block: with their number and the next block, 64 bytes.
 const ENTRIES: usize = 14;
 
-/// All entries by the time that they are due. When each is due, the caller knows.
+/// All entries by due time. The caller knows the exact time of each.
 #[derive(Clone, Debug)]
 pub(super) struct Wheel {
     heads: Vec<u32>,
@@ -49,7 +49,7 @@ impl Wheel {
         }
     }
 
-    /// Notes when one is due; never where that is infinite.
+    /// Enters an actor with its due time; an infinite one is ignored.
     pub(super) fn set(&mut self, id: u32, due: f64) {
         if due.is_finite() {
             self.add(slot(tick(due)), id);
@@ -79,8 +79,8 @@ impl Wheel {
         block.n += 1;
     }
 
-    /// Adds all to `due` that are due between two times, both included, and forgets them; `when` tells and may change when one is
-    /// due.
+    /// Appends to `due` all entries due between two times, both included, and removes them; `when` returns the due time of an actor,
+    /// which it may change.
     pub(super) fn due(
         &mut self,
         from: f64,
@@ -116,9 +116,9 @@ mod tests {
     use super::*;
     use enfilade_testkit::Rng;
 
-    /// Covers W13: who is due is who a list would say, over rounds and jumps.
+    /// Covers W13: due actors equal those of a plain list, over rounds and jumps.
     #[test]
-    fn due_are_those_whose_time_has_come() {
+    fn due_actors_equal_those_of_a_list() {
         let mut rng = Rng::new(3);
         let mut wheel = Wheel::new();
         let mut times = vec![f64::INFINITY; 300];
@@ -148,7 +148,7 @@ mod tests {
             assert_eq!(due, expected);
             now = then;
         }
-        // Blocks are used again.
+        // Blocks are reused.
         assert!(wheel.blocks.len() < 600, "{}", wheel.blocks.len());
     }
 }

@@ -1,33 +1,33 @@
-//! The shapes that bodies have.
+//! Shapes of bodies.
 
 use enfilade_geom::{Aabb, DMat3, DQuat, DVec3};
 
-/// The shape of a body about its center. Sizes are not negative.
+/// The shape of a body about its center. Sizes must not be negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Body {
     /// A ball; with radius 0 a point.
     Sphere {
-        /// [Units: wu] [Limit: >= 0]
+        /// Radius. [Units: wu] [Limit: >= 0]
         radius: f64,
     },
-    /// All within `radius` of a segment.
+    /// All points within `radius` of a segment.
     Capsule {
-        /// From the center to one end of the segment; the other is opposite. [Units: wu]
+        /// Vector from the center to one end of the segment; the other end is opposite. [Units: wu]
         half: DVec3,
-        /// [Units: wu] [Limit: >= 0]
+        /// Radius. [Units: wu] [Limit: >= 0]
         radius: f64,
     },
     /// An oriented box.
     Box {
-        /// Half of its sizes, along its own axes. [Units: wu] [Limit: >= 0]
+        /// Half sizes along its own axes. [Units: wu] [Limit: >= 0]
         half: DVec3,
-        /// From its own axes to the world's.
+        /// Rotation from its own axes to the world's.
         turn: DQuat,
     },
 }
 
 impl Body {
-    /// An upright capsule of a whole height and a radius. [Units: wu]
+    /// Makes an upright capsule of a total height and a radius. [Units: wu]
     #[must_use]
     pub fn upright(height: f64, radius: f64) -> Self {
         Self::Capsule {
@@ -36,14 +36,14 @@ impl Body {
         }
     }
 
-    /// The box around it when its center is at `center`. [Units: wu]
+    /// Returns its bounding box with its center at `center`. [Units: wu]
     #[must_use]
     pub fn bounds(&self, center: DVec3) -> Aabb {
         let half = BodyCore::of(self).reach();
         Aabb::new(center - half, center + half)
     }
 
-    /// Of the sphere about its center that holds it. [Units: wu]
+    /// Returns the radius of the bounding sphere about its center. [Units: wu]
     #[must_use]
     pub fn bounding_radius(&self) -> f64 {
         match *self {
@@ -53,7 +53,7 @@ impl Body {
         }
     }
 
-    /// Grown by `margin` on every side; boxes keep their corners.
+    /// Returns the body grown by `margin` on every side; boxes stay boxes.
     pub(super) fn grown(&self, margin: f64) -> Self {
         match *self {
             Self::Sphere { radius } => Self::Sphere {
@@ -70,7 +70,7 @@ impl Body {
         }
     }
 
-    /// Whether all its numbers are finite.
+    /// Returns `true` if all its numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
         match *self {
             Self::Sphere { radius } => radius.is_finite(),
@@ -80,16 +80,16 @@ impl Body {
     }
 }
 
-/// A body as sums tell it: all points `s0 · axes[0] + s1 · axes[1] + s2 · axes[2]` with shares from -1 to 1, and what is within
-/// a radius of them.
+/// A body as a Minkowski sum: all points `s0 · axes[0] + s1 · axes[1] + s2 · axes[2]` with factors from -1 to 1, and everything
+/// within a radius of them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BodyCore {
     pub(super) axes: [DVec3; 3],
-    /// Of a box, their directions, though it may have no size along them.
+    /// For a box, the directions of its axes, even if it has no size along them.
     pub(super) directions: [DVec3; 3],
-    /// How many of these count.
+    /// Number of axes used.
     pub(super) n_axes: usize,
-    /// 0 for boxes.
+    /// Radius; 0 for boxes.
     pub(super) radius: f64,
 }
 
@@ -121,7 +121,7 @@ impl BodyCore {
         }
     }
 
-    /// Half of what it takes along a direction of any length.
+    /// Returns half of its extent along a direction of any length.
     #[inline]
     pub(super) fn support(&self, direction: DVec3) -> f64 {
         let mut sum = self.radius * direction.length();
@@ -131,7 +131,7 @@ impl BodyCore {
         sum
     }
 
-    /// Half sizes of the box around it. [Units: wu]
+    /// Returns the half sizes of its bounding box. [Units: wu]
     pub(super) fn reach(&self) -> DVec3 {
         let sum = |sum: DVec3, axis: &DVec3| sum + axis.abs();
         self.axes[..self.n_axes]
@@ -139,7 +139,7 @@ impl BodyCore {
             .fold(DVec3::splat(self.radius), sum)
     }
 
-    /// Half sizes of the box around it in a space that `to` leads to.
+    /// Returns the half sizes of its bounding box in another space; `to` maps to that space.
     pub(super) fn reach_in(&self, to: &DMat3) -> DVec3 {
         let rows = to.transpose();
         DVec3::from_array([0, 1, 2].map(|k| self.support(rows.col(k))))

@@ -1,7 +1,7 @@
-//! What is asked of the triangles on a body's way: what it meets first, what it touches, which may matter.
+//! Queries of the triangles on a body's way: first impact, contacts, candidates.
 //!
-//! The flood (`flood.rs`) finds them, the kernel (`kernel.rs`) tries each: O(candidates), and casts shorten the flood as they meet
-//! something. What is nearly tangential is told by [`ALONG`].
+//! The flood (`flood.rs`) finds them, the kernel (`kernel.rs`) tests each: O(candidates), and casts shorten the flood at each
+//! impact. [`ALONG`] decides nearly tangential cases.
 
 use enfilade_cpg::CellId;
 use enfilade_geom::{DVec3, Triangle};
@@ -12,55 +12,55 @@ use super::flood::{BodyFlood, CastCounts, Moving, Question};
 use super::kernel::{depth, point_of_contact, sweep};
 use super::walls::Contacts;
 
-/// What approaches slower than this share of its motion goes no deeper: it passes along.
+/// A body that approaches slower than this fraction of its motion slides along instead of hitting.
 const ALONG: f64 = 1e-9;
 
-/// A body that moves straight, without turning.
+/// A straight motion of a body, without rotation.
 #[derive(Clone, Copy, Debug)]
 pub struct Cast<'a> {
     /// Its shape.
     pub body: &'a Body,
-    /// Where its center is. [Units: wu]
+    /// Initial position of its center. [Units: wu]
     pub from: DVec3,
-    /// How far it moves. [Units: wu]
+    /// Displacement. [Units: wu]
     pub by: DVec3,
-    /// The cell of its center; where that is matter, the last one that it was in.
+    /// The cell of its center; in solid matter, the last one that it was in.
     pub cell: CellId,
 }
 
-/// What a moving body meets first.
+/// First impact of a moving body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
-    /// When, as a share of the motion, 0 to 1.
+    /// Time, as a fraction of the motion, 0 to 1.
     pub t: f64,
-    /// Of unit length, from what was met to the body.
+    /// Unit normal, from the target to the body.
     pub normal: DVec3,
-    /// Where. Of a box that meets with a face or an edge, the middle of what touches. [Units: wu]
+    /// Position. For a box that hits with a face or an edge, the middle of the contact area. [Units: wu]
     pub point: DVec3,
-    /// What was met.
+    /// The target.
     pub target: Target,
-    /// The cell through which it was met.
+    /// The cell through which it was hit.
     pub cell: CellId,
 }
 
-/// Something that a resting body touches.
+/// Contact of a resting body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Of unit length: the shortest way out.
+    /// Unit vector of the shortest way out.
     pub normal: DVec3,
-    /// How far that way. [Units: wu]
+    /// Penetration depth along it. [Units: wu]
     pub depth: f64,
-    /// Where. [Units: wu]
+    /// Position. [Units: wu]
     pub point: DVec3,
-    /// What is touched.
+    /// The target.
     pub target: Target,
-    /// The cell through which it was met.
+    /// The cell through which it was found.
     pub cell: CellId,
 }
 
-/// Asks what bodies touch. Holds the buffers of the flood; one a thread.
+/// Queries contacts of bodies. Holds the buffers of the flood; use one per thread.
 ///
-/// Nothing is allocated once the buffers have grown.
+/// Allocates nothing once the buffers have grown.
 ///
 /// ```
 /// use enfilade_cpg::PortalId;
@@ -76,7 +76,7 @@ pub struct Contact {
 /// let contacts = Contacts::new(&world, &sight, &layout);
 /// let mut caster = Caster::new(&contacts);
 ///
-/// // A ball before the doorway rolls through.
+/// // A ball in front of the doorway rolls through.
 /// let body = Body::Sphere { radius: 0.25 };
 /// let from = layout.opening(PortalId(0)).center() - DVec3::X;
 /// let cell = layout.locate(from).expect("a room");
@@ -97,7 +97,7 @@ pub struct Caster {
 }
 
 impl Caster {
-    /// For one world.
+    /// Makes a caster for one world.
     #[must_use]
     pub fn new(contacts: &Contacts) -> Self {
         Self {
@@ -105,16 +105,17 @@ impl Caster {
         }
     }
 
-    /// What a moving body meets first: walls, seals, objects, leaves of doors as `state` has them, openings that it shuts.
+    /// Returns the first impact of a moving body: on walls, seals, objects, leaves of doors where `state` puts them, and openings that
+    /// `state` shuts.
     ///
     /// Never misses a triangle of a cell that the body reaches by openings, nor stops at one behind a wall that it does not
-    /// pass: what it touches at its start stops it unless it moves away, or along. Keep a gap, a millimeter say, to
-    /// what is slid along, or the seams of a floor stop the body. A body that does not move meets nothing, nor does one whose
-    /// numbers are not finite. A microsecond or less in rooms.
+    /// pass. A triangle touched at the start stops the body unless it moves away or along. Keep a gap, such as a millimeter, to a
+    /// surface to slide along, or the seams of a floor stop the body. A body that does not move, or is not finite, hits nothing.
+    /// Takes a microsecond or less in rooms.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn cast(
         &mut self,
         contacts: &Contacts,
@@ -124,7 +125,7 @@ impl Caster {
         self.cast_where(contacts, state, cast, |_| true)
     }
 
-    /// The same, passing by objects for which `counts` is false: what the body carries, curtains.
+    /// As [`Caster::cast`], ignoring objects for which `counts` returns `false`, such as carried ones or curtains.
     ///
     /// # Panics
     ///
@@ -164,12 +165,12 @@ impl Caster {
         best
     }
 
-    /// Calls `visit` with all that a resting body touches, in no order that means anything; what two cells see is told for each
-    /// that the body reaches. Nothing for a body whose numbers are not finite.
+    /// Calls `visit` for all contacts of a resting body, in arbitrary order; a triangle that two cells see is reported for each that
+    /// the body reaches. Nothing for a body that is not finite.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn for_each_contact(
         &mut self,
         contacts: &Contacts,
@@ -202,12 +203,12 @@ impl Caster {
         );
     }
 
-    /// Calls `visit` with the triangles that a resting body may touch, for whoever has a narrow phase of his own: all those of
-    /// reached cells whose boxes the box around the body touches.
+    /// Calls `visit` for the triangles that a resting body may touch, for use with another narrow phase: all those of reached cells
+    /// whose boxes meet the body's bounding box.
     ///
     /// # Panics
     ///
-    /// When there is no such cell.
+    /// If there is no such cell.
     pub fn for_each_candidate(
         &mut self,
         contacts: &Contacts,
@@ -226,13 +227,13 @@ impl Caster {
         }
     }
 
-    /// The cells that the body of the last question reached, before its impact if there was one; its own first.
+    /// Returns the cells that the body of the last query reached, before its impact if there was one; its own first.
     #[must_use]
     pub fn cells(&self) -> &[CellId] {
         self.flood.cells()
     }
 
-    /// What the last question cost.
+    /// Returns the cost of the last query.
     #[must_use]
     pub fn counts(&self) -> CastCounts {
         self.flood.counts()

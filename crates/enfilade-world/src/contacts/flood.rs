@@ -1,12 +1,12 @@
-//! The flood of a body through cells: which triangles it may touch on its way.
+//! The flood of a body through cells: finds the triangles that it may touch on its way.
 //!
-//! Cells are taken in the order in which the body reaches them: the first is its own, others when it first touches an opening to
-//! them, and a cell's triangles count from then on. So the order of the list of portals does not matter, and no cell is looked
-//! at that is reached only after the impact. With a queue that is searched straight through, since a body touches few
-//! openings: O(log n) for each cell's tree, and O(k²) for k cells.
+//! Cells are taken in the order in which the body reaches them: its own first, others when it first touches an opening to
+//! them, and a cell's triangles count from then on. So the order of portals does not matter, and a cell reached only after the
+//! impact is never searched. The queue is searched linearly, since a body touches few openings: O(log n) for each cell's tree, and
+//! O(k²) for k cells.
 //!
-//! In a cell, triangles are tried in the order in which the box around the body touches their boxes, so that those behind the
-//! impact are not tried at all. They are gathered first, [`BATCH`] at a time, which bounds how far behind it one looks.
+//! In a cell, triangles are tested in the order in which the body's bounding box touches their boxes, so that those behind the
+//! impact are not tested at all. They are gathered first, [`BATCH`] at a time, which bounds the work behind it.
 
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::{Aabb, DMat3, DVec3, Ray, Triangle};
@@ -16,27 +16,27 @@ use super::body::{Body, BodyCore};
 use super::kernel::{boxes_meet, sweep};
 use super::walls::{Contacts, TriangleOf};
 
-/// Impacts so near in time are one: shares of the motion.
+/// Impacts within this fraction of the motion are simultaneous.
 const SAME: f64 = 1e-12;
-/// Triangles gathered before they are tried, and in how many are then tried. 32 is more than most rooms have on a body's way.
+/// Triangles gathered before they are tested. 32 is more than most rooms have on a body's way.
 const BATCH: usize = 32;
 
-/// What a question cost.
+/// Cost of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CastCounts {
-    /// Cells whose trees were asked.
+    /// Cells whose trees were queried.
     pub cells: u32,
     /// Candidates: triangles of obstacles that were tried one by one. All whose boxes the box around the body touches before the
     /// impact, and a few behind it.
     pub triangles: u32,
-    /// Triangles of openings that were tried.
+    /// Triangles of openings tested.
     pub openings: u32,
 }
 
-/// Goes from cell to cell with a body. Holds the buffers.
+/// Follows a body from cell to cell. Holds the buffers.
 #[derive(Clone, Debug)]
 pub(super) struct BodyFlood {
-    /// By cell.
+    /// Per cell.
     reached: Vec<Reached>,
     question: u32,
     waiting: Vec<CellId>,
@@ -45,7 +45,7 @@ pub(super) struct BodyFlood {
     counts: CastCounts,
 }
 
-/// When a cell was reached, in which question.
+/// The time at which a cell was reached, and the query.
 #[derive(Clone, Copy, Debug, Default)]
 struct Reached {
     question: u32,
@@ -53,7 +53,7 @@ struct Reached {
     since: f64,
 }
 
-/// A body made ready.
+/// A body prepared for the flood.
 pub(super) struct Moving {
     pub(super) core: BodyCore,
     reach: DVec3,
@@ -64,19 +64,19 @@ pub(super) struct Moving {
     by: DVec3,
 }
 
-/// A triangle on the way: when the boxes meet, and its corners relative to where the body is when it reaches the cell.
+/// A triangle on the way: the time at which the boxes meet, and its vertices relative to the body's position on entering the cell.
 #[derive(Clone, Copy, Debug)]
 struct Gathered {
     enter: f64,
     order: u32,
     /// The cell that it opens to.
     opens_to: Option<CellId>,
-    /// What it is, if it is in the way.
+    /// The obstacle, if it is one.
     target: Option<Target>,
     corners: Triangle,
 }
 
-/// An obstacle on the way: in which cell, what it is, its corners relative to where the body is at `since`.
+/// An obstacle on the way: its cell, its target, and its vertices relative to the body's position at `since`.
 pub(super) struct Candidate<'a> {
     pub(super) cell: CellId,
     pub(super) target: Target,
@@ -84,20 +84,20 @@ pub(super) struct Candidate<'a> {
     pub(super) since: f64,
 }
 
-/// What does not change in a question.
+/// Constant inputs of a query.
 pub(super) struct Question<'a> {
     contacts: &'a Contacts,
     state: &'a SightState,
     moving: &'a Moving,
 }
 
-/// A cell that the body is in from `since` on, and how much of the motion is left then.
+/// A cell that the body is in from `since` on, and the rest of its motion then.
 struct Stay {
     cell: CellId,
     since: f64,
     start: DVec3,
     left: f64,
-    /// Whether `left` is that much because of an impact.
+    /// True if an impact determines `left`.
     is_met: bool,
 }
 
@@ -113,17 +113,17 @@ impl BodyFlood {
         }
     }
 
-    /// Cells of the last question, in the order in which they were reached.
+    /// Returns the cells of the last query in the order in which they were reached.
     pub(super) fn cells(&self) -> &[CellId] {
         &self.cells
     }
 
-    /// What it cost.
+    /// Returns its cost.
     pub(super) fn counts(&self) -> CastCounts {
         self.counts
     }
 
-    /// Calls `visit` with every obstacle whose box the moving body's box touches, and with the time left, which it may lower.
+    /// Calls `visit` for each obstacle whose box the moving body's box touches, with the time left, which it may lower.
     pub(super) fn run(
         &mut self,
         question: &Question<'_>,
@@ -163,7 +163,7 @@ impl BodyFlood {
         self.counts = CastCounts::default();
     }
 
-    /// Notes that a cell is reached.
+    /// Records that a cell is reached.
     fn reach(&mut self, cell: CellId, since: f64) {
         let known = &mut self.reached[cell.idx()];
         if known.question == self.question {
@@ -185,7 +185,7 @@ impl BodyFlood {
         known.question == self.question && known.is_done
     }
 
-    /// The cell that is reached next, and when; none that is reached after `limit`.
+    /// Returns the cell reached next, with its time; none that is reached after `limit`.
     fn next_cell(&mut self, limit: f64) -> Option<(CellId, f64)> {
         let since = |c: &CellId| self.reached[c.idx()].since;
         let order = |&(_, a): &(usize, &CellId), &(_, b): &(usize, &CellId)| {
@@ -198,7 +198,7 @@ impl BodyFlood {
         (known.since <= limit).then_some((cell, known.since))
     }
 
-    /// Structural triangles and openings of one cell.
+    /// Gathers structural triangles and openings of one cell.
     fn gather_walls(
         &mut self,
         question: &Question<'_>,
@@ -238,7 +238,7 @@ impl BodyFlood {
             });
     }
 
-    /// Objects of one cell.
+    /// Gathers the objects of one cell.
     fn gather_objects(
         &mut self,
         question: &Question<'_>,
@@ -293,7 +293,7 @@ impl BodyFlood {
         });
     }
 
-    /// Notes a triangle to be tried, if the boxes meet; tries all when there are enough.
+    /// Gathers a triangle if the boxes meet; tests the gathered ones when there are enough.
     #[inline]
     fn gather(
         &mut self,
@@ -309,7 +309,7 @@ impl BodyFlood {
         let Some(mut enter) = meet(reach) else {
             return;
         };
-        // What an opening's growth adds is for those who pass along it, not for those who stop right there.
+        // The growth of an opening matters for passing along it, not for stopping right there.
         if opens_to.is_some() {
             enter = meet(moving.reach).unwrap_or(enter);
         }
@@ -325,20 +325,20 @@ impl BodyFlood {
         });
     }
 
-    /// Tries what was gathered, from near to far, as long as anything is left of the motion.
+    /// Tests the gathered triangles, near to far, while any of the motion is left.
     fn try_gathered(
         &mut self,
         moving: &Moving,
         stay: &mut Stay,
         visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
     ) {
-        // What is in the way first: it may spare the openings beside it.
+        // Obstacles first: they may make the openings beside them unnecessary.
         let rank = |a: &Gathered| (a.target.is_none(), a.order);
         self.gathered
             .sort_unstable_by(|a, b| a.enter.total_cmp(&b.enter).then(rank(a).cmp(&rank(b))));
         for i in 0..self.gathered.len() {
             let it = self.gathered[i];
-            // Of walls in one plane one is enough, though rounding may tell them apart.
+            // One of several coplanar walls is enough, though rounding may separate them.
             let rounding = if stay.is_met { SAME } else { 0.0 };
             if it.enter > stay.left - rounding {
                 break;
@@ -377,7 +377,7 @@ impl<'a> Question<'a> {
 }
 
 impl Moving {
-    /// `None` where a number is not finite.
+    /// `None` if a number is not finite.
     pub(super) fn new(contacts: &Contacts, body: &Body, from: DVec3, by: DVec3) -> Option<Self> {
         if !(body.is_finite() && from.is_finite() && by.is_finite()) {
             return None;

@@ -1,41 +1,41 @@
-//! One body and one triangle: whether they touch, how deep, and when a moving body first touches.
+//! One body and one triangle: contact, depth, and first contact of a moving body.
 //!
 //! - **Boxes**: separating axes, and for moving ones the interval of time in which none separates (Ericson, *Real-Time Collision
-//!   Detection*, 2005, sections 5.2.9 and 5.5.8). Closed, no steps. Of nearly parallel edges the cross product is noise; the
-//!   other axes decide for these.
-//! - **Spheres and capsules**: the distance of two convex sets that move straight is a convex function of time, and its slope is
-//!   known from the nearest points. Newton's steps from the left never pass its first root, and end in a few of these, since
-//!   they start where the separating axes of the triangle's plane and of the world end. Where the body only grazes, steps
-//!   halve; those that are left over after [`MAX_STEPS`] count as touching.
+//!   Detection*, 2005, sections 5.2.9 and 5.5.8). Closed form. The cross product of nearly parallel edges is noise; the other
+//!   axes decide for these.
+//! - **Spheres and capsules**: the distance of two convex sets in straight motion is a convex function of time, and the nearest
+//!   points give its slope. Newton's steps from the left never pass its first root, and take only a few iterations, since they
+//!   start where the separating axes of the triangle's plane and of the world end. Where the body only grazes, steps halve;
+//!   a search that reaches [`MAX_STEPS`] counts as touching.
 //!
-//! All intervals are wider by [`TOUCH`]: what has no thickness touches a triangle for an instant only, and two axes round it differently.
-//! The parry library's way (GJK on the difference) was measured and not taken: see `docs/living.md`.
-//! Coordinates are taken relative to the body's start, so that their rounding is that of the file.
+//! All intervals are widened by [`TOUCH`]: a body without thickness touches a triangle for an instant only, which two axes round
+//! differently. The method of the parry library (GJK on the difference) was measured and rejected: see `docs/living.md`.
+//! Coordinates are relative to the body's start, so that their rounding is that of the file.
 
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
 use super::body::BodyCore;
 
-/// So near counts as touching. [Units: wu]
+/// Distance that counts as touching. [Units: wu]
 const TOUCH: f64 = 1e-9;
-/// Steps of Newton's method.
+/// Maximum number of steps of Newton's method.
 const MAX_STEPS: usize = 48;
 
-/// Where a moving body first touches a triangle.
+/// First contact of a moving body with a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FirstTouch {
-    /// In lengths of the motion.
+    /// Time in lengths of the motion.
     pub(super) t: f64,
-    /// Of unit length, from the triangle to the body.
+    /// Unit normal, from the triangle to the body.
     pub(super) normal: DVec3,
 }
 
-/// How a resting body touches a triangle.
+/// Contact of a resting body with a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Penetration {
-    /// Of unit length: the way out that is shortest.
+    /// Unit vector of the shortest way out.
     pub(super) normal: DVec3,
-    /// How far that way. [Units: wu]
+    /// Depth along it. [Units: wu]
     pub(super) depth: f64,
 }
 
@@ -47,8 +47,8 @@ struct Meeting {
 }
 
 impl Meeting {
-    /// Narrows it to when the body, whose center is at `center` and moves by `speed` along some axis and takes `reach` on either
-    /// side, touches what lies from `low` to `high`; whether anything is left.
+    /// Narrows the interval to the times at which the body, with its center at `center`, moving by `speed` along an axis and extending
+    /// by `reach` on either side, touches `low..=high`; returns `true` if any is left.
     #[inline]
     fn narrow(&mut self, speed: f64, reach: f64, low: f64, high: f64) -> bool {
         let (low, high) = (low - reach, high + reach);
@@ -62,15 +62,16 @@ impl Meeting {
     }
 }
 
-/// Half of what a body takes along a direction, with what counts as touching.
+/// Returns half of a body's extent along a direction, with [`TOUCH`] added.
 #[inline]
 fn reach_along(core: &BodyCore, axis: DVec3) -> f64 {
     core.support(axis) + TOUCH * axis.abs().element_sum()
 }
 
-/// When the box around a body that moves by `by` from the origin first touches the box around a triangle, up to `t_max`.
+/// Returns the time up to `t_max` at which the bounding box of a body that moves by `by` from the origin first touches that of a
+/// triangle.
 ///
-/// `reach`: half sizes of the box around the body.
+/// `reach`: half sizes of the body's bounding box.
 #[inline]
 pub(super) fn boxes_meet(reach: DVec3, by: DVec3, t_max: f64, bounds: &Aabb) -> Option<f64> {
     let mut span = Meeting {
@@ -81,7 +82,7 @@ pub(super) fn boxes_meet(reach: DVec3, by: DVec3, t_max: f64, bounds: &Aabb) -> 
     meet.then_some(span.enter)
 }
 
-/// When a body that moves by `by` first touches a triangle, up to `t_max`. Corners are relative to the body's center.
+/// Returns the first contact, up to `t_max`, of a body that moves by `by` with a triangle. Vertices are relative to the body's center.
 pub(super) fn sweep(
     core: &BodyCore,
     by: DVec3,
@@ -95,7 +96,7 @@ pub(super) fn sweep(
     }
 }
 
-/// How a resting body touches a triangle, if it does. Corners are relative to the body's center.
+/// Returns the contact of a resting body with a triangle, if any. Vertices are relative to the body's center.
 pub(super) fn depth(core: &BodyCore, triangle: &Triangle) -> Option<Penetration> {
     if core.n_axes == 3 {
         return depth_of_box(core, triangle);
@@ -108,12 +109,12 @@ pub(super) fn depth(core: &BodyCore, triangle: &Triangle) -> Option<Penetration>
     })
 }
 
-/// The point of a triangle where a body touches it, or near there. All are relative to the body's center.
+/// Returns the point of a triangle where a body touches it, or near there. All are relative to the body's center.
 pub(super) fn point_of_contact(core: &BodyCore, triangle: &Triangle) -> DVec3 {
     if core.n_axes < 3 {
         return nearest(core.axes[0], core.n_axes == 0, DVec3::ZERO, triangle).1;
     }
-    // The middle of what the box, a little grown, cuts out of it.
+    // The middle of the triangle's section with the slightly grown box.
     let mut corners = [DVec3::ZERO; 12];
     corners[..3].copy_from_slice(triangle);
     let mut n = 3;
@@ -172,7 +173,7 @@ fn sweep_round(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<F
         let away = p - q;
         let distance = away.length();
         let gap = distance - core.radius;
-        // Where intervals begin, it is within the sum of what widened them.
+        // At the start of the interval, the gap is at most the sum of both widenings.
         if gap <= 2.0 * TOUCH {
             let normal = normal_of(away, t, by * now, by);
             return Some(FirstTouch { t: now, normal });
@@ -189,7 +190,7 @@ fn sweep_round(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<F
     Some(FirstTouch { t: now, normal })
 }
 
-/// The direction of `away`; where that is none, of the triangle's plane, to the side of `center`, or else against `by`.
+/// Returns the direction of `away`; if it is zero, the normal of the triangle on the side of `center`, or else against `by`.
 fn normal_of(away: DVec3, t: &Triangle, center: DVec3, by: DVec3) -> DVec3 {
     if away.length_squared() > TOUCH * TOUCH * 1e-6 {
         return away.normalize();
@@ -204,7 +205,7 @@ fn normal_of(away: DVec3, t: &Triangle, center: DVec3, by: DVec3) -> DVec3 {
     face * if side < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// Calls `visit` with the axes that may separate a box from a triangle, until it says no; whether it never did.
+/// Calls `visit` with the axes that may separate a box from a triangle until it returns `false`; returns `true` if it never did.
 #[inline]
 fn for_each_axis(core: &BodyCore, t: &Triangle, mut visit: impl FnMut(DVec3) -> bool) -> bool {
     let edges = [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
@@ -224,7 +225,7 @@ fn for_each_axis(core: &BodyCore, t: &Triangle, mut visit: impl FnMut(DVec3) -> 
     })
 }
 
-/// From and to where a triangle lies along an axis.
+/// Returns the interval of a triangle along an axis.
 #[inline]
 fn extent(axis: DVec3, t: &Triangle) -> (f64, f64) {
     let [a, b, c] = t.map(|p| axis.dot(p));
@@ -252,7 +253,7 @@ fn sweep_box(core: &BodyCore, by: DVec3, t_max: f64, t: &Triangle) -> Option<Fir
     }
     let normal = match last {
         Some(axis) => axis.normalize(),
-        // It touches from the start.
+        // In contact from the start.
         None => depth_of_box(core, t).map_or(DVec3::Y, |d| d.normal),
     };
     let t = span.enter;
@@ -264,7 +265,7 @@ fn depth_of_box(core: &BodyCore, t: &Triangle) -> Option<Penetration> {
     let meets = for_each_axis(core, t, |axis| {
         let (low, high) = extent(axis, t);
         let (reach, length) = (core.support(axis), axis.length());
-        // Out to the side of less, or of more.
+        // Out on the lower or on the upper side.
         let (down, up) = ((reach - low) / length, (high + reach) / length);
         let (depth, side) = if down < up { (down, -1.0) } else { (up, 1.0) };
         if best.is_none_or(|b| depth < b.depth) {
@@ -280,8 +281,8 @@ fn depth_of_box(core: &BodyCore, t: &Triangle) -> Option<Penetration> {
     })
 }
 
-/// The nearest points of the segment from `center - half` to `center + half`, or of `center` alone, and of a triangle: first
-/// the body's, then the triangle's. The same point twice where they meet.
+/// Returns the nearest points of the segment from `center - half` to `center + half`, or of `center` alone, and of a triangle: first
+/// the body's, then the triangle's. Twice the same point if they meet.
 fn nearest(half: DVec3, is_point: bool, center: DVec3, t: &Triangle) -> (DVec3, DVec3) {
     if is_point {
         return (center, nearest_on_triangle(center, t));
@@ -314,8 +315,8 @@ fn nearest(half: DVec3, is_point: bool, center: DVec3, t: &Triangle) -> (DVec3, 
     best
 }
 
-/// The feet of the common perpendicular of two segments, where both lie in them. Without it, the nearest points are an end and
-/// some point; lines nearly as parallel as rounding can tell count as parallel.
+/// Returns the feet of the common perpendicular of two segments, if both lie in them; otherwise one of the nearest points is an end.
+/// Lines that are parallel up to rounding count as parallel.
 fn common_perpendicular(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Option<(DVec3, DVec3)> {
     let (u, v, w) = (b - a, d - c, a - c);
     let n = u.cross(v);
@@ -331,11 +332,11 @@ fn common_perpendicular(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Option<(DVec3
 fn nearest_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     let along = b - a;
     let share = along.dot(p - a) / along.length_squared();
-    // Of a segment without a length the share is no number.
+    // For a segment of zero length the factor is NaN.
     a + along * if share > 0.0 { share.min(1.0) } else { 0.0 }
 }
 
-/// Ericson, section 5.1.5: by the region of the triangle's corners, edges and face that the point is in.
+/// Ericson, section 5.1.5: by the region of the triangle's vertices, edges and face that contains the point.
 fn nearest_on_triangle(p: DVec3, [a, b, c]: &Triangle) -> DVec3 {
     let (ab, ac, ap) = (*b - *a, *c - *a, p - *a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -368,12 +369,12 @@ fn nearest_on_triangle(p: DVec3, [a, b, c]: &Triangle) -> DVec3 {
     if sum <= 1e-20 * ab.length_squared() * ac.length_squared() {
         return nearest_on_sliver(p, &[*a, *b, *c]);
     }
-    // Along the normal, not by shares of the edges: of long triangles these are far less exact.
+    // Along the normal, not by weights of the edges: for long triangles these are far less exact.
     let face = ab.cross(ac);
     p - face * (face.dot(ap) / face.length_squared())
 }
 
-/// Of a triangle that is a line but for rounding.
+/// The same for a triangle that is a line up to rounding.
 fn nearest_on_sliver(p: DVec3, t: &Triangle) -> DVec3 {
     let mut best = t[0];
     for i in 0..3 {

@@ -1,16 +1,16 @@
-//! Bodies that may touch each other: those that share a cell and whose boxes touch.
+//! Pairs of bodies that may touch: they share a cell and their boxes overlap.
 //!
-//! Bodies are listed by cell, as Gjørup's segments list the objects in them (1999, section 3.3.4); in each cell they are swept along x
-//! (Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies*, 1992, section 2.2.2). A pair that shares several cells is told in
-//! the least of these. O(n log n + pairs that overlap along x), n bodies each counted once for each cell. Boxes are compared
-//! closed, so that rounding of what the caller gives decides and nothing else.
+//! Bodies are listed by cell, as Gjørup's segments list their objects (1999, section 3.3.4); in each cell they are swept along x
+//! (Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies*, 1992, section 2.2.2). A pair that shares several cells is reported
+//! in the least of these. O(n log n + pairs that overlap along x), each of n bodies counted once per cell. Boxes are closed and
+//! compared exactly as given.
 
 use std::ops::ControlFlow;
 
 use enfilade_cpg::CellId;
 use enfilade_geom::Aabb;
 
-/// Finds pairs of bodies that may touch. Holds the buffers; nothing is allocated once they have grown.
+/// Finds pairs of bodies that may touch. Holds the buffers; allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct Pairs {
     entries: Vec<Entry>,
@@ -25,16 +25,15 @@ struct Entry {
 }
 
 impl Pairs {
-    /// Without buffers yet.
+    /// Makes it without buffers.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Calls `visit` with each pair of bodies that share a cell and whose boxes touch, once, the lesser number first, until it
-    /// breaks; whether it did.
+    /// Calls `visit` once for each pair of bodies that share a cell and whose boxes touch, the lesser index first, until it breaks.
     ///
-    /// `bodies`: the box around each, and the cells that it touches, ascending. A box that is empty or not a number touches none.
+    /// `bodies`: the bounding box of each, and the cells that it touches, ascending. An empty box, or one with NaN, touches none.
     pub fn for_each<'a>(
         &mut self,
         bodies: &[(Aabb, &'a [CellId])],
@@ -67,7 +66,7 @@ impl Pairs {
     }
 }
 
-/// The least of two ascending lists' common cells.
+/// Returns the least common cell of two ascending lists.
 fn least_shared(a: &[CellId], b: &[CellId]) -> Option<CellId> {
     let (mut i, mut k) = (0, 0);
     while let (Some(x), Some(y)) = (a.get(i), b.get(k)) {
@@ -90,7 +89,7 @@ mod tests {
     use enfilade_testkit::Rng;
     use std::collections::BTreeSet;
 
-    /// Covers W12: pairs that share a cell and overlap, each once, as trying all pairs finds them.
+    /// Covers W12: pairs that share a cell and overlap are found once each, as by brute force.
     #[test]
     fn pairs_are_those_that_share_a_cell_and_overlap() {
         let mut rng = Rng::new(5);

@@ -12,7 +12,7 @@ use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 use super::{Body, Cast, Caster, Contact, Contacts, Impact};
 use crate::layout::Layout;
 
-/// A world and all that casts need of it.
+/// A world and everything that casts need of it.
 struct Site {
     world: World,
     sight: Sight,
@@ -59,7 +59,7 @@ impl Site {
         all
     }
 
-    /// All obstacles of a cell in world space.
+    /// Returns all obstacles of a cell in world space.
     fn obstacles(&self, cell: CellId) -> Vec<Triangle> {
         let mut all = Vec::new();
         for batch in self.world.batches_of(cell) {
@@ -95,8 +95,8 @@ impl Site {
             .flat_map(|piece| (2..piece.len()).map(move |k| [0, k - 1, k].map(|i| point(piece[i]))))
     }
 
-    /// When a body first meets something, by trying all triangles of all cells in the order in which it reaches them.
-    /// And when it reaches each cell.
+    /// Brute force: the first impact of a body on any triangle of the cells in the order in which it reaches them, and the time at
+    /// which it reaches each cell.
     fn brute(&self, body: &Body, margin: f64, from: DVec3, by: DVec3) -> (Option<f64>, Vec<f64>) {
         let grown = |margin: f64| body.grown(margin);
         let n_cells = self.world.graph.cells.len();
@@ -112,7 +112,7 @@ impl Site {
             let cell = CellId(c as u32);
             let reach = since[c];
             for exit in self.world.graph.exits(cell) {
-                // Openings are grown by the layout's tolerance: at least not for those who must be missed, at most for the others.
+                // Openings are grown by the layout's tolerance: a lower bound for impacts that must happen, an upper bound for others.
                 let more = if margin > 0.0 {
                     self.layout.tolerance() + margin
                 } else {
@@ -138,7 +138,7 @@ fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from(p.map(f64::from))
 }
 
-/// How far a body is from a triangle; at most 0 where it touches.
+/// Distance of a body from a triangle; at most 0 if they touch.
 fn gap(body: &Body, at: DVec3, t: &Triangle) -> f64 {
     match *body {
         Body::Sphere { radius } => closest_point_on_triangle(at, t).distance(at) - radius,
@@ -173,8 +173,8 @@ fn gap(body: &Body, at: DVec3, t: &Triangle) -> f64 {
     }
 }
 
-/// The first time from `since` on: the gap of two convex bodies is a convex function of time, so its least is found by
-/// sections, and the first zero before that by halving.
+/// First time from `since` on: the gap of two convex bodies is a convex function of time, so sectioning finds its minimum, and
+/// bisection the first zero before that.
 fn first_touch(body: &Body, from: DVec3, by: DVec3, since: f64, t: &Triangle) -> Option<f64> {
     let (a, b) = (body.bounds(from + by * since), body.bounds(from + by));
     if !a.union(b).overlaps(&Aabb::of_points(t)) {
@@ -248,7 +248,7 @@ fn random_point(rng: &mut Rng, world: &World) -> DVec3 {
     all.min + all.size() * share
 }
 
-/// Casts of one kind of body in one world against trying all triangles; how many impacts and how many cells there were.
+/// Compares casts of one kind of body in one world with brute force; returns the numbers of impacts and of cells.
 fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
     let margin = 1e-7;
     let (mut n_impacts, mut n_cells) = (0, 0);
@@ -258,7 +258,7 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
         let Some(cell) = site.layout.locate(from) else {
             continue;
         };
-        // Who touches something at the start is another test's.
+        // Contacts at the start belong to another test.
         let is_free = site.touched(&body.grown(1e-4), from).is_empty();
         if !is_free || site.layout.cell(cell).is_outdoor && rng.chance(0.7) {
             continue;
@@ -291,7 +291,7 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
             let own = body.bounds(at).expanded(1e-5);
             assert!(own.contains(impact.point), "{body:?} {impact:?}");
             assert!(impact.normal.dot(by) < 0.0 && (impact.normal.length() - 1.0).abs() < 1e-9);
-            // Once off by the normal, nothing is touched there.
+            // Moved off along the normal, nothing is touched there.
             assert!(gap(&body, at + impact.normal * 1e-6, &around(impact.point)) > -1e-5);
         }
     }
@@ -304,7 +304,7 @@ fn around(p: DVec3) -> Triangle {
 }
 
 #[test]
-fn casts_meet_what_trying_every_reachable_triangle_meets() {
+fn casts_equal_a_test_of_every_reachable_triangle() {
     let mut rng = Rng::new(12);
     let mut n = [0; 2];
     for seed in 0..4 {
@@ -331,7 +331,7 @@ fn casts_meet_what_trying_every_reachable_triangle_meets() {
 }
 
 #[test]
-fn points_meet_what_lines_of_sight_meet() {
+fn points_hit_the_same_as_lines_of_sight() {
     let mut rng = Rng::new(8);
     let (mut n_hits, mut n_flat) = (0, 0);
     for (seed, turn) in [(1, 0.0), (2, 0.7)] {
@@ -341,7 +341,7 @@ fn points_meet_what_lines_of_sight_meet() {
         }
         let lines = Sightlines::build(&site.world);
         for _ in 0..2000 {
-            // As lines of sight have them.
+            // Rounded as for lines of sight.
             let from = random_point(&mut rng, &site.world).as_vec3();
             let to = random_point(&mut rng, &site.world).as_vec3();
             let (a, b) = (from.as_dvec3(), to.as_dvec3());
@@ -393,7 +393,7 @@ fn bodies_pass_open_doorways_and_stop_at_shut_ones_and_at_leaves() {
         site.cast(&body, from, DVec3::X * 3.0)
             .map(|i| (i.target, i.t * 3.0))
     };
-    // As the model has it, the leaf is shut 6 to 8 cm behind the opening.
+    // In the model's pose, the leaf is shut 6 to 8 cm behind the opening.
     let (target, at) = stop(&site).unwrap();
     assert!(
         matches!(target, Target::Detail { .. }) && (at - 1.24).abs() < 1e-6,
@@ -415,7 +415,7 @@ fn bodies_pass_open_doorways_and_stop_at_shut_ones_and_at_leaves() {
 }
 
 #[test]
-fn only_cells_whose_openings_are_touched_are_asked() {
+fn only_cells_whose_openings_are_touched_are_searched() {
     let (site, middle, door) = two_rooms(false);
     let body = Body::Sphere { radius: 0.4 };
     let cells = || site.caster.borrow().cells().to_vec();
@@ -431,15 +431,15 @@ fn only_cells_whose_openings_are_touched_are_asked() {
     );
     assert!(!site.touched(&body, beside).is_empty());
     assert_eq!(cells(), [CellId(0)]);
-    // What stops at the wall reaches nothing behind it, and what turns back before the opening does not, either.
+    // A body that stops at the wall reaches nothing behind it, nor does one that turns back before the opening.
     let _ = site.cast(&body, middle, DVec3::Z * 20.0);
     assert_eq!(cells(), [CellId(0)]);
 }
 
 #[test]
-fn what_stands_behind_a_wall_counts_from_when_its_cell_is_reached() {
-    // A ball that bulges through the wall beside a doorway, and a box behind the wall, before the doorway. The wall's own triangles
-    // would stop it at their seams.
+fn objects_behind_a_wall_count_once_their_cell_is_reached() {
+    // A ball that bulges through the wall beside a doorway, and a box behind the wall, in front of the doorway. The wall's own
+    // triangles would stop it at their seams.
     let mut world = room_grid(&GridParams::two_rooms());
     world.batches.clear();
     let hole = *Layout::new(&world).opening(PortalId(0)).bounds();
@@ -475,7 +475,7 @@ fn what_stands_behind_a_wall_counts_from_when_its_cell_is_reached() {
 }
 
 #[test]
-fn what_is_touched_from_the_start_stops_only_who_moves_into_it() {
+fn contacts_at_the_start_stop_only_motion_into_them() {
     let (site, middle, _) = two_rooms(false);
     let floor = site.layout.cell(CellId(0)).bounds.min.y;
     let turn = DQuat::from_rotation_y(0.3);
@@ -529,7 +529,7 @@ fn contacts_are_those_of_every_reachable_triangle() {
             "{body:?} {at}"
         );
         for c in &found {
-            // A little farther than its depth, it no longer reaches where it touched most.
+            // A little farther than its depth, it no longer reaches the deepest point.
             let out = at + c.normal * (c.depth + 1e-6);
             if let Body::Sphere { radius } = body {
                 assert!(out.distance(c.point) >= radius - 1e-9);
@@ -549,7 +549,7 @@ fn contacts_are_those_of_every_reachable_triangle() {
 }
 
 #[test]
-fn asking_allocates_nothing_once_warm() {
+fn queries_allocate_nothing_once_warm() {
     let site = Site::new(with_doors(room_grid(&grid(3)), |_| false));
     let mut rng = Rng::new(4);
     let points: Vec<DVec3> = (0..300)

@@ -1,9 +1,9 @@
-//! The triangles that bodies meet, by cell, made once from a world.
+//! The triangles that bodies can hit, by cell, made once from a world.
 //!
-//! Each cell has a tree over the structural triangles that it sees, seals among them, and the pieces of its portals, which tell
-//! the flood where to go and are walls when shut. Detail objects share the trees of their meshes, in the meshes' own space, and
-//! are listed by the cells that they touch, leaves of doors by all cells on their way. A structural triangle that several cells
-//! see stands in the tree of each: 76 bytes and a share of a node.
+//! Each cell has a tree over the structural triangles that it sees, seals included, and the pieces of its portals, which lead
+//! the flood on and are walls when shut. Detail objects share the trees of their meshes, in the meshes' own space, and are listed
+//! by the cells that they touch, leaves of doors by all cells that they sweep. A structural triangle that several cells see is in
+//! the tree of each: 76 bytes and a share of a node.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::scene::Primitive;
@@ -12,47 +12,47 @@ use enfilade_runtime::{DetailId, Sight};
 
 use crate::layout::Layout;
 
-/// Poses of a leaf between shut and open that the box around its way is measured at.
+/// Poses between shut and open at which the box of a leaf's sweep is measured.
 const POSES: u32 = 16;
 
-/// What bodies meet in a world: walls, seals, objects, leaves of doors, shut portals; by cell. Made once, shared by any number
-/// of [`Caster`](crate::Caster)s.
+/// Obstacles of a world by cell: walls, seals, objects, leaves of doors, shut portals. Made once, shared by any number of
+/// [`Caster`](crate::Caster)s.
 #[derive(Clone, Debug)]
 pub struct Contacts {
     pub(super) cells: Vec<CellWalls>,
     pub(super) meshes: Vec<MeshWalls>,
-    /// By detail object; `None` for those without triangles.
+    /// Per detail object; `None` for those without triangles.
     pub(super) placed: Vec<Option<Placed>>,
-    /// By portal.
+    /// Per portal.
     pub(super) portal_cells: Vec<[CellId; 2]>,
-    /// Openings are grown by it when they are touched. [Units: wu]
+    /// Growth of openings in contact tests. [Units: wu]
     pub(super) tolerance: f64,
 }
 
-/// What bodies meet in one cell.
+/// Obstacles of one cell.
 #[derive(Clone, Debug)]
 pub(super) struct CellWalls {
     pub(super) bvh: Bvh,
-    /// By triangle of the tree.
+    /// Per triangle of the tree.
     pub(super) surfaces: Vec<TriangleOf>,
-    /// Over the boxes of the objects that touch the cell, and which these are.
+    /// Tree over the boxes of the objects that touch the cell, and their indices.
     pub(super) tree: BoxTree,
     pub(super) details: Vec<u32>,
 }
 
-/// What a triangle of a cell belongs to.
+/// Owner of a triangle of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TriangleOf {
     Wall {
         batch: u32,
         triangle: u32,
     },
-    /// A part of an opening; where `is_panel`, a wall while it is shut.
+    /// A part of an opening; if `is_panel`, a wall while it is shut.
     Opening {
         portal: u32,
         is_panel: bool,
     },
-    /// A part of what fills an opening while it is shut, where its leaves are.
+    /// A part of the panel that fills an opening while it is shut, at the depth of its leaves.
     Panel {
         portal: u32,
     },
@@ -62,27 +62,27 @@ pub(super) enum TriangleOf {
 #[derive(Clone, Debug)]
 pub(super) struct MeshWalls {
     pub(super) bvh: Bvh,
-    /// By primitive: its first triangle.
+    /// Index of the first triangle of each primitive.
     pub(super) first: Vec<u32>,
 }
 
-/// A detail object as the model has it.
+/// A detail object in the model's pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     pub(super) mesh: u32,
     pub(super) to_world: DMat4,
     pub(super) to_mesh: DMat4,
-    /// Around it, of a leaf around all its way. [Units: wu]
+    /// Its bounding box; for a leaf, that of its sweep. [Units: wu]
     pub(super) bounds: Aabb,
     pub(super) is_leaf: bool,
 }
 
 impl Contacts {
-    /// O(n log n) in triangles, each counted once for each cell that sees it.
+    /// Prepares a world. O(n log n) in triangles, each counted once for each cell that sees it.
     ///
     /// # Panics
     ///
-    /// When `sight` or `layout` is not of this world.
+    /// If `sight` or `layout` is not of this world.
     #[must_use]
     pub fn new(world: &World, sight: &Sight, layout: &Layout) -> Self {
         let n_cells = layout.n_cells();
@@ -128,27 +128,27 @@ impl Contacts {
         }
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.cells.len()
     }
 
-    /// Triangles in the trees of all cells, portals' among them; one that several cells see counts for each.
+    /// Returns the number of triangles in the trees of all cells, portals included; one that several cells see counts for each.
     #[must_use]
     pub fn n_triangles(&self) -> usize {
         self.cells.iter().map(|c| c.surfaces.len()).sum()
     }
 }
 
-/// The triangles of a portal's opening, and of what fills it where its leaves are.
+/// Returns the triangles of a portal's opening, and of its panel at the depth of its leaves.
 fn openings(
     layout: &Layout,
     sight: &Sight,
     portal: PortalId,
 ) -> impl Iterator<Item = (Triangle, TriangleOf)> {
     let opening = layout.opening(portal);
-    // Its leaves hide a panel at this depth: bodies stop at the leaf, not before it.
+    // The leaves hide a panel at this depth: bodies stop at the leaf, not in front of it.
     let off = opening.normal() * f64::from(sight.depth_of_leaves(portal));
     let is_panel = off == DVec3::ZERO;
     let own = TriangleOf::Opening {
@@ -167,7 +167,7 @@ fn openings(
 
 type Objects = (Vec<MeshWalls>, Vec<Option<Placed>>, Vec<Vec<u32>>);
 
-/// All meshes, all objects, and by cell the objects that touch it.
+/// Returns all meshes, all objects, and per cell the objects that touch it.
 fn objects(world: &World, sight: &Sight, n_cells: usize) -> Objects {
     let mut listed = vec![Vec::new(); n_cells];
     let whole = |mesh: usize| MeshWalls::new(world, mesh, &DMat4::IDENTITY);
@@ -206,7 +206,7 @@ fn objects(world: &World, sight: &Sight, n_cells: usize) -> Objects {
     (meshes, placed, listed)
 }
 
-/// The box around all that a leaf passes through, given the corners of a box around it as the model has it.
+/// Returns the box of a leaf's sweep, given the vertices of its box in the model's pose.
 fn way_of(sight: &Sight, detail: DetailId, corners: &[DVec3; 8]) -> Option<Aabb> {
     let portal = sight.portals_of(detail).next()?;
     let leaf = sight.leaves(portal).iter().find(|l| l.detail == detail)?;
@@ -218,7 +218,7 @@ fn way_of(sight: &Sight, detail: DetailId, corners: &[DVec3; 8]) -> Option<Aabb>
     let mut here = at(0);
     for pose in 1..=POSES {
         let next = at(pose);
-        // Between two poses nothing is farther from the first than it is at the second.
+        // Between two poses, no point is farther from the first pose than the second pose is.
         let moved = here.iter().zip(&next).map(|(a, b)| a.distance(*b));
         way = way.union(Aabb::of_points(&here).expanded(moved.fold(0.0, f64::max)));
         here = next;
@@ -238,7 +238,7 @@ impl MeshWalls {
         Self { bvh, first }
     }
 
-    /// The primitive of a triangle, and its number there.
+    /// Returns the primitive of a triangle, and the triangle's index there.
     pub(super) fn named(&self, triangle: u32) -> (u32, u32) {
         let primitive = self.first.partition_point(|&f| f <= triangle) - 1;
         (primitive as u32, triangle - self.first[primitive])

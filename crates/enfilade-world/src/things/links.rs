@@ -1,4 +1,4 @@
-//! Which things are in which cells: two lists at once, of a thing and of a cell, whose links come from one pool.
+//! Links between things and cells, each in two lists at once, of a thing and of a cell, from one pool.
 
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -6,19 +6,19 @@ pub(super) const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug)]
 struct Link {
     thing: u32,
-    /// Of all parts' cells.
+    /// Index among all parts' cells.
     cell: u32,
     next_in_cell: u32,
     previous_in_cell: u32,
     next_of_thing: u32,
 }
 
-/// All links. A thing knows its first.
+/// All links. A thing stores its first.
 #[derive(Clone, Debug)]
 pub(super) struct Links {
     links: Vec<Link>,
     free: u32,
-    /// By cell of all parts.
+    /// Per cell of all parts.
     first_in_cell: Vec<u32>,
 }
 
@@ -33,14 +33,14 @@ impl Default for Links {
 }
 
 impl Links {
-    /// Makes room for so many cells.
+    /// Makes room for a number of cells.
     pub(super) fn grow(&mut self, n_cells: usize) {
         if self.first_in_cell.len() < n_cells {
             self.first_in_cell.resize(n_cells, NONE);
         }
     }
 
-    /// The things in a cell, with the latest first.
+    /// Returns the things in a cell, latest first.
     pub(super) fn in_cell(&self, cell: u32) -> impl Iterator<Item = u32> + use<'_> {
         let first = self.first_in_cell.get(cell as usize).copied();
         let mut at = first.unwrap_or(NONE);
@@ -51,7 +51,7 @@ impl Links {
         })
     }
 
-    /// The cells of a thing, from its first link on.
+    /// Returns the cells of a thing, from its first link on.
     pub(super) fn of_thing(&self, first: u32) -> impl Iterator<Item = u32> + use<'_> {
         let mut at = first;
         std::iter::from_fn(move || {
@@ -61,7 +61,7 @@ impl Links {
         })
     }
 
-    /// Adds a cell to a thing before its first link; the new first link.
+    /// Adds a cell to a thing before its first link; returns the new first link.
     pub(super) fn add(&mut self, thing: u32, cell: u32, first: u32) -> u32 {
         let next_in_cell = self.first_in_cell[cell as usize];
         let link = Link {
@@ -87,7 +87,7 @@ impl Links {
         at
     }
 
-    /// Takes a thing out of all its cells.
+    /// Removes a thing from all its cells.
     pub(super) fn drop_all(&mut self, first: u32) {
         let mut at = first;
         while let Some(&link) = self.links.get(at as usize) {
