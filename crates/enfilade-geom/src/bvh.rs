@@ -516,8 +516,8 @@ impl Stack {
         while mask != 0 {
             let k = mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            // From an origin that `f32` cannot hold, even the empty box of an unused child is met; it must not be taken for a child,
-            // or it would lead back to the root for ever.
+            // From an origin that `f32` cannot hold, even the empty box of an unused child is met; it must not be taken for a
+            // child, or it would lead back to the root for ever.
             if node.counts[k] == 0 && node.children[k] == 0 {
                 continue;
             }

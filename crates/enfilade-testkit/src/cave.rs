@@ -9,13 +9,13 @@ use crate::surface_net::surface_net;
 use crate::truth::{Convex, Opening, OpeningKind, Room, Side};
 
 const N_CHAMBERS: usize = 7;
-/// Region that the chambers' middles lie in. [Units: wu]
+/// Region of the chambers' centers. [Units: wu]
 const REGION: DVec3 = DVec3::new(34.0, 8.0, 28.0);
-/// Rock between chambers, and between a tunnel and a chamber it passes, at least. [Units: wu]
+/// Minimum rock between chambers, and between a tunnel and a chamber that it passes. [Units: wu]
 const ROCK: f64 = 2.5;
-/// Largest step of the walls in or out. [Units: wu]
+/// Largest displacement of the walls in or out. [Units: wu]
 const ROUGHNESS: f64 = 0.3;
-/// Side of the grid that the surface is taken from. [Units: wu]
+/// Cell size of the meshing grid. [Units: wu]
 const GRID: f64 = 0.4;
 
 struct Chamber {
@@ -34,7 +34,7 @@ struct Field {
     seed: u64,
 }
 
-/// [Units: wu]
+/// Returns the distance of a point from a segment. [Units: wu]
 pub(crate) fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let along = b - a;
     let t = ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
@@ -42,7 +42,7 @@ pub(crate) fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
 }
 
 impl Field {
-    /// Negative in the air, about the distance to the wall near it. [Units: wu]
+    /// Returns the field at a point: negative in the air, near a wall about the distance to it. [Units: wu]
     fn at(&self, p: DVec3) -> f64 {
         let mut d = f64::INFINITY;
         for c in &self.chambers {
@@ -80,7 +80,7 @@ impl Field {
     }
 }
 
-/// Chambers and tunnels, or `None` if this try does not connect.
+/// Places chambers and tunnels; `None` if this attempt does not connect them.
 fn layout(rng: &mut Rng) -> Option<(Vec<Chamber>, Vec<Tunnel>)> {
     let mut chambers: Vec<Chamber> = Vec::new();
     for _ in 0..400 {
@@ -119,7 +119,7 @@ fn layout(rng: &mut Rng) -> Option<(Vec<Chamber>, Vec<Tunnel>)> {
                 .map(|i| ends[0].lerp(ends[1], f64::from(i) / 40.0))
                 .map(|p| distance_to_segment(p, other[0], other[1]))
                 .fold(f64::INFINITY, f64::min);
-            // Tunnels from one chamber diverge; the angle between them is what counts.
+            // Tunnels from one chamber diverge; require a minimum angle between them.
             let angle = (ends[1] - ends[0])
                 .normalize()
                 .dot((other[1] - other[0]).normalize());
@@ -150,12 +150,12 @@ fn layout(rng: &mut Rng) -> Option<(Vec<Chamber>, Vec<Tunnel>)> {
     whole.then_some((chambers, tunnels))
 }
 
-/// A cave of seven chambers joined by straight tunnels, all with rough walls: the surface of its
-/// air, closed and facing the air. There is no way out.
+/// A cave of seven chambers joined by straight tunnels, all with rough walls: the surface of its air,
+/// closed and facing the air, without a way out.
 ///
-/// Its truth: chambers, given by an ellipsoid well inside each and the volume of the smooth
-/// ellipsoid; tunnels as openings, each a square in its middle with the tunnel's length for
-/// thickness. About 20,000 triangles.
+/// Its truth: chambers, given by an ellipsoid well inside each and the volume of the smooth ellipsoid;
+/// tunnels as openings, each a square in its middle with the tunnel's length for thickness. About 20,000
+/// triangles.
 #[must_use]
 pub fn cave(seed: u64) -> Generated {
     let mut site = Site::new("cave");
@@ -200,12 +200,12 @@ pub fn cave(seed: u64) -> Generated {
 fn tunnel_opening(chambers: &[Chamber], t: &Tunnel) -> Opening {
     let [a, b] = t.chambers.map(|i| &chambers[i]);
     let normal = (b.center - a.center).normalize();
-    // Where the tunnel's axis leaves the ellipsoids.
+    // Points where the tunnel's axis leaves the ellipsoids.
     let exit = |c: &Chamber| 1.0 / (normal / c.radii).length();
     let (start, end) = (a.center + normal * exit(a), b.center - normal * exit(b));
     let right = DVec3::Y.cross(normal).normalize();
     let up = normal.cross(right);
-    // The square as large as the round tunnel.
+    // A square of the round tunnel's area.
     let half = t.radius * std::f64::consts::PI.sqrt() * 0.5;
     let center = start.midpoint(end);
     Opening {

@@ -1,17 +1,17 @@
 //! A clinic made of brushes, of any size: storeys of wards along corridors, in three wings around a hall.
 //!
 //! Stands for the clinic of Lefebvre & Hornus 2003, table 1, which is not public: rooms with doorways on
-//! both sides of corridors, furnished with what they name (tables, beds, wash basins) as brushes of the
-//! structure, so that the tree has to cut them. Wings stand at 120 degrees to each other, none along an axis, and
-//! furniture stands as people leave it, at any angle, so that planes of one piece run through others: what
-//! makes a tree cut polygons.
+//! both sides of corridors, with the furniture that they list (tables, beds, wash basins) as structural
+//! brushes, so that the tree has to cut them. Wings stand at 120 degrees to each other, none along an axis,
+//! and furniture stands at any angle, as in real life, so that planes of one piece run through others: the
+//! situation in which a tree cuts polygons.
 
 use enfilade_geom::scene::{Entity, Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Plane};
 
 use crate::Rng;
 
-/// Inner length and depth of a ward, width of a corridor, inner height, thickness of what is between.
+/// Inner length and depth of a ward, width of a corridor, inner height, thickness of walls and slabs.
 /// [Units: wu]
 const WARD: [f64; 2] = [4.0, 5.0];
 const CORRIDOR: f64 = 2.5;
@@ -19,17 +19,17 @@ const HEIGHT: f64 = 3.0;
 const WALL: f64 = 0.25;
 /// Wards on one side of a corridor.
 const PER_SIDE: usize = 6;
-/// Wings around the hall, whose walls stand this far from its middle. [Units: wu]
+/// Number of wings around the hall, and distance of its walls from its center. [Units: wu]
 const WINGS: usize = 3;
 const HALL: f64 = 4.25;
-/// The first wing's angle to the x axis, in radians: none of the three lies along an axis.
+/// Angle of the first wing to the x axis, in radians: none of the three lies along an axis.
 const TURN: f64 = 0.2;
-/// Boards of a shelf.
+/// Number of boards of a shelf.
 const BOARDS: usize = 2;
-/// Faces of brushes seen from inside of a storey, counted.
+/// Number of brush faces per storey seen from inside, as counted.
 const PER_STOREY: f64 = 3750.0;
 
-/// A place and a turn around the vertical axis.
+/// A frame: a position and a rotation about the vertical axis.
 #[derive(Clone, Copy)]
 struct Frame {
     origin: DVec3,
@@ -47,7 +47,7 @@ impl Frame {
         self.origin + self.turned(p)
     }
 
-    /// A frame that stands in this one.
+    /// Returns a frame given in this one.
     fn within(&self, origin: DVec3, angle: f64) -> Self {
         Self {
             origin: self.at(origin),
@@ -55,7 +55,7 @@ impl Frame {
         }
     }
 
-    /// What lies behind all planes, each a point and a normal of this frame.
+    /// Returns the solid behind all planes, each a point and a normal of this frame.
     fn solid(&self, planes: &[(DVec3, DVec3)]) -> ConvexSolid {
         let planes: Vec<Plane> = planes
             .iter()
@@ -85,10 +85,10 @@ impl Frame {
     }
 }
 
-/// A clinic of which about `n_polygons` faces of brushes are seen from inside; closed. The hall is open through all storeys.
+/// A closed clinic with about `n_polygons` faces of brushes seen from inside. The hall is open through all storeys.
 ///
 /// # Panics
-/// Never: all brushes bound something.
+/// Never: all brushes are bounded.
 #[must_use]
 pub fn clinic(n_polygons: usize, seed: u64) -> Scene {
     let mut rng = Rng::new(seed);
@@ -99,7 +99,7 @@ pub fn clinic(n_polygons: usize, seed: u64) -> Scene {
         angle: TURN,
     };
     let top = n_storeys as f64 * (HEIGHT + WALL);
-    // Wider than the hall, whose walls stand on the one and carry the other.
+    // Wider than the hall, whose walls stand on the floor and carry the roof.
     solids.push(ground.prism(WINGS, HALL + 0.1, [-WALL, 0.0]));
     solids.push(ground.prism(WINGS, HALL + 0.1, [top - WALL, top]));
     solids.push(ground.prism(8, 0.4, [0.0, top - WALL]));
@@ -112,7 +112,7 @@ pub fn clinic(n_polygons: usize, seed: u64) -> Scene {
     scene_of(solids, n_storeys)
 }
 
-/// Where a wing begins: at the hall's wall, its floor, the outer wall of its first side of wards.
+/// Frame of a wing: at the hall's wall, its floor, the outer wall of its first side of wards.
 fn wing_frame(storey: usize, k: usize) -> Frame {
     let turn = TURN + k as f64 / WINGS as f64 * std::f64::consts::TAU;
     let hall = Frame {
@@ -169,7 +169,7 @@ fn wing_of(rng: &mut Rng, wing: &Frame, is_top: bool, solids: &mut Vec<ConvexSol
     }
 }
 
-/// Beds with slanted heads, a table on legs, a round stool, a wash basin on a foot, each at an angle of its own.
+/// Adds beds with slanted heads, a table on legs, a round stool, a wash basin on a foot, each at its own angle.
 fn furnish(rng: &mut Rng, ward: &Frame, solids: &mut Vec<ConvexSolid>) {
     for bed in 0..2 {
         let z = 0.7 + 2.1 * f64::from(bed) + 0.3 * rng.unit();
@@ -196,7 +196,7 @@ fn furnish(rng: &mut Rng, ward: &Frame, solids: &mut Vec<ConvexSolid>) {
     }
     let stool = ward.within(DVec3::new(2.6 + 0.8 * rng.unit(), 0.0, 3.0), turn);
     solids.push(stool.prism(6, 0.2, [0.0, 0.45]));
-    // Four posts through the boards of a shelf that nobody pushed back to the wall.
+    // Four posts through the boards of a shelf that stands away from the wall.
     let place = DVec3::new(1.0 + rng.unit(), 0.0, 4.3);
     let shelf = ward.within(place, 0.4 * (rng.unit() - 0.5));
     for board in 0..BOARDS {
@@ -251,10 +251,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_grows_as_asked_and_its_lights_hang_in_air() {
+    fn the_clinic_has_the_requested_size_and_its_lights_hang_in_air() {
         let (small, large) = (clinic(1, 1), clinic(11_500, 1));
         let n = |s: &Scene| s.solids.len();
-        // A light a storey; all storeys are alike but for floor and roof of the hall.
+        // One light per storey; all storeys are alike except the floor and the roof of the hall.
         assert_eq!([small.entities.len(), large.entities.len()], [1, 3]);
         let growth = n(&large) as f64 / n(&small) as f64;
         assert!((2.9..3.0).contains(&growth), "{growth}");

@@ -1,7 +1,7 @@
 //! Furniture, doors and glass: meshes for detail objects.
 //!
-//! Each stands on the origin, its back towards -z and its front towards +z, centered in x and z,
-//! so that a yaw of 0 faces the viewer who looks along -z.
+//! Each stands on the origin, its back towards -z and its front towards +z, centered in x and z, so
+//! that at a yaw of 0 it faces a viewer who looks along -z.
 
 use enfilade_geom::{Aabb, DVec2, DVec3};
 
@@ -201,8 +201,8 @@ impl Furniture {
 /// Width from which a door has two leaves. [Units: wu]
 const DOUBLE: f64 = 1.3;
 
-/// Hangs open door leaves into `hole`, a hole across `axis` (0 or 2), swung by `degrees` towards
-/// the positive side of `axis`: one hinged at its low end, in wide doors one at either end.
+/// Hangs open door leaves into `hole`, a hole across `axis` (0 or 2), swung by `degrees` towards the
+/// positive side of `axis`: one hinged at its low end, in wide doors one at either end.
 pub fn hang_door(site: &mut Site, p: &Palette, hole: &Aabb, axis: usize, degrees: f64) {
     let along = 2 - axis;
     let size = hole.size();

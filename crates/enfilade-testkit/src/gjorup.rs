@@ -1,25 +1,25 @@
-//! The test models of Gjørup, "Cell and portal based visibility" (master's thesis, 1999),
-//! section 4.3, built from their descriptions and counts.
+//! The test models of Gjørup, "Cell and portal based visibility" (master's thesis, 1999), section 4.3,
+//! rebuilt from their descriptions and counts.
 //!
-//! The models themselves were never published. What the text fixes, and what follows from it:
+//! The models themselves were never published. The text determines:
 //!
 //! - *Optimised rooms* (4.3.1): four unaligned rooms joined by short corridors, 64 shared
 //!   vertices, 8 for each room and corridor, 96 triangles. Four portals separate the rooms, so
 //!   there are four corridors and they form a ring. 96 triangles are possible only if the
 //!   corridors are as high as the rooms: 4 rooms of 16 and 4 corridors of 8; floors and ceilings
-//!   ignore the corridors' corners on their edges.
+//!   ignore the corridors' vertices on their edges.
 //! - *Tessellated rooms* (4.3.2): 200 vertices and 400 triangles of roughly equal size; a closed
 //!   surface with one hole (V = F / 2), so without T-junctions.
-//! - *Distorted rooms* (4.3.3): each room turned about all three axes, some corners moved;
+//! - *Distorted rooms* (4.3.3): each room rotated about all three axes, some vertices moved;
 //!   96 triangles.
 //! - *Cavern* (4.3.4): six rooms of one shape, 7 portals, transitions without an edge,
 //!   548 triangles. Seven portals join six rooms in a 2 × 3 lattice, and 548 = 6 · 88 + 10 · 2:
 //!   a globe of 12 meridians and 4 parallels (96 triangles) whose middle belt has four of its
-//!   quadrangles drawn out into necks (88), the 10 necks that lead nowhere closed by two
-//!   triangles. The thesis counts 68 vertices a room (408); shared, they are 272.
+//!   quadrangles extended into necks (88), the 10 necks that lead nowhere closed by two
+//!   triangles. The thesis counts 68 vertices per room (408); shared, they are 272.
 //!
-//! Sizes in meters, angles and which corners move are ours. Surfaces are the insides of the air,
-//! without thickness, and face it.
+//! Sizes in meters, angles and the choice of moved vertices are ours. Surfaces are the insides of the
+//! air, without thickness, and face it.
 
 use enfilade_geom::{DMat3, DMat4, DVec3};
 
@@ -30,12 +30,12 @@ use crate::solid::newell;
 use crate::transform::transformed;
 use crate::truth::{Convex, Opening, OpeningKind, Room, Side};
 
-/// Which of the four-room models.
+/// Variant of the four-room model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Variant {
-    /// Fewest triangles: 96.
+    /// Minimal: 96 triangles.
     Optimised,
-    /// 400 triangles of roughly one size.
+    /// 400 triangles of roughly equal size.
     Tessellated,
     /// 96 triangles, hardly two of them parallel.
     Distorted,
@@ -50,9 +50,9 @@ const PLANS: [[[f64; 2]; 2]; 4] = [
 ];
 const HEIGHT: f64 = 2.5;
 
-/// Corridors: room and wall they leave, room and wall they reach, and their extent along both.
+/// Corridors: room and wall at the start, room and wall at the end, and the extent along both.
 ///
-/// Wall `i` of a room runs from its corner `i` to corner `i + 1`; corners are (x0, z0), (x1, z0),
+/// Wall `i` of a room runs from its vertex `i` to vertex `i + 1`; vertices are (x0, z0), (x1, z0),
 /// (x1, z1), (x0, z1).
 const CORRIDORS: [(usize, usize, usize, usize, [f64; 2]); 4] = [
     (0, 1, 1, 3, [2.0, 2.9]),
@@ -61,7 +61,7 @@ const CORRIDORS: [(usize, usize, usize, usize, [f64; 2]); 4] = [
     (3, 0, 0, 2, [1.6, 2.5]),
 ];
 
-/// Turns of the distorted rooms about x, y and z. [Units: degrees]
+/// Rotations of the distorted rooms about x, y and z. [Units: degrees]
 const TURNS: [[f64; 3]; 4] = [
     [4.0, -5.0, 3.0],
     [-3.0, 4.0, 4.0],
@@ -69,7 +69,7 @@ const TURNS: [[f64; 3]; 4] = [
     [-4.0, -3.0, -3.0],
 ];
 
-/// Corners of the distorted rooms that move: room, corner (floor 0-3, ceiling 4-7), by how much.
+/// Moved vertices of the distorted rooms: room, vertex (floor 0-3, ceiling 4-7), displacement.
 const MOVED: [(usize, usize, [f64; 3]); 8] = [
     (0, 0, [-0.30, -0.10, -0.25]),
     (0, 6, [0.10, 0.35, 0.05]),
@@ -81,17 +81,17 @@ const MOVED: [(usize, usize, [f64; 3]); 8] = [
     (3, 5, [0.10, 0.20, -0.10]),
 ];
 
-/// A turn about x, then y, then z. [Units: degrees]
+/// Returns the rotation about x, then y, then z. [Units: degrees]
 fn turn([x, y, z]: [f64; 3]) -> DMat3 {
     DMat3::from_rotation_z(z.to_radians())
         * DMat3::from_rotation_y(y.to_radians())
         * DMat3::from_rotation_x(x.to_radians())
 }
 
-/// The four rooms of section 4.3, the whole turned by `degrees` about x, y and z in that order.
+/// The four rooms of section 4.3, the whole rotated by `degrees` about x, y and z in that order.
 ///
-/// Its truth: four rooms and, as openings, the four corridors, each the rectangle in its middle
-/// with the corridor's length for thickness.
+/// Its truth: four rooms and, as openings, the four corridors, each the rectangle in its middle with the
+/// corridor's length for thickness.
 #[must_use]
 pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
     let name = match variant {
@@ -126,17 +126,17 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
     finish(site, mesh, degrees)
 }
 
-/// The corners of a corridor's end on a wall, in the wall's direction: floor 0, floor 1, ceiling 0,
+/// The vertices of a corridor's end on a wall, in the wall's direction: floor 0, floor 1, ceiling 0,
 /// ceiling 1.
 type End = [u32; 4];
 
-/// The four rooms while they are built.
+/// The four rooms under construction.
 struct FourRooms {
     variant: Variant,
     mesh: Interior,
-    /// Floor corners 0-3 and ceiling corners 4-7 of every room.
+    /// Floor vertices 0-3 and ceiling vertices 4-7 of every room.
     corners: [[u32; 8]; 4],
-    /// By room and wall.
+    /// Per room and wall.
     ends: [[Option<End>; 4]; 4],
 }
 
@@ -158,7 +158,7 @@ impl FourRooms {
         }
     }
 
-    /// The two ends of a corridor.
+    /// Adds the two ends of a corridor.
     fn add_ends(&mut self, corridor: (usize, usize, usize, usize, [f64; 2])) -> Corridor {
         let (a, wall_a, b, wall_b, extent) = corridor;
         let p = self.add_end(a, wall_a, extent);
@@ -187,7 +187,7 @@ impl FourRooms {
         made
     }
 
-    /// Walls, floor and ceiling of a room, around the ends of its corridors; returns its volume.
+    /// Adds walls, floor and ceiling of a room around the ends of its corridors; returns its volume.
     fn add_room(&mut self, r: usize) -> f64 {
         let (mesh, c) = (&mut self.mesh, &self.corners[r]);
         let first = mesh.triangles.len();
@@ -222,7 +222,7 @@ impl FourRooms {
     }
 }
 
-/// A corner of a room by its plan: floor 0-3, ceiling 4-7. [Units: wu]
+/// Returns a vertex of a room by its plan: floor 0-3, ceiling 4-7. [Units: wu]
 fn plan_corner(r: usize, k: usize) -> DVec3 {
     let [low, high] = PLANS[r];
     let plan = [low, [high[0], low[1]], high, [low[0], high[1]]];
@@ -230,7 +230,7 @@ fn plan_corner(r: usize, k: usize) -> DVec3 {
     DVec3::new(plan[k % 4][0], y, plan[k % 4][1])
 }
 
-/// The same corner of the distorted room.
+/// Returns the same vertex of the distorted room.
 fn distorted(r: usize, k: usize, p: DVec3) -> DVec3 {
     let [low, high] = PLANS[r];
     let middle = DVec3::new(
@@ -244,10 +244,10 @@ fn distorted(r: usize, k: usize, p: DVec3) -> DVec3 {
     })
 }
 
-/// The solid of a room's eight corners.
+/// Returns the solid of a room's eight vertices.
 fn solid_of(corners: [DVec3; 8]) -> Convex {
-    // Faces of distorted rooms are not planar; cut as the mesh cuts them where it does not
-    // make room for a corridor, they bound the room to within a few centimeters.
+    // Faces of distorted rooms are not planar; triangulated as in the mesh (corridors aside), they
+    // bound the room to within a few centimeters.
     let faces: [[u32; 4]; 6] = [
         [1, 2, 3, 0],
         [4, 7, 6, 5],
@@ -265,7 +265,7 @@ fn solid_of(corners: [DVec3; 8]) -> Convex {
     }
 }
 
-/// A corridor by the rooms that it joins and its ends in them.
+/// A corridor: the rooms that it joins, and its ends in them.
 struct Corridor {
     rooms: [usize; 2],
     p: End,
@@ -273,10 +273,10 @@ struct Corridor {
 }
 
 impl Corridor {
-    /// The rectangle in its middle.
+    /// Returns the rectangle in its middle.
     fn opening(&self, mesh: &Interior) -> Opening {
         let at = |i: u32| mesh.corners[i as usize];
-        // q runs against p.
+        // `q` runs against `p`.
         let middle = |i: usize, j: usize| at(self.p[i]).midpoint(at(self.q[j]));
         let corners = [middle(1, 0), middle(0, 1), middle(2, 3), middle(3, 2)];
         let along = at(self.q[0]) - at(self.p[1]);
@@ -313,7 +313,7 @@ fn finish(mut site: Site, mesh: Interior, degrees: [f64; 3]) -> Generated {
 
 /// Distance between the centers of neighboring cavern rooms. [Units: wu]
 ///
-/// A power of two, so that both rooms compute the same corners for the neck they share.
+/// A power of two, so that both rooms compute the same vertices for their common neck.
 const PITCH: f64 = 8.0;
 /// Half measures of a cavern room without its necks. [Units: wu]
 const GLOBE: DVec3 = DVec3::new(3.0, 2.2, 3.0);
@@ -323,8 +323,8 @@ const PARALLELS: [f64; 4] = [-52.0, -16.0, 16.0, 52.0];
 /// Half width and half height of a neck. [Units: wu]
 const NECK: [f64; 2] = [0.55, 0.75];
 
-/// The cavern of section 4.3.4, turned by `degrees` about x, y and z in that order (the thesis
-/// turns it by 7, 8 and 9).
+/// The cavern of section 4.3.4, rotated by `degrees` about x, y and z in that order (the thesis rotates
+/// it by 7, 8 and 9).
 ///
 /// Its truth: six rooms, given by an ellipsoid well inside each, and the seven necks.
 #[must_use]
@@ -349,10 +349,10 @@ pub fn gjorup_cavern(degrees: [f64; 3]) -> Generated {
     finish(site, mesh, degrees)
 }
 
-/// Corners of a cavern room by parallel and meridian, about its center.
+/// Vertices of a cavern room by parallel and meridian, about its center.
 type Shape = [[DVec3; MERIDIANS]; 4];
 
-/// One shape for all rooms: every corner a little off the globe, with its four necks.
+/// The common shape of all rooms: every vertex a little off the globe, with its four necks.
 fn cavern_shape() -> Shape {
     let mut rng = Rng::new(1999);
     let mut shape = [[DVec3::ZERO; MERIDIANS]; 4];
@@ -393,7 +393,7 @@ fn cavern_shape() -> Shape {
     shape
 }
 
-/// Adds a room of the cavern; returns the ends of the necks that lead on, and to which room.
+/// Adds a room of the cavern; returns the ends of the necks that lead on, and the rooms behind them.
 fn add_globe(
     mesh: &mut Interior,
     shape: &Shape,
@@ -422,7 +422,7 @@ fn add_globe(
     necks
 }
 
-/// The room that a neck beginning at meridian `m` leads to: 2 towards +z, 5 towards -x, 8 to -z, 11 to +x.
+/// Returns the room behind the neck that begins at meridian `m`: 2 towards +z, 5 towards -x, 8 to -z, 11 to +x.
 fn neighbor_beyond(m: usize, cell: usize) -> Option<usize> {
     let (ix, iz) = (cell % 3, cell / 3);
     match m {
@@ -434,7 +434,7 @@ fn neighbor_beyond(m: usize, cell: usize) -> Option<usize> {
     }
 }
 
-/// The opening at the end of a neck; `quad` faces the first room.
+/// Returns the opening at the end of a neck; `quad` faces the first room.
 fn neck(mesh: &Interior, quad: [u32; 4], rooms: [usize; 2]) -> Opening {
     let [a, b, c, d] = quad.map(|i| mesh.corners[i as usize]);
     let corners = [b, a, d, c];

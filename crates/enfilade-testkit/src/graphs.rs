@@ -1,7 +1,7 @@
 //! Worlds made without a bake: rooms on a grid, with graph, locator and geometry by construction.
 //!
 //! Walls have no thickness and are seen from both sides; each opening is a rectangle in one wall. The
-//! graph is exact, so whatever a run-time loses in such a world, it lost itself.
+//! graph is exact, so any loss at run-time is the run-time's own.
 
 mod doors;
 mod grid;
@@ -19,26 +19,26 @@ use grid::{Face, Grid};
 pub use scale::scaled_world;
 use world::{FaceHole, world_of};
 
-/// What grid of rooms to make.
+/// Parameters of [`room_grid`].
 #[derive(Clone, Debug)]
 pub struct GridParams {
     /// Squares along x, y (storeys) and z. [Limit: above 0]
     pub size: [usize; 3],
-    /// Start of the random choices.
+    /// Seed of the random choices.
     pub seed: u64,
-    /// Chance of a doorway in a wall between two rooms.
+    /// Probability of a doorway in a wall between two rooms.
     pub doors: f64,
-    /// Chance of a window in a wall to the outdoors, or between rooms without a doorway.
+    /// Probability of a window in a wall to the outdoors, or between rooms without a doorway.
     pub windows: f64,
-    /// Chance of a hole in a floor between two rooms.
+    /// Probability of a hole in a floor between two rooms.
     pub holes: f64,
-    /// Chance that a square joins its neighbor's room: makes concave cells.
+    /// Probability that a square joins its neighbor's room, which makes concave cells.
     pub merges: f64,
-    /// Whether there is an outdoors.
+    /// True to add the outdoors.
     pub outdoors: bool,
-    /// Boxes standing in each square.
+    /// Number of boxes in each square.
     pub furniture: usize,
-    /// Turn about a slanting axis. [Units: rad]
+    /// Rotation about a slanted axis. [Units: rad]
     pub turn: f64,
 }
 
@@ -56,7 +56,7 @@ impl GridParams {
         }
     }
 
-    /// About `rooms` office-like rooms on storeys of at most 100, unturned.
+    /// About `rooms` office-like rooms on storeys of at most 100, not rotated.
     #[must_use]
     pub fn offices(rooms: usize, seed: u64) -> Self {
         let storeys = rooms.div_ceil(100).max(1);
@@ -75,11 +75,11 @@ impl GridParams {
         }
     }
 }
-/// Rooms on a grid, with doorways, windows, holes in floors, concave rooms and furniture by chance.
+/// Rooms on a grid, with random doorways, windows, holes in floors, concave rooms and furniture.
 ///
 /// # Panics
 ///
-/// When a side of the grid has no squares.
+/// If a side of the grid has no squares.
 #[must_use]
 pub fn room_grid(params: &GridParams) -> World {
     let mut rng = Rng::new(params.seed);
@@ -95,7 +95,7 @@ pub fn room_grid(params: &GridParams) -> World {
         at
     });
     let n = size[0] * size[1] * size[2];
-    // Squares join the room of a neighbor on a lower side; numbers without gaps at the end.
+    // A square joins the room of a neighbor on a lower side; consecutive numbers at the end.
     let mut label: Vec<u32> = (0..n as u32).collect();
     let stride = [1, size[0], size[0] * size[1]];
     for i in 0..n {
@@ -163,7 +163,7 @@ pub fn room_grid(params: &GridParams) -> World {
     world_of(&grid, &furniture, &mut hole)
 }
 
-/// A courtyard with `per_side` windows on each of its four sides; behind each its own room, with
+/// A courtyard with `per_side` windows on each of its four sides; behind each a room of its own, with
 /// doorways from room to room, or `one_room` all around.
 ///
 /// Cell 0 is the courtyard.
@@ -200,14 +200,14 @@ pub fn courtyard(per_side: usize, one_room: bool) -> World {
     })
 }
 
-/// A tower of `storeys` with `per_side` windows on each side of each: rooms around a core as high as
-/// the tower, with a doorway to it but at corners, or `one_room` all around.
+/// A tower of `storeys` with `per_side` windows on each side of each: rooms around a core as high as the
+/// tower, with doorways to it except where two facades meet, or `one_room` all around.
 ///
 /// Cell 0 is the core, the last one the outdoors. Both have a portal for most rooms.
 ///
 /// # Panics
 ///
-/// When `per_side` is below 3 or there is no storey.
+/// If `per_side` is below 3 or there are no storeys.
 #[must_use]
 pub fn window_tower(per_side: usize, storeys: usize, one_room: bool) -> World {
     assert!(per_side > 2 && storeys > 0, "a tower has rooms and a core");
@@ -237,7 +237,7 @@ pub fn window_tower(per_side: usize, storeys: usize, one_room: bool) -> World {
     })
 }
 
-/// The middle of a wall across an axis: a window above the sill, or an open doorway; as shares of the wall.
+/// The middle of a wall across an axis, in fractions of the wall: a window above the sill, or an open doorway.
 fn window_or_doorway(axis: usize, is_window: bool) -> ([f64; 2], [f64; 2], PortalKind) {
     let up = usize::from(axis != 0);
     let (sill, lintel, kind) = if is_window {
@@ -301,7 +301,7 @@ mod tests {
         assert_eq!(world.validate(), Ok(()));
         let is_window = |p: &&Portal| p.kind == PortalKind::Window;
         assert_eq!(world.graph.portals.iter().filter(is_window).count(), 64);
-        // Twelve rooms a storey; those at corners have two windows and no doorway.
+        // Twelve rooms per storey; those where two facades meet have two windows and no doorway.
         assert_eq!(world.graph.cells.len(), 1 + 4 * 12 + 1);
         assert_eq!(world.graph.cells[0].portals.len(), 4 * 8);
         let ring = window_tower(4, 4, true);

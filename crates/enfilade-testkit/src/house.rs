@@ -11,7 +11,7 @@ use crate::truth::{Convex, OpeningKind, Room, Side};
 
 /// Thickness of outer and inner walls. [Units: wu]
 const OUTER: f64 = 0.36;
-/// Outer measures of the house on plan, along x and z. [Units: wu]
+/// Outer size of the house in plan, along x and z. [Units: wu]
 const LENGTH: f64 = 11.0;
 const DEPTH: f64 = 8.6;
 /// Floor and ceiling of the two storeys, and the floor of the attic. [Units: wu]
@@ -28,12 +28,12 @@ const ROOF: GableRoof = GableRoof {
     window: Some([6.6, 7.7]),
 };
 
-/// Clear widths of the rooms between the walls, along x, and where the last along z end. [Units: wu]
+/// Clear widths of the rooms between the walls, along x, and the end of the last ones along z. [Units: wu]
 const WEST: [f64; 2] = [OUTER, 4.3];
 const MID: [f64; 2] = [4.45, 7.05];
 const EAST: [f64; 2] = [7.2, LENGTH - OUTER];
 const NORTH_END: f64 = DEPTH - OUTER;
-/// Faces of the outer walls along x, and the runs of outer walls along x and z. [Units: wu]
+/// Faces of the outer walls along x, and the extents of outer walls along x and z. [Units: wu]
 const NORTH: [f64; 2] = [0.0, OUTER];
 const SOUTH: [f64; 2] = [DEPTH - OUTER, DEPTH];
 const ALL: [f64; 2] = [0.0, LENGTH];
@@ -60,11 +60,11 @@ struct HouseHole {
     up: [f64; 2],
     kind: OpeningKind,
     rooms: [Side; 2],
-    /// How far a door's leaf stands open towards its second side; 0 is shut. [Units: degrees]
+    /// Opening angle of a door's leaf towards its second side; 0 is shut. [Units: degrees]
     swing: f64,
 }
 
-/// A leaf pushed to, and not shut. [Units: degrees]
+/// Angle of a leaf that is almost shut. [Units: degrees]
 const AJAR: f64 = 8.0;
 
 impl HouseHole {
@@ -94,7 +94,7 @@ fn window(along: [f64; 2], up: [f64; 2], rooms: [Side; 2]) -> HouseHole {
 }
 
 impl House {
-    /// A wall across `axis` (0: x, 2: z) between `faces`, running over `along` and `up`.
+    /// Adds a wall across `axis` (0: x, 2: z) between `faces`, over `along` and `up`.
     fn wall(
         &mut self,
         axis: usize,
@@ -126,7 +126,7 @@ impl House {
         }
     }
 
-    /// A slab over the whole footprint, wooden on top.
+    /// Adds a slab over the whole footprint, wooden on top.
     fn slab(&mut self, low: f64, high: f64, holes: &[Aabb]) {
         let mut slab = MeshBuilder::new(self.plaster);
         slab.paint_top(self.oak);
@@ -137,10 +137,9 @@ impl House {
 
 /// A furnished house of two storeys and an attic, on a lawn.
 ///
-/// Entrance hall with stairs to a landing, living room, kitchen, dining room, toilet; three
-/// bedrooms, study and bath; an attic under a pitched roof, reached through a hatch. 12 rooms,
-/// 9 doors (the front door and two more shut, two ajar), a passage, 17 windows; colored and textured materials; furniture,
-/// door leaves and glass as detail.
+/// Entrance hall with stairs to a landing, living room, kitchen, dining room, toilet; three bedrooms, study and bath; an attic
+/// under a pitched roof, reached through a hatch. 12 rooms, 9 doors (the front door and two more shut, two ajar), a passage, 17
+/// windows; colored and textured materials; furniture, door leaves and glass as detail.
 #[must_use]
 pub fn furnished_house() -> Generated {
     let mut site = Site::new("furnished-house");
@@ -217,7 +216,7 @@ impl House {
         }
     }
 
-    /// The slabs, the stairs and the hatch through them.
+    /// Adds the slabs, the stairs and the hatch through them.
     fn add_floors(&mut self, rooms: &Rooms) {
         let stair_hole = aabb([6.05, GROUND[1], 3.4], [7.05, UPPER[0], 6.5]);
         let hatch = aabb([4.6, UPPER[1], 6.3], [5.3, ATTIC, 7.5]);

@@ -1,4 +1,4 @@
-//! Surfaces of air seen from inside, as shared corners and triangles.
+//! Surfaces of air seen from inside, as shared vertices and triangles.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -8,7 +8,7 @@ use enfilade_geom::scene::{Mesh, Primitive};
 
 use crate::solid::{newell, triangulate};
 
-/// A triangle mesh with shared corners.
+/// A triangle mesh with shared vertices.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Interior {
     pub(crate) corners: Vec<DVec3>,
@@ -16,13 +16,13 @@ pub(crate) struct Interior {
 }
 
 impl Interior {
-    /// Adds a corner and gives its index.
+    /// Adds a vertex and returns its index.
     pub(crate) fn corner(&mut self, p: DVec3) -> u32 {
         self.corners.push(p);
         self.corners.len() as u32 - 1
     }
 
-    /// Adds a quadrangle as two triangles, split from its first corner.
+    /// Adds a quadrangle as two triangles, split from its first vertex.
     pub(crate) fn quad(&mut self, q: [u32; 4]) {
         self.triangles
             .extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
@@ -35,15 +35,15 @@ impl Interior {
             .extend(triangulate(&at).iter().map(|t| t.map(|i| corners[i])));
     }
 
-    /// Splits the longest edge in the middle, over and over, until there are `n` triangles.
+    /// Splits the longest edge in the middle until there are `n` triangles.
     ///
-    /// Each split adds a corner and two triangles, so the mesh must be closed, without
-    /// T-junctions, and `n` even like the number of its triangles. O(n log n).
+    /// Each split adds a vertex and two triangles, so the mesh must be closed, without T-junctions, and `n`
+    /// even like the number of its triangles. O(n log n).
     pub(crate) fn bisect_to(&mut self, n: usize) {
         let mut owner: HashMap<(u32, u32), usize> = HashMap::new();
         let mut longest = BinaryHeap::new();
         let corners = &mut self.corners;
-        // Bits of positive numbers compare as the numbers do; ties go to the older corners.
+        // Bits of positive numbers compare as the numbers do; ties go to the older vertices.
         let entry = |corners: &[DVec3], a: u32, b: u32| {
             let length = corners[a as usize].distance_squared(corners[b as usize]);
             (length.to_bits(), Reverse(a.min(b)), Reverse(a.max(b)))
@@ -88,7 +88,7 @@ impl Interior {
         }
     }
 
-    /// Volume of the air inside, with its openings closed by `plugs` (quadrangles that face it).
+    /// Returns the volume of the air inside, with its openings closed by `plugs` (quadrangles that face it).
     pub(crate) fn air_volume(&self, triangles: &[[u32; 3]], plugs: &[[u32; 4]]) -> f64 {
         let at = |i: u32| self.corners[i as usize];
         let six = |a: u32, b: u32, c: u32| at(a).dot(at(b).cross(at(c)));
@@ -100,7 +100,7 @@ impl Interior {
         -(walls + plugs) / 6.0
     }
 
-    /// The mesh with one flat normal a triangle, or with shared corners and no normals.
+    /// Returns the mesh with one flat normal per triangle, or with shared vertices and no normals.
     pub(crate) fn into_mesh(self, name: &str, material: u32, flat: bool) -> Mesh {
         let mut p = Primitive {
             material: Some(material),
@@ -159,14 +159,14 @@ mod tests {
             .map(|t| t.map(|i| mesh.corners[i as usize]))
             .collect();
         assert_eq!(n_open_edges(&triangles), 0);
-        // Halves of binary fractions: exact but for the sum's rounding.
+        // Halves of binary fractions: exact up to the sum's rounding.
         assert!((signed_volume(&triangles) - 16.0).abs() < 1e-9);
         let longest = triangles
             .iter()
             .flat_map(|t| (0..3).map(|i| t[i].distance(t[(i + 1) % 3])))
             .fold(0.0, f64::max);
         // Triangles of 52 / 2000 square units, half a square each: the long side is 0.32. A
-        // factor of 2 for one bisection more or less.
+        // factor of 2 allows for one bisection more or less.
         assert!(longest < 0.65, "{longest}");
     }
 }

@@ -1,10 +1,10 @@
 //! The maze of Dirkse, "Portal processing in 3D-environments: visibility determination and other
-//! applications" (master's thesis, 2002), section 8.2, built from its counts.
+//! applications" (master's thesis, 2002), section 8.2, rebuilt from its counts.
 //!
-//! The text gives 583 cells, 29,988 wall triangles and 2,735 dots of 20 triangles each, 1 dot in
-//! the smallest cells and up to 12 in the largest. So cells differ in size as dots do: ours are
-//! rectangles of 1 to 12 squares with a dot in the middle of every square, which fill a plan of
-//! 50 × 55 squares but for a block of 3 × 5. Sizes in meters and the layout are ours.
+//! The text gives 583 cells, 29,988 wall triangles and 2,735 dots of 20 triangles each, 1 dot in the
+//! smallest cells and up to 12 in the largest. So cells differ in size as dots do: ours are rectangles of 1
+//! to 12 squares with a dot in the middle of every square, which fill a plan of 50 × 55 squares except for
+//! a block of 3 × 5. Sizes in meters and the layout are ours.
 
 use enfilade_geom::scene::Role;
 use enfilade_geom::{Aabb, DMat4, DVec3};
@@ -53,7 +53,7 @@ impl Plot {
             longer
         };
         let n = self.size(axis);
-        // Away from the ends where there is room.
+        // Away from the ends if there is room.
         let margin = if n > 5 { n / 4 } else { 0 };
         let at = self.low[axis] + 1 + margin + rng.below(n - 1 - 2 * margin);
         let (mut a, mut b) = (self, self);
@@ -62,7 +62,7 @@ impl Plot {
         [a, b]
     }
 
-    /// Where the wall across `axis` stands, on the plot's side of it. [Units: wu]
+    /// Returns the position of the wall across `axis`, on the plot's side of it. [Units: wu]
     fn face(&self, axis: usize, high: bool) -> f64 {
         let at = if high {
             self.high[axis]
@@ -77,13 +77,13 @@ impl Plot {
         }
     }
 
-    /// From its lower to its upper wall. [Units: wu]
+    /// Returns the extent from its lower to its upper wall. [Units: wu]
     fn faces(&self, axis: usize) -> [f64; 2] {
         [false, true].map(|high| self.face(axis, high))
     }
 }
 
-/// A way from plot `from`, through its wall towards greater x or z, to plot `to`; `square` along
+/// A passage from plot `from`, through its wall towards greater x or z, to plot `to`; `square` along
 /// the wall.
 #[derive(Clone, Copy, Debug)]
 struct Passage {
@@ -121,7 +121,7 @@ fn plots(rng: &mut Rng) -> Vec<Plot> {
             done.push(plot);
         }
     }
-    // Far fewer than 583 by now; split at random, sparing some of the largest.
+    // Far fewer than 583 so far; split at random, sparing some of the largest.
     while done.len() < N_CELLS {
         let i = rng.below(done.len());
         if done[i].area() > 1 && (done[i].area() < LARGEST || rng.chance(0.5)) {
@@ -165,7 +165,7 @@ fn passages(plots: &[Plot], rng: &mut Rng) -> Vec<Passage> {
     let mut joined = std::collections::BTreeSet::new();
     candidates.retain(|p| {
         let (a, b) = (group[p.from], group[p.to]);
-        // A tree that reaches all, and one more in twelve so that there are ways around.
+        // A spanning tree, and one more passage in twelve, for cycles.
         let wanted = (a != b || rng.chance(1.0 / 12.0)) && joined.insert((p.from, p.to));
         if wanted {
             group.iter_mut().filter(|g| **g == a).for_each(|g| *g = b);
@@ -178,8 +178,8 @@ fn passages(plots: &[Plot], rng: &mut Rng) -> Vec<Passage> {
 
 /// The maze of Dirkse 2002, section 8.2: 583 cells, 29,988 wall triangles, 2,735 dots.
 ///
-/// Walls are one closed surface that faces the cells, without T-junctions; another object, `shell`
-/// of 12 triangles, makes a solid of it that stands in the open. Dots are detail.
+/// Walls are one closed surface that faces the cells, without T-junctions; another object, `shell` of 12
+/// triangles, makes a solid of it that stands in the open. Dots are detail.
 #[must_use]
 pub fn dirkse_maze(seed: u64) -> Generated {
     let mut rng = Rng::new(seed);
@@ -216,17 +216,16 @@ pub fn dirkse_maze(seed: u64) -> Generated {
     site.finish()
 }
 
-/// Where a passage ends in a wall: place along it; floor corners and head corners, in the wall's
-/// direction.
+/// End of a passage in a wall: position along it; lower and upper vertices, in the wall's direction.
 type PassageEnd = (f64, [u32; 4]);
 
-/// By wall of a plot.
+/// Per wall of a plot.
 type Ends = [Vec<PassageEnd>; 4];
 
 /// A passage through the wall between two plots.
 struct WallPassage {
     axis: usize,
-    /// Where it begins and ends across the wall. [Units: wu]
+    /// Start and end across the wall. [Units: wu]
     across: [f64; 2],
     /// Its middle and its sides along the wall. [Units: wu]
     middle: f64,
@@ -263,7 +262,7 @@ impl WallPassage {
         Aabb::new(ends[0].min(ends[1]), ends[0].max(ends[1]))
     }
 
-    /// Adds its four faces; returns which wall of either plot it ends in, and the corners there.
+    /// Adds its four faces; returns the wall of either plot in which it ends, and the vertices there.
     fn add_to(&self, mesh: &mut Interior) -> ([usize; 2], [[u32; 4]; 2]) {
         let [low, high] = self.along;
         let mut end = |across: f64| {
@@ -276,7 +275,7 @@ impl WallPassage {
             .map(|(along, y)| mesh.corner(self.point(across, along, y)))
         };
         let (a, b) = (end(self.across[0]), end(self.across[1]));
-        // Walls turn as the corners of a plan do, (x0, z0), (x1, z0), (x1, z1), (x0, z1): along z
+        // Walls run as the vertices of a plan do, (x0, z0), (x1, z0), (x1, z1), (x0, z1): along z
         // in the wall at greater x, against x in the wall at greater z.
         let flip = |e: [u32; 4]| [e[1], e[0], e[3], e[2]];
         let (p, q, walls) = if self.axis == 0 {
@@ -292,7 +291,7 @@ impl WallPassage {
     }
 }
 
-/// Walls, floor and ceiling of a cell, around the ends of its passages.
+/// Adds walls, floor and ceiling of a cell around the ends of its passages.
 fn add_cell(mesh: &mut Interior, plot: &Plot, ends: &mut Ends) {
     let [x, z] = [0, 1].map(|axis| plot.faces(axis));
     let plan = [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]];
@@ -357,7 +356,7 @@ mod tests {
             let walls = object_triangles(&g.scene, 0);
             assert_eq!(walls.len(), 29_988);
             assert_eq!(n_open_edges(&walls), 0);
-            // Volume of the air: cells and passages, corners rounded to f32.
+            // Volume of the air: cells and passages, vertices rounded to f32.
             let rooms: f64 = g.truth.rooms.iter().map(|r| r.volume).sum();
             let holes: f64 = g
                 .truth

@@ -1,7 +1,7 @@
-//! Small buildings, each with one thing that simple methods get wrong.
+//! Small buildings, each with one feature that simple methods get wrong.
 //!
-//! All stand in the open: closed solids with outer faces, walls of 10-30 cm, slabs above and
-//! below. Floors are at height 0 unless a scene has storeys.
+//! All stand in the open: closed solids with outer faces, walls of 10-30 cm, slabs above and below. Floors
+//! are at height 0 unless a scene has storeys.
 
 use enfilade_geom::{Aabb, DVec3};
 
@@ -21,11 +21,11 @@ struct Carver {
     voids: Vec<Aabb>,
 }
 
-/// The side that no room is on.
+/// The side without a room.
 const OUT: Side = Side::Outside;
 
 impl Carver {
-    /// A building without parts, its first storey at height 0.
+    /// Makes a building without parts, its first storey at height 0.
     fn new(name: &str) -> Self {
         let mut site = Site::new(name);
         let material = site.material("plaster", [0.8, 0.78, 0.72]);
@@ -43,12 +43,12 @@ impl Carver {
         self.solids.push(aabb(min, max));
     }
 
-    /// A room that fills a box.
+    /// Adds a room that fills a box.
     fn room(&mut self, name: &str, min: [f64; 3], max: [f64; 3]) -> Side {
         self.rooms(name, &[aabb(min, max)], &[])
     }
 
-    /// A room of several boxes, with solids in it that are modelled elsewhere.
+    /// Adds a room of several boxes, with solids in it that are modelled elsewhere.
     fn rooms(&mut self, name: &str, air: &[Aabb], inside: &[(Aabb, f64)]) -> Side {
         self.voids.extend_from_slice(air);
         let parts = air.iter().map(Convex::of_aabb).collect();
@@ -56,7 +56,7 @@ impl Carver {
             .add_room(Room::new(name, self.storey, parts, inside))
     }
 
-    /// An opening across `axis` through the box from `min` to `max`.
+    /// Adds an opening across `axis` through the box from `min` to `max`.
     fn hole(
         &mut self,
         kind: OpeningKind,
@@ -70,8 +70,8 @@ impl Carver {
         self.site.opening(kind, hole, axis, rooms);
     }
 
-    /// A door of 0.9 × 2.05 m at floor level, across `axis` between the faces of a wall, its
-    /// middle `at` along the wall.
+    /// Adds a door of 0.9 × 2.05 m at floor level, across `axis` between the faces of a wall, its middle `at`
+    /// along the wall.
     fn door(&mut self, axis: usize, faces: [f64; 2], at: f64, rooms: [Side; 2]) {
         self.wide_door(axis, faces, at, [0.9, 2.05], rooms);
     }
@@ -94,7 +94,7 @@ impl Carver {
         self.hole(Door, axis, min, max, rooms);
     }
 
-    /// A window of 1.2 × 1.3 m, its sill 0.9 m above the floor.
+    /// Adds a window of 1.2 × 1.3 m, its sill 0.9 m above the floor.
     fn window(&mut self, axis: usize, faces: [f64; 2], at: f64, rooms: [Side; 2]) {
         let (low, high, sill) = (at - 0.6, at + 0.6, self.floor() + 0.9);
         let (min, max) = if axis == 0 {
@@ -109,7 +109,7 @@ impl Carver {
         if self.storey == 0 { 0.0 } else { UPPER_FLOOR }
     }
 
-    /// Models what was collected so far as one object, and starts another.
+    /// Models everything collected so far as one object, and starts another.
     fn flush(&mut self, name: &str) {
         let mut mesh = MeshBuilder::new(self.material);
         mesh.carved(
@@ -137,14 +137,14 @@ fn two_rooms_carved(name: &str) -> (Carver, [Side; 2]) {
     (c, [west, east])
 }
 
-/// Two rooms and the door between them; no way out.
+/// Two rooms and the door between them, without a way out.
 #[must_use]
 pub fn two_rooms() -> Generated {
     two_rooms_carved("two-rooms").0.finish()
 }
 
-/// [`two_rooms`], and a gap of `width` all along the top of the wall between them. The gap is a
-/// fault of the model and no opening in the truth. [Units: wu] [Limit: 0.0001 <= width <= 0.5]
+/// [`two_rooms`], with a gap of `width` all along the top of the wall between them. The gap is a fault of
+/// the model and not an opening in the truth. [Units: wu] [Limit: 0.0001 <= width <= 0.5]
 #[must_use]
 pub fn two_rooms_crack(width: f64) -> Generated {
     let (mut c, _) = two_rooms_carved("two-rooms-crack");
@@ -152,8 +152,8 @@ pub fn two_rooms_crack(width: f64) -> Generated {
     c.finish()
 }
 
-/// Two rooms, a door and a window, every wall, floor and ceiling a single rectangle without
-/// thickness. Corners of the door meet the floor in the middle of its edge.
+/// Two rooms, a door and a window; every wall, floor and ceiling is a single rectangle without thickness.
+/// Vertices of the door meet the floor in the middle of its edge.
 #[must_use]
 pub fn zero_thickness_rooms() -> Generated {
     let mut site = Site::new("zero-thickness-rooms");
@@ -179,7 +179,7 @@ pub fn zero_thickness_rooms() -> Generated {
     for (i, b) in boxes.iter().enumerate() {
         for axis in 0..3 {
             for high in [false, true] {
-                // The wall between the rooms comes once, with the west room.
+                // The wall between the rooms is added once, with the west room.
                 if i == 1 && axis == 0 && !high {
                     continue;
                 }
@@ -225,7 +225,7 @@ pub fn room_within_room() -> Generated {
     let mut c = Carver::new("room-within-room");
     c.solid([-0.3, -0.3, -0.3], [12.3, 4.3, 10.3]);
     let booth_box = aabb([4.0, 0.0, 3.0], [8.2, 2.7, 6.2]);
-    // The hall less the booth, as boxes around and above it.
+    // The hall without the booth, as boxes around and above it.
     let around = [
         aabb([0.0; 3], [4.0, 4.0, 10.0]),
         aabb([8.2, 0.0, 0.0], [12.0, 4.0, 10.0]),
@@ -329,7 +329,7 @@ pub fn rooms_with_closet() -> Generated {
     c.finish()
 }
 
-/// A corridor 2 m wide, parted by double doors of 1.8 m into three, with rooms on both sides.
+/// A corridor 2 m wide, divided by double doors of 1.8 m into three, with rooms on both sides.
 #[must_use]
 pub fn double_door_corridor() -> Generated {
     let mut c = Carver::new("double-door-corridor");

@@ -1,11 +1,11 @@
-//! Slow, plain checks that share no code with the kernels they judge.
+//! Slow, plain checks that share no code with the kernels under test.
 
 use std::collections::HashMap;
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, DVec3, Triangle, triangle_area_normal};
 
-/// World triangles of all structural objects.
+/// Returns the world triangles of all structural objects.
 #[must_use]
 pub fn structural_triangles(scene: &Scene) -> Vec<Triangle> {
     scene
@@ -14,7 +14,7 @@ pub fn structural_triangles(scene: &Scene) -> Vec<Triangle> {
         .collect()
 }
 
-/// World triangles of one object.
+/// Returns the world triangles of one object.
 #[must_use]
 pub fn object_triangles(scene: &Scene, object: usize) -> Vec<Triangle> {
     [Role::Structural, Role::Detail]
@@ -25,9 +25,9 @@ pub fn object_triangles(scene: &Scene, object: usize) -> Vec<Triangle> {
         .collect()
 }
 
-/// Number of directed edges that no opposite edge answers; 0 for closed, well-oriented surfaces.
+/// Returns the number of directed edges without an opposite edge; 0 for closed, well-oriented surfaces.
 ///
-/// Corners are the same when all bits are.
+/// Vertices are equal if all bits are.
 #[must_use]
 pub fn n_open_edges(triangles: &[Triangle]) -> usize {
     balance(triangles)
@@ -37,7 +37,7 @@ pub fn n_open_edges(triangles: &[Triangle]) -> usize {
 }
 
 fn bits(p: DVec3) -> [u64; 3] {
-    // Adding zero makes -0.0 and 0.0 one corner.
+    // Adding zero makes -0.0 and 0.0 one vertex.
     p.to_array().map(|x| (x + 0.0).to_bits())
 }
 
@@ -53,7 +53,7 @@ fn balance(triangles: &[Triangle]) -> HashMap<[[u64; 3]; 2], i64> {
     edges
 }
 
-/// Numbers of distinct corners and distinct undirected edges.
+/// Returns the numbers of distinct vertices and of distinct undirected edges.
 #[must_use]
 pub fn n_corners_and_edges(triangles: &[Triangle]) -> (usize, usize) {
     let corners: std::collections::HashSet<_> =
@@ -61,7 +61,7 @@ pub fn n_corners_and_edges(triangles: &[Triangle]) -> (usize, usize) {
     (corners.len(), balance(triangles).len())
 }
 
-/// Volume enclosed by a closed surface with outward faces; negative if they face inwards.
+/// Returns the volume enclosed by a closed surface with outward faces; negative if they face inwards.
 #[must_use]
 pub fn signed_volume(triangles: &[Triangle]) -> f64 {
     triangles
@@ -71,16 +71,16 @@ pub fn signed_volume(triangles: &[Triangle]) -> f64 {
         / 6.0
 }
 
-/// Whether the closed segment meets any triangle, edges included. O(triangles).
+/// Returns `true` if the closed segment meets any triangle, edges included. O(triangles).
 #[must_use]
 pub fn segment_is_blocked(triangles: &[Triangle], from: DVec3, to: DVec3) -> bool {
     first_hit(triangles, from, to).is_some()
 }
 
-/// Share of the segment passed at its first hit, with the index of the triangle. O(triangles).
+/// Returns the fraction of the segment before its first hit, with the index of the triangle. O(triangles).
 ///
-/// Möller and Trumbore 1997, in `f64`, widened by 1e-9 so that a seam between two triangles is
-/// never slipped through.
+/// Möller and Trumbore 1997, in `f64`, widened by 1e-9 so that no segment slips through a seam between two
+/// triangles.
 #[must_use]
 pub fn first_hit(triangles: &[Triangle], from: DVec3, to: DVec3) -> Option<(f64, usize)> {
     let along = to - from;
@@ -104,16 +104,16 @@ pub fn first_hit(triangles: &[Triangle], from: DVec3, to: DVec3) -> Option<(f64,
     best
 }
 
-/// How often outward-facing surfaces enclose `p`: positive in a solid, 0 in the open air, -1 in
-/// a cave that is modelled by its inner surface alone. O(triangles).
+/// Returns the number of times that outward-facing surfaces enclose `p`: positive in a solid, 0 in the open
+/// air, -1 in a cave that is modelled by its inner surface alone. O(triangles).
 ///
-/// Signed crossings along one ray, in a direction that no wall is built along.
+/// Signed crossings along one ray, in a direction that is not parallel to any wall.
 #[must_use]
 pub fn winding_number(triangles: &[Triangle], p: DVec3) -> i32 {
     let along = DVec3::new(0.301_511_3, 0.904_534_1, 0.301_931_7);
     let mut winding = 0;
     for t in triangles {
-        // Seen along the ray, does the triangle's projection hold the origin, and which way round?
+        // Containment of the origin in the triangle's projection along the ray, with orientation.
         let [a, b, c] = t.map(|q| q - p);
         let [u, v, w] = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n.dot(along));
         let front = u > 0.0 && v > 0.0 && w > 0.0;
@@ -128,7 +128,7 @@ pub fn winding_number(triangles: &[Triangle], p: DVec3) -> i32 {
 
 /// Air regions of a coarse voxel grid: voxels that no triangle touches, joined through faces.
 ///
-/// Rasterisation is conservative, so a region never leaks through a crack narrower than a voxel.
+/// Rasterization is conservative, so a region never leaks through a crack narrower than a voxel.
 #[derive(Clone, Debug)]
 pub struct FloodGrid {
     origin: DVec3,
@@ -141,7 +141,7 @@ const SOLID: u32 = u32::MAX;
 const UNSEEN: u32 = u32::MAX - 1;
 
 impl FloodGrid {
-    /// Floods the box `bounds` in voxels of side `voxel`.
+    /// Floods the box `bounds` in voxels of edge `voxel`.
     #[must_use]
     pub fn new(triangles: &[Triangle], bounds: Aabb, voxel: f64) -> Self {
         let n = (bounds.size() / voxel)
@@ -210,7 +210,7 @@ impl FloodGrid {
         }
     }
 
-    /// Region of the voxel that holds `p`; `None` where a triangle touches it, or off the grid.
+    /// Returns the region of the voxel that contains `p`; `None` if a triangle touches it, or off the grid.
     #[must_use]
     pub fn region_at(&self, p: DVec3) -> Option<u32> {
         let c = ((p - self.origin) / self.voxel).floor();
@@ -223,7 +223,7 @@ impl FloodGrid {
     }
 }
 
-/// Whether a triangle meets a cube: no separating axis among the 13 candidates.
+/// Returns `true` if a triangle meets a cube, so that none of the 13 candidate axes separates them.
 fn touches_cube(t: &Triangle, center: DVec3, half: f64) -> bool {
     let c = t.map(|p| p - center);
     let separates = |axis: DVec3| {

@@ -1,10 +1,10 @@
-//! A small repeatable random generator: PCG-XSH-RR 64/32 (O'Neill 2014, "PCG: A Family of Simple
+//! A small reproducible random generator: PCG-XSH-RR 64/32 (O'Neill 2014, "PCG: A Family of Simple
 //! Fast Space-Efficient Statistically Good Algorithms for Random Number Generation").
 //!
-//! Scenes must come out the same on every machine and for every version of any dependency, so
-//! the generator is written out here.
+//! Scenes must be equal on every machine and for every version of any dependency, so the generator is
+//! implemented here.
 
-/// Repeatable random numbers.
+/// A reproducible random generator.
 #[derive(Clone, Debug)]
 pub struct Rng {
     state: u64,
@@ -14,7 +14,7 @@ const MULTIPLIER: u64 = 6_364_136_223_846_793_005;
 const INCREMENT: u64 = 1_442_695_040_888_963_407;
 
 impl Rng {
-    /// The generator of `seed`.
+    /// Makes the generator of `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut rng = Self {
@@ -24,13 +24,13 @@ impl Rng {
         rng
     }
 
-    /// The generator of `seed` and a `stream`, so that parts of a scene do not disturb each other.
+    /// Makes the generator of `seed` and a `stream`, so that parts of a scene are independent.
     #[must_use]
     pub fn stream(seed: u64, stream: u64) -> Self {
         Self::new(seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(17))
     }
 
-    /// Any `u32`.
+    /// Returns any `u32`.
     pub fn next_u32(&mut self) -> u32 {
         let old = self.state;
         self.state = old.wrapping_mul(MULTIPLIER).wrapping_add(INCREMENT);
@@ -38,27 +38,27 @@ impl Rng {
         xored.rotate_right((old >> 59) as u32)
     }
 
-    /// A number in `0.0..1.0`.
+    /// Returns a number in `0.0..1.0`.
     pub fn unit(&mut self) -> f64 {
         f64::from(self.next_u32()) / 4_294_967_296.0
     }
 
-    /// A number in `low..high`.
+    /// Returns a number in `low..high`.
     pub fn range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// An index in `0..n`. `n` is above 0 and below 2³².
+    /// Returns an index in `0..n`. `n` must be above 0 and below 2³².
     pub fn below(&mut self, n: usize) -> usize {
         ((u64::from(self.next_u32()) * n as u64) >> 32) as usize
     }
 
-    /// `true` with probability `p`.
+    /// Returns `true` with probability `p`.
     pub fn chance(&mut self, p: f64) -> bool {
         self.unit() < p
     }
 
-    /// Puts `items` into a random order (Fisher and Yates).
+    /// Shuffles `items` (Fisher and Yates).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, self.below(i + 1));

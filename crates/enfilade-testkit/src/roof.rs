@@ -6,12 +6,12 @@ use crate::site::Site;
 use crate::solid::{MeshBuilder, aabb};
 use crate::truth::Convex;
 
-/// Measures of a roof whose ridge runs along x, over a house with one corner at the origin.
+/// Dimensions of a roof whose ridge runs along x, over a house with its minimum x and z at the origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GableRoof {
-    /// Outer measure along x. [Units: wu]
+    /// Outer size along x. [Units: wu]
     pub(crate) length: f64,
-    /// Outer measure along z. [Units: wu]
+    /// Outer size along z. [Units: wu]
     pub(crate) depth: f64,
     /// Thickness of the walls. [Units: wu]
     pub(crate) wall: f64,
@@ -25,21 +25,21 @@ pub(crate) struct GableRoof {
     pub(crate) window: Option<[f64; 2]>,
 }
 
-/// Vertical thickness of the roof, and how far it overhangs. [Units: wu]
+/// Vertical thickness of the roof, and its overhang. [Units: wu]
 const THICKNESS: f64 = 0.3;
 const OVERHANG: f64 = 0.5;
 
-/// How far walls reach into the roof, so that no gap is left where they meet. [Units: wu]
+/// Overlap of walls with the roof, so that no gap is left where they meet. [Units: wu]
 const BURIED: f64 = 0.02;
 
 impl GableRoof {
-    /// Height of the underside at `z`. [Units: wu]
+    /// Returns the height of the underside at `z`. [Units: wu]
     fn underside(&self, z: f64) -> f64 {
         let middle = self.depth * 0.5;
         self.eaves + self.slope * (middle - self.wall - (z - middle).abs())
     }
 
-    /// The air below the roof.
+    /// Returns the air below the roof.
     pub(crate) fn loft(&self) -> Convex {
         let (low, high) = (self.wall, self.depth - self.wall);
         let section = [
@@ -53,7 +53,7 @@ impl GableRoof {
         Convex::prism(&section, DVec3::X * (self.length - 2.0 * self.wall))
     }
 
-    /// The holes of the windows in the west and the east gable; flat where there are none.
+    /// Returns the holes of the windows in the west and the east gable; flat if there are none.
     pub(crate) fn gable_windows(&self) -> [Aabb; 2] {
         let middle = self.depth * 0.5;
         let [low, high] = self.window.unwrap_or([self.eaves; 2]);

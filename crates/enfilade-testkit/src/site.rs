@@ -6,7 +6,7 @@ use enfilade_geom::{Aabb, DMat4, DVec3};
 use crate::solid::MeshBuilder;
 use crate::truth::{Convex, Opening, OpeningKind, Room, Side, Truth};
 
-/// A generated scene and what it holds by construction.
+/// A generated scene and its truth by construction.
 #[derive(Clone, Debug, Default)]
 pub struct Generated {
     /// The scene.
@@ -16,7 +16,7 @@ pub struct Generated {
 }
 
 impl Generated {
-    /// Number of triangles of the objects with `role`.
+    /// Returns the number of triangles of the objects with `role`.
     #[must_use]
     pub fn n_triangles(&self, role: Role) -> usize {
         let per_mesh: Vec<usize> = self
@@ -29,13 +29,13 @@ impl Generated {
         objects.map(|o| per_mesh[o.mesh as usize]).sum()
     }
 
-    /// The truth as `truth.json`.
+    /// Returns the truth as `truth.json`.
     #[must_use]
     pub fn truth_json(&self) -> String {
         self.truth.to_json(self.n_triangles(Role::Structural))
     }
 
-    /// The scene with objects of `role` only, and only the meshes they place.
+    /// Returns the scene with objects of `role` only, and only the meshes that they place.
     #[must_use]
     pub fn only(&self, role: Role) -> Scene {
         let mut scene = self.scene.clone();
@@ -54,7 +54,7 @@ impl Generated {
     }
 }
 
-/// Builds a scene and its truth side by side, so that neither can forget the other.
+/// Builds a scene and its truth side by side, so that they stay consistent.
 #[derive(Clone, Debug, Default)]
 pub struct Site {
     generated: Generated,
@@ -62,7 +62,7 @@ pub struct Site {
 }
 
 impl Site {
-    /// An empty site.
+    /// Makes an empty site.
     #[must_use]
     pub fn new(name: &str) -> Self {
         let mut site = Self::default();
@@ -95,7 +95,7 @@ impl Site {
         })
     }
 
-    /// Adds a material with a texture, repeated; faces get one texture repeat a meter.
+    /// Adds a material with a repeated texture; one repeat per meter.
     pub fn textured_material(&mut self, name: &str, png: Vec<u8>) -> u32 {
         let scene = &mut self.generated.scene;
         let image = scene.images.len() as u32;
@@ -160,7 +160,7 @@ impl Site {
         self.generated.scene.meshes.len() as u32 - 1
     }
 
-    /// Adds a structural object that is modelled in place. Nothing happens for an empty mesh.
+    /// Adds a structural object that is modelled in place. Ignores an empty mesh.
     pub fn structure(&mut self, name: &str, builder: MeshBuilder) {
         if builder.n_triangles() > 0 {
             let mesh = self.mesh(name, builder);
@@ -168,7 +168,7 @@ impl Site {
         }
     }
 
-    /// Adds a detail object that is modelled in place. Nothing happens for an empty mesh.
+    /// Adds a detail object that is modelled in place. Ignores an empty mesh.
     pub fn detail(&mut self, name: &str, builder: MeshBuilder) {
         if builder.n_triangles() > 0 {
             let mesh = self.mesh(name, builder);
@@ -176,7 +176,7 @@ impl Site {
         }
     }
 
-    /// Stands a mesh as a detail object at `at`, turned by `yaw` degrees about +Y.
+    /// Places a mesh as a detail object at `at`, rotated by `yaw` degrees about +Y.
     pub fn furnish(&mut self, name: &str, mesh: u32, at: DVec3, yaw: f64) {
         let turned = DMat4::from_rotation_y(yaw.to_radians());
         self.place(
@@ -200,13 +200,13 @@ impl Site {
         });
     }
 
-    /// Adds a storey and gives its index.
+    /// Adds a storey and returns its index.
     pub fn storey(&mut self, name: &str, elevation: f64) -> usize {
         self.generated.truth.storeys.push((name.into(), elevation));
         self.generated.truth.storeys.len() - 1
     }
 
-    /// Adds a room to the truth that is one box.
+    /// Adds a room of one box to the truth.
     pub fn room(&mut self, name: &str, storey: usize, air: Aabb) -> Side {
         self.add_room(Room::new(name, storey, vec![Convex::of_aabb(&air)], &[]))
     }
@@ -217,8 +217,8 @@ impl Site {
         Side::Room(self.generated.truth.rooms.len() - 1)
     }
 
-    /// Adds an opening to the truth: the air box `hole` across `axis` (0, 1, 2 for x, y, z),
-    /// `rooms` in ascending order along it.
+    /// Adds an opening to the truth: the air box `hole` across `axis` (0, 1, 2 for x, y, z), `rooms` in
+    /// ascending order along it.
     pub fn opening(&mut self, kind: OpeningKind, hole: Aabb, axis: usize, rooms: [Side; 2]) {
         let truth = &mut self.generated.truth;
         let label = |s: Side| match s {
@@ -242,12 +242,12 @@ impl Site {
         self.generated.truth.openings.push(opening);
     }
 
-    /// Adds a point to the truth that lies in matter.
+    /// Adds a point in solid matter to the truth.
     pub fn matter(&mut self, point: DVec3) {
         self.generated.truth.matter.push(point);
     }
 
-    /// The scene and its truth.
+    /// Returns the scene and its truth.
     #[must_use]
     pub fn finish(self) -> Generated {
         self.generated

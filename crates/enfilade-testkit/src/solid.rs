@@ -1,26 +1,26 @@
 //! A small solid modeller: boxes with rectangular holes, prisms, stairs, spheres.
 //!
-//! Every solid comes out closed, with outward counter-clockwise faces: each directed edge of its
-//! triangles is met by the opposite one. Within one solid there are no T-junctions.
+//! Every solid is closed, with outward counter-clockwise faces: each directed edge of its triangles has an
+//! opposite one. Within one solid there are no T-junctions.
 
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DVec2, DVec3};
 
-/// Lengths closer than this are one coordinate. [Units: wu]
+/// Lengths closer than this are equal. [Units: wu]
 ///
-/// A tenth of a millimeter: far below any wall or crack we model, far above rounding in `f64`
-/// and, in scenes up to a kilometer, above the spacing of `f32`.
+/// A tenth of a millimeter: far below any wall or crack in our models, far above rounding in `f64` and, in
+/// scenes up to a kilometer, above the spacing of `f32`.
 const SNAP: f64 = 1e-4;
 
-/// `x` on the grid of `SNAP`, so that neighbors that compute a coordinate in different ways
-/// still share it to the last bit.
+/// Rounds `x` to the grid of `SNAP`, so that neighbors that compute a coordinate in different ways still
+/// share it to the last bit.
 #[must_use]
 pub fn snapped(x: f64) -> f64 {
     // Divide by the exact reciprocal: 0.3 then is the double nearest to 0.3.
     (x / SNAP).round() / (1.0 / SNAP)
 }
 
-/// The box from `min` to `max`, written as arrays.
+/// Makes the box from `min` to `max`, given as arrays.
 #[must_use]
 pub fn aabb(min: [f64; 3], max: [f64; 3]) -> Aabb {
     Aabb::new(DVec3::from_array(min), DVec3::from_array(max))
@@ -35,7 +35,7 @@ pub struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// An empty mesh whose faces get `material`.
+    /// Makes an empty mesh whose faces get `material`.
     #[must_use]
     pub fn new(material: u32) -> Self {
         Self {
@@ -51,26 +51,26 @@ impl MeshBuilder {
         self
     }
 
-    /// Sets another material for those faces to come that look straight up.
+    /// Sets another material for those later faces that face straight up.
     pub fn paint_top(&mut self, material: u32) -> &mut Self {
         self.top_material = Some(material);
         self
     }
 
-    /// Number of triangles so far.
+    /// Returns the number of triangles so far.
     #[must_use]
     pub fn n_triangles(&self) -> usize {
         self.parts.iter().map(|(_, p)| p.indices.len() / 3).sum()
     }
 
-    /// Adds a planar convex polygon, counter-clockwise seen from its front. [Limit: >= 3 corners]
+    /// Adds a planar convex polygon, counter-clockwise seen from its front. [Limit: >= 3 vertices]
     pub fn convex(&mut self, corners: &[DVec3]) -> &mut Self {
         let fan: Vec<[usize; 3]> = (2..corners.len()).map(|i| [0, i - 1, i]).collect();
         self.face(corners, &fan)
     }
 
-    /// Adds a planar simple polygon, counter-clockwise seen from its front; may be concave and
-    /// have corners in the middle of straight edges.
+    /// Adds a planar simple polygon, counter-clockwise seen from its front; may be concave and have vertices in
+    /// the middle of straight edges.
     pub fn polygon(&mut self, corners: &[DVec3]) -> &mut Self {
         let triangles = triangulate(corners);
         self.face(corners, &triangles)
@@ -108,12 +108,11 @@ impl MeshBuilder {
         self.carved(&[b], &[])
     }
 
-    /// Adds the union of the boxes `solids` less the boxes `voids`, closed and free of
-    /// T-junctions.
+    /// Adds the union of the boxes `solids` minus the boxes `voids`, closed and free of T-junctions.
     ///
-    /// Faces are cut along every plane of every box, which suits walls with a few openings and
-    /// small buildings; work grows with the product of the numbers of planes along the axes.
-    /// Two parts that touch along an edge only make an edge of four triangles.
+    /// Faces are cut along every plane of every box, which suits walls with a few openings and small buildings;
+    /// the work grows with the product of the numbers of planes along the axes. Two parts that touch only along
+    /// an edge share an edge of four triangles.
     pub fn carved(&mut self, solids: &[Aabb], voids: &[Aabb]) -> &mut Self {
         let cuts: [Vec<f64>; 3] = [0, 1, 2].map(|axis| {
             let bounds = solids.iter().fold(Aabb::EMPTY, |b, s| b.union(*s));
@@ -181,8 +180,8 @@ impl MeshBuilder {
         self
     }
 
-    /// Adds a rectangle without thickness, `face` being flat across `axis`, less `holes`, which
-    /// are cut like [`MeshBuilder::carved`] cuts. It looks along the axis, or against it.
+    /// Adds a rectangle without thickness, `face` being flat across `axis`, minus `holes`, which are cut as in
+    /// [`MeshBuilder::carved`]. It faces along the axis, or against it.
     pub fn sheet(&mut self, face: Aabb, axis: usize, along: bool, holes: &[Aabb]) -> &mut Self {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let cuts = [u, v].map(|a: usize| {
@@ -255,7 +254,7 @@ impl MeshBuilder {
         self.prism(&profile, DVec3::Y * (high - low))
     }
 
-    /// Adds an icosahedron (20 triangles) with corners at `radius`, scaled along the axes.
+    /// Adds an icosahedron (20 triangles) with vertices at `radius`, scaled along the axes.
     pub fn icosahedron(&mut self, center: DVec3, radius: DVec3) -> &mut Self {
         let (corners, faces) = icosahedron();
         for f in faces {
@@ -266,9 +265,9 @@ impl MeshBuilder {
 
     /// Adds a straight flight of stairs.
     ///
-    /// Treads rise from `foot` (middle of the lowest edge) towards `uphill` (unit, level):
-    /// `n` risers of `riser` each, `n - 1` treads of `going`, so the top riser meets the upper
-    /// floor. The soffit runs `waist` below the steps. [Limit: n >= 2]
+    /// Treads rise from `foot` (middle of the lowest edge) towards `uphill` (unit, level): `n` risers of
+    /// `riser` each, `n - 1` treads of `going`, so the top riser meets the upper floor. The soffit runs `waist`
+    /// below the steps. [Limit: n >= 2]
     pub fn flight(&mut self, foot: DVec3, uphill: DVec3, width: f64, steps: &Steps) -> &mut Self {
         let point = |run: f64, rise: f64| foot + uphill * run + DVec3::Y * rise;
         let slope = steps.riser / steps.going;
@@ -280,7 +279,7 @@ impl MeshBuilder {
             profile.push(point((i + 1) as f64 * steps.going, rise));
         }
         profile.push(point(run, slope * run - steps.waist));
-        // Where the soffit comes out of the lower floor.
+        // Point where the soffit comes out of the lower floor.
         profile.push(point((steps.waist / slope).min(run * 0.5), 0.0));
         let side = DVec3::Y.cross(uphill) * width;
         for p in &mut profile {
@@ -289,8 +288,8 @@ impl MeshBuilder {
         self.prism(&profile, side)
     }
 
-    /// The finished mesh. Primitives whose material is in `textured` get texture coordinates:
-    /// one unit a meter, projected along the axis that each face looks along most.
+    /// Returns the finished mesh. Primitives whose material is in `textured` get texture coordinates: one unit
+    /// per meter, projected along the dominant axis of each face.
     #[must_use]
     pub fn build(self, name: &str, textured: &[u32]) -> Mesh {
         let mut primitives: Vec<Primitive> = self.parts.into_iter().map(|(_, p)| p).collect();
@@ -306,7 +305,7 @@ impl MeshBuilder {
     }
 }
 
-/// Measures of a flight of stairs.
+/// Dimensions of a flight of stairs.
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
     /// Number of risers, the one up to the next floor included.
@@ -315,18 +314,18 @@ pub struct Steps {
     pub riser: f64,
     /// Depth of a tread. [Units: wu]
     pub going: f64,
-    /// Height of the body below the inner corners of the steps. [Units: wu]
+    /// Height of the body below the inner edges of the steps. [Units: wu]
     pub waist: f64,
 }
 
 impl Steps {
-    /// Length of the flight on plan. [Units: wu]
+    /// Returns the length of the flight in plan. [Units: wu]
     #[must_use]
     pub fn run(&self) -> f64 {
         (self.n - 1) as f64 * self.going
     }
 
-    /// Volume of the part of a flight of `width` that lies below the height `top`. [Units: wu³]
+    /// Returns the volume of the part of a flight of `width` below the height `top`. [Units: wu³]
     #[must_use]
     pub fn volume_below(&self, width: f64, top: f64) -> f64 {
         let soffit = |run: f64| (run * self.riser / self.going - self.waist).max(0.0);
@@ -353,7 +352,7 @@ fn planar_uv((p, n): (&[f32; 3], &[f32; 3])) -> [f32; 2] {
     }
 }
 
-/// Twice the area-weighted normal of a planar polygon.
+/// Returns the normal of a planar polygon with twice its area as length.
 pub(crate) fn newell(corners: &[DVec3]) -> DVec3 {
     let first = corners[0];
     (2..corners.len())
@@ -361,15 +360,15 @@ pub(crate) fn newell(corners: &[DVec3]) -> DVec3 {
         .sum()
 }
 
-/// Triangles (corner indices) of a planar simple polygon, in its own turning sense.
+/// Returns the triangles (vertex indices) of a planar simple polygon, in its own orientation.
 ///
-/// Ear clipping, each time the ear with the largest least height, so that walls do not fall into
-/// needles where another choice exists. Corners in the middle of straight edges are kept: none
-/// ends up on the side of a triangle. O(n³), n is the number of corners of a wall.
+/// Ear clipping, each time the ear with the largest least height, so that walls do not fall into needles if
+/// there is another choice. Vertices in the middle of straight edges are kept: none ends up on the side of a
+/// triangle. O(n³) in the number of vertices of a wall.
 #[must_use]
 pub fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let normal = newell(corners);
-    // Drop the axis along which the polygon looks most, keeping the turning sense.
+    // Drop the dominant axis of the normal, keeping the orientation.
     let axis = [0, 1, 2]
         .into_iter()
         .max_by(|&a: &usize, &b: &usize| normal[a].abs().total_cmp(&normal[b].abs()));
@@ -384,7 +383,7 @@ pub fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let scale = flat
         .iter()
         .fold(0.0_f64, |m, p| m.max((*p - flat[0]).length_squared()));
-    // Twice the area below which three corners count as lying on a line.
+    // Twice the area below which three vertices count as collinear.
     let flatness = scale * 1e-12;
 
     let mut left: Vec<usize> = (0..corners.len()).collect();
@@ -415,7 +414,7 @@ pub fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
                 best = Some((height, i));
             }
         }
-        // Only a polygon that is not simple has no ear; clipping any corner still ends.
+        // Only a polygon that is not simple has no ear; clipping any vertex still terminates.
         let i = best.map_or(0, |(_, i)| i);
         triangles.push([left[(i + n - 1) % n], left[i], left[(i + 1) % n]]);
         left.remove(i);
@@ -426,7 +425,7 @@ pub fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// Unit corners and outward faces of an icosahedron.
+/// Returns unit vertices and outward faces of an icosahedron.
 #[must_use]
 pub fn icosahedron() -> ([DVec3; 12], [[usize; 3]; 20]) {
     let p = f64::midpoint(1.0, 5.0_f64.sqrt());
@@ -447,8 +446,8 @@ pub fn icosahedron() -> ([DVec3; 12], [[usize; 3]; 20]) {
     .map(|c| DVec3::from_array(c).normalize());
     let mut faces = [[0; 3]; 20];
     let mut n = 0;
-    // Faces are the triples of mutually nearest corners; listing them by search leaves no table
-    // to mistype. 1.2 lies between the edge (1.05) and the next distance (1.70).
+    // Faces are the triples of mutually nearest vertices; finding them avoids a table with typing errors.
+    // 1.2 lies between the edge (1.05) and the next distance (1.70).
     let near = |a: usize, b: usize| corners[a].distance(corners[b]) < 1.2;
     for a in 0..12 {
         for b in a + 1..12 {

@@ -1,4 +1,4 @@
-//! The surface of a field's inside, as triangles.
+//! Triangulated surface of a field's inside.
 
 use std::collections::HashMap;
 
@@ -7,12 +7,12 @@ use enfilade_geom::{Aabb, DVec3};
 
 use crate::solid::newell;
 
-/// Naive surface nets (Gibson 1998, "Constrained elastic surface nets"): a corner in each cell of a grid
-/// that the surface passes, at the mean of its crossings with the cell's edges; a quadrangle for each
-/// edge of the grid that it crosses.
+/// Naive surface nets (Gibson 1998, "Constrained elastic surface nets"): a vertex in each cell of a grid that
+/// the surface passes, at the mean of its crossings with the cell's edges; a quadrangle for each edge of the
+/// grid that it crosses.
 ///
-/// `field` is negative in the air, which the faces look at; `bounds` lie around the air with a cell to spare.
-/// `grid` is the side of a cell. [Units: wu]
+/// `field` is negative in the air, which the faces face; `bounds` contains the air with a margin of one cell.
+/// `grid` is the size of a cell. [Units: wu]
 pub(crate) fn surface_net(
     field: impl Fn(DVec3) -> f64,
     bounds: Aabb,

@@ -19,12 +19,11 @@ pub use params::TowerParams;
 
 /// An office tower that stands in the open.
 ///
-/// Storeys of one or more wings: a corridor of 2 m with rooms of varied width on both sides,
-/// joined by a cross corridor where there are several wings. Walls are closed solids (facade
-/// 30 cm, corridors 15 cm, partitions 12 cm), floors are slabs of 25 cm with holes for the
-/// flights of the stairwells. The first room of each wing's north row is its stairwell.
-/// 85 to 150 structural triangles a room, the fewer the more rooms lie inside. O(rooms) time and
-/// memory.
+/// Storeys of one or more wings: a corridor of 2 m with rooms of varied width on both sides, joined by a
+/// cross corridor if there are several wings. Walls are closed solids (facade 30 cm, corridors 15 cm,
+/// partitions 12 cm), floors are slabs of 25 cm with holes for the flights of the stairwells. The first room
+/// of each wing's north row is its stairwell. 85 to 150 structural triangles per room, the fewer the more
+/// rooms lie inside. O(rooms) time and memory.
 #[must_use]
 pub fn office_tower(params: &TowerParams) -> Generated {
     let mut site = Site::new("office-tower");
@@ -42,7 +41,7 @@ pub fn office_tower(params: &TowerParams) -> Generated {
     // Dealt out one by one, so that no row is longer than another by more than one office.
     let mut rows = vec![[0, 0]; n_wings];
     for i in 0..offices {
-        // Rows with a stairwell are full last.
+        // Rows with a stairwell fill up last.
         rows[i / 2 % n_wings][(i + 1) % 2] += 1;
     }
     let longest = rows.iter().flatten().copied().max().unwrap_or(1).max(1);
@@ -80,7 +79,7 @@ const STEPS: Steps = Steps {
     going: 0.27,
     waist: 0.16,
 };
-/// How far into the stairwell the flight begins; there is a landing at both ends. [Units: wu]
+/// Start of the flight within the stairwell; there is a landing at both ends. [Units: wu]
 const LANDING: f64 = 0.8;
 
 impl Tower<'_> {
@@ -106,7 +105,7 @@ impl Tower<'_> {
         }
     }
 
-    /// Adds a storey over one with the stairwells `below`; returns its own.
+    /// Adds a storey above one with the stairwells `below`; returns its own stairwells.
     fn add_storey(&mut self, s: usize, has_flight: bool, below: &[Side]) -> Vec<Side> {
         let floor = s as f64 * STOREY;
         let storey = self.site.storey(&format!("storey {s}"), floor);
@@ -161,18 +160,18 @@ impl Tower<'_> {
         self.site.structure(&format!("slab {s}"), slab);
     }
 
-    /// Extent of a flight along x: against the stairwell's west wall. [Units: wu]
+    /// Returns the extent of a flight along x, at the stairwell's west wall. [Units: wu]
     fn flight_x(&self) -> [f64; 2] {
         [self.row_start, self.row_start + 1.3]
     }
 
-    /// The hole in the slab below `floor` that a flight comes up through.
+    /// Returns the hole for a flight in the slab below `floor`.
     fn stair_hole(&self, w: usize, floor: f64) -> Aabb {
         let (x, z) = (self.flight_x(), Self::wing_start(w) + LANDING);
         aabb([x[0], floor - SLAB, z], [x[1], floor, z + 3.6])
     }
 
-    /// A flight up from a storey; returns the box that it stands in, and how much of that it fills.
+    /// Adds a flight up from a storey; returns its bounding box, and the volume of it that the flight fills.
     fn add_flight(&mut self, s: usize, w: usize) -> (Aabb, f64) {
         let (x, floor) = (self.flight_x(), s as f64 * STOREY);
         let (width, start) = (x[1] - x[0], Self::wing_start(w) + LANDING);

@@ -1,11 +1,11 @@
-//! The same scene another way: turned, scaled, its triangles in another order.
+//! Transformed copies of a scene: rotated, scaled, reordered.
 
 use enfilade_geom::{DMat4, DVec3};
 
 use crate::rng::Rng;
 use crate::site::Generated;
 
-/// The scene moved by a rotation, uniform scaling and translation. Meshes stay as they are.
+/// Moves a scene by a rotation, uniform scaling and translation. Leaves meshes unchanged.
 #[must_use]
 pub fn transformed(mut generated: Generated, by: &DMat4) -> Generated {
     for o in &mut generated.scene.objects {
@@ -15,20 +15,20 @@ pub fn transformed(mut generated: Generated, by: &DMat4) -> Generated {
     generated
 }
 
-/// The scene turned about +Y.
+/// Rotates a scene about +Y.
 #[must_use]
 pub fn rotated(generated: Generated, degrees: f64) -> Generated {
     transformed(generated, &DMat4::from_rotation_y(degrees.to_radians()))
 }
 
-/// The scene scaled about the origin.
+/// Scales a scene about the origin.
 #[must_use]
 pub fn scaled(generated: Generated, factor: f64) -> Generated {
     transformed(generated, &DMat4::from_scale(DVec3::splat(factor)))
 }
 
-/// The scene with its objects, and the triangles within each part, in another order; triangles
-/// also start at another of their corners. The truth stays.
+/// Shuffles the objects of a scene, and the triangles within each part; triangles also start at another of
+/// their vertices. The truth stays the same.
 #[must_use]
 pub fn shuffled(mut generated: Generated, seed: u64) -> Generated {
     let mut rng = Rng::new(seed);
@@ -53,14 +53,14 @@ pub fn shuffled(mut generated: Generated, seed: u64) -> Generated {
     generated
 }
 
-/// [`shuffled`], and the vertices of each part in another order, too: the same scene as another program might write it.
+/// As [`shuffled`], also with the vertices of each part in another order: the same scene as written by another program.
 #[must_use]
 pub fn reordered(generated: Generated, seed: u64) -> Generated {
     let mut generated = shuffled(generated, seed);
     let mut rng = Rng::new(seed ^ 0x5eed);
     let meshes = generated.scene.meshes.iter_mut();
     for p in meshes.flat_map(|m| &mut m.primitives) {
-        // By new number the old one, and the other way round.
+        // Old index by new index, and the inverse.
         let mut old: Vec<usize> = (0..p.positions.len()).collect();
         rng.shuffle(&mut old);
         let mut new = vec![0; old.len()];

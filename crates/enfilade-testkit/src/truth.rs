@@ -1,4 +1,4 @@
-//! What a generated scene holds by construction: its rooms and openings.
+//! Truth of a generated scene by construction: its rooms and openings.
 
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
@@ -16,7 +16,7 @@ pub struct Truth {
     pub openings: Vec<Opening>,
     /// Storeys as name and height of the floor, ascending. [Units: wu]
     pub storeys: Vec<(String, f64)>,
-    /// Points inside closed solids that might be taken for rooms.
+    /// Points inside closed solids that might be mistaken for rooms.
     pub matter: Vec<DVec3>,
 }
 
@@ -27,30 +27,30 @@ pub struct Room {
     pub name: String,
     /// Index into [`Truth::storeys`].
     pub storey: usize,
-    /// Convex parts that the room consists of. For caverns, whose rooms narrow gradually into
-    /// passages, parts well inside it.
+    /// Convex parts of the room. For caverns, whose rooms narrow gradually into passages, parts well inside
+    /// it.
     pub parts: Vec<Convex>,
-    /// Volume of its free air, door reveals left out. [Units: wu³]
+    /// Volume of its free air, without door reveals. [Units: wu³]
     pub volume: f64,
     /// Points well inside: in a part and away from every solid.
     pub sample_points: Vec<DVec3>,
 }
 
-/// What an opening is.
+/// Kind of an opening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum OpeningKind {
-    /// To walk through, with or without a leaf.
+    /// Walked through, with or without a leaf.
     Door,
     /// Above a parapet, or glazed.
     Window,
     /// Another hole: passage, stair hole, hatch, cave neck.
     Opening,
-    /// No wall at all between two parts of an open plan.
+    /// An open boundary without a wall, between two parts of an open plan.
     Virtual,
 }
 
 impl OpeningKind {
-    /// The word that `truth.json` uses.
+    /// Returns the word used in `truth.json`.
     #[must_use]
     pub fn as_str(self) -> &'static str {
         match self {
@@ -62,7 +62,7 @@ impl OpeningKind {
     }
 }
 
-/// What lies on one side of an opening.
+/// One side of an opening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Side {
     /// Index into [`Truth::rooms`].
@@ -74,7 +74,7 @@ pub enum Side {
 /// An opening between two rooms, or to the outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opening {
-    /// What it is.
+    /// Its kind.
     pub kind: OpeningKind,
     /// Name, unique in the scene.
     pub name: String,
@@ -90,21 +90,21 @@ pub struct Opening {
     pub thickness: f64,
     /// Rectangle at mid-wall, counter-clockwise seen from `rooms[1]`.
     pub corners: [DVec3; 4],
-    /// What lies on the side that the normal leaves, and on the side that it points to.
+    /// The side that the normal leaves, and the side that it points to.
     pub rooms: [Side; 2],
 }
 
 /// A closed convex polyhedron, faces counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Convex {
-    /// Corner positions. [Units: wu]
+    /// Vertex positions. [Units: wu]
     pub corners: Vec<DVec3>,
     /// Faces as loops of indices into `corners`.
     pub faces: Vec<Vec<u32>>,
 }
 
 impl Convex {
-    /// A box.
+    /// Makes a box.
     #[must_use]
     pub fn of_aabb(b: &Aabb) -> Self {
         let profile = [
@@ -116,7 +116,7 @@ impl Convex {
         Self::prism(&profile, DVec3::Y * (b.max.y - b.min.y))
     }
 
-    /// The prism over a planar convex polygon, swept by `along`.
+    /// Makes the prism over a planar convex polygon, swept by `along`.
     #[must_use]
     pub fn prism(profile: &[DVec3], along: DVec3) -> Self {
         let mut base = profile.to_vec();
@@ -134,7 +134,7 @@ impl Convex {
         }
     }
 
-    /// A polyhedron with its corners on an ellipsoid: 16 meridians, 7 parallels and the poles.
+    /// Makes a polyhedron with its vertices on an ellipsoid: 16 meridians, 7 parallels and the poles.
     #[must_use]
     pub fn ellipsoid(center: DVec3, radii: DVec3) -> Self {
         const MERIDIANS: u32 = 16;
@@ -168,7 +168,7 @@ impl Convex {
         Self { corners, faces }
     }
 
-    /// Outward unit normal of each face with a point on it.
+    /// Returns a point and the outward unit normal of each face.
     fn planes(&self) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
         self.faces.iter().map(|f| {
             let loop_: Vec<DVec3> = f.iter().map(|&i| self.corners[i as usize]).collect();
@@ -176,14 +176,14 @@ impl Convex {
         })
     }
 
-    /// Whether `p` lies inside, at least `margin` from every face.
+    /// Returns `true` if `p` lies inside, at least `margin` from every face.
     #[must_use]
     pub fn contains(&self, p: DVec3, margin: f64) -> bool {
         self.planes()
             .all(|(normal, on)| normal.dot(p - on) <= -margin)
     }
 
-    /// The faces as triangles of corner indices.
+    /// Returns the faces as triangles of vertex indices.
     #[must_use]
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let fan = |f: &Vec<u32>| {
@@ -194,7 +194,7 @@ impl Convex {
         self.faces.iter().flat_map(fan).collect()
     }
 
-    /// Volume. [Units: wu³]
+    /// Returns the volume. [Units: wu³]
     #[must_use]
     pub fn volume(&self) -> f64 {
         let corner = |i: u32| self.corners[i as usize];
@@ -206,21 +206,21 @@ impl Convex {
         six / 6.0
     }
 
-    /// Smallest box around it.
+    /// Returns the smallest box around it.
     #[must_use]
     pub fn aabb(&self) -> Aabb {
         Aabb::of_points(&self.corners)
     }
 }
 
-/// Most sample points of a room, as in the shared scenes' truth.
+/// Maximum number of sample points of a room, as in the shared scenes' truth.
 const N_SAMPLES: usize = 30;
 
-/// Distance of sample points from the room's surface, where the room allows. [Units: wu]
+/// Distance of sample points from the room's surface, if the room allows. [Units: wu]
 const SAMPLE_MARGIN: f64 = 0.2;
 
 impl Room {
-    /// A room of `parts` that do not overlap, less `solids` that stand in it.
+    /// Makes a room of `parts` that do not overlap, minus the `solids` that stand in it.
     ///
     /// `solids` holds boxes around stairs and the like, with their true volume.
     #[must_use]
@@ -238,7 +238,7 @@ impl Room {
         room
     }
 
-    /// Smallest box around the room.
+    /// Returns the smallest box around the room.
     #[must_use]
     pub fn aabb(&self) -> Aabb {
         self.parts
@@ -246,14 +246,14 @@ impl Room {
             .fold(Aabb::EMPTY, |b, p| b.union(p.aabb()))
     }
 
-    /// Whether `p` lies in the room, at least `margin` from the surface of one of its parts.
+    /// Returns `true` if `p` lies in the room, at least `margin` from the surface of one of its parts.
     #[must_use]
     pub fn contains(&self, p: DVec3, margin: f64) -> bool {
         self.parts.iter().any(|part| part.contains(p, margin))
     }
 
     fn sample(&mut self, solids: &[(Aabb, f64)]) {
-        // By name: a room keeps its points when another is added.
+        // Seeded by name: a room keeps its points if another is added.
         let seed = self.name.bytes().fold(0xcbf2_9ce4_8422_2325, |h: u64, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
         });
@@ -276,15 +276,15 @@ impl Room {
                     self.sample_points.push(p);
                 }
             }
-            // Closets narrower than twice the margin.
+            // For closets narrower than twice the margin.
             margin /= 2.0;
         }
     }
 }
 
 impl Opening {
-    /// The opening that the air box `hole` makes through a wall or slab across `axis`
-    /// (0, 1, 2 for x, y, z); `rooms` in ascending order along it.
+    /// Makes the opening of the air box `hole` through a wall or slab across `axis` (0, 1, 2 for x, y, z);
+    /// `rooms` in ascending order along it.
     #[must_use]
     pub fn of_hole(
         kind: OpeningKind,
@@ -322,7 +322,7 @@ impl Opening {
         }
     }
 
-    /// Area of the hole. [Units: wu²]
+    /// Returns the area of the hole. [Units: wu²]
     #[must_use]
     pub fn area(&self) -> f64 {
         newell(&self.corners).length() * 0.5
@@ -330,13 +330,13 @@ impl Opening {
 }
 
 impl Truth {
-    /// Index of the room named `name`.
+    /// Returns the index of the room named `name`.
     #[must_use]
     pub fn room(&self, name: &str) -> Option<usize> {
         self.rooms.iter().position(|r| r.name == name)
     }
 
-    /// The room that holds `p`, if one does.
+    /// Returns the room that contains `p`, if any.
     #[must_use]
     pub fn room_at(&self, p: DVec3) -> Option<usize> {
         self.rooms.iter().position(|r| r.contains(p, 0.0))
@@ -370,7 +370,7 @@ impl Truth {
         }
     }
 
-    /// Says what is wrong with itself; empty when it is in order.
+    /// Returns its inconsistencies; empty if there are none.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();

@@ -1,4 +1,4 @@
-//! [`Truth`] as `truth.json`, the shape that the scoring script reads.
+//! [`Truth`] as `truth.json`, in the format of the scoring script.
 
 use std::fmt::Write;
 
@@ -7,8 +7,8 @@ use enfilade_geom::{Aabb, DVec3};
 use crate::truth::{OpeningKind, Side, Truth};
 
 impl Truth {
-    /// The truth as JSON, `schema_version` 1 of the shared scenes: rooms, openings, storeys,
-    /// bounds and counts; besides them `matter`, points inside closed solids. `occluder_triangles` is the number of structural triangles.
+    /// Returns the truth as JSON, `schema_version` 1 of the shared scenes: rooms, openings, storeys, bounds and counts, and in
+    /// addition `matter`, points inside closed solids. `occluder_triangles` is the number of structural triangles.
     #[must_use]
     pub fn to_json(&self, occluder_triangles: usize) -> String {
         let mut out = String::new();
@@ -91,7 +91,7 @@ impl Truth {
     }
 }
 
-/// A number to the micrometer; `null` where JSON has no number for it.
+/// Formats a number to the micrometer; `null` if JSON cannot represent it.
 fn number(x: f64) -> String {
     if x.is_finite() {
         // Adding zero turns -0.0 into 0.0.

@@ -1,4 +1,4 @@
-//! Vessels: tubes with round ends that run into one another.
+//! Vessels: tubes with round ends that merge.
 
 use enfilade_geom::scene::{Mesh, Role};
 use enfilade_geom::{Aabb, DMat4, DVec3};
@@ -7,22 +7,22 @@ use crate::cave::distance_to_segment;
 use crate::site::{Generated, Site};
 use crate::surface_net::surface_net;
 
-/// The points nearer than `radius` to the line between two ends.
+/// The points within `radius` of the segment between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tube {
     /// Ends of its axis, which differ. [Units: wu]
     pub ends: [DVec3; 2],
-    /// [Units: wu] [Limit: above 0]
+    /// Radius. [Units: wu] [Limit: above 0]
     pub radius: f64,
 }
 
-/// The surface of what lies in any of some tubes, closed and facing the air. There is no way out.
+/// The surface of the union of some tubes, closed and facing the air, without a way out.
 ///
-/// It is meshed with triangles of about `grid`, which a tube should be six of across for its radius to be right to a
-/// hundredth or so. Its truth is empty: which tubes are cells of their own is the tests' question.
+/// The mesh has triangles of about `grid`; a tube should be six of these across for its radius to be correct to a hundredth or
+/// so. Its truth is empty: the division into cells is left to the tests.
 ///
 /// # Panics
-/// Without tubes, since there is no surface then.
+/// If there are no tubes, since there is no surface then.
 #[must_use]
 pub fn tubes(tubes: &[Tube], grid: f64) -> Generated {
     assert!(!tubes.is_empty(), "there is no surface without tubes");
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_lie_on_a_tube() {
+    fn vertices_lie_on_a_tube() {
         let tube = Tube {
             ends: [DVec3::ZERO, DVec3::new(3.0, 1.0, 0.5)],
             radius: 0.7,
@@ -63,7 +63,7 @@ mod tests {
         for p in positions {
             let p = DVec3::from_array(p.map(f64::from));
             let d = distance_to_segment(p, tube.ends[0], tube.ends[1]);
-            // A cell's corner is the mean of points on the surface: below it by h² / 8r or so.
+            // A cell's vertex is the mean of points on the surface: below it by h² / 8r or so.
             assert!((d - tube.radius).abs() < 0.1 * 0.1 / 0.7, "{d} at {p}");
         }
     }

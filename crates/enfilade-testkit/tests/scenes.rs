@@ -1,4 +1,4 @@
-//! What every generated scene owes: closed solids, a truth in order, open openings, rooms apart.
+//! Guarantees of all generated scenes: closed solids, a consistent truth, open openings, separate rooms.
 
 use enfilade_geom::scene::Role;
 use enfilade_geom::{Aabb, DVec3, Triangle};
@@ -10,7 +10,7 @@ use enfilade_testkit::{
     furnished_house, gjorup_cavern, gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
 };
 
-/// Triangles whose box comes near `bounds`, to keep the brute-force rays short.
+/// Returns the triangles whose box is near `bounds`, to keep the brute-force rays short.
 fn near(triangles: &[Triangle], bounds: Aabb) -> Vec<Triangle> {
     triangles
         .iter()
@@ -53,8 +53,8 @@ fn check_truth_is_in_order(g: &Generated) {
     }
 }
 
-/// At least `share` of 49 rays along the normal pass each opening, as `clear_fraction` in the
-/// shared scenes is counted.
+/// At least the fraction `share` of 49 rays along the normal pass each opening, counted like
+/// `clear_fraction` in the shared scenes.
 fn check_openings_are_open(g: &Generated, share: f64) {
     let triangles = structural_triangles(&g.scene);
     for o in &g.truth.openings {
@@ -107,8 +107,7 @@ fn check_openings_fill_their_holes(g: &Generated) {
     }
 }
 
-/// With all openings plugged, voxel regions and rooms are the same thing. Plugs are openings
-/// scaled by `plug`.
+/// With all openings plugged, voxel regions and rooms coincide. Plugs are openings scaled by `plug`.
 fn check_rooms_are_apart(g: &Generated, voxel: f64, plug: f64) {
     let mut triangles = structural_triangles(&g.scene);
     let mut bounds = Aabb::EMPTY;
@@ -170,7 +169,7 @@ fn check_rooms_are_apart(g: &Generated, voxel: f64, plug: f64) {
     );
 }
 
-/// Monte Carlo estimate of each room's air against what the truth says.
+/// Compares a Monte Carlo estimate of each room's air with the truth.
 fn check_volumes(g: &Generated) {
     let triangles = structural_triangles(&g.scene);
     let mut rng = Rng::new(5);
@@ -262,7 +261,7 @@ fn small_buildings_are_sound() {
             check_rooms_are_apart(&g, 0.1, 1.0);
             continue;
         }
-        // In stair holes stand stairs.
+        // Stairs stand in stair holes.
         let share = if g.truth.scene == "stair-hall" {
             0.7
         } else {
@@ -284,7 +283,7 @@ fn buildings_with_faults_have_no_others() {
         assert_eq!(g.truth.scene, fault.name());
         check_solids_are_closed(&g);
         check_truth_is_in_order(&g);
-        // A bay of a curtain wall is a window across which transoms run.
+        // A bay of a curtain wall is one window, with transoms across it.
         let share = if fault == Fault::CurtainWall {
             0.8
         } else {
@@ -309,7 +308,7 @@ fn the_models_of_the_theses_are_sound() {
     for degrees in [[0.0; 3], [7.0, 8.0, 9.0]] {
         for variant in [Variant::Optimised, Variant::Tessellated, Variant::Distorted] {
             let g = gjorup_rooms(variant, degrees);
-            // The two ends of a distorted corridor are turned against each other.
+            // The two ends of a distorted corridor are rotated against each other.
             let share = if variant == Variant::Distorted {
                 0.6
             } else {
@@ -338,7 +337,7 @@ fn caves_are_sound() {
         let g = cave(seed);
         check_solids_are_closed(&g);
         check_truth_is_in_order(&g);
-        // The square's corners reach beyond the round, rough tunnel; half is the bar at which
+        // The square extends beyond the round, rough tunnel; half is the fraction from which
         // the shared scenes call an opening usable.
         check_openings_are_open(&g, 0.5);
         check_rooms_are_apart(&g, 0.15, 1.8);
@@ -386,7 +385,7 @@ fn the_same_seed_gives_the_same_scene_and_another_gives_another() {
 }
 
 #[test]
-fn towers_have_the_rooms_asked_for() {
+fn towers_have_the_requested_rooms() {
     for rooms in [4, 16, 64, 256, 1024, 4096] {
         let params = TowerParams::with_rooms(rooms, 1);
         let g = office_tower(&params);
@@ -398,7 +397,7 @@ fn towers_have_the_rooms_asked_for() {
             "{per_room} triangles a room at {rooms} rooms"
         );
         if rooms >= 16 {
-            // Constant density: between 40 and 80 m3 of air a room, whatever the size.
+            // Constant density: between 40 and 80 m3 of air per room, whatever the size.
             let air = g.truth.rooms.iter().map(|r| r.volume).sum::<f64>() / rooms as f64;
             assert!(
                 (40.0..80.0).contains(&air),

@@ -1,4 +1,4 @@
-//! The solid modeller: whatever is asked for, it comes out closed and as large as it must be.
+//! The solid modeller: every solid is closed and has the right volume.
 
 use enfilade_geom::scene::{Mesh, Object, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
@@ -27,7 +27,7 @@ fn triangles(b: MeshBuilder) -> Vec<Triangle> {
     object_triangles(&scene, 0)
 }
 
-/// Corners are rounded to `f32`: relative 6e-8 of up to 10 m, over up to 600 m² of surface.
+/// Vertices are rounded to `f32`: relative 6e-8 of up to 10 m, over up to 600 m² of surface.
 const VOLUME_SLACK: f64 = 1e-3;
 
 #[test]
@@ -47,7 +47,7 @@ fn a_wall_with_door_and_window_is_closed_and_each_edge_joins_two_faces() {
 }
 
 #[test]
-fn stairs_enclose_what_they_say_and_are_closed() {
+fn stairs_have_their_volume_and_are_closed() {
     for n in [2, 5, 18] {
         let steps = Steps {
             n,
@@ -131,9 +131,9 @@ proptest! {
     }
 
     #[test]
-    fn polygons_fall_into_triangles_that_cover_them_once(seed in 0..10_000u64, n in 3..24usize) {
-        // A star-shaped polygon with some corners in the middle of straight edges, in a plane
-        // that looks anywhere.
+    fn triangulations_cover_polygons_once(seed in 0..10_000u64, n in 3..24usize) {
+        // A star-shaped polygon with some vertices in the middle of straight edges, in a plane of
+        // any orientation.
         let mut rng = Rng::new(seed);
         let u = DVec3::new(rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 1.1).normalize();
         let v = u.cross(DVec3::new(0.3, rng.range(0.5, 1.0), -0.2)).normalize();
@@ -160,7 +160,7 @@ proptest! {
             prop_assert!(a > 0.0, "a triangle of area {}", a);
             sum += a;
         }
-        // All turn the right way and together have the polygon's area: none overlaps another.
+        // All have the right orientation and together the polygon's area: none overlaps another.
         prop_assert!((sum - whole).abs() < 1e-9);
     }
 

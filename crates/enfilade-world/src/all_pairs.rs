@@ -1,9 +1,9 @@
 //! Least lengths between all pairs of few nodes, maintained while links open and close.
 //!
 //! A table of lengths and of the last link of each path, by source. A link that opens or closes changes only paths through it:
-//! for each source, the nodes whose path used it, or that it brings nearer (after Ramalingam & Reps, "An incremental algorithm for
-//! a generalization of the shortest-path problem", Journal of Algorithms 21, 1996). `O(n²)` memory; a change costs `O(n)` and, for
-//! every pair whose path changes, its links times the logarithm of a heap.
+//! for each source, the nodes whose path used it, or that it brings nearer (after Ramalingam & Reps, "An incremental algorithm
+//! for a generalization of the shortest-path problem", Journal of Algorithms 21, 1996). `O(n²)` memory; a change costs `O(n)`
+//! and, for every pair whose path changes, its links times the logarithm of a heap.
 //!
 //! Lengths are integers: sums are exact in any order, so the table equals a new one, to the bit.
 

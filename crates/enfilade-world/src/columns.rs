@@ -51,7 +51,8 @@ pub(crate) struct Span {
 /// Tops nearer to each other than this are merged. [Units: wu]
 const SAME: f32 = 0.02;
 
-/// Returns the spans of all triangles, ascending by square and height, none touching another. `slope` is the steepest floor. [Units: rad]
+/// Returns the spans of all triangles, ascending by square and height, none touching another. `slope` is the steepest floor.
+/// [Units: rad]
 pub(crate) fn spans(
     squares: &Squares,
     triangles: impl Iterator<Item = Triangle>,

@@ -1,9 +1,10 @@
 //! Edges of walls about which shortest paths bend: more than half of their surroundings is air of the cell.
 //!
-//! A shortest path among walls bends only at such edges (Sharir & Schorr, "On shortest paths in polyhedral spaces", 1986). They are
-//! found by querying the locator on a small circle about each edge, not from the mesh: whatever its triangles, an edge within a flat
-//! wall has as much air as solid around it, and a convex one has more air. Collinear edges are joined before. O(edges · points along
-//! them). A surface that turns by less than a step of the circle, 11°, from triangle to triangle counts as flat.
+//! A shortest path among walls bends only at such edges (Sharir & Schorr, "On shortest paths in polyhedral spaces", 1986). They
+//! are found by querying the locator on a small circle about each edge, not from the mesh: whatever its triangles, an edge
+//! within a flat wall has as much air as solid around it, and a convex one has more air. Collinear edges are joined before.
+//! O(edges · points along them). A surface that turns by less than a step of the circle, 11°, from triangle to triangle counts
+//! as flat.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +29,8 @@ const N_AROUND: usize = 32;
 /// Lines nearer to each other than this are one. [Units: wu]
 const SAME_LINE: f64 = 1e-3;
 
-/// Returns the [`Corner`]s of a cell with these walls: points at most `spacing` apart along the edges, `off` from the wall. [Units: wu]
+/// Returns the [`Corner`]s of a cell with these walls: points at most `spacing` apart along the edges, `off` from the wall.
+/// [Units: wu]
 pub(crate) fn corners(
     layout: &Layout,
     cell: CellId,

@@ -58,8 +58,9 @@ impl<'a> Posted<'a> {
 }
 
 impl Flood {
-    /// Returns the places that a shape reaches from `start`, through openings that it meets and for which `passes` returns `true`: first
-    /// `start`, then the others in the order in which they are reached. A shape within the tolerance of an opening meets it.
+    /// Returns the places that a shape reaches from `start`, through openings that it meets and for which `passes` returns
+    /// `true`: first `start`, then the others in the order in which they are reached. A shape within the tolerance of an opening
+    /// meets it.
     ///
     /// # Panics
     ///
@@ -114,8 +115,8 @@ impl Flood {
         &self.places
     }
 
-    /// Returns the distance by which the shape of the last flood may move without meeting another opening: a lower bound, and 0 where
-    /// parts stand in a cell that it reached. [Units: wu]
+    /// Returns the distance by which the shape of the last flood may move without meeting another opening: a lower bound, and 0
+    /// where parts stand in a cell that it reached. [Units: wu]
     #[must_use]
     pub fn clearance(&self) -> f64 {
         self.clearance

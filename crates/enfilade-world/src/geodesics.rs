@@ -2,9 +2,9 @@
 //!
 //! A graph of points that see each other: [`Corner`]s at convex edges of the cell's walls, and the points of its portals. All
 //! lengths between `Corner`s are found once (Floyd, "Algorithm 97: shortest path", 1962); a query takes the best path over those
-//! that its ends see. A path may bend at any point of an edge, while `Corner`s are a meter apart: the bends of the path slide along
-//! their edges to where it is shortest, one after another, by unfolding the edge (Sharir & Schorr 1986). Walls are the structure of
-//! the cell, its portals are closed: paths stay inside. Furniture is ignored.
+//! that its ends see. A path may bend at any point of an edge, while `Corner`s are a meter apart: the bends of the path slide
+//! along their edges to where it is shortest, one after another, by unfolding the edge (Sharir & Schorr 1986). Walls are the
+//! structure of the cell, its portals are closed: paths stay inside. Furniture is ignored.
 //!
 //! Lengths are those of true paths, never less than the shortest; after sliding, within a thousandth of it about sharp edges, and
 //! less exact about round surfaces. `O(n³)` for `n` `Corner`s, once; a query costs a line of sight for each `Corner` of the cell.
@@ -54,8 +54,8 @@ struct Concave {
 }
 
 impl Geodesics {
-    /// Prepares a world, for the points of `ways`, and stores the lengths between them in all concave cells there. Takes milliseconds
-    /// for a cell with tens of `Corner`s, a second for one with hundreds.
+    /// Prepares a world, for the points of `ways`, and stores the lengths between them in all concave cells there. Takes
+    /// milliseconds for a cell with tens of `Corner`s, a second for one with hundreds.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, ways: &mut Ways) -> Self {
         let off = OFF.max(8.0 * layout.tolerance());
@@ -70,8 +70,8 @@ impl Geodesics {
         Self { cells, off }
     }
 
-    /// Returns `true` if lines between points of a cell may meet its walls, and paths around them are known; `false` for a cell with
-    /// more than 2,048 points.
+    /// Returns `true` if lines between points of a cell may meet its walls, and paths around them are known; `false` for a cell
+    /// with more than 2,048 points.
     ///
     /// # Panics
     ///
@@ -107,8 +107,8 @@ impl Geodesics {
         }
     }
 
-    /// Returns the length of the shortest path between two points of a cell, and writes its bends to `bends` (cleared first), each with
-    /// its edge; `None` if no path was found. A point on a portal is moved a little into the cell. [Units: wu]
+    /// Returns the length of the shortest path between two points of a cell, and writes its bends to `bends` (cleared first),
+    /// each with its edge; `None` if no path was found. A point on a portal is moved a little into the cell. [Units: wu]
     ///
     /// # Panics
     ///

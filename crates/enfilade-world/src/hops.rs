@@ -1,10 +1,10 @@
 //! Distance and next portal from any cell to any other.
 //!
 //! After Gjørup ("Cell and portal based visibility", 1999, §3.3.4), who keeps a table of distances and next portals between all
-//! pairs of cells, except those with exactly two portals, which offer no choice. Here dead ends are left out, too: a subgraph that
-//! one portal attaches to the rest is a tree, and has one way out. There remain *junctions*, joined by *chains* of two-portal cells;
-//! their table is maintained while doors open and close ([`AllPairs`]). A door in a tree, or in a chain with another shut door,
-//! changes no more than its tree or chain.
+//! pairs of cells, except those with exactly two portals, which offer no choice. Here dead ends are left out, too: a subgraph
+//! that one portal attaches to the rest is a tree, and has one way out. There remain *junctions*, joined by *chains* of
+//! two-portal cells; their table is maintained while doors open and close ([`AllPairs`]). A door in a tree, or in a chain with
+//! another shut door, changes no more than its tree or chain.
 //!
 //! The caller defines the length of a step from cell to cell; steps are rounded to tenths of a millimeter, so that sums are exact
 //! and answers equal those of a search through all cells. Paths longer than 400 km count as none.
@@ -112,8 +112,8 @@ struct Out {
 }
 
 impl Hops {
-    /// Makes the table for a layout. `step` returns the length of a step through a portal, from the middle of one of its cells to that of
-    /// the other, or `None` if it is never passed. All portals are open at first. [Units: wu]
+    /// Makes the table for a layout. `step` returns the length of a step through a portal, from the middle of one of its cells
+    /// to that of the other, or `None` if it is never passed. All portals are open at first. [Units: wu]
     ///
     /// O(cells) and, for `n` junctions with `l` chains, `O(n · l · log n)` time and 6 · n² bytes. A length that is not finite or
     /// below 0 counts as `None`. Panics if a junction has more than 65,535 chains.
@@ -569,7 +569,8 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Numbers the cells so that all descendants of a cell follow it. Returns the first branches per cell, the branches, the cells by number.
+    /// Numbers the cells so that all descendants of a cell follow it. Returns the first branches per cell, the branches, the
+    /// cells by number.
     fn number_trees(&mut self) -> (Vec<u32>, Vec<CellId>, Vec<CellId>) {
         let n = self.nodes.len();
         let ups: Vec<[usize; 2]> = (self.peeled.iter())

@@ -5,8 +5,8 @@ use enfilade_geom::{Aabb, DVec3, Plane, Winding, world_tolerance};
 
 /// The cells and portals of a world in double precision, in contiguous arrays.
 ///
-/// Made once. A portal's opening is its convex pieces, not the outline around them: a shape that touches only the outline does not
-/// touch the opening.
+/// Made once. A portal's opening is its convex pieces, not the outline around them: a shape that touches only the outline does
+/// not touch the opening.
 #[derive(Clone, Debug)]
 pub struct Layout {
     cells: Vec<CellShape>,
@@ -63,10 +63,11 @@ pub struct Opening<'a> {
 }
 
 impl Layout {
-    /// Makes the layout of a world whose graph is [valid](enfilade_cpg::CellPortalGraph::validate). O(cells + vertices of portals).
+    /// Makes the layout of a world whose graph is [valid](enfilade_cpg::CellPortalGraph::validate). O(cells + vertices of
+    /// portals).
     ///
-    /// Leaves out pieces without area, by rounding. A portal without any other piece has its outline for an opening; if that has no
-    /// area either, it has no opening at all: nothing passes it.
+    /// Leaves out pieces without area, by rounding. A portal without any other piece has its outline for an opening; if that has
+    /// no area either, it has no opening at all: nothing passes it.
     #[must_use]
     pub fn new(world: &World) -> Self {
         let graph = &world.graph;
@@ -193,7 +194,8 @@ impl Layout {
         &self.exits[first[0] as usize..first[1] as usize]
     }
 
-    /// Returns the distance of a point from the nearest box around an opening of a cell; infinite if the cell has none. O(its openings).
+    /// Returns the distance of a point from the nearest box around an opening of a cell; infinite if the cell has none. O(its
+    /// openings).
     /// [Units: wu]
     ///
     /// # Panics
@@ -232,8 +234,8 @@ impl Layout {
         self.locator.locate_with_room(p)
     }
 
-    /// Adds to `cells` those that the hull of `points`, grown by `margin`, may touch; `cells` stays ascending and without repeats.
-    /// `stack` is a buffer to keep between calls. As [`Locator::cells_near`]. [Units: wu]
+    /// Adds to `cells` those that the hull of `points`, grown by `margin`, may touch; `cells` stays ascending and without
+    /// repeats. `stack` is a buffer to keep between calls. As [`Locator::cells_near`]. [Units: wu]
     pub fn cells_near(
         &self,
         points: &[DVec3],

@@ -173,8 +173,8 @@ impl Lights {
             })
     }
 
-    /// Returns the lamps whose light may fall on anything in a view, ascending: those that light a cell that it sees, and whose range
-    /// reaches into the visible part of it.
+    /// Returns the lamps whose light may fall on anything in a view, ascending: those that light a cell that it sees, and whose
+    /// range reaches into the visible part of it.
     pub fn that_matter(&mut self, space: &Space, seen: &SpaceSeen) -> &[LampId] {
         self.seen.clear();
         for (id, lit) in (0..).map(LampId).zip(&self.lamps) {

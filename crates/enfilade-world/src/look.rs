@@ -1,9 +1,9 @@
 //! Visibility in a world and in the worlds that move in it.
 //!
 //! Each part is followed by its own [`Viewer`], in its own frame. A view that leaves a part through one of its doors continues in
-//! the surrounding places behind the door, and in the doors that it meets; a view of a cell in which parts stand continues in these
-//! from outside. The part of the screen is passed on unchanged: it depends on the eye alone, not on the frame. Parts take turns
-//! until none has anything new, which ends because each adds only what it had not seen.
+//! the surrounding places behind the door, and in the doors that it meets; a view of a cell in which parts stand continues in
+//! these from outside. The part of the screen is passed on unchanged: it depends on the eye alone, not on the frame. Parts take
+//! turns until none has anything new, which ends because each adds only what it had not seen.
 
 use enfilade_cpg::CellId;
 use enfilade_runtime::{Crossing, SeeOptions, Seen, StepQuestion, View, Viewer, Window};
@@ -59,8 +59,8 @@ impl SpaceViewer {
         }
     }
 
-    /// Returns everything that `view`, in the frame of part `frame`, sees. A view in the frame of the part that the eye is in is exact
-    /// wherever that part is.
+    /// Returns everything that `view`, in the frame of part `frame`, sees. A view in the frame of the part that the eye is in is
+    /// exact wherever that part is.
     ///
     /// Time grows with the visible part, and a little with the number of parts. Allocates only while buffers grow.
     ///
@@ -189,8 +189,8 @@ pub struct SpaceSeen<'a> {
 }
 
 impl<'a> SpaceSeen<'a> {
-    /// Returns the visible parts, ascending, each with its visible contents in its own frame: draw them at its [pose](Space::pose). The
-    /// border cell of a part stands for its outside.
+    /// Returns the visible parts, ascending, each with its visible contents in its own frame: draw them at its
+    /// [pose](Space::pose). The border cell of a part stands for its outside.
     pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
         let viewer = self.viewer;
         let answer = |id: &PartId| (*id, viewer.parts[id.idx()].viewer.answer());

@@ -1,14 +1,14 @@
 //! Paths for walkers: from point to point at any angle, and walking distances.
 //!
 //! Two levels, as in Botea, Müller & Schaeffer ("Near optimal hierarchical path-finding", 2004), but with cells and portals for
-//! clusters and entrances. Lengths between the portals of each cell are found once, over its [floors](Floors), so that paths go around
-//! walls within a cell. A query takes the best sequences of portals from the [length search](LengthSearch), finds the path over the
-//! floors of their cells only, and pulls it taut: each bend moves straight towards the line between its neighbors as far as the floors
-//! allow, until none moves. The shortest of the best few sequences wins.
+//! clusters and entrances. Lengths between the portals of each cell are found once, over its [floors](Floors), so that paths go
+//! around walls within a cell. A query takes the best sequences of portals from the [length search](LengthSearch), finds the
+//! path over the floors of their cells only, and pulls it taut: each bend moves straight towards the line between its neighbors
+//! as far as the floors allow, until none moves. The shortest of the best few sequences wins.
 //!
-//! The path keeps the walker's radius from walls as [floors](Floors) do, and is never shorter than the shortest such path. It may be
-//! longer if it is caught on the other side of a free-standing obstacle in a cell, or if two sequences are nearly equally short.
-//! O(floors of the cells passed), at most milliseconds for a storey.
+//! The path keeps the walker's radius from walls as [floors](Floors) do, and is never shorter than the shortest such path. It
+//! may be longer if it is caught on the other side of a free-standing obstacle in a cell, or if two sequences are nearly equally
+//! short. O(floors of the cells passed), at most milliseconds for a storey.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
@@ -34,8 +34,8 @@ pub struct WalkMap {
 const SPACING: f64 = 1.0;
 
 impl WalkMap {
-    /// Prepares the structure of a world, without its objects. Takes seconds for a large building: floors are laid out in squares of a
-    /// quarter of the walker's radius, and searched in each cell from each of its portals.
+    /// Prepares the structure of a world, without its objects. Takes seconds for a large building: floors are laid out in
+    /// squares of a quarter of the walker's radius, and searched in each cell from each of its portals.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let floors = Floors::new(layout, world, walker);
@@ -102,7 +102,8 @@ impl WalkMap {
         &self.ways
     }
 
-    /// Returns `true` if the walker fits through a portal: wide and high enough, not a window or crack, with floors on both sides.
+    /// Returns `true` if the walker fits through a portal: wide and high enough, not a window or crack, with floors on both
+    /// sides.
     #[must_use]
     pub fn is_walkable(&self, portal: PortalId) -> bool {
         !self.ways.points(portal).is_empty()
@@ -198,8 +199,8 @@ impl PathSearch {
         Self::default()
     }
 
-    /// Finds the path from one point to another through the portals for which `may_pass` returns `true`, such as open doors. Points are
-    /// at the walker's feet, or any height up to its head. [Units: wu]
+    /// Finds the path from one point to another through the portals for which `may_pass` returns `true`, such as open doors.
+    /// Points are at the walker's feet, or any height up to its head. [Units: wu]
     ///
     /// # Errors
     ///
@@ -263,8 +264,8 @@ impl PathSearch {
         Ok(start)
     }
 
-    /// Finds the cells within walking distance `radius` of a point, for maps and radars, ascending by the length to the nearest portal that
-    /// leads in, the point's own first. Then query the [distances](Self::distance) of things. [Units: wu]
+    /// Finds the cells within walking distance `radius` of a point, for maps and radars, ascending by the length to the nearest
+    /// portal that leads in, the point's own first. Then query the [distances](Self::distance) of things. [Units: wu]
     ///
     /// # Errors
     ///
@@ -281,8 +282,8 @@ impl PathSearch {
         Ok(self.search.cells())
     }
 
-    /// Returns the walking distance of a point from the start of [`PathSearch::cells_within`]; `None` if the walker cannot stand there or
-    /// did not reach it. Square by square, so up to 3 % too long. [Units: wu]
+    /// Returns the walking distance of a point from the start of [`PathSearch::cells_within`]; `None` if the walker cannot stand
+    /// there or did not reach it. Square by square, so up to 3 % too long. [Units: wu]
     pub fn distance(&mut self, map: &WalkMap, layout: &Layout, to: DVec3) -> Option<f64> {
         let goal = map.floors.below(to)?;
         let (cell, from) = self.search.start()?;

@@ -43,8 +43,8 @@ impl Pose {
         }
     }
 
-    /// Returns the motion that applies `inner` first, and then this one. Normalizes the rotation, so that errors do not grow with the
-    /// number of motions.
+    /// Returns the motion that applies `inner` first, and then this one. Normalizes the rotation, so that errors do not grow
+    /// with the number of motions.
     #[must_use]
     pub fn after(&self, inner: &Self) -> Self {
         Self {
@@ -96,8 +96,8 @@ impl Pose {
         DMat4::from_rotation_translation(self.turn, self.at)
     }
 
-    /// Returns the pose at a fraction `t` of the way to `end`: the origin moves in a straight line, while the frame rotates uniformly by
-    /// the lesser angle. [Limit: `t` from 0 to 1]
+    /// Returns the pose at a fraction `t` of the way to `end`: the origin moves in a straight line, while the frame rotates
+    /// uniformly by the lesser angle. [Limit: `t` from 0 to 1]
     #[must_use]
     pub fn toward(&self, end: &Self, t: f64) -> Self {
         Self {

@@ -1,9 +1,9 @@
 //! Paths over floors, pulled taut.
 //!
-//! A path found square by square bends where squares do. Each bend moves straight towards the line between its neighbors, as far as
-//! floors allow, by halving; where a line is caught, as a string at a post, it gets another bend; bends that a straight line can
-//! skip are removed. No step makes the path longer, so the process ends, at a path that is the shortest of those it can be pulled to
-//! without leaving the floors. O(rounds · bends · squares along them).
+//! A path found square by square bends where squares do. Each bend moves straight towards the line between its neighbors, as far
+//! as floors allow, by halving; where a line is caught, as a string at a post, it gets another bend; bends that a straight line
+//! can skip are removed. No step makes the path longer, so the process ends, at a path that is the shortest of those it can be
+//! pulled to without leaving the floors. O(rounds · bends · squares along them).
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;

@@ -1,13 +1,13 @@
 //! Reverberation: decay times of rooms, and levels of their diffuse fields, coupled through openings.
 //!
-//! Statistical room acoustics: a cell of volume `V` whose walls absorb like an area `A` (Sabine; Eyring, "Reverberation time in dead
-//! rooms", 1930) loses energy at the rate `c A / 4 V`, and has `RT60 = 55.3 V / c A` (Kuttruff, "Room Acoustics", §5.1). An opening
-//! of area `S` takes `c S / 4 V` of it to the cell behind (coupled rooms, §5.9). For a steady source of power `P` the fields `w`
-//! solve `A w + Σ S (w − w') = 4 P / c`, a symmetric system with a dominant diagonal. `O(portals)` per step of conjugate gradients,
-//! which end by their residual; one solution for each source covers all cells.
+//! Statistical room acoustics: a cell of volume `V` whose walls absorb like an area `A` (Sabine; Eyring, "Reverberation time in
+//! dead rooms", 1930) loses energy at the rate `c A / 4 V`, and has `RT60 = 55.3 V / c A` (Kuttruff, "Room Acoustics", §5.1). An
+//! opening of area `S` takes `c S / 4 V` of it to the cell behind (coupled rooms, §5.9). For a steady source of power `P` the
+//! fields `w` solve `A w + Σ S (w − w') = 4 P / c`, a symmetric system with a dominant diagonal. `O(portals)` per step of
+//! conjugate gradients, which end by their residual; one solution for each source covers all cells.
 //!
-//! Rooms are assumed to be diffuse: within about a tenth for rooms that are not very long or very dead. The system is singular only
-//! if nothing absorbs; absorption is at least a thousandth of the walls.
+//! Rooms are assumed to be diffuse: within about a tenth for rooms that are not very long or very dead. The system is singular
+//! only if nothing absorbs; absorption is at least a thousandth of the walls.
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{DVec3, triangle_area_normal};
@@ -76,8 +76,9 @@ struct Coupling {
 }
 
 impl Reverb {
-    /// Computes the rooms of a world's structure. `absorption` returns the coefficient of a material, `None` for triangles without one. A
-    /// wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything. O(triangles).
+    /// Computes the rooms of a world's structure. `absorption` returns the coefficient of a material, `None` for triangles
+    /// without one. A wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
+    /// O(triangles).
     #[must_use]
     pub fn new(
         layout: &Layout,
@@ -284,8 +285,8 @@ impl DiffuseFields {
         }
     }
 
-    /// Returns the time in which a cell's field falls by 60 dB after the source has stopped, from its mean decay time, including the
-    /// energy that other rooms return. 0 if no sound reaches it. [Units: s]
+    /// Returns the time in which a cell's field falls by 60 dB after the source has stopped, from its mean decay time, including
+    /// the energy that other rooms return. 0 if no sound reaches it. [Units: s]
     ///
     /// # Panics
     ///
@@ -300,8 +301,8 @@ impl DiffuseFields {
         6.0 * std::f64::consts::LN_10 * mean.max(0.0)
     }
 
-    /// Returns the amplitude of a cell's field, relative to the source's free field at a distance of 1: its energy is `16 π` times this.
-    /// Above 0 if any sound reaches it.
+    /// Returns the amplitude of a cell's field, relative to the source's free field at a distance of 1: its energy is `16 π`
+    /// times this. Above 0 if any sound reaches it.
     ///
     /// # Panics
     ///

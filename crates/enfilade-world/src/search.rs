@@ -3,13 +3,13 @@
 //! Dijkstra's algorithm ("A note on two problems in connexion with graphs", 1959) over *crossings*: points of a portal's opening,
 //! each once per side from which it may be entered. Portals are areas, and no single point can represent one: lengths through
 //! middles are too long at wide portals, lengths between nearest points too short. So each opening has several points
-//! ([`Sampling`]), and every length is that of a true walk from point to point: never less than the shortest. `O(e log e)` for `e`
-//! pairs of points of one cell that are reached.
+//! ([`Sampling`]), and every length is that of a true walk from point to point: never less than the shortest. `O(e log e)` for
+//! `e` pairs of points of one cell that are reached.
 //!
 //! **Accuracy.** Let the shortest walk cross each portal at most `d` from one of its points. Moving the crossings there makes it
-//! longer by about `d² / l` per portal, for legs of length `l` between portals. The route found is no longer than that, and shorter
-//! once pulled taut. `d` is at most `0.71 · spacing`, and 0 where the walk bends about vertices. If two routes are nearly equally
-//! short, [`LengthSearch::arrivals`] has both: pull each taut and take the shorter.
+//! longer by about `d² / l` per portal, for legs of length `l` between portals. The route found is no longer than that, and
+//! shorter once pulled taut. `d` is at most `0.71 · spacing`, and 0 where the walk bends about vertices. If two routes are
+//! nearly equally short, [`LengthSearch::arrivals`] has both: pull each taut and take the shorter.
 //!
 //! Sums of lengths round. Of two routes to a crossing that are equally long, to the last bit, the one found first is kept: equal
 //! queries have equal answers.
@@ -249,8 +249,8 @@ impl LengthSearch {
 
     /// Finds least lengths from a point in `cell` to all portals that can be passed, up to `radius` (infinite: all). [Units: wu]
     ///
-    /// `pass` returns the extra cost (`Some(0.0)`: none) of passing a portal into the cell behind it, `None` if it cannot be passed. It is
-    /// called at most once per search for each portal and side. Costs below 0 count as 0.
+    /// `pass` returns the extra cost (`Some(0.0)`: none) of passing a portal into the cell behind it, `None` if it cannot be
+    /// passed. It is called at most once per search for each portal and side. Costs below 0 count as 0.
     ///
     /// # Panics
     ///
@@ -267,8 +267,8 @@ impl LengthSearch {
         self.run_from(ways, cell, from, straight, radius, pass);
     }
 
-    /// As [`LengthSearch::run`], with given lengths from the start to the points of its cell: `first` is called with each one's index among
-    /// [those of the cell](Ways::points_of). For cells where straight lines are too short.
+    /// As [`LengthSearch::run`], with given lengths from the start to the points of its cell: `first` is called with each one's
+    /// index among [those of the cell](Ways::points_of). For cells where straight lines are too short.
     ///
     /// # Panics
     ///
@@ -397,7 +397,8 @@ impl LengthSearch {
         &self.reached
     }
 
-    /// Returns the cells entered, ascending by the length to the nearest portal that leads in; the start's cell first, at 0. [Units: wu]
+    /// Returns the cells entered, ascending by the length to the nearest portal that leads in; the start's cell first, at 0.
+    /// [Units: wu]
     #[must_use]
     pub fn cells(&self) -> &[(CellId, f64)] {
         &self.cells
@@ -409,8 +410,8 @@ impl LengthSearch {
         self.start
     }
 
-    /// Writes the paths to a point in `cell`, the shortest first: each with its own sequence of portals, none longer than `most` times
-    /// the shortest, at most `n`. Straight lines from the last portal to the point. Clears `arrivals` first. [Units: wu]
+    /// Writes the paths to a point in `cell`, the shortest first: each with its own sequence of portals, none longer than `most`
+    /// times the shortest, at most `n`. Straight lines from the last portal to the point. Clears `arrivals` first. [Units: wu]
     ///
     /// These are not all sequences: of several to one point of a portal the search keeps the shortest.
     pub fn arrivals(
@@ -426,8 +427,9 @@ impl LengthSearch {
         self.arrivals_by(ways, cell, to, straight, most, n, arrivals);
     }
 
-    /// As [`LengthSearch::arrivals`], with given lengths from the points of the cell to the end, as for [`LengthSearch::run_from`];
-    /// `direct` is called for the length to the start if that is in the same cell, with an index after those of all points.
+    /// As [`LengthSearch::arrivals`], with given lengths from the points of the cell to the end, as for
+    /// [`LengthSearch::run_from`]; `direct` is called for the length to the start if that is in the same cell, with an index
+    /// after those of all points.
     #[expect(
         clippy::too_many_arguments,
         reason = "two limits and a buffer more than a way has ends"

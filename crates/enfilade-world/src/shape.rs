@@ -1,10 +1,10 @@
 //! Convex shapes, and their contact with openings.
 //!
 //! A shape is the hull of a few points, grown by a radius: a sphere is one point, a capsule two, a box eight. It meets a convex
-//! polygon if the distance of the two hulls is at most the radius. The distance is computed by the algorithm of Gilbert, Johnson &
-//! Keerthi ("A fast procedure for computing the distance between complex objects", 1988), which needs only the farthest point of a
-//! hull in a direction: O(points) per step, a handful of steps. A lower bound ends it as soon as the two are certainly apart. If
-//! rounding stops its progress, they count as meeting: within the tolerance.
+//! polygon if the distance of the two hulls is at most the radius. The distance is computed by the algorithm of Gilbert, Johnson
+//! & Keerthi ("A fast procedure for computing the distance between complex objects", 1988), which needs only the farthest point
+//! of a hull in a direction: O(points) per step, a handful of steps. A lower bound ends it as soon as the two are certainly
+//! apart. If rounding stops its progress, they count as meeting: within the tolerance.
 
 use enfilade_geom::{Aabb, DVec3};
 
@@ -161,8 +161,8 @@ impl Simplex {
         self.len += 1;
     }
 
-    /// Returns the point of the simplex nearest to the origin; keeps only the vertices of the face that contains it, three at most unless
-    /// the origin is inside.
+    /// Returns the point of the simplex nearest to the origin; keeps only the vertices of the face that contains it, three at
+    /// most unless the origin is inside.
     fn nearest_to_origin(&mut self) -> DVec3 {
         if self.len == 4 && self.holds_origin() {
             return DVec3::ZERO;

@@ -3,18 +3,19 @@
 //! One [length search](LengthSearch) from the listener serves all sources: the best few sequences of portals for each, any number
 //! deep, [pulled taut](TautString). Along a string each portal reduces the level by
 //!
-//! - diffraction at its edge: Maekawa ("Noise reduction by screens", 1968) in the closed form of Kurze & Anderson ("Sound attenuation by
-//!   barriers", 1971) by the Fresnel number of the detour over the edge, below 0 on the bright side: 5 dB at grazing, none in the clear;
+//! - diffraction at its edge: Maekawa ("Noise reduction by screens", 1968) in the closed form of Kurze & Anderson ("Sound
+//!   attenuation by barriers", 1971) by the Fresnel number of the detour over the edge, below 0 on the bright side: 5 dB at
+//!   grazing, none in the clear;
 //! - its limited area: the share of the first Fresnel zone that is open (Born & Wolf, "Principles of Optics", §8.2);
 //! - the transmission loss of a leaf or pane, by [kind](Transmission), where it is shut, and by the open share where it is not.
 //!
-//! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, so that none
-//! appears or vanishes abruptly. The search may still replace a sequence by another of equal length but different level, so levels
-//! change by at most 0.4 dB per centimeter walked. All of this is for one wavelength, that of 500 Hz. O(portals of a sequence) per
-//! source.
+//! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, so that
+//! none appears or vanishes abruptly. The search may still replace a sequence by another of equal length but different level, so
+//! levels change by at most 0.4 dB per centimeter walked. All of this is for one wavelength, that of 500 Hz. O(portals of a
+//! sequence) per source.
 //!
-//! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.7 m. Within a concave cell strings are
-//! straight, too short where a wall of the cell is in between.
+//! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.7 m. Within a concave cell strings
+//! are straight, too short where a wall of the cell is in between.
 
 use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
 use enfilade_geom::{DVec3, Winding};
@@ -115,7 +116,8 @@ impl Acoustics {
         }
     }
 
-    /// Returns the fraction of a portal's opening that lets sound pass freely, 0 to 1, from the pose of its leaves; 0 behind a pane.
+    /// Returns the fraction of a portal's opening that lets sound pass freely, 0 to 1, from the pose of its leaves; 0 behind a
+    /// pane.
     ///
     /// # Panics
     ///
@@ -210,8 +212,8 @@ struct Route {
 
 /// A pair of ears, with reusable buffers: allocates nothing once they have grown.
 ///
-/// Searches sequences again when the listener enters a cell or has moved by a quarter of a meter, and when doors moved; pulls strings at
-/// each query.
+/// Searches sequences again when the listener enters a cell or has moved by a quarter of a meter, and when doors moved; pulls
+/// strings at each query.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     search: LengthSearch,
@@ -273,8 +275,8 @@ impl Listener {
         self.n_searches
     }
 
-    /// Returns a source in `cell` as heard. `id` numbers sources from 0, without large gaps. `None` before the first [`Listener::listen`],
-    /// and if no path exists. [Units: wu]
+    /// Returns a source in `cell` as heard. `id` numbers sources from 0, without large gaps. `None` before the first
+    /// [`Listener::listen`], and if no path exists. [Units: wu]
     ///
     /// # Panics
     ///

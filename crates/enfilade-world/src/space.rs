@@ -140,8 +140,8 @@ impl Space {
         Ok(space)
     }
 
-    /// Adds a world that stands in another, at a pose in the host's frame. Its outdoors stands for its surroundings; a world without
-    /// outdoors is closed to sight both ways. O(its size).
+    /// Adds a world that stands in another, at a pose in the host's frame. Its outdoors stands for its surroundings; a world
+    /// without outdoors is closed to sight both ways. O(its size).
     ///
     /// # Errors
     ///
@@ -199,8 +199,8 @@ impl Space {
         Ok(())
     }
 
-    /// Moves a part, and everything that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they touch).
-    /// Allocates nothing once its lists have grown.
+    /// Moves a part, and everything that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they
+    /// touch). Allocates nothing once its lists have grown.
     ///
     /// # Errors
     ///
@@ -436,7 +436,8 @@ impl Space {
         door.map_or(&[], |d| &d.meets)
     }
 
-    /// Returns the places around a part to which one of its doors currently leads; none in front of a wall, and for inner portals.
+    /// Returns the places around a part to which one of its doors currently leads; none in front of a wall, and for inner
+    /// portals.
     #[must_use]
     pub fn leads_to(&self, part: PartId, portal: PortalId) -> &[Place] {
         let doors = &self.parts[part.idx()].doors;
@@ -444,8 +445,9 @@ impl Space {
         door.map_or(&[], |d| &d.leads_to)
     }
 
-    /// Returns the place of a point of a part's frame: a cell of the innermost part that contains it; `None` in solid matter of all.
-    /// O(depth of the locators), for each part at the point. A point in the walls of a part counts as in that part's surroundings.
+    /// Returns the place of a point of a part's frame: a cell of the innermost part that contains it; `None` in solid matter of
+    /// all. O(depth of the locators), for each part at the point. A point in the walls of a part counts as in that part's
+    /// surroundings.
     #[must_use]
     pub fn locate(&self, frame: PartId, p: DVec3) -> Option<Place> {
         let p = if frame == PartId::ROOT {

@@ -74,8 +74,8 @@ impl Strides {
         }
     }
 
-    /// Returns the length to a floor; infinite if no path was found. After a search for one goal, only that of the goal is certainly the
-    /// least. [Units: wu]
+    /// Returns the length to a floor; infinite if no path was found. After a search for one goal, only that of the goal is
+    /// certainly the least. [Units: wu]
     pub(crate) fn length(&self, to: u32) -> f64 {
         let label = self.labels.get(to as usize);
         let known = label.filter(|l| l.stamp == self.stamp);

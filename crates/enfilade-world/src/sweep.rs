@@ -1,10 +1,10 @@
 //! Passage of a moving door over a point at rest.
 //!
-//! In the frame of the moving part, the point moves along a curve (Dirkse 2002, section 3.2.2: portals are tested in portal space).
-//! Its height over the opening's plane is zero at a passage; a straight line between the two ends of a step, as used there, misses
-//! passages of the curve and finds false ones. Here time advances by at most the height divided by the greatest speed (conservative
-//! advancement, Mirtich 1996), so no side is skipped; a change of side is then bisected. O(log) steps per crossing where the curve
-//! meets the plane at an angle; bounded by [`SHORTEST`] where it runs along it.
+//! In the frame of the moving part, the point moves along a curve (Dirkse 2002, section 3.2.2: portals are tested in portal
+//! space). Its height over the opening's plane is zero at a passage; a straight line between the two ends of a step, as used
+//! there, misses passages of the curve and finds false ones. Here time advances by at most the height divided by the greatest
+//! speed (conservative advancement, Mirtich 1996), so no side is skipped; a change of side is then bisected. O(log) steps per
+//! crossing where the curve meets the plane at an angle; bounded by [`SHORTEST`] where it runs along it.
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
@@ -31,8 +31,8 @@ pub struct Passing {
 }
 
 impl Space {
-    /// Appends to `into` the doors of `part` that pass over a point as the part moves from one pose to another, in order of time. The
-    /// poses and the point are in the host's frame; the motion between is [`Pose::toward`].
+    /// Appends to `into` the doors of `part` that pass over a point as the part moves from one pose to another, in order of
+    /// time. The poses and the point are in the host's frame; the motion between is [`Pose::toward`].
     ///
     /// A passage within the part's tolerance of an opening's rim counts.
     pub fn passings(

@@ -5,17 +5,18 @@
 //!
 //! 1. *Sweeps*: each point moves to its best place between its neighbors, which has a closed form: reflection at the plane, then
 //!    unfolding about an edge. They find the edges and vertices at which points are caught.
-//! 2. *Newton's method* on the faces found, a block tridiagonal system of 2 × 2 blocks: a few steps where sweeps would need hundreds.
+//! 2. *Newton's method* on the faces found, a block tridiagonal system of 2 × 2 blocks: a few steps where sweeps would need
+//!    hundreds.
 //! 3. Where points of neighboring openings coincide, and both stall, an *interior-point method* with logarithmic barriers
-//!    (Boyd & Vandenberghe, "Convex Optimization", 2004, §11.3) and lengths smoothed at zero: its gap shrinks by a constant factor per
-//!    step, whatever the openings.
+//!    (Boyd & Vandenberghe, "Convex Optimization", 2004, §11.3) and lengths smoothed at zero: its gap shrinks by a constant
+//!    factor per step, whatever the openings.
 //!
 //! All end by the same test. For any vectors `uᵢ` of length 1 or less, one per leg, `uₙ·b − u₀·a + Σᵢ min over opening i of
-//! (uᵢ₋₁ − uᵢ)·x` is at most the length of any string (the dual problem): with the legs' directions for `u` it equals the string's
-//! length at the optimum, and elsewhere its distance from that length bounds the error. O(vertices) per step.
+//! (uᵢ₋₁ − uᵢ)·x` is at most the length of any string (the dual problem): with the legs' directions for `u` it equals the
+//! string's length at the optimum, and elsewhere its distance from that length bounds the error. O(vertices) per step.
 //!
-//! Numerically: legs of zero length have no direction, so these end with step 3; slivers of openings have ill-conditioned barriers,
-//! so a step that does not shorten is rejected.
+//! Numerically: legs of zero length have no direction, so these end with step 3; slivers of openings have ill-conditioned
+//! barriers, so a step that does not shorten is rejected.
 
 use enfilade_geom::DVec3;
 
@@ -50,11 +51,11 @@ impl TautString {
         Self::default()
     }
 
-    /// Pulls the string taut from `from` through `n` openings to `to`, and returns its length. `pieces(i)` returns the convex planar
-    /// polygons of opening `i`, at least one, each with an area. [Units: wu]
+    /// Pulls the string taut from `from` through `n` openings to `to`, and returns its length. `pieces(i)` returns the convex
+    /// planar polygons of opening `i`, at least one, each with an area. [Units: wu]
     ///
-    /// Starts at the middles of openings; O(vertices) per step, about ten steps, rarely a hundred. If the pieces of an opening together
-    /// are not convex, the result is a local optimum, and [`TautString::bound`] is that of its hull.
+    /// Starts at the middles of openings; O(vertices) per step, about ten steps, rarely a hundred. If the pieces of an opening
+    /// together are not convex, the result is a local optimum, and [`TautString::bound`] is that of its hull.
     pub fn pull<'a, I>(
         &mut self,
         from: DVec3,
@@ -321,8 +322,8 @@ impl TautString {
         }
     }
 
-    /// Sets the legs' directions after the solved step, from their derivatives: these satisfy the constraints of the dual problem exactly,
-    /// while the directions of almost zero legs are far off.
+    /// Sets the legs' directions after the solved step, from their derivatives: these satisfy the constraints of the dual
+    /// problem exactly, while the directions of almost zero legs are far off.
     fn set_newton_directions(&mut self, round: f64) {
         self.directions.clear();
         let n = self.axes.len();

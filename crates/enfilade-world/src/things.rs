@@ -118,8 +118,8 @@ impl Things {
         Self::default()
     }
 
-    /// Adds a thing at a pose in the frame of a part; that of a [child](Tie::Child) is relative to its parent, and `frame` is ignored.
-    /// Allocates while lists grow.
+    /// Adds a thing at a pose in the frame of a part; that of a [child](Tie::Child) is relative to its parent, and `frame` is
+    /// ignored. Allocates while lists grow.
     ///
     /// # Errors
     ///
@@ -236,9 +236,9 @@ impl Things {
         Ok(Moved { from, to })
     }
 
-    /// Call after a part has moved ([`Space::set_pose`]), and after doors of parts have met or separated: updates the cells of things
-    /// that stand around it, that stick out of it, or that one of its doors has passed over. O(things in the cells of the part, and in
-    /// those in which it stands).
+    /// Call after a part has moved ([`Space::set_pose`]), and after doors of parts have met or separated: updates the cells of
+    /// things that stand around it, that stick out of it, or that one of its doors has passed over. O(things in the cells of the
+    /// part, and in those in which it stands).
     pub fn part_moved(&mut self, space: &Space, part: PartId) {
         let mut affected = std::mem::take(&mut self.affected);
         affected.clear();
@@ -310,8 +310,8 @@ impl Things {
         self.in_cell(Self::cell_index(space, place))
     }
 
-    /// Returns the things in a view, ascending, each once: those whose shape meets the visible part of a cell that they are in, and all
-    /// global ones. No visible thing is missing.
+    /// Returns the things in a view, ascending, each once: those whose shape meets the visible part of a cell that they are in,
+    /// and all global ones. No visible thing is missing.
     pub fn see(&mut self, space: &Space, seen: &SpaceSeen) -> &[ThingId] {
         self.seen.clear();
         self.seen.extend_from_slice(&self.globals);
@@ -562,8 +562,8 @@ fn locate(space: &Space, thing: &Thing) -> (Option<Place>, DVec3, f64) {
     (space.locate(thing.frame, at), at, 0.0)
 }
 
-/// Returns the distance by which a thing in a place may move without meeting an opening of its cell; not above 0 if it may meet one
-/// now, if other parts stand in the cell, or if the thing is in the frame of another part. [Units: wu]
+/// Returns the distance by which a thing in a place may move without meeting an opening of its cell; not above 0 if it may meet
+/// one now, if other parts stand in the cell, or if the thing is in the frame of another part. [Units: wu]
 fn clearance_in(space: &Space, place: Place, thing: &Thing) -> f64 {
     let part = &space.parts[place.part.idx()];
     if place.part != thing.frame || part.has_guests[place.cell.idx()] {

@@ -1,7 +1,7 @@
 //! A walker with gravity, steps, and collisions.
 //!
-//! Collide and slide (Fauerby, *Improved collision detection and response*, 2003), with a capsule that begins above the height of a
-//! step: it moves by casts, loses the component of its motion into an obstacle, and goes on, a few times. So it passes over
+//! Collide and slide (Fauerby, *Improved collision detection and response*, 2003), with a capsule that begins above the height
+//! of a step: it moves by casts, loses the component of its motion into an obstacle, and goes on, a few times. So it passes over
 //! low obstacles, and the floor is found separately, straight below. Objects that have moved into it meanwhile, such as leaves of
 //! doors, push it out. Two to five casts per step.
 //!
@@ -83,9 +83,9 @@ impl Walker {
         self.cell
     }
 
-    /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors where `state` puts
-    /// them and openings that `state` shuts; falls, and climbs up to the height of a step. In no cell, nothing stops it and it does not
-    /// fall. [Units: wu/s, s]
+    /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors where
+    /// `state` puts them and openings that `state` shuts; falls, and climbs up to the height of a step. In no cell, nothing
+    /// stops it and it does not fall. [Units: wu/s, s]
     ///
     /// # Panics
     ///

@@ -55,8 +55,8 @@ fn corners_in_plan(walls: &[Triangle]) -> Vec<DVec3> {
     corners
 }
 
-/// The shortest path in plan within one cell, by a graph of all wall ends that see each other: paths about vertical edges are as long
-/// as those in plan, unrolled.
+/// The shortest path in plan within one cell, by a graph of all wall ends that see each other: paths about vertical edges are as
+/// long as those in plan, unrolled.
 fn by_visibility(
     layout: &Layout,
     cell: CellId,

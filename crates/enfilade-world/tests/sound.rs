@@ -58,8 +58,8 @@ impl Site {
         ears.hear(&self.acoustics, &self.layout, 0, source.0, source.1)
     }
 
-    /// The least length over all sequences of at most `most` portals, and that sequence: depth first, cut off if the string through
-    /// the portals so far, straight on to the end, is at least as long as the best.
+    /// The least length over all sequences of at most `most` portals, and that sequence: depth first, cut off if the string
+    /// through the portals so far, straight on to the end, is at least as long as the best.
     fn least(
         &self,
         from: (CellId, DVec3),

@@ -8,12 +8,12 @@ use crate::solid::{MeshBuilder, aabb};
 use crate::truth::OpeningKind::{Door, Window};
 use crate::truth::{Convex, Room, Side};
 
-/// Height of everything. [Units: wu]
+/// Height of all rooms and corridors. [Units: wu]
 const CEILING: f64 = 2.7;
 /// Thickness of walls and slabs. [Units: wu]
 const WALL: f64 = 0.3;
 
-/// Rooms and corridors that are carved out of shells around them.
+/// Rooms and corridors, carved out of shells around them.
 struct Shells {
     site: Site,
     storey: usize,
@@ -21,7 +21,7 @@ struct Shells {
     holes: Vec<Aabb>,
 }
 
-/// The air over an area of the plan.
+/// The air above an area of the plan.
 fn air(x: [f64; 2], z: [f64; 2]) -> Aabb {
     aabb([x[0], 0.0, z[0]], [x[1], CEILING, z[1]])
 }
@@ -38,14 +38,14 @@ impl Shells {
         }
     }
 
-    /// A room of boxes that do not overlap.
+    /// Adds a room of boxes that do not overlap.
     fn room(&mut self, name: &str, boxes: &[Aabb]) -> Side {
         self.air.extend_from_slice(boxes);
         let parts = boxes.iter().map(Convex::of_aabb).collect();
         self.site.add_room(Room::new(name, self.storey, parts, &[]))
     }
 
-    /// Where a corridor opens into a room: in the plane of the room's wall, across `axis` at `at`.
+    /// Adds the mouth of a corridor: in the plane of the room's wall, across `axis` at `at`.
     fn mouth(&mut self, axis: usize, at: f64, along: [f64; 2], rooms: [Side; 2]) {
         let hole = if axis == 0 {
             air([at, at], along)
@@ -55,14 +55,14 @@ impl Shells {
         self.site.opening(Door, hole, axis, rooms);
     }
 
-    /// A front door of 1.0 × 2.1 m through the wall across x that ends at `high`.
+    /// Adds a front door of 1.0 × 2.1 m through the wall across x that ends at `high`.
     fn front_door(&mut self, high: f64, z: f64, room: Side) {
         let hole = aabb([high - WALL, 0.0, z - 0.5], [high, 2.1, z + 0.5]);
         self.holes.push(hole);
         self.site.opening(Door, hole, 0, [OUT, room]);
     }
 
-    /// A window of 1.4 × 1.3 m through the wall across x that begins at `low`.
+    /// Adds a window of 1.4 × 1.3 m through the wall across x that begins at `low`.
     fn window(&mut self, low: f64, z: f64, room: Side) {
         let hole = aabb([low, 0.9, z - 0.7], [low + WALL, 2.2, z + 0.7]);
         self.holes.push(hole);
@@ -95,12 +95,12 @@ pub(super) fn straight(name: &str, width: f64) -> Generated {
     s.finish()
 }
 
-/// Width of corridors that bend and meet, half of it, and the size of the rooms at their ends.
+/// Width of corridors that bend or meet, half of it, and the size of the rooms at their ends.
 /// [Units: wu]
 const WIDTH: f64 = 1.6;
 const HALF: f64 = WIDTH * 0.5;
 const ROOM: f64 = 5.0;
-/// From the middle of a bend or crossing to the rooms. [Units: wu]
+/// Distance from the middle of a bend or crossing to the rooms. [Units: wu]
 const ARM: f64 = 8.0;
 
 /// Directions in which corridors run from the middle of a crossing.
@@ -112,7 +112,7 @@ enum Way {
     South,
 }
 
-/// Corridors from a square in the middle to a room each, all of them one corridor.
+/// Corridors from a square in the middle to one room each; together they are one corridor.
 fn star(name: &str, ways: &[Way]) -> Generated {
     let mut s = Shells::new(name);
     let across = [-HALF, HALF];

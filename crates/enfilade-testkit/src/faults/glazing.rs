@@ -6,8 +6,8 @@ use crate::site::Generated;
 use crate::solid::aabb;
 use crate::truth::{OpeningKind, Side};
 
-/// Where the bays of [`curtain_wall`] begin along the long sides, the last one ends, and where the
-/// partition between hall and gallery stands. [Units: wu]
+/// Start of the bays of [`curtain_wall`] along the long sides, end of the last one, and position of the
+/// partition between hall and gallery. [Units: wu]
 const BAY: f64 = 3.0;
 const SIZE: [f64; 2] = [18.0, 9.0];
 const PARTITION: f64 = 12.0;
@@ -88,7 +88,7 @@ pub(super) fn curtain_wall(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Bays of glass from 0 to `end` across `axis` between `faces`, and the rooms at a place.
+/// Adds bays of glass from 0 to `end` across `axis` between `faces`, with the rooms at each place.
 fn facade(
     plan: &mut Plan,
     axis: usize,
@@ -98,7 +98,7 @@ fn facade(
 ) {
     const PANES: u8 = 4;
     let n = (end / BAY).round() as u8;
-    // The partition ends at a mullion as wide as itself; at the corners stand posts.
+    // The partition ends at a mullion of its own width; posts stand where two facades meet.
     let half = |at: f64| match at {
         at if at <= 0.0 || at >= end => 0.0,
         at if axis == 2 && at == PARTITION => 2.0 * HALF,
@@ -131,8 +131,8 @@ fn facade(
     }
 }
 
-/// Three offices behind a partition of panes in bays of 1.2 m between mullions of 6 cm, a door with
-/// a pane above it in the second bay of each; outside, windows parted into three by mullions of 5 cm.
+/// Three offices behind a partition of panes in bays of 1.2 m between mullions of 6 cm, with a door below
+/// a pane in the second bay of each; outside, windows divided into three by mullions of 5 cm.
 pub(super) fn mullions(name: &str) -> Generated {
     const CEILING: f64 = 2.8;
     const BAY: f64 = 1.2;
@@ -164,10 +164,10 @@ pub(super) fn mullions(name: &str) -> Generated {
             [corridor, office],
         );
         if i > 0 {
-            // It runs up to the corridor and parts the panes.
+            // It runs up to the corridor and divides the panes.
             plan.wall(0, [ends[i - 1][1], x[0]], [GLASS[0], DEPTH], UP, &[]);
         }
-        // A window of 3 m, parted into three.
+        // A window of 3 m, divided into three.
         outside.extend((0..3_u8).map(|k| {
             let at = f64::midpoint(x[0], x[1]) - 1.5 + f64::from(k);
             Hole {
@@ -198,8 +198,8 @@ pub(super) fn mullions(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Four bays across z from `low` on: panes from floor to ceiling, in the second one a door of 2.1 m
-/// below a rail of 6 cm and a pane. `half` of a mullion, and the height.
+/// Adds four bays across z from `low` on: panes from floor to ceiling, in the second one a door of 2.1 m
+/// below a rail of 6 cm and a pane. `half` is half the width of a mullion, then comes the height.
 fn glass_partition(
     plan: &mut Plan,
     faces: [f64; 2],

@@ -1,7 +1,7 @@
-//! Buildings with the faults that models have as people draw, export and download them.
+//! Buildings with the faults of models as people draw, export and download them.
 //!
-//! Each is sound but for the one thing that it is named after, and its truth is what a visitor
-//! would say: which rooms there are, and where one walks or looks from one to the next.
+//! Each has exactly the fault that names it. Its truth is a visitor's view: the rooms, and the places
+//! where one walks or looks from one to the next.
 
 mod corridors;
 mod glazing;
@@ -12,7 +12,7 @@ mod walls;
 
 use crate::site::Generated;
 
-/// What is wrong with a building, or hard about it.
+/// A fault or difficulty of a building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Fault {
     /// Walls begin 2 mm above the slab that they stand on.
@@ -23,17 +23,17 @@ pub enum Fault {
     WallsToCeiling,
     /// A storey is glazed from slab to slab on all sides, between mullions and transoms.
     CurtainWall,
-    /// Partitions inside are panes between mullions, with a door in one bay; windows are parted.
+    /// Inner partitions are panes between mullions, with a door in one bay; windows are divided.
     Mullions,
-    /// Columns stand in the walls, thicker than these and modelled apart from them.
+    /// Columns stand in the walls, thicker than these and modelled separately.
     ColumnsInWalls,
-    /// Four doorways around one post, each reaching into the corner of its rooms.
+    /// Four doorways around one post, each at the very end of its rooms' walls.
     CornerDoors,
-    /// Leaves of doors stand open into a corridor and take up most of its width.
+    /// Door leaves stand open into a corridor and take up most of its width.
     LeavesInCorridor,
     /// Ten walls around seven rooms, without a floor or a ceiling.
     WallsAlone,
-    /// Two rooms joined by 20 m of corridor, 1.6 m wide and as high as they.
+    /// Two rooms joined by 20 m of corridor, 1.6 m wide and as high as the rooms.
     CorridorWide,
     /// The same, 1.2 m wide.
     CorridorMedium,
@@ -45,11 +45,11 @@ pub enum Fault {
     CorridorT,
     /// Two corridors that cross.
     CorridorCross,
-    /// Closed blocks on open land, with streets between them and no room at all.
+    /// Closed blocks on open land, with streets between them and without any room.
     CityBlocks,
-    /// Closed columns that stand free in a hall.
+    /// Closed free-standing columns in a hall.
     Columns,
-    /// Closed boxes, as large as furniture and not told from walls, on floors, at walls, in stacks.
+    /// Closed boxes of furniture size, not marked as detail, on floors, at walls, in stacks.
     Boxes,
 }
 
@@ -76,7 +76,7 @@ impl Fault {
         Self::Boxes,
     ];
 
-    /// Its name, which its scene has, too.
+    /// Returns its name, which is also the name of its scene.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -101,7 +101,7 @@ impl Fault {
         }
     }
 
-    /// The building.
+    /// Builds it.
     #[must_use]
     pub fn build(self) -> Generated {
         let name = self.name();

@@ -1,4 +1,4 @@
-//! Buildings as planning programs write them: every wall, slab and ceiling a closed solid of its own.
+//! Buildings as CAD programs export them: every wall, slab and ceiling a separate closed solid.
 
 use enfilade_geom::{Aabb, DVec3};
 
@@ -7,7 +7,7 @@ use crate::site::{Generated, Site};
 use crate::solid::{MeshBuilder, aabb};
 use crate::truth::{Convex, OpeningKind, Room, Side};
 
-/// The side that no room is on.
+/// The side without a room.
 pub(super) const OUT: Side = Side::Outside;
 
 /// A building under construction.
@@ -16,7 +16,7 @@ pub(super) struct Plan {
     pub(super) palette: Palette,
     pub(super) plaster: u32,
     pub(super) storey: usize,
-    /// What stands in rooms and is modelled apart from them: no room has it for air.
+    /// Solids that stand in rooms and are modelled separately; no room has them as air.
     pub(super) obstacles: Vec<Aabb>,
 }
 
@@ -26,14 +26,14 @@ pub(super) struct Hole {
     pub(super) along: [f64; 2],
     pub(super) up: [f64; 2],
     pub(super) rooms: [Side; 2],
-    /// How far a door's leaf stands open towards its second side. [Units: degrees]
+    /// Opening angle of a door's leaf towards its second side. [Units: degrees]
     pub(super) swing: f64,
 }
 
-/// How far leaves stand open. [Units: degrees]
+/// Default opening angle of leaves. [Units: degrees]
 const SWING: f64 = 80.0;
 
-/// A door of 0.9 × 2.05 m, its middle `at` along the wall.
+/// Makes a door of 0.9 × 2.05 m with its middle `at` along the wall.
 pub(super) fn door(at: f64, rooms: [Side; 2]) -> Hole {
     Hole {
         kind: OpeningKind::Door,
@@ -44,7 +44,7 @@ pub(super) fn door(at: f64, rooms: [Side; 2]) -> Hole {
     }
 }
 
-/// A window of 1.4 × 1.3 m above a sill of 0.9 m.
+/// Makes a window of 1.4 × 1.3 m above a sill of 0.9 m.
 pub(super) fn window(at: f64, rooms: [Side; 2]) -> Hole {
     Hole {
         kind: OpeningKind::Window,
@@ -55,7 +55,7 @@ pub(super) fn window(at: f64, rooms: [Side; 2]) -> Hole {
     }
 }
 
-/// The box between `faces` across `axis` (0: x, 2: z), running over `along` and `up`.
+/// Returns the box between `faces` across `axis` (0: x, 2: z), over `along` and `up`.
 pub(super) fn span(axis: usize, faces: [f64; 2], along: [f64; 2], up: [f64; 2]) -> Aabb {
     if axis == 0 {
         aabb([faces[0], up[0], along[0]], [faces[1], up[1], along[1]])
@@ -79,21 +79,21 @@ impl Plan {
         }
     }
 
-    /// A closed box of its own.
+    /// Adds a separate closed box.
     pub(super) fn solid(&mut self, name: &str, b: Aabb) {
         let mut mesh = MeshBuilder::new(self.plaster);
         mesh.cuboid(b);
         self.site.structure(name, mesh);
     }
 
-    /// A closed box of its own that stands in rooms, and is matter.
+    /// Adds a separate closed box that stands in rooms, and is solid.
     pub(super) fn obstacle(&mut self, name: &str, b: Aabb) {
         self.solid(name, b);
         self.site.matter(b.center());
         self.obstacles.push(b);
     }
 
-    /// A wall across `axis` with its holes, which are hung with doors and glazed.
+    /// Adds a wall across `axis` with its holes, which get doors or glass.
     pub(super) fn wall(
         &mut self,
         axis: usize,
@@ -114,7 +114,7 @@ impl Plan {
         }
     }
 
-    /// An opening in the truth, with a leaf that stands open or a pane.
+    /// Adds an opening to the truth, with an open leaf or a pane.
     pub(super) fn opening(
         &mut self,
         kind: OpeningKind,
@@ -131,7 +131,7 @@ impl Plan {
         }
     }
 
-    /// A room that fills a box but for the obstacles in it.
+    /// Adds a room that fills a box except for the obstacles in it.
     pub(super) fn room(&mut self, name: &str, min: [f64; 3], max: [f64; 3]) -> Side {
         let air = aabb(min, max);
         let inside: Vec<(Aabb, f64)> = self
@@ -151,22 +151,22 @@ impl Plan {
     }
 }
 
-/// Inner measures of [`office`] on plan, along x and z. [Units: wu]
+/// Inner size of [`office`] in plan, along x and z. [Units: wu]
 pub(super) const OFFICE: [f64; 2] = [12.0, 8.0];
 /// Thickness of its outer walls. [Units: wu]
 pub(super) const OUTER: f64 = 0.3;
 
-/// What differs between offices; heights are above the floor. [Units: wu]
+/// Parameters of offices; heights are above the floor. [Units: wu]
 pub(super) struct Office {
-    /// Where walls begin.
+    /// Lower end of the walls.
     pub(super) foot: f64,
-    /// Where the rooms' air ends, at a slab or a hung ceiling.
+    /// Upper end of the rooms' air, at a slab or a hung ceiling.
     pub(super) ceiling: f64,
-    /// Where inner walls end.
+    /// Upper end of the inner walls.
     pub(super) inner: f64,
-    /// Underside of the slab above; outer walls end there.
+    /// Underside of the slab above, which is the upper end of the outer walls.
     pub(super) slab: f64,
-    /// Leaves stand open into the corridor instead of the rooms beside it.
+    /// True if leaves stand open into the corridor, not into the rooms beside it.
     pub(super) has_leaves_in_corridor: bool,
 }
 
@@ -189,10 +189,10 @@ pub(super) const CEILING: f64 = 2.7;
 pub(super) const BESIDE: [[f64; 2]; 2] = [[3.08, 3.2], [4.8, 4.92]];
 pub(super) const BETWEEN: [[f64; 2]; 2] = [[5.94, 6.06], [3.94, 4.06]];
 
-/// Adds a storey with a corridor from end to end and two rooms on either side of it: four doors
-/// inside, a front door at the corridor's end, a window a room. 0 is the floor.
+/// Adds a storey with a corridor from end to end and two rooms on either side of it: four doors inside, a
+/// front door at the corridor's end, one window per room. The floor is at 0.
 ///
-/// Returns the floor areas of the five rooms, as low and high corners (x, z).
+/// Returns the floor areas of the five rooms, as minimum and maximum (x, z).
 pub(super) fn office(plan: &mut Plan, h: &Office) -> [[[f64; 2]; 2]; 5] {
     let [length, depth] = OFFICE;
     let areas = [
@@ -260,7 +260,7 @@ pub(super) fn office(plan: &mut Plan, h: &Office) -> [[[f64; 2]; 2]; 5] {
     areas
 }
 
-/// A point of the plan at a height.
+/// Returns a point of the plan at a height.
 pub(super) fn at(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }

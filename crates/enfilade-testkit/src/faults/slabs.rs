@@ -1,18 +1,18 @@
-//! Walls, slabs and ceilings that do not meet, or meet elsewhere than one would think.
+//! Walls, slabs and ceilings that do not meet, or meet in unexpected places.
 
 use crate::faults::plan::{CEILING, OFFICE, Office, Plan, office};
 use crate::site::Generated;
 use crate::solid::aabb;
 
-/// How far above its slab a wall begins. [Units: wu]
+/// Height of a wall's lower end above its slab. [Units: wu]
 const SLIT: f64 = 0.002;
-/// Between a hung ceiling and the walls around it. [Units: wu]
+/// Gap between a hung ceiling and the walls around it. [Units: wu]
 const SHADOW_GAP: f64 = 0.107;
 /// Thickness of the hung ceilings, and the underside of the slab above them. [Units: wu]
 const BOARD: f64 = 0.02;
 const SLAB: f64 = 3.4;
 
-/// Walls begin 2 mm above the slab that they stand on, the outer ones, too.
+/// Walls begin 2 mm above the slab that they stand on, outer ones included.
 pub(super) fn walls_above_slabs(name: &str) -> Generated {
     let mut plan = Plan::new(name);
     let how = Office {
@@ -23,7 +23,7 @@ pub(super) fn walls_above_slabs(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Walls from slab to slab; the ceiling of each room hangs free. The air above it is the room's.
+/// Walls from slab to slab; the ceiling of each room hangs free. The air above it belongs to the room.
 pub(super) fn hung_ceilings(name: &str) -> Generated {
     let mut plan = Plan::new(name);
     let how = Office {
@@ -41,7 +41,7 @@ pub(super) fn hung_ceilings(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Inner walls end at one ceiling over all rooms. The closed plenum above it is no room.
+/// Inner walls end at one ceiling over all rooms. The closed plenum above it is not a room.
 pub(super) fn walls_to_ceiling(name: &str) -> Generated {
     let mut plan = Plan::new(name);
     let how = Office {

@@ -1,4 +1,4 @@
-//! Closed solids whose insides are matter, however much they look like rooms.
+//! Closed solids whose insides are not air, however much they look like rooms.
 
 use enfilade_geom::{Aabb, DVec2};
 
@@ -7,8 +7,8 @@ use crate::site::Generated;
 use crate::solid::{MeshBuilder, aabb};
 use crate::truth::{Convex, Room};
 
-/// Blocks of houses on open land: streets of 5 m, two blocks that touch, one that stands a little
-/// into the ground and one that hovers a little above it.
+/// Blocks of houses on open land: streets of 5 m, two blocks that touch, one sunk a little into the
+/// ground and one hovering a little above it.
 pub(super) fn city_blocks(name: &str) -> Generated {
     let mut plan = Plan::new(name);
     plan.solid("ground", aabb([-20.0, -0.5, -20.0], [56.0, 0.0, 56.0]));
@@ -89,19 +89,19 @@ pub(super) fn columns(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Boxes in an office: free, against walls, in corners, on each other, below the ceiling, and from
-/// floor to ceiling. Their names say nothing.
+/// Boxes in an office: free, against walls, between two walls, stacked, below the ceiling, and from floor
+/// to ceiling. Their names carry no information.
 pub(super) fn boxes(name: &str) -> Generated {
     let mut plan = Plan::new(name);
     let [length, depth] = OFFICE;
     let places = [
-        // A table's size, free; a cupboard at a wall; one in a corner.
+        // A table, free; a cupboard at a wall; one between two walls.
         aabb([2.0, 0.0, 0.9], [3.6, 0.75, 1.7]),
         aabb([3.0, 0.0, 2.48], [4.8, 2.0, 3.08]),
         aabb([0.0, 0.0, 0.0], [0.6, 1.8, 1.2]),
-        // A shaft's size, from floor to ceiling at a wall.
+        // A shaft, from floor to ceiling at a wall.
         aabb([length - 0.8, 0.0, 0.0], [length, CEILING, 0.9]),
-        // Two on each other.
+        // Two stacked.
         aabb([7.4, 0.0, 0.8], [8.6, 1.0, 1.8]),
         aabb([7.5, 1.0, 0.9], [8.4, 1.7, 1.7]),
         // Below the ceiling, as large as an air conditioner.

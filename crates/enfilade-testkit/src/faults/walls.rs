@@ -1,4 +1,4 @@
-//! Walls with something in them, and walls with nothing around them.
+//! Walls with columns, posts or leaves, and walls without floors.
 
 use crate::faults::plan::{
     BESIDE, BETWEEN, CEILING, Hole, OFFICE, OUT, OUTER, Office, Plan, door, office, window,
@@ -36,7 +36,7 @@ pub(super) fn columns_in_walls(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Four rooms around a post of 15 cm, and between each two of them a doorway that begins at it.
+/// Four rooms around a post of 15 cm, with a doorway between each two of them that begins at the post.
 pub(super) fn corner_doors(name: &str) -> Generated {
     const POST: [f64; 2] = [4.0, 4.15];
     const END: f64 = 8.15;
@@ -91,8 +91,8 @@ pub(super) fn corner_doors(name: &str) -> Generated {
     plan.finish()
 }
 
-/// Ten walls of 4 m height around a corridor and three rooms on either side. No floor lies under
-/// them and nothing on them, as in plans that were pulled up.
+/// Ten walls of 4 m height around a corridor and three rooms on either side, without floors and ceilings,
+/// as in extruded plans.
 pub(super) fn walls_alone(name: &str) -> Generated {
     const LENGTH: f64 = 13.6;
     const DEPTH: f64 = 10.0;
@@ -157,7 +157,7 @@ pub(super) fn walls_alone(name: &str) -> Generated {
     plan.finish()
 }
 
-/// A sound building, but leaves that stand open take up most of the corridor's width.
+/// A sound building, except that open leaves take up most of the corridor's width.
 pub(super) fn leaves_in_corridor(name: &str) -> Generated {
     let mut plan = Plan::new(name);
     let how = Office {

@@ -1,4 +1,4 @@
-//! Doorways of a generated world get leaves.
+//! Leaves for the doorways of a generated world.
 
 use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, MotionKind, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive};
@@ -6,16 +6,15 @@ use enfilade_geom::{Aabb, DVec3};
 
 use super::world::box_indices;
 
-/// Half the thickness of a leaf, and how far its middle is from the portal's plane. [Units: wu]
+/// Half the thickness of a leaf, and the distance of its middle from the portal's plane. [Units: wu]
 const HALF: f64 = 0.02;
 const OFF: f64 = 0.06;
-/// Lower openings have no leaves. [Units: wu]
+/// Minimum height of an opening with a leaf. [Units: wu]
 const LEAST_HEIGHT: f64 = 1.5;
 
-/// `world` with a leaf in each upright opening that is high enough: a plate that fills it, shut, 6 cm off the portal's
-/// plane on the side of its second cell; it turns by a right angle to that side. Leaves are of glass where `is_glass` says
-/// so, by portal.
-/// Of worlds whose walls lie along x and z.
+/// Adds to `world` a leaf in each upright opening that is high enough: a plate that fills it, shut, 6 cm off the portal's
+/// plane on the side of its second cell; it turns by a right angle to that side. Leaves are of glass where `is_glass(portal)`
+/// is `true`. The walls of the world must lie along x and z.
 #[must_use]
 pub fn with_doors(mut world: World, is_glass: impl Fn(usize) -> bool) -> World {
     world.materials.push(Material {
@@ -85,7 +84,7 @@ pub fn with_doors(mut world: World, is_glass: impl Fn(usize) -> bool) -> World {
     world
 }
 
-/// The box from a corner along three directions.
+/// The box at a vertex along three directions.
 fn plate(corner: DVec3, u: DVec3, v: DVec3, w: DVec3) -> Primitive {
     let at = |k: usize| {
         let bit = |b: usize| f64::from(u8::from(k & b != 0));

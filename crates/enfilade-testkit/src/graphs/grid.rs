@@ -1,15 +1,15 @@
-//! Squares with the numbers of rooms: the walls between them, and where a point is.
+//! Squares labeled with their rooms: the walls between them, and the locator.
 
 use enfilade_cpg::{CellId, Locator, LocatorNode};
 use enfilade_geom::{Aabb, DMat3, DVec3};
 
-/// A rectangle, and which way it was cut out of its wall.
+/// A rectangle, and the direction in which it was cut out of its wall.
 pub(super) type Quad = [DVec3; 4];
 
-/// The grid while it is built.
+/// The grid under construction.
 pub(super) struct Grid {
     pub(super) size: [usize; 3],
-    /// Where squares end, by axis: `size + 1` numbers each.
+    /// Boundaries of squares per axis: `size + 1` numbers each.
     pub(super) at: [Vec<f64>; 3],
     /// Cell of each square, x fastest, then y.
     pub(super) label: Vec<u32>,
@@ -28,7 +28,7 @@ pub(super) struct Face {
 }
 
 impl Grid {
-    /// The square of a place in `label`.
+    /// Returns the square at an index of `label`.
     pub(super) fn square(&self, i: usize) -> [usize; 3] {
         let [x, y, _] = self.size;
         [i % x, i / x % y, i / x / y]
@@ -51,7 +51,7 @@ impl Grid {
         out
     }
 
-    /// The face across `axis` below a square; `None` within a room.
+    /// Returns the face across `axis` below a square; `None` within a room.
     fn face(&self, axis: usize, square: [usize; 3]) -> Option<Face> {
         let mut below = square;
         let lower = if square[axis] == 0 {
@@ -72,7 +72,7 @@ impl Grid {
         })
     }
 
-    /// The part of a face from `low` to `high` (0 to 1 along the two other axes, in cyclic order),
+    /// Returns the part of a face from `low` to `high` (0 to 1 along the two other axes, in cyclic order),
     /// counter-clockwise about the axis.
     pub(super) fn rectangle(&self, face: &Face, low: [f64; 2], high: [f64; 2]) -> Quad {
         let (a, b) = ((face.axis + 1) % 3, (face.axis + 2) % 3);
@@ -129,7 +129,7 @@ impl Grid {
             }
         }
         let inner = self.split(&mut nodes, [0; 3], self.size, &first);
-        // A grid that is one room has no node of its own.
+        // A grid of one room has no node of its own.
         nodes[5].children[1] = inner;
         Locator {
             bounds,

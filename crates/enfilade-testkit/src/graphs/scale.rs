@@ -1,8 +1,8 @@
-//! A finished world in another size.
+//! Scaling of a finished world.
 
 use enfilade_cpg::World;
 
-/// `world` scaled about the origin, with its graph, locator and geometry. Leaves of doors keep no motion.
+/// Scales `world` about the origin, with its graph, locator and geometry. Leaves of doors lose their motion.
 #[must_use]
 pub fn scaled_world(mut world: World, factor: f32) -> World {
     let scale = |p: &mut [f32; 3]| *p = p.map(|x| x * factor);

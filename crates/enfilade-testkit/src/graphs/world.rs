@@ -1,4 +1,4 @@
-//! A world of a grid and one choice a wall: portals, cells, batches, furniture.
+//! A world from a grid and one choice per wall: portals, cells, batches, furniture.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use enfilade_geom::{Aabb, DVec3};
 
 use super::grid::{Face, Grid};
 
-/// A hole in a face: `[low, high]` along its two other axes, and what it is.
+/// A hole in a face: `[low, high]` along its two other axes, and its kind.
 pub(super) type FaceHole = ([f64; 2], [f64; 2], PortalKind);
 
-/// Puts a world together from the grid and one choice a face.
+/// Builds a world from the grid and one choice per face.
 pub(super) fn world_of(
     grid: &Grid,
     furniture: &[(u32, Aabb)],
@@ -123,7 +123,7 @@ fn portal_of(grid: &Grid, face: &Face, (low, high, kind): FaceHole) -> Portal {
     }
 }
 
-/// Cells by name, box and volume; what else they have is counted by who adds it.
+/// Makes cells with name, box and volume; the callers count the rest.
 fn cells_of(grid: &Grid) -> Vec<Cell> {
     let labels = grid.label.iter().copied().chain(grid.outdoors);
     let n_cells = labels.max().map_or(0, |c| c as usize + 1);
@@ -155,7 +155,7 @@ fn cells_of(grid: &Grid) -> Vec<Cell> {
     if let Some(outdoors) = grid.outdoors {
         let all = boxes.iter().fold(Aabb::EMPTY, |b, &c| b.union(c));
         boxes[outdoors as usize] = all.expanded(5.0);
-        // All of the locator's box that is no room.
+        // The locator's box without the rooms.
         let rooms: f32 = cells.iter().map(|c| c.volume).sum();
         cells[outdoors as usize].volume = (all.volume() as f32 - rooms).max(0.0);
     }
@@ -168,7 +168,7 @@ fn cells_of(grid: &Grid) -> Vec<Cell> {
     cells
 }
 
-/// A unit cube put into the place of each box, with the cell that it stands in.
+/// Places a unit cube at each box, with the cell in which it stands.
 fn details_of(grid: &Grid, furniture: &[(u32, Aabb)]) -> Vec<DetailObject> {
     let column = |v: DVec3, w: f32| {
         let [x, y, z] = to_f32(v);
@@ -208,7 +208,7 @@ fn unit_cube() -> Mesh {
     }
 }
 
-/// The triangles of a box whose corners are numbered by a bit an axis.
+/// The triangles of a box whose vertices are numbered by one bit per axis.
 pub(super) fn box_indices() -> Vec<u32> {
     let quads = [
         [0, 2, 3, 1],

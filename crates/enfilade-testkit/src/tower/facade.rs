@@ -5,7 +5,7 @@ use crate::solid::{aabb, snapped};
 use crate::truth::{OpeningKind, Side};
 
 impl Tower<'_> {
-    /// Walls along x behind the rows: facades with windows, and plain walls between wings.
+    /// Adds walls along x behind the rows: facades with windows, and plain walls between wings.
     pub(super) fn back_walls(&mut self, wings: &[BuiltWing], up: [f64; 2]) {
         let depth = self.size().z;
         let first = wings.first().map(|w| (0, w, [0.0, FACADE]));
@@ -14,7 +14,7 @@ impl Tower<'_> {
             let rooms = &wing.rows[row];
             for (i, &(x, side)) in rooms.iter().enumerate() {
                 let panel = [
-                    // The corner posts belong to this facade.
+                    // The posts where two facades meet belong to this facade.
                     if i == 0 {
                         0.0
                     } else {
@@ -68,7 +68,7 @@ impl Tower<'_> {
         }
     }
 
-    /// West and east facades: entrance and windows at the ends of the corridors.
+    /// Adds west and east facades: entrance and windows at the ends of the corridors.
     pub(super) fn end_walls(&mut self, wings: &[BuiltWing], up: [f64; 2], cross: Option<Side>) {
         let size = self.size();
         let z_end = FACADE + self.inner_depth();

@@ -1,4 +1,4 @@
-//! The tower while it is built: its measures, and the walls that all parts of it are made of.
+//! The tower under construction: its dimensions, and the walls of all its parts.
 
 use enfilade_geom::{Aabb, DVec3};
 
@@ -9,13 +9,13 @@ use crate::site::Site;
 use crate::solid::{MeshBuilder, snapped};
 use crate::truth::{OpeningKind, Side};
 
-/// Floor to floor. [Units: wu]
+/// Height from floor to floor. [Units: wu]
 pub(super) const STOREY: f64 = 3.2;
 pub(super) const SLAB: f64 = 0.25;
 pub(super) const FACADE: f64 = 0.3;
 pub(super) const CORRIDOR_WALL: f64 = 0.15;
 pub(super) const PARTITION: f64 = 0.12;
-/// A double wall: two leaves and what is between them. [Units: wu]
+/// A double wall: its two leaves and the cavity between them. [Units: wu]
 pub(super) const LEAF: f64 = 0.08;
 pub(super) const CAVITY: f64 = 0.06;
 pub(super) const CORRIDOR: f64 = 2.0;
@@ -24,10 +24,10 @@ pub(super) const ROWS: [f64; 2] = [6.2, 4.9];
 pub(super) const STAIRWELL: f64 = 2.8;
 /// Mean clear width of an office, with its share of partition. [Units: wu]
 pub(super) const BAY: f64 = 3.7;
-/// Rooms that one corridor serves at most.
+/// Maximum number of rooms along one corridor.
 pub(super) const WING: usize = 40;
 
-/// A wall across `axis`: the box it fills, holes through it, and the chance of cracks.
+/// A wall across `axis`: the box it fills, holes through it, and the probability of cracks.
 pub(super) struct Wall {
     pub(super) axis: usize,
     pub(super) body: Aabb,
@@ -35,7 +35,7 @@ pub(super) struct Wall {
     pub(super) double: bool,
 }
 
-/// Where a wing is to be built.
+/// Position of a wing to be built.
 pub(super) struct Wing {
     pub(super) s: usize,
     pub(super) storey: usize,
@@ -43,11 +43,11 @@ pub(super) struct Wing {
     pub(super) up: [f64; 2],
     /// The cross corridor.
     pub(super) cross: Option<Side>,
-    /// Where its flight of stairs leaves no air: a box, and how much of it.
+    /// The box of its flight of stairs, and the volume of it that the flight fills.
     pub(super) flight: Option<(Aabb, f64)>,
 }
 
-/// What the walls around a wing need to know of it.
+/// Data of a wing for the walls around it.
 pub(super) struct BuiltWing {
     pub(super) corridor: Side,
     pub(super) corridor_z: [f64; 2],
@@ -78,23 +78,23 @@ pub(super) struct Tower<'a> {
 const WING_DEPTH: f64 = ROWS[0] + ROWS[1] + CORRIDOR + 2.0 * CORRIDOR_WALL;
 
 impl Tower<'_> {
-    /// The rows' ends along x. [Units: wu]
+    /// Returns the rows' ends along x. [Units: wu]
     pub(super) fn rows_x(&self) -> [f64; 2] {
         [self.row_start, snapped(self.row_start + self.row_length)]
     }
 
-    /// Where a wing begins along z. [Units: wu]
+    /// Returns the start of a wing along z. [Units: wu]
     pub(super) fn wing_start(w: usize) -> f64 {
         FACADE + w as f64 * (WING_DEPTH + CORRIDOR_WALL)
     }
 
-    /// Depth of all wings together. [Units: wu]
+    /// Returns the depth of all wings together. [Units: wu]
     pub(super) fn inner_depth(&self) -> f64 {
         let n = self.rows.len();
         n as f64 * WING_DEPTH + (n - 1) as f64 * CORRIDOR_WALL
     }
 
-    /// Outer measures on plan; y is 0. [Units: wu]
+    /// Returns the outer size in plan; y is 0. [Units: wu]
     pub(super) fn size(&self) -> DVec3 {
         DVec3::new(
             self.row_start + self.row_length + FACADE,
@@ -103,7 +103,7 @@ impl Tower<'_> {
         )
     }
 
-    /// Models a wall, cracked or doubled where asked for, and notes its openings.
+    /// Models a wall, cracked or doubled if requested, and records its openings.
     pub(super) fn add_wall(&mut self, wall: Wall) {
         let Wall {
             axis,

@@ -1,13 +1,13 @@
-//! What tower to build.
+//! Parameters of an office tower.
 
-/// What an office tower has. [`TowerParams::default`] is 4 storeys of 16 rooms with all of it.
+/// Parameters of an office tower. [`TowerParams::default`] is 4 storeys of 16 rooms with all features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TowerParams {
     /// Number of storeys. [Limit: >= 1]
     pub storeys: usize,
     /// Rooms of a storey, corridors and stairwells included. [Limit: >= 4]
     pub rooms_per_storey: usize,
-    /// Seed of room widths, door places and furniture.
+    /// Seed of room widths, door positions and furniture.
     pub seed: u64,
     /// Desks, chairs, shelves and plants, as detail.
     pub furniture: bool,
@@ -17,7 +17,7 @@ pub struct TowerParams {
     pub double_walls: bool,
     /// Windows above parapets in the facades.
     pub windows: bool,
-    /// Stairwells through all storeys, one a wing.
+    /// Stairwells through all storeys, one per wing.
     pub stairwell: bool,
     /// Door leaves and window panes, as detail.
     pub leaves: bool,
@@ -43,8 +43,8 @@ impl Default for TowerParams {
 }
 
 impl TowerParams {
-    /// A tower of about `rooms` rooms whose storeys and wings both grow, at constant density:
-    /// exact for 16, 64, 256, 1024 and 4096.
+    /// Makes a tower of about `rooms` rooms whose storeys and wings both grow, at constant density: exact for
+    /// 16, 64, 256, 1024 and 4096.
     #[must_use]
     pub fn with_rooms(rooms: usize, seed: u64) -> Self {
         // Two storeys at 16 rooms, twice as many for every factor of 4.

@@ -9,7 +9,7 @@ use crate::solid::{aabb, snapped};
 use crate::truth::{Convex, OpeningKind, Room, Side};
 
 impl Tower<'_> {
-    /// Rooms, corridor, corridor walls and partitions of one wing on one storey.
+    /// Builds rooms, corridor, corridor walls and partitions of one wing on one storey.
     pub(super) fn wing(&mut self, wing: &Wing) -> BuiltWing {
         let Wing { s, w, up, .. } = *wing;
         let start = Self::wing_start(w);
@@ -42,7 +42,7 @@ impl Tower<'_> {
         built
     }
 
-    /// The rooms on one side of the corridor.
+    /// Adds the rooms on one side of the corridor.
     fn add_row(&mut self, wing: &Wing, row: usize, built: &mut BuiltWing) {
         let Wing { s, w, up, .. } = *wing;
         let (z, corridor_z) = (built.rows_z[row], built.corridor_z);
@@ -96,7 +96,7 @@ impl Tower<'_> {
         }
     }
 
-    /// The wall between the cross corridor and the rows, with a double door to the corridor.
+    /// Adds the wall between the cross corridor and the rows, with a double door to the corridor.
     fn add_cross_wall(&mut self, wing: &Wing, cross: Side, built: &BuiltWing) {
         let (up, west) = (wing.up, self.row_start);
         let x = [west - CORRIDOR_WALL, west];
@@ -116,7 +116,7 @@ impl Tower<'_> {
         });
     }
 
-    /// Clear extents along x of the rooms of one row.
+    /// Returns the clear extents along x of the rooms of one row.
     fn row_spans(&mut self, w: usize, row: usize, has_stairs: bool) -> Vec<[f64; 2]> {
         let n = self.rows[w][row];
         let mut spans = Vec::with_capacity(n + 1);
@@ -193,8 +193,7 @@ impl Tower<'_> {
         });
     }
 
-    /// Desks along one side wall, shelves along the other; `north` rooms have their window at
-    /// low z.
+    /// Adds desks along one side wall, shelves along the other; `north` rooms have their window at low z.
     fn furnish(&mut self, air: &Aabb, north: bool) {
         let (f, floor) = (self.furniture, air.min.y);
         let size = air.size();

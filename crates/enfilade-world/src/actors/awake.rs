@@ -29,8 +29,8 @@ impl AwakeCells {
     }
 
     /// Wakes cells that may be seen or heard now: those of a [`Pvs`](enfilade_cpg::Pvs) from each eye's cell
-    /// ([`Pvs::visible_from`](enfilade_cpg::Pvs::visible_from)), or of a view, and those from which sound reaches a listener. Ignores
-    /// cells that do not exist. Puts cells to sleep when their time is over.
+    /// ([`Pvs::visible_from`](enfilade_cpg::Pvs::visible_from)), or of a view, and those from which sound reaches a listener.
+    /// Ignores cells that do not exist. Puts cells to sleep when their time is over.
     pub fn update(&mut self, now: f64, perceived: impl IntoIterator<Item = CellId>) {
         self.now = now;
         for cell in perceived {

@@ -1,7 +1,7 @@
 //! Random numbers determined by a seed, an actor and an event alone.
 //!
-//! The mixing function of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014) over a
-//! state that advances by their odd constant. O(1); integers only, so equal on every machine.
+//! The mixing function of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014) over
+//! a state that advances by their odd constant. O(1); integers only, so equal on every machine.
 
 /// Random numbers of one event of one actor.
 #[derive(Clone, Debug)]

@@ -199,8 +199,8 @@ impl Actors {
         }
     }
 
-    /// Sends an actor the message `what` at a time: it then gets a new plan, whatever its current one. A time that has passed, or is
-    /// NaN, counts as now, at the next [`Actors::advance`]. [Units: s]
+    /// Sends an actor the message `what` at a time: it then gets a new plan, whatever its current one. A time that has passed,
+    /// or is NaN, counts as now, at the next [`Actors::advance`]. [Units: s]
     pub fn tell(&mut self, actor: ActorId, time: f64, what: u32) {
         let time = time.max(self.now);
         self.n_told += 1;
@@ -214,10 +214,10 @@ impl Actors {
 
     /// Advances time to `time`; time does not run back. [Units: s]
     ///
-    /// Calls `plan` for each event on the way with the event, its own random numbers, and an empty plan that starts there and then. If
-    /// `plan` adds nothing, the actor stays until it receives a message. `plan` must depend only on its arguments and on constants;
-    /// then positions do not depend on the times at which this is called. The events of an actor come in order of time; those of
-    /// different actors in arbitrary order.
+    /// Calls `plan` for each event on the way with the event, its own random numbers, and an empty plan that starts there and
+    /// then. If `plan` adds nothing, the actor stays until it receives a message. `plan` must depend only on its arguments and
+    /// on constants; then positions do not depend on the times at which this is called. The events of an actor come in order of
+    /// time; those of different actors in arbitrary order.
     ///
     /// O(actors that changed their cell + Σ events); nothing for actors that stay.
     pub fn advance(

@@ -25,8 +25,8 @@ impl Default for Errands {
 }
 
 impl Errands {
-    /// Plans one errand to one of `n_places`. `way` finds the path and adds it to an empty list: the points after the start, each with
-    /// the cell on the way to it. If it adds none, the actor stays. Allocates nothing once the list has grown.
+    /// Plans one errand to one of `n_places`. `way` finds the path and adds it to an empty list: the points after the start,
+    /// each with the cell on the way to it. If it adds none, the actor stays. Allocates nothing once the list has grown.
     ///
     /// `way` must be deterministic, or the actor's behavior depends on the times of queries.
     pub fn plan(

@@ -15,7 +15,8 @@ pub struct WayPoint {
     pub cell: CellId,
 }
 
-/// Time of a point of a plan; from then until the next one the actor is in `cell`. Points are stored apart: few queries need them.
+/// Time of a point of a plan; from then until the next one the actor is in `cell`. Points are stored apart: few queries need
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Knot {
     pub(super) time: f64,

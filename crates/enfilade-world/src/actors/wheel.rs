@@ -1,10 +1,10 @@
 //! A hashed timing wheel of due actors.
 //!
-//! After Varghese and Lauck, "Hashed and hierarchical timing wheels" (SOSP 1987), scheme 6: a slot for each tick, the ticks modulo
-//! the number of slots; entries of later rounds stay where they are. Slots are chains of blocks of one cache line, from one pool:
-//! linked actors would cost a cache miss each, one after another. Setting a new time leaves the old entry behind, which is dropped
-//! when its slot comes up. O(1) to set, and O(entries of its slot) for each tick that passes; at most all entries once, however much
-//! time passes.
+//! After Varghese and Lauck, "Hashed and hierarchical timing wheels" (SOSP 1987), scheme 6: a slot for each tick, the ticks
+//! modulo the number of slots; entries of later rounds stay where they are. Slots are chains of blocks of one cache line, from
+//! one pool: linked actors would cost a cache miss each, one after another. Setting a new time leaves the old entry behind,
+//! which is dropped when its slot comes up. O(1) to set, and O(entries of its slot) for each tick that passes; at most all
+//! entries once, however much time passes.
 
 /// Ticks per second; each has a slot.
 const TICKS: f64 = 64.0;
@@ -79,8 +79,8 @@ impl Wheel {
         block.n += 1;
     }
 
-    /// Appends to `due` all entries due between two times, both included, and removes them; `when` returns the due time of an actor,
-    /// which it may change.
+    /// Appends to `due` all entries due between two times, both included, and removes them; `when` returns the due time of an
+    /// actor, which it may change.
     pub(super) fn due(
         &mut self,
         from: f64,

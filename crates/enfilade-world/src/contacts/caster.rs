@@ -105,8 +105,8 @@ impl Caster {
         }
     }
 
-    /// Returns the first impact of a moving body: on walls, seals, objects, leaves of doors where `state` puts them, and openings that
-    /// `state` shuts.
+    /// Returns the first impact of a moving body: on walls, seals, objects, leaves of doors where `state` puts them, and
+    /// openings that `state` shuts.
     ///
     /// Never misses a triangle of a cell that the body reaches by openings, nor stops at one behind a wall that it does not
     /// pass. A triangle touched at the start stops the body unless it moves away or along. Keep a gap, such as a millimeter, to a
@@ -165,8 +165,8 @@ impl Caster {
         best
     }
 
-    /// Calls `visit` for all contacts of a resting body, in arbitrary order; a triangle that two cells see is reported for each that
-    /// the body reaches. Nothing for a body that is not finite.
+    /// Calls `visit` for all contacts of a resting body, in arbitrary order; a triangle that two cells see is reported for each
+    /// that the body reaches. Nothing for a body that is not finite.
     ///
     /// # Panics
     ///
@@ -203,8 +203,8 @@ impl Caster {
         );
     }
 
-    /// Calls `visit` for the triangles that a resting body may touch, for use with another narrow phase: all those of reached cells
-    /// whose boxes meet the body's bounding box.
+    /// Calls `visit` for the triangles that a resting body may touch, for use with another narrow phase: all those of reached
+    /// cells whose boxes meet the body's bounding box.
     ///
     /// # Panics
     ///

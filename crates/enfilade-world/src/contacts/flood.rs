@@ -2,8 +2,8 @@
 //!
 //! Cells are taken in the order in which the body reaches them: its own first, others when it first touches an opening to
 //! them, and a cell's triangles count from then on. So the order of portals does not matter, and a cell reached only after the
-//! impact is never searched. The queue is searched linearly, since a body touches few openings: O(log n) for each cell's tree, and
-//! O(k²) for k cells.
+//! impact is never searched. The queue is searched linearly, since a body touches few openings: O(log n) for each cell's tree,
+//! and O(k²) for k cells.
 //!
 //! In a cell, triangles are tested in the order in which the body's bounding box touches their boxes, so that those behind the
 //! impact are not tested at all. They are gathered first, [`BATCH`] at a time, which bounds the work behind it.
@@ -64,7 +64,8 @@ pub(super) struct Moving {
     by: DVec3,
 }
 
-/// A triangle on the way: the time at which the boxes meet, and its vertices relative to the body's position on entering the cell.
+/// A triangle on the way: the time at which the boxes meet, and its vertices relative to the body's position on entering the
+/// cell.
 #[derive(Clone, Copy, Debug)]
 struct Gathered {
     enter: f64,

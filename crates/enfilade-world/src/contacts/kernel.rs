@@ -47,8 +47,8 @@ struct Meeting {
 }
 
 impl Meeting {
-    /// Narrows the interval to the times at which the body, with its center at `center`, moving by `speed` along an axis and extending
-    /// by `reach` on either side, touches `low..=high`; returns `true` if any is left.
+    /// Narrows the interval to the times at which the body, with its center at `center`, moving by `speed` along an axis and
+    /// extending by `reach` on either side, touches `low..=high`; returns `true` if any is left.
     #[inline]
     fn narrow(&mut self, speed: f64, reach: f64, low: f64, high: f64) -> bool {
         let (low, high) = (low - reach, high + reach);
@@ -82,7 +82,8 @@ pub(super) fn boxes_meet(reach: DVec3, by: DVec3, t_max: f64, bounds: &Aabb) -> 
     meet.then_some(span.enter)
 }
 
-/// Returns the first contact, up to `t_max`, of a body that moves by `by` with a triangle. Vertices are relative to the body's center.
+/// Returns the first contact, up to `t_max`, of a body that moves by `by` with a triangle. Vertices are relative to the body's
+/// center.
 pub(super) fn sweep(
     core: &BodyCore,
     by: DVec3,
@@ -281,8 +282,8 @@ fn depth_of_box(core: &BodyCore, t: &Triangle) -> Option<Penetration> {
     })
 }
 
-/// Returns the nearest points of the segment from `center - half` to `center + half`, or of `center` alone, and of a triangle: first
-/// the body's, then the triangle's. Twice the same point if they meet.
+/// Returns the nearest points of the segment from `center - half` to `center + half`, or of `center` alone, and of a triangle:
+/// first the body's, then the triangle's. Twice the same point if they meet.
 fn nearest(half: DVec3, is_point: bool, center: DVec3, t: &Triangle) -> (DVec3, DVec3) {
     if is_point {
         return (center, nearest_on_triangle(center, t));
@@ -315,8 +316,8 @@ fn nearest(half: DVec3, is_point: bool, center: DVec3, t: &Triangle) -> (DVec3, 
     best
 }
 
-/// Returns the feet of the common perpendicular of two segments, if both lie in them; otherwise one of the nearest points is an end.
-/// Lines that are parallel up to rounding count as parallel.
+/// Returns the feet of the common perpendicular of two segments, if both lie in them; otherwise one of the nearest points is an
+/// end. Lines that are parallel up to rounding count as parallel.
 fn common_perpendicular(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Option<(DVec3, DVec3)> {
     let (u, v, w) = (b - a, d - c, a - c);
     let n = u.cross(v);

@@ -1,9 +1,9 @@
 //! Pairs of bodies that may touch: they share a cell and their boxes overlap.
 //!
 //! Bodies are listed by cell, as Gjørup's segments list their objects (1999, section 3.3.4); in each cell they are swept along x
-//! (Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies*, 1992, section 2.2.2). A pair that shares several cells is reported
-//! in the least of these. O(n log n + pairs that overlap along x), each of n bodies counted once per cell. Boxes are closed and
-//! compared exactly as given.
+//! (Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies*, 1992, section 2.2.2). A pair that shares several cells is
+//! reported in the least of these. O(n log n + pairs that overlap along x), each of n bodies counted once per cell. Boxes are
+//! closed and compared exactly as given.
 
 use std::ops::ControlFlow;
 
@@ -31,7 +31,8 @@ impl Pairs {
         Self::default()
     }
 
-    /// Calls `visit` once for each pair of bodies that share a cell and whose boxes touch, the lesser index first, until it breaks.
+    /// Calls `visit` once for each pair of bodies that share a cell and whose boxes touch, the lesser index first, until it
+    /// breaks.
     ///
     /// `bodies`: the bounding box of each, and the cells that it touches, ascending. An empty box, or one with NaN, touches none.
     pub fn for_each<'a>(

@@ -95,8 +95,8 @@ impl Site {
             .flat_map(|piece| (2..piece.len()).map(move |k| [0, k - 1, k].map(|i| point(piece[i]))))
     }
 
-    /// Brute force: the first impact of a body on any triangle of the cells in the order in which it reaches them, and the time at
-    /// which it reaches each cell.
+    /// Brute force: the first impact of a body on any triangle of the cells in the order in which it reaches them, and the time
+    /// at which it reaches each cell.
     fn brute(&self, body: &Body, margin: f64, from: DVec3, by: DVec3) -> (Option<f64>, Vec<f64>) {
         let grown = |margin: f64| body.grown(margin);
         let n_cells = self.world.graph.cells.len();
@@ -112,7 +112,8 @@ impl Site {
             let cell = CellId(c as u32);
             let reach = since[c];
             for exit in self.world.graph.exits(cell) {
-                // Openings are grown by the layout's tolerance: a lower bound for impacts that must happen, an upper bound for others.
+                // Openings are grown by the layout's tolerance: a lower bound for impacts that must happen, an upper bound for
+                // others.
                 let more = if margin > 0.0 {
                     self.layout.tolerance() + margin
                 } else {

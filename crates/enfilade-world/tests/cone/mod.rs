@@ -4,8 +4,8 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SupportedConeT};
 use enfilade_geom::DVec3;
 
-/// Each point of the string is a mean of its polygon's vertices with weights of at least 0 that sum to 1; each leg is at most as long
-/// as its own variable; the sum of these is minimal. [Units: wu]
+/// Each point of the string is a mean of its polygon's vertices with weights of at least 0 that sum to 1; each leg is at most as
+/// long as its own variable; the sum of these is minimal. [Units: wu]
 pub(crate) fn least_length(from: DVec3, to: DVec3, polygons: &[Vec<DVec3>]) -> f64 {
     if polygons.is_empty() {
         return from.distance(to);
