@@ -93,7 +93,7 @@ fn a_shuffled_glb_is_the_same_scene_in_another_order() {
 fn shuffled_text_has_the_same_lines_in_another_order() {
     let obj = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1//1 2//1 4//1\nf 1 3 4\nf 2 3 4\nusemtl b\nf 1 2 3 4\n";
     // Positions by number, and the faces as sets of them, by material.
-    let read = |obj: &str| {
+    fn read(obj: &str) -> Vec<(&str, Vec<&str>)> {
         let positions: Vec<&str> = obj.lines().filter(|l| l.starts_with("v ")).collect();
         let mut faces: Vec<(&str, Vec<&str>)> = Vec::new();
         let mut material = "";
@@ -113,7 +113,7 @@ fn shuffled_text_has_the_same_lines_in_another_order() {
         }
         faces.sort();
         faces
-    };
+    }
     let map = "{\n\"classname\" \"worldspawn\"\n{\n( 1\n( 2\n( 3\n}\n{\n( 4\n( 5\n}\n}\n{\n\"classname\" \"light\"\n}\n{\n\"classname\" \"door\"\n{\npatchDef2\n{\n( 6\n( 7\n}\n}\n}\n";
     let sorted = |text: &str| {
         let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
