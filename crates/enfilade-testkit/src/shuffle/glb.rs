@@ -125,7 +125,9 @@ impl Document {
 
     /// Gives each primitive accessors of its own, with triangles and vertices in another order.
     fn shuffle_triangles(&mut self) {
-        let mut meshes = self.root["meshes"].take();
+        let Some(mut meshes) = self.root.get_mut("meshes").map(Value::take) else {
+            return;
+        };
         for mesh in meshes.as_array_mut().into_iter().flatten() {
             for primitive in mesh["primitives"].as_array_mut().into_iter().flatten() {
                 self.shuffle_primitive(primitive);
