@@ -133,7 +133,7 @@ fn rounded(piece: &[[f32; 3]]) -> Winding {
     Winding::new(corners.collect())
 }
 
-/// Whether something is left of a rounded piece.
+/// Tells whether a rounded piece still has a width.
 fn is_there(piece: &[[f32; 3]], plane: &Plane) -> bool {
     let w = rounded(piece);
     let n = w.points.len();

@@ -85,7 +85,7 @@ pub(crate) fn realize(
     })
 }
 
-/// What is said of a model whose triangles miss each other.
+/// The note about a model whose triangles miss each other.
 fn note_of_misfit(config: &BakeConfig, structure: &Structure<'_>) -> Option<String> {
     let misfit = structure.misfit;
     let width = SmallestHole::Auto.resolved(misfit).gap();
@@ -104,7 +104,7 @@ fn note_of_misfit(config: &BakeConfig, structure: &Structure<'_>) -> Option<Stri
     }
 }
 
-/// Which seals close more than the smallest hole, if any.
+/// The note about seals that close more than the smallest hole, if any do.
 fn note_of_wide_seals(partition: &Partition, hole: SmallestHole) -> Option<String> {
     let [x, y, z] = partition.wide_seals.first()?.to_array();
     Some(format!(

@@ -234,8 +234,8 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
 
 /// Width of the narrowest openings that are told where no seals close them. [Units: wu]
 ///
-/// Each point of a narrower one is nearer to its rim than what builders and files may move it ([`world_tolerance`]), so nobody can say
-/// that it is open; and where corners miss each other by as little, there is one at every edge.
+/// Each point of a narrower one is nearer to its rim than builders and files may move it ([`world_tolerance`]), so nobody
+/// can say that it is open; and where vertices miss each other by as little, there is one at every edge.
 fn least_unsealed(bounds: &Aabb) -> f64 {
     2.0 * world_tolerance(bounds.extent())
 }

@@ -33,7 +33,7 @@ pub struct Partition {
     pub hairlines: Vec<PartitionPortal>,
     /// Gaps that are closed: what a bake adds to the model's own surfaces.
     pub seals: Vec<Seal>,
-    /// Where seals before matter close more than a gap.
+    /// Places of seals before matter that close more than a gap.
     pub wide_seals: Vec<DVec3>,
     /// The portals that lie on no candidate: where cells leak into each other.
     pub leaks: Vec<Leak>,
@@ -230,8 +230,8 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
     }
 }
 
-/// The seals that close gaps, those between two cells that would have closed more, as portals, and where those before matter do:
-/// nothing else could close them.
+/// The seals that close gaps; as portals, those between two cells that would close more; and the places of those before
+/// matter that do, as nothing else could close them.
 fn without_holes(
     seals: Vec<Seal>,
     complex: &Complex,

@@ -22,8 +22,8 @@ const TOGETHER: f64 = 0.01;
 /// Corners this near to a line lie on it; the tree's own cuts are good to 1e-9. [Units: wu]
 const STRAIGHT: f64 = 1e-7;
 
-/// Two pieces with a notch this deep between them are not one: what is there may be open to another cell. A tenth is lost when
-/// corners are rounded to `f32`. [Units: wu]
+/// Two pieces with a notch this deep between them are not one: what is there may be open to another cell. Rounding to `f32`
+/// moves vertices as far. [Units: wu]
 const NOTCH: f64 = 1e-6;
 
 /// A convex opening between two leaves of different cells.
@@ -196,7 +196,7 @@ fn hull(points: impl Iterator<Item = DVec2>) -> Flat {
 
 /// The union of two disjoint convex polygons where it is convex too.
 ///
-/// Little area is filled then, and no notch: as deep as wide, one may be a thousand times wider than a slit of its area.
+/// Little area is filled then, and no notch: a short one may be a thousand times wider than a long slit of its area.
 fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
     if !a.touches(b, STRAIGHT) {
         return None;
@@ -496,7 +496,7 @@ mod tests {
 
     #[test]
     fn a_notch_of_little_area_is_not_filled() {
-        // Two pieces side by side, 2.4 m in all, the one a corner of 0.15 mm by 2 mm short: less area than a slit of 0.1 um.
+        // Two pieces side by side, 2.4 m in all, the one short of a triangle of 0.15 mm by 2 mm: less area than a slit of 0.1 um.
         let left = hull(
             [[0.0, 0.0], [1.2, 0.0], [1.2, 1.0], [0.0, 1.0]]
                 .map(DVec2::from)

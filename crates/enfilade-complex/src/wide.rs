@@ -1,8 +1,8 @@
 //! Seals that would close a hole.
 //!
-//! What is a gap is told piece by piece, at a few points of each, and pieces at the rims of thin leaves count as gaps where they are
-//! narrow. So a large piece may have a hole between the points, and several narrow ones side by side may close one. Here the seals are
-//! looked at together and all over: one is too wide where a ball of the smallest hole has room in the middle of it, and the
+//! Gaps are told piece by piece, at a few points of each, and pieces at the rims of thin leaves count as gaps where they
+//! are narrow. So a large piece may have a hole between the points, and several narrow ones side by side may close one.
+//! Here the seals are looked at together and all over: one is too wide where a ball of the smallest hole has room in the middle of it, and the
 //! disk as wide as the ball is closed by it and those beside it.
 //!
 //! A part of a seal is cut in two until all of it is near matter, or too far from where seals end for a disk, or [`FINEST`].
@@ -20,7 +20,7 @@ const FINEST: f64 = 5e-4;
 /// Points on the rim of a disk.
 const AROUND: usize = 16;
 
-/// Which seals close a hole through which a ball of so large a diameter passes.
+/// Tells of each seal whether it closes a hole through which a ball of this diameter passes.
 pub(super) fn wide(seals: &[Seal], model: &Bvh, hole: f64) -> Vec<bool> {
     let parts = |seal: &Seal| -> Vec<Triangle> {
         let p = &seal.outline.points;
@@ -39,7 +39,7 @@ pub(super) fn wide(seals: &[Seal], model: &Bvh, hole: f64) -> Vec<bool> {
 struct Holes<'a> {
     model: &'a Bvh,
     closed: Bvh,
-    /// Of the ball. [Units: wu]
+    /// Radius of the ball. [Units: wu]
     radius: f64,
 }
 
@@ -70,7 +70,7 @@ impl Holes<'_> {
         false
     }
 
-    /// How far the rim of a disk about a point of a seal is from all seals, where it is farthest.
+    /// The greatest distance from all seals on the rim of a disk about a point of one.
     fn most_bare(&self, p: DVec3, normal: DVec3) -> f64 {
         let u = normal.any_orthonormal_vector();
         let v = normal.cross(u);
@@ -97,7 +97,7 @@ mod tests {
             .to_vec()
     }
 
-    /// Which seals are too wide for a hole of 10 mm.
+    /// Tells of each seal whether it is too wide for a hole of 10 mm.
     fn judged(walls: &[[f64; 4]], seals: &[[f64; 4]]) -> Vec<bool> {
         let corners = walls.iter().map(|&w| rectangle(w));
         let fans = corners.flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);

@@ -17,8 +17,8 @@ const AROUND: usize = 16;
 /// A seal closes more where a ball of that diameter has room in the middle of it, far enough from the model, and a disk of that
 /// diameter fits into it and those beside it: the ball would have passed. A strip that is narrower is no hole, wherever it is.
 ///
-/// Exact but for what is smaller than [`OVERLAP`]: the distance from a triangle is a convex function, so what has its corners near one
-/// triangle of the model is near it all over; what has not is cut in two.
+/// Exact but for holes smaller than [`OVERLAP`]: the distance from a triangle is a convex function, so a part whose vertices
+/// are near one triangle of the model is near it all over; others are cut in two.
 pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
     let all = structural_triangles(world);
     let is_seal = |batch: u32| world.batches[batch as usize].is_seal;
@@ -55,7 +55,7 @@ pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
         .collect()
 }
 
-/// What tells holes from gaps.
+/// The model and the seals, to tell holes from gaps.
 struct Holes<'a> {
     model: &'a [Triangle],
     around: Bvh,
@@ -65,7 +65,7 @@ struct Holes<'a> {
 }
 
 impl Holes<'_> {
-    /// Where a ball passes that a seal closes.
+    /// A point of a seal through which the ball passes.
     fn in_seal(&self, t: &Triangle) -> Option<DVec3> {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).try_normalize()?;
         // No recursion: a seal is cut into as many parts as it takes.
@@ -94,7 +94,7 @@ impl Holes<'_> {
         None
     }
 
-    /// Whether the disk as wide as the ball about a point of a seal is closed by seals.
+    /// Tells whether seals close the disk as wide as the ball about a point of one.
     fn has_disk(&self, p: DVec3, normal: DVec3) -> bool {
         let u = normal.any_orthonormal_vector();
         let v = normal.cross(u);
