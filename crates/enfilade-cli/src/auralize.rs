@@ -33,7 +33,7 @@ pub(crate) struct Block {
 pub(crate) struct Renderer<'s> {
     source: &'s [f32],
     rate: f64,
-    /// Of the ears, at the end of the block before. [Units: samples]
+    /// Delays of the ears at the end of the block before. [Units: samples]
     delays: Option<[f64; 2]>,
     last: Block,
     tail: Tail,
@@ -129,7 +129,7 @@ impl Tail {
             self.shares = [0, 1, 2, 3].map(|k| {
                 let seconds = self.lines[k].len() as f64 / self.rate;
                 let kept = 10f64.powf(-3.0 * seconds / rt60.max(0.05));
-                // Of a steady source the energy in the line is then the input's.
+                // The energy in the line is then the input's, if the source is steady.
                 (kept, (1.0 - kept * kept).sqrt())
             });
         }

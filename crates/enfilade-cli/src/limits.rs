@@ -1,4 +1,4 @@
-//! What a command may take: time and memory, as those who call it say.
+//! Limits of a command's time and memory, as its caller sets them.
 //!
 //! Loops that can end early spend from an [`Allowance`]; what a scene or an argument would take out of all proportion is refused
 //! before, whatever is said here. Beyond both, a thread looks at clock and memory, so that the bounds hold for code that asks neither:
@@ -15,7 +15,7 @@ use enfilade::geom::Allowance;
 use crate::output::Warned;
 use enfilade_cli::values::{bytes, seconds};
 
-/// Of all commands that can take long.
+/// Options of all commands that can take long.
 #[derive(clap::Args, Clone, Copy, Default)]
 pub(crate) struct Limits {
     /// End without a result after this long.
@@ -28,7 +28,7 @@ pub(crate) struct Limits {
 
 /// Between two looks: memory grows by some 10 MB in that time at most.
 const PAUSE: Duration = Duration::from_millis(5);
-/// What ends by itself when its time is up gets so much more to do so: promised is half as much again and a second.
+/// Returns the time that a command gets if it does not end by itself: promised is half as much again and a second.
 fn with_grace(time: Duration) -> Duration {
     (time.saturating_add(time / 5)).saturating_add(Duration::from_millis(400))
 }
@@ -47,7 +47,7 @@ impl Limits {
     }
 
     fn allowance(&self) -> Allowance {
-        // What is too long to be counted is no bound.
+        // A time too long to be counted is no bound.
         let end = self.max_time.and_then(|t| Instant::now().checked_add(t));
         Allowance::new(u64::MAX, end)
     }

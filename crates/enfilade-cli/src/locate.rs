@@ -100,7 +100,7 @@ fn sources_named(world: &World, pattern: &str) -> Vec<bool> {
         is_parent[parent as usize] = true;
     }
     let mut is_found: Vec<bool> = Vec::with_capacity(world.sources.len());
-    // Of those with others below that are not found yet: whether a path has begun, and what of the pattern it has come to.
+    // States of the sources that have others below and are not found yet: if a path has begun, and how far it has come in the pattern.
     let mut paths: Vec<Option<(bool, GlobState)>> = Vec::with_capacity(world.sources.len());
     for (i, node) in world.sources.iter().enumerate() {
         let parent = node.parent.map(|p| p as usize);

@@ -56,7 +56,7 @@ const LONGEST: f64 = 3600.0;
 /// Samples of `--wav` that are held: 25 minutes of 44.1 kHz.
 const MOST_SAMPLES: usize = 1 << 26;
 const RATE: u32 = 44100;
-/// What a block takes, in units of [`Allowance`]: most of it is the search for ways.
+/// Work of a block, in units of [`Allowance`]: most of it is the search for ways.
 const WORK_A_BLOCK: u64 = 500;
 
 /// A line of what is heard.

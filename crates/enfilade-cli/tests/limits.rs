@@ -1,4 +1,4 @@
-//! What commands may take: refused beforehand where an argument asks for too much, ended where it turns out so.
+//! Limits of commands: refused beforehand where an argument asks for too much, ended where it turns out so.
 
 use std::fs;
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ fn commands_that_can_take_long_have_bounds_and_keep_to_them() {
             assert!(help.contains(option), "{command} {option}");
         }
     }
-    // By themselves they would take hours, or gigabytes.
+    // Without a limit they would take hours, or gigabytes.
     let rays = ["verify", "w.glb", "--rays", "100000000000"];
     let late = [&rays[..], &["--max-time", "0.2"]].concat();
     folder.refused(&late, 1, &["within 0.2 s", "--max-time"]);
@@ -75,7 +75,7 @@ fn commands_that_can_take_long_have_bounds_and_keep_to_them() {
     ];
     let late = [&heard[..], &["--max-time", "0"]].concat();
     folder.refused(&late, 1, &["--max-time"]);
-    // What is done in time is not touched.
+    // A command that is done in time is not touched.
     let done = folder.run(&[
         "inspect",
         "w.glb",

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// Whether a pattern fits the whole text. Time: product of the lengths.
+/// Tells if a pattern fits the whole text. Time: product of the lengths.
 ///
 /// Many texts that begin alike are better asked by a [`Glob`].
 #[must_use]
@@ -43,7 +43,7 @@ fn folded(text: &str) -> impl Iterator<Item = char> {
 /// approach to text searching", 1992). Time: letters of the text, times those of the pattern over 64.
 #[derive(Clone, Debug)]
 pub struct Glob {
-    /// By letter of the pattern, where it stands; a `?` stands for each.
+    /// Places of each letter in the pattern; a `?` stands for each.
     places: BTreeMap<char, Vec<u64>>,
     /// Where any one letter does.
     any: Vec<u64>,
@@ -53,7 +53,7 @@ pub struct Glob {
     n: usize,
 }
 
-/// What of a [`Glob`] a text has come to.
+/// Places of a [`Glob`] that a text has come to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GlobState(Vec<u64>);
 
@@ -108,7 +108,7 @@ impl Glob {
         }
     }
 
-    /// Whether the pattern fits all that was read.
+    /// Tells if the pattern fits all that was read.
     #[must_use]
     pub fn fits(&self, state: &GlobState) -> bool {
         state.0[self.n / 64] >> (self.n % 64) & 1 == 1

@@ -267,7 +267,7 @@ struct Folder {
     lock: Option<File>,
 }
 
-/// What names of such folders begin with.
+/// Beginning of the names of such folders.
 const PREFIX: &str = "enfilade-ifc-";
 const LOCK: &str = "lock";
 

@@ -108,7 +108,7 @@ fn a_converter_that_fails_is_quoted_and_leaves_nothing_behind() {
 fn a_converter_is_ended_that_takes_too_long_too_much_or_writes_too_much() {
     let second = Duration::from_secs(1);
     for (name, script, text) in [
-        // Of itself it would end after an hour.
+        // It would end by itself after an hour.
         ("ifc-endless", "exec sleep 3600", "--max-time"),
         (
             "ifc-greedy",

@@ -50,7 +50,7 @@ pub enum RenderError {
         .size[0], .size[1], u64::from(.size[0]) * u64::from(.size[1]), MOST_PIXELS, .most[0], .most[1]
     )]
     TooManyPixels {
-        /// What was asked for.
+        /// The size asked for.
         size: [u32; 2],
         /// The largest of this shape.
         most: [u32; 2],
@@ -127,7 +127,7 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
-    /// What went wrong first that no call returned: memory that there was not.
+    /// The first error that no call returned: too little memory.
     failed: Arc<OnceLock<String>>,
 }
 
@@ -253,7 +253,7 @@ impl Gpu {
             .map_err(|why| broken(why.to_string()))?;
         let failed = Arc::new(OnceLock::new());
         let first = Arc::clone(&failed);
-        // By itself it would panic.
+        // Without a handler wgpu panics.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             let _ = first.set(error.to_string());
         }));
@@ -303,7 +303,7 @@ impl Gpu {
         self.check_failed()
     }
 
-    /// Whether all went well so far.
+    /// Returns the first error that no call returned.
     pub(crate) fn check_failed(&self) -> Result<(), RenderError> {
         match self.failed.get() {
             Some(why) => Err(RenderError::Lost(why.clone())),

@@ -10,7 +10,7 @@ const MAX_SIDE: u32 = 2048;
 
 /// Largest picture: 8192 x 8192 pixels of four bytes. [Units: bytes, decoded]
 const MAX_PICTURE: u64 = 1 << 28;
-/// What all pictures of a world may come to, and for each byte of them as they are in the file: ten times what JPEG packs.
+/// Most bytes of all pictures of a world, and more for each byte of them in the file: ten times what JPEG packs.
 const MAX_PICTURES: u64 = 1 << 29;
 const MAX_EXPANSION: u64 = 128;
 
@@ -156,7 +156,7 @@ impl<'w> Decoder<'w> {
             .with_guessed_format()
             .map_err(|_| NoPicture::Broken)?;
         let mut limits = image::Limits::default();
-        // What the decoder holds beside the picture is far less.
+        // The decoder holds far less beside the picture.
         limits.max_alloc = Some(2 * MAX_PICTURE);
         reader.limits(limits);
         let decoder = reader.into_decoder().map_err(broken)?;
@@ -334,7 +334,7 @@ mod tests {
         let sheet = png(4096, 4096);
         let world = textured(vec![sheet; 12]);
         let mut decoder = Decoder::new(&world);
-        // What is left is less with each, though none is decoded here.
+        // No picture has been decoded here.
         let all = decoder.left;
         assert!(
             all > 8 * 4 * 4096 * 4096 && all < 12 * 4 * 4096 * 4096,

@@ -143,14 +143,14 @@ pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, Ren
     with_bytes(gpu, buffer, <[u8]>::to_vec)
 }
 
-/// What `read` makes of the bytes of a buffer, once all that was submitted is done.
+/// Returns what `read` makes of the bytes of a buffer, once all that was submitted is done.
 fn with_bytes<T>(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
     read: impl FnOnce(&[u8]) -> T,
 ) -> Result<T, RenderError> {
     let lost = |why: String| RenderError::Lost(why);
-    // What is no buffer for want of memory is not mapped either.
+    // A buffer that there was no memory for is not mapped.
     gpu.check_failed()?;
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {

@@ -99,7 +99,7 @@ struct Ground {
 }
 
 impl Floors {
-    /// Of the structure of a world, without its objects, outdoors included as far as there is ground, which is laid out to 30 m around
+    /// Floors of the structure of a world, without its objects, outdoors included as far as there is ground, which is laid out to 30 m around
     /// the rooms. Squares are a quarter of the walker's radius wide, but wider where there would be more than 8 million, and up to 5 cm
     /// wide where there would be more than half a million: somebody thin walks the same floors as somebody of 0.2 m.
     #[must_use]
@@ -343,7 +343,7 @@ fn squares_of(bounds: &Aabb, side: f64, triangles: impl Iterator<Item = Triangle
     let size = bounds.size().max(DVec3::ZERO);
     let side_of = |area: f64, n: f64| (area / n).sqrt();
     let all = size.x * size.z;
-    // What triangles cover within the bounds: areas in plan, and lengths along the axes, as borders cover squares, too.
+    // Squares that triangles cover within the bounds: areas in plan, and lengths along the axes, as borders cover squares, too.
     let (mut areas, mut lengths) = (0.0, 0.0);
     for t in triangles.filter(|t| t.iter().all(|p| p.is_finite())) {
         let whole = t.into_iter().fold(Aabb::EMPTY, Aabb::including);

@@ -8,10 +8,10 @@ use flate2::write::ZlibEncoder;
 use super::budgets::{cuboid, obj, scenes};
 use super::{Figures, Ran};
 
-/// What each command may take, as it is told. [Units: s, MiB]
+/// Limits that each command is given. [Units: s, MiB]
 const TIME: f64 = 4.0;
 const MEMORY: f64 = 300.0;
-/// What is promised then: half as much time again and a second; a fifth more memory and 100 MB. [Units: s, GiB]
+/// Promised bounds: half as much time again and a second; a fifth more memory and 100 MB. [Units: s, GiB]
 const MOST_TIME: f64 = 1.5 * TIME + 1.0;
 const MOST_MEMORY: f64 = (1.2 * MEMORY + 100.0) / 1024.0;
 
@@ -53,7 +53,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
         }
         let bake = ["bake", "w.obj", "-o", "w.glb", "--max-time", "60"];
         if rows.enfilade(&bake, 200)?.code != Some(0) {
-            // What no world is made of, nobody asks about.
+            // There is no world to ask about.
             rows.print("commands", &scene, None, "a world", None);
             continue;
         }

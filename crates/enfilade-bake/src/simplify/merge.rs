@@ -27,7 +27,7 @@ pub(super) struct Bounds {
     pub(super) max_cost: f64,
     pub(super) max_cells: usize,
     pub(super) max_portals: usize,
-    /// Whether rooms and the outdoors may become one.
+    /// Lets rooms and the outdoors become one.
     pub(super) joins_outdoors: bool,
 }
 
@@ -40,7 +40,7 @@ pub(super) trait Badness {
 }
 
 impl CostGraph {
-    /// Whether two cells may become one as far as the outdoors and what it costs go.
+    /// Tells if two cells may become one as far as the outdoors and the cost go.
     pub(super) fn may_join(&self, [a, b]: [u32; 2], both: f64, bounds: &Bounds) -> bool {
         let is_alike = self.aloof[a as usize] == self.aloof[b as usize];
         both <= bounds.max_cost && (is_alike || bounds.joins_outdoors)

@@ -28,7 +28,7 @@ pub struct SimplifySettings {
     pub max_cells: Option<usize>,
     /// Cells are merged until there are no more portals than this, where that keeps the upper bound.
     pub max_portals: Option<usize>,
-    /// Whether rooms and the outdoors may become one cell, where a bound cannot be met otherwise. Without it, portals that lead outdoors
+    /// Lets rooms and the outdoors become one cell, where a bound cannot be met otherwise. Without it, portals that lead outdoors
     /// all stay.
     pub join_outdoors: bool,
     /// How portals are compared.

@@ -34,9 +34,9 @@ pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
 
 /// Textures on the adapter.
 pub(super) struct Textures {
-    /// What materials use; the first is white.
+    /// The textures that materials use; the first is white.
     pub(super) groups: Vec<wgpu::BindGroup>,
-    /// By texture of the world, which of them.
+    /// Indices into these by texture of the world.
     pub(super) of: Vec<u32>,
     /// Pictures that are missing or damaged.
     pub(super) n_missing: u32,
@@ -57,7 +57,7 @@ pub(super) fn load_textures(
     let mut texture_of = vec![0; world.textures.len()];
     let (mut n_missing, mut n_too_large) = (0, 0);
     let mut decoder = Decoder::new(world);
-    // Of textures without a picture, each is asked once.
+    // A texture without a picture is asked once.
     let mut is_without = vec![false; world.textures.len()];
     for look in looks {
         let Some(t) = look.texture else { continue };
