@@ -491,7 +491,7 @@ fn a_thin_walker_finds_a_way_on_no_finer_floors() {
         (path.length, map.floors().n_floors())
     };
     let (length, _) = found(0.1);
-    for radius in [1e-9, 1e-4, 0.002, 0.01, 0.05] {
+    for radius in [1e-9, 0.01] {
         let (thin, n) = found(radius);
         assert!(thin < length + 1e-6 && thin > ends[0].distance(ends[1]) - 1e-6);
         assert!(n < 600_000, "{radius}: {n} floors");
