@@ -160,12 +160,7 @@ impl ViewMerger {
         // Once for all orders.
         self.weigh();
         let start = &*self;
-        // Where rooms and the outdoors are not joined at all, both kinds of orders are the same.
-        let orders = ORDERS
-            .into_iter()
-            .filter(|o| bounds.joins_outdoors || o.is_outdoors_last);
-        let tries: Vec<(Excess, Vec<u32>)> = orders
-            .collect::<Vec<_>>()
+        let tries: Vec<(Excess, Vec<u32>)> = ORDERS
             .into_par_iter()
             .with_max_len(1)
             .map(|order| {
