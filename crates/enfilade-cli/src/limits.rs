@@ -5,14 +5,14 @@
 //! decoders, drivers of graphics cards. It ends the process, but not in the middle of an output.
 
 use std::io::Write;
-use std::sync::{Mutex, TryLockError};
+use std::sync::TryLockError;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use enfilade::geom::Allowance;
 
-use crate::output::Warned;
+use crate::output::{WRITING, Warned};
 use enfilade_cli::values::{bytes, seconds};
 
 /// Options of all commands that can take long.
@@ -35,9 +35,6 @@ fn with_grace(time: Duration) -> Duration {
 
 /// An output that is being written is waited for.
 const WRITING_TIME: Duration = Duration::from_secs(1);
-
-/// Held while an output is written.
-pub(crate) static WRITING: Mutex<()> = Mutex::new(());
 
 impl Limits {
     /// Holds the bounds from now on; what loops may spend.

@@ -5,6 +5,7 @@ use std::fmt;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, bail};
@@ -12,7 +13,9 @@ use enfilade::whole;
 use enfilade_cli::input::is_stream;
 
 use crate::formats::Format;
-use crate::limits::WRITING;
+
+/// Held while an output is written.
+pub(crate) static WRITING: Mutex<()> = Mutex::new(());
 
 /// Writes `bytes` to `path`, [whole or not at all](enfilade::whole), or to standard output where it is `-`.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {

@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
         Some(path) => read_wav(path, seconds)?,
         None => (RATE, test_sound(RATE)),
     };
-    let walk = Walk {
+    let walk = HeardWalk {
         points: &points,
         n_blocks: n_blocks(seconds, rate),
         seconds_of_block: BLOCK as f64 / f64::from(rate),
@@ -128,14 +128,14 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
 }
 
 /// A walk and the source that is heard on it.
-struct Walk<'a> {
+struct HeardWalk<'a> {
     points: &'a [DVec3],
     n_blocks: usize,
     seconds_of_block: f64,
     source: DVec3,
 }
 
-impl Walk<'_> {
+impl HeardWalk<'_> {
     /// Hands out what is heard block by block; returns lines for the reader.
     fn hear(
         &self,
