@@ -96,11 +96,9 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         make_folder("--pictures", folder)?;
     }
     let world = read_world(&args.world)?;
-    let source = if args.source.is_empty() {
-        None
-    } else {
-        Some(read_source(args, &mut outputs)?)
-    };
+    let source = (!args.source.is_empty())
+        .then(|| read_source(args, &mut outputs))
+        .transpose()?;
     let structure = source.as_ref().map(structure_of);
     let options = VerifyOptions {
         rays: args.rays,
