@@ -4,7 +4,7 @@ use enfilade_bake::simplify::{
     CostModel, Metric, SimplifySettings, delete_portal, expected_cost, expected_cost_after,
     least_expected_cost, simplify, simplify_graph,
 };
-use enfilade_cpg::{CellSet, PortalId, Pvs, SightGraph, SightPortal, World};
+use enfilade_cpg::{CellId, CellSet, Portal, PortalId, Pvs, SightGraph, SightPortal, World};
 use enfilade_geom::DVec3;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 use enfilade_verify::{VerifyOptions, verify_world};
@@ -51,6 +51,7 @@ fn merged_worlds_keep_their_promises_and_bounds() {
             } else {
                 Metric::VisibleVolume
             },
+            join_outdoors: rng.chance(0.5),
             cost: CostModel {
                 area: 0.1,
                 ..CostModel::default()
@@ -153,6 +154,7 @@ fn views_of_fewer_cells_are_never_cheaper_also_where_rooms_join_the_outdoors() {
         let before = expected_cost(&world, &plain, 64);
         let settings = SimplifySettings {
             max_cells: Some(1 + rng.below(4)),
+            join_outdoors: true,
             ..SimplifySettings::default()
         };
         let after = expected_cost_after(&world, &simplify(&world, &settings), &plain, 64);
@@ -171,6 +173,8 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
         let n_portals = world.graph.portals.len();
         let settings = SimplifySettings {
             max_portals: Some(n_portals * (2 + rng.below(5)) / 10),
+            // The best of all ways may.
+            join_outdoors: true,
             ..SimplifySettings::default()
         };
         let most = settings.max_portals.unwrap();
@@ -252,5 +256,54 @@ fn graphs_without_surfaces_keep_their_bounds_and_merge_across_what_is_widest() {
     assert_eq!(
         simplify_graph(&graph, &dear, &settings).cell_of,
         [0, 1, 2, 2, 3, 4, 5]
+    );
+}
+
+#[test]
+fn rooms_and_the_outdoors_stay_apart_and_numbers_are_met_from_above() {
+    let mut rng = Rng::new(11);
+    let (mut n_worlds, mut n_met, mut n_below) = (0, 0, 0);
+    for i in 0..40 {
+        let world = grid(&mut rng);
+        let graph = &world.graph;
+        let is_outdoor = |c: CellId| graph[c].outdoor;
+        let leads_out = |p: &&Portal| is_outdoor(p.cells[0]) != is_outdoor(p.cells[1]);
+        let n_out = graph.portals.iter().filter(leads_out).count();
+        let n = graph.portals.len();
+        if n_out == 0 || n_out == n {
+            continue;
+        }
+        n_worlds += 1;
+        let with = |most, join_outdoors| SimplifySettings {
+            max_portals: Some(most),
+            metric: if i % 2 == 0 {
+                Metric::ExpectedTriangles
+            } else {
+                Metric::VisibleVolume
+            },
+            join_outdoors,
+            ..SimplifySettings::default()
+        };
+        let most = n_out + rng.below(n - n_out);
+        let simple = simplify(&world, &with(most, false));
+        let after = &simple.world.graph;
+        for (c, cell) in (0..).map(CellId).zip(&graph.cells) {
+            assert_eq!(after[simple.cell_of[c.idx()]].outdoor, cell.outdoor);
+        }
+        let left = after.portals.len();
+        assert!(left <= most, "{left} {most}");
+        n_met += usize::from(left == most);
+        // Fewer than lead outdoors, where that is asked for.
+        let most = rng.below(n_out);
+        let joined = simplify(&world, &with(most, true));
+        let left = joined.world.graph.portals.len();
+        assert!(left <= most, "{left} {most}");
+        n_below += most - left;
+    }
+    // Rooms may have several openings between them, of which none goes alone.
+    assert!(n_worlds > 15, "{n_worlds}");
+    assert!(
+        3 * n_met > 2 * n_worlds && n_below < 2 * n_worlds,
+        "{n_met} {n_below} {n_worlds}"
     );
 }

@@ -159,6 +159,7 @@ pub(crate) fn bench_simplify(table: &mut Table, worlds: &[PathBuf]) -> anyhow::R
                 let settings = SimplifySettings {
                     max_portals: Some((share * n_portals as f64) as usize),
                     metric,
+                    join_outdoors: true,
                     ..SimplifySettings::default()
                 };
                 let simple = simplify(&world, &settings);

@@ -29,38 +29,67 @@ pub(crate) struct Block {
     pub(crate) rt60: f64,
 }
 
-/// Renders `source` as heard over `blocks`: pairs of samples, left and right. The source repeats.
-pub(crate) fn render(source: &[f32], rate: u32, blocks: &[Block]) -> Vec<[f32; 2]> {
-    let rate = f64::from(rate);
-    let mut out = Vec::with_capacity(blocks.len() * BLOCK);
-    let Some(&first) = blocks.first().filter(|_| !source.is_empty()) else {
-        return out;
-    };
-    let delays_of = |b: &Block| b.ears.map(|e| (b.length / SPEED_OF_SOUND + e.1) * rate);
-    let (mut delays, mut last) = (delays_of(&first), first);
-    let mut tail = Tail::new(rate);
-    for block in blocks {
+/// Makes sound of what is heard, block by block. The source repeats.
+pub(crate) struct Renderer<'s> {
+    source: &'s [f32],
+    rate: f64,
+    /// Delays of the ears at the end of the block before. [Units: samples]
+    delays: Option<[f64; 2]>,
+    last: Block,
+    tail: Tail,
+    /// Samples so far.
+    now: u64,
+    out: Vec<[f32; 2]>,
+}
+
+impl<'s> Renderer<'s> {
+    pub(crate) fn new(source: &'s [f32], rate: u32) -> Self {
+        let rate = f64::from(rate);
+        Self {
+            source,
+            rate,
+            delays: None,
+            last: Block::default(),
+            tail: Tail::new(rate),
+            now: 0,
+            out: Vec::with_capacity(BLOCK),
+        }
+    }
+
+    /// The samples of the next block, left and right.
+    pub(crate) fn render(&mut self, block: &Block) -> &[[f32; 2]] {
+        self.out.clear();
+        if self.source.is_empty() {
+            return &self.out;
+        }
+        let goal = (block.ears).map(|e| (block.length / SPEED_OF_SOUND + e.1) * self.rate);
+        let delays = self.delays.unwrap_or(goal);
+        let last = if self.delays.is_some() {
+            self.last
+        } else {
+            *block
+        };
         let most = FASTEST * BLOCK as f64;
-        let goal = delays_of(block);
         let next = [0, 1].map(|k| goal[k].clamp(delays[k] - most, delays[k] + most));
         for i in 0..BLOCK {
             let share = (i + 1) as f64 / BLOCK as f64;
             let mix = |a: f64, b: f64| a + (b - a) * share;
-            let now = out.len() as f64;
-            let room = tail.next(
-                at(source, now) * mix(last.room, block.room),
+            let now = self.now as f64;
+            let room = self.tail.next(
+                at(self.source, now) * mix(last.room, block.room),
                 mix(last.rt60, block.rt60),
             );
             let ears = [0, 1].map(|k| {
-                let direct = at(source, now - mix(delays[k], next[k]));
+                let direct = at(self.source, now - mix(delays[k], next[k]));
                 let sample = direct * mix(last.ears[k].0, block.ears[k].0) + room[k];
                 (LEVEL * sample).clamp(-1.0, 1.0) as f32
             });
-            out.push(ears);
+            self.out.push(ears);
+            self.now += 1;
         }
-        (delays, last) = (next, *block);
+        (self.delays, self.last) = (Some(next), *block);
+        &self.out
     }
-    out
 }
 
 /// The source at a time in samples, between two by a line; nothing before it starts.
@@ -78,6 +107,9 @@ struct Tail {
     lines: [Vec<f64>; 4],
     heads: [usize; 4],
     rate: f64,
+    /// The time of decay before, and by line what is kept of a sample, and fed: it mostly stays the same.
+    rt60: f64,
+    shares: [(f64, f64); 4],
 }
 
 impl Tail {
@@ -86,22 +118,30 @@ impl Tail {
             lines: LINES.map(|s| vec![0.0; (s * rate).round().max(1.0) as usize]),
             heads: [0; 4],
             rate,
+            rt60: f64::NAN,
+            shares: [(0.0, 0.0); 4],
         }
     }
 
     fn next(&mut self, input: f64, rt60: f64) -> [f64; 2] {
+        if rt60 != self.rt60 {
+            self.rt60 = rt60;
+            self.shares = [0, 1, 2, 3].map(|k| {
+                let seconds = self.lines[k].len() as f64 / self.rate;
+                let kept = 10f64.powf(-3.0 * seconds / rt60.max(0.05));
+                // The energy in the line is then the input's, if the source is steady.
+                (kept, (1.0 - kept * kept).sqrt())
+            });
+        }
         let out = [0, 1, 2, 3].map(|k| self.lines[k][self.heads[k]]);
         let [a, b, c, d] = out;
         // A Hadamard matrix of length 1.
         let mixed = [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d].map(|x| 0.5 * x);
-        for ((line, head), mixed) in self.lines.iter_mut().zip(&mut self.heads).zip(mixed) {
-            let length = line.len();
-            let seconds = length as f64 / self.rate;
-            let kept = 10f64.powf(-3.0 * seconds / rt60.max(0.05));
-            // Of a steady source the energy in the line is then the input's.
-            let fed = input * (1.0 - kept * kept).sqrt();
-            line[*head] = kept * mixed + 0.5 * fed;
-            *head = (*head + 1) % length;
+        for (k, mixed) in mixed.into_iter().enumerate() {
+            let (kept, fed) = self.shares[k];
+            let (line, head) = (&mut self.lines[k], &mut self.heads[k]);
+            line[*head] = kept * mixed + 0.5 * (input * fed);
+            *head = (*head + 1) % line.len();
         }
         [a + c, b + d].map(|x| x * std::f64::consts::FRAC_1_SQRT_2)
     }
@@ -160,7 +200,10 @@ mod tests {
         let blocks: Vec<_> = (0..300)
             .map(|k| block(if k < 150 { 30.0 } else { 10.0 }))
             .collect();
-        let out = render(&source, 44100, &blocks);
+        let mut renderer = Renderer::new(&source, 44100);
+        let out: Vec<_> = (blocks.iter())
+            .flat_map(|b| renderer.render(b).to_vec())
+            .collect();
         for k in 0..2 {
             let channel: Vec<f32> = out.iter().map(|s| s[k]).collect();
             assert!(jump(&channel) <= 1.15 * LEVEL as f32 * jump(&source));

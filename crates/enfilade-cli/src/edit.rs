@@ -9,6 +9,7 @@ use enfilade::cpg::{Portal, PortalId, World};
 use enfilade::geom::DVec3;
 
 use crate::formats::Format;
+use crate::limits::Limits;
 use crate::output::Outputs;
 use crate::simplify::{Done, write};
 use enfilade_cli::input::name_of;
@@ -40,6 +41,8 @@ pub(crate) struct Edit {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// Corners of a polygon.
@@ -80,6 +83,7 @@ fn parse_polygon(text: &str) -> Result<Polygon, String> {
 }
 
 pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let mut outputs = Outputs::reading([&args.input])?;
     outputs.write("-o", Format::World, &args.output)?;
     let before = read_world(&args.input)?;

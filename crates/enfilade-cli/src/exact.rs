@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::formats::Format;
 use crate::output::{Outputs, write_whole};
 use crate::progress::StageBar;
+use crate::render::tell_of_pictures;
 use enfilade_cli::cameras::random_camera;
 use enfilade_cli::doors::random_doors;
 
@@ -143,6 +144,7 @@ fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) 
 
 pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::Result<Exactness> {
     let mut studio = Studio::new(enfilade_cli::adapter::open(asked.adapter)?, world)?;
+    tell_of_pictures(&studio)?;
     let bounds = studio.world.bounds();
     let margin = 0.05;
     let bounds = [bounds[0].map(|x| x - margin), bounds[1].map(|x| x + margin)];

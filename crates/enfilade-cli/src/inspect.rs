@@ -13,6 +13,7 @@ use enfilade::bake::simplify::{CostModel, portal_scores};
 use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
 use serde::Serialize;
 
+use crate::limits::Limits;
 use enfilade_cli::world::read_world;
 
 /// Shows the cells, portals and statistics of a world.
@@ -23,12 +24,15 @@ pub(crate) struct Inspect {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
     /// Instead of all that: the objects that this cell sees, by its name or id, with their triangles.
     #[arg(long, value_name = "CELL")]
     objects: Option<String>,
 }
 
 pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let world = read_world(&args.world)?;
     let mut out = BufWriter::new(io::stdout().lock());
     if let Some(cell) = &args.objects {

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use enfilade::cpg::{Locator, World};
 use enfilade::geom::DVec3;
-use enfilade::import::is_match;
+use enfilade::import::{Glob, GlobState};
 
+use crate::limits::Limits;
 use crate::output::print_json;
 use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
@@ -26,6 +27,8 @@ pub(crate) struct Locate {
     /// of its cells.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// What `--json` prints.
@@ -38,7 +41,11 @@ struct LocateReport {
 /// not fill the memory.
 const MAX_LINE: u64 = 4096;
 
+/// Longest pattern: what it has come to is kept for each node of the tree of names.
+const MAX_PATTERN: usize = 1000;
+
 pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
+    args.limits.begin()?;
     if let Some(pattern) = &args.object {
         return locate_object(&read_world(&args.world)?, pattern, args.json);
     }
@@ -62,6 +69,9 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
 
 /// Prints the cells of all sources whose name or path fits.
 fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()> {
+    if pattern.len() > MAX_PATTERN {
+        bail!("--object: a pattern of at most {MAX_PATTERN} letters is needed");
+    }
     let found = sources_named(world, pattern);
     if !found.contains(&true) {
         bail!(
@@ -81,12 +91,35 @@ fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()>
 }
 
 /// By source, whether its name or path fits the pattern, or that of one above it: the cells of a storey are those of what it holds.
+///
+/// Paths are read on from where those above ended, not each from the top: linear in the names, however deep they are nested.
 fn sources_named(world: &World, pattern: &str) -> Vec<bool> {
-    let fits = |text: &str| is_match(pattern, text);
+    let glob = Glob::new(pattern);
+    let mut is_parent = vec![false; world.sources.len()];
+    for parent in world.sources.iter().filter_map(|node| node.parent) {
+        is_parent[parent as usize] = true;
+    }
     let mut is_found: Vec<bool> = Vec::with_capacity(world.sources.len());
+    // States of the sources that have others below and are not found yet: if a path has begun, and how far it has come in the pattern.
+    let mut paths: Vec<Option<(bool, GlobState)>> = Vec::with_capacity(world.sources.len());
     for (i, node) in world.sources.iter().enumerate() {
-        let is_below = node.parent.is_some_and(|p| is_found[p as usize]);
-        is_found.push(is_below || fits(&node.name) || fits(&world.source_path(i as u32)));
+        let parent = node.parent.map(|p| p as usize);
+        if parent.is_some_and(|p| is_found[p]) {
+            is_found.push(true);
+            paths.push(None);
+            continue;
+        }
+        let above = parent.and_then(|p| paths[p].clone());
+        let (mut has_begun, mut path) = above.unwrap_or_else(|| (false, glob.start()));
+        if !node.name.is_empty() {
+            glob.read(&mut path, if has_begun { "/" } else { "" });
+            glob.read(&mut path, &node.name);
+            has_begun = true;
+        }
+        let mut name = glob.start();
+        glob.read(&mut name, &node.name);
+        is_found.push(glob.fits(&name) || glob.fits(&path));
+        paths.push((is_parent[i] && !is_found[i]).then_some((has_begun, path)));
     }
     is_found
 }

@@ -13,6 +13,7 @@ mod edit;
 mod exact;
 mod formats;
 mod inspect;
+mod limits;
 mod locate;
 mod manual;
 mod output;

@@ -5,6 +5,7 @@ use std::fmt;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, bail};
@@ -13,21 +14,43 @@ use enfilade_cli::input::is_stream;
 
 use crate::formats::Format;
 
+/// Held while an output is written.
+pub(crate) static WRITING: Mutex<()> = Mutex::new(());
+
 /// Writes `bytes` to `path`, [whole or not at all](enfilade::whole), or to standard output where it is `-`.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    write_streamed(path, |out| Ok(out.write_all(bytes)?))
+}
+
+/// The same for what is made while it is written.
+pub(crate) fn write_streamed(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let _is_writing = WRITING.lock();
     if is_stream(path) {
         let mut out = io::stdout().lock();
-        return out
-            .write_all(bytes)
-            .and_then(|()| out.flush())
-            .context("cannot write to standard output");
+        let filled = fill(&mut out).and_then(|()| Ok(out.flush()?));
+        return filled.map_err(|e| explained(e, || "cannot write to standard output".into()));
     }
-    whole::write(path, bytes).with_context(|| {
-        format!(
-            "cannot write {}; choose another place, or make room there",
-            path.display()
-        )
+    let written = whole::write_with(path, fill);
+    written.map_err(|e| {
+        explained(e, || {
+            format!(
+                "cannot write {}; choose another place, or make room there",
+                path.display()
+            )
+        })
     })
+}
+
+/// Adds what could not be written, unless it was something else that failed while it was.
+fn explained(error: anyhow::Error, what: impl FnOnce() -> String) -> anyhow::Error {
+    if error.is::<io::Error>() {
+        error.context(what())
+    } else {
+        error
+    }
 }
 
 /// Whether `--quiet` was given: once, before any command runs.

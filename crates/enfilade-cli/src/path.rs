@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
-use enfilade::world::{Agent, Layout, Path, PathSearch, WalkMap};
+use enfilade::world::{Agent, Layout, NoPath, Path, PathSearch, WalkMap};
 
+use crate::limits::Limits;
 use crate::output::print_json;
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
@@ -41,6 +42,8 @@ pub(crate) struct WalkedPath {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// What `--json` prints.
@@ -54,6 +57,7 @@ struct PathReport {
 }
 
 pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
+    args.limits.begin()?;
     for (name, value) in [("radius", args.radius), ("height", args.height)] {
         if !(value > 0.0 && value < 100.0) {
             bail!("--{name} {value}: a length above 0 and below 100 is needed");
@@ -77,13 +81,18 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
     let map = WalkMap::new(&layout, &world, walker);
     let ends = [args.from, args.to].map(|p| DVec3::from_array(p.map(f64::from)));
     let mut path = Path::default();
-    PathSearch::new().find(
-        &map,
-        &layout,
-        ends,
-        |portal: PortalId| !args.closed.contains(&portal.0),
-        &mut path,
-    )?;
+    let is_open = |portal: PortalId| !args.closed.contains(&portal.0);
+    let found = PathSearch::new().find(&map, &layout, ends, is_open, &mut path);
+    let side = map.floors().side();
+    match found {
+        // They are a quarter of the radius wide where the world is not too large for that.
+        Err(NoPath::NoWay) if side > 0.26 * args.radius => bail!(
+            "{}; in squares of {side:.3} m, which the floors are laid out in, doorways narrower than {:.2} m may be missed",
+            NoPath::NoWay,
+            2.0 * (args.radius + side)
+        ),
+        found => found?,
+    }
     let start = layout.locate(path.points[0] + DVec3::Y * 0.5 * args.height);
     let cells = path.portals.iter().map(|e| e.to);
     let report = PathReport {

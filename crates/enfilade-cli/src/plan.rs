@@ -7,6 +7,7 @@ use enfilade::cpg::World;
 use enfilade_report::{Drawing, PAPERS, Paper, PlanOptions, Plans, Storey, to_pdf};
 
 use crate::formats::Format;
+use crate::limits::Limits;
 use crate::output::{Outputs, Written, print_json, write_whole};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
@@ -44,6 +45,8 @@ pub(crate) struct Plan {
     /// Print what was written as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// What `--json` prints.
@@ -77,6 +80,7 @@ enum Kind {
 }
 
 pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let kind = kind(args)?;
     let name = args.output.file_name().unwrap_or_default();
     let is_several = name.to_string_lossy().contains(PLACE);

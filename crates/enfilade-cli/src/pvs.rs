@@ -16,6 +16,7 @@ use enfilade_verify::structural_triangles;
 
 use self::statistics::Statistics;
 use crate::formats::Format;
+use crate::limits::watch;
 use crate::output::{Outputs, is_same_file, write_whole};
 use crate::progress::StageBar;
 use enfilade_cli::input::{is_stream, name_of, read};
@@ -48,7 +49,11 @@ pub(crate) struct Pvs {
     /// Stop searching after this long; the answer is then larger than need be, and no less right.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     budget: Option<Duration>,
-    /// Refuse a graph that is estimated to take more, before anything is allocated: a number and K, M, G or T.
+    /// End without an answer after this long.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    max_time: Option<Duration>,
+    /// Refuse a graph that is estimated to take more, before anything is allocated, and end rather than take more: a number and K, M,
+    /// G or T.
     #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = bytes)]
     max_memory: u64,
     /// Nothing farther than this is seen.
@@ -123,6 +128,7 @@ struct PvsReport {
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
+    watch(args.max_time, Some(args.max_memory))?;
     let (outputs, output) = outputs_of(args)?;
     let input = read_input(&args.input)?;
     let graph = &input.graph;

@@ -14,6 +14,7 @@ use enfilade_render::{
 use serde_json::json;
 
 use crate::formats::Format;
+use crate::limits::Limits;
 use crate::output::{Outputs, Warned, print_json, refuse_stream, write_whole};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::input::name_of;
@@ -37,9 +38,9 @@ pub(crate) struct Render {
     /// A picture for each line of this file: eye and point looked at, `x y z x y z`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "walk"])]
     path: Option<PathBuf>,
-    /// So many pictures on a walk through the doorways.
-    #[arg(long, value_name = "N", conflicts_with = "eye")]
-    walk: Option<usize>,
+    /// So many pictures on a walk through the doorways, 10,000 at most.
+    #[arg(long, value_name = "N", conflicts_with = "eye", value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    walk: Option<u32>,
     /// Write the cameras of the pictures to this file, for --path.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -93,6 +94,8 @@ pub(crate) struct Render {
     /// Print what was drawn as JSON for machines; of a path, its pictures one by one in a list.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// What is drawn.
@@ -132,14 +135,27 @@ pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(Worl
     let world = read_world(path)?;
     let studio = Studio::new(enfilade_cli::adapter::open(adapter)?, &world)
         .with_context(|| name_of(path))?;
-    let n = studio.world.n_missing_pictures();
-    if n > 0 {
-        writeln!(
-            Warned,
-            "enfilade: {n} pictures of textures are missing or damaged; drawn without"
-        )?;
-    }
+    tell_of_pictures(&studio)?;
     Ok((world, studio))
+}
+
+/// Says which pictures of textures are not drawn.
+pub(crate) fn tell_of_pictures(studio: &Studio) -> anyhow::Result<()> {
+    for (n, why) in [
+        (studio.world.n_missing_pictures(), "missing or damaged"),
+        (
+            studio.world.n_large_pictures(),
+            "larger than 8192x8192, or all of them than 512 MiB and 128 times their files",
+        ),
+    ] {
+        if n > 0 {
+            writeln!(
+                Warned,
+                "enfilade: {n} pictures of textures are {why}; drawn without"
+            )?;
+        }
+    }
+    Ok(())
 }
 
 /// Computes the light of each place; where the adapter cannot hold it, says so, and all places are lit alike.
@@ -163,6 +179,7 @@ pub(crate) fn smooth(
 }
 
 pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let fov = args.fov.to_radians();
     let is_path = args.path.is_some() || args.walk.is_some();
     let mut outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
@@ -296,7 +313,7 @@ fn style_of(args: &Render) -> Style {
 fn cameras(args: &Render, studio: &mut Studio, world: &World) -> anyhow::Result<Vec<Camera>> {
     let fov_y = args.fov.to_radians();
     if let Some(n) = args.walk {
-        return Ok(walk_cameras(world, &studio.sight, n, fov_y));
+        return Ok(walk_cameras(world, &studio.sight, n as usize, fov_y));
     }
     let camera = match args.eye.zip(args.look) {
         Some((eye, look)) => Camera::looking_at(eye, look),

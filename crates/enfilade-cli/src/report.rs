@@ -14,8 +14,9 @@ use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
 use crate::formats::Format;
+use crate::limits::Limits;
 use crate::output::{Outputs, Warned, Written, print_json, write_whole};
-use crate::render::{above, light, portal_marks, smooth};
+use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
 use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
@@ -28,9 +29,9 @@ pub(crate) struct Report {
     /// Where to write the page; `-` for standard output.
     #[arg(short, long, value_name = "HTML")]
     output: PathBuf,
-    /// Views on the walk that is measured.
-    #[arg(long, default_value_t = 200, value_name = "N")]
-    views: usize,
+    /// Views on the walk that is measured, 100,000 at most.
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    views: u32,
     /// What draws the pictures: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
@@ -40,6 +41,8 @@ pub(crate) struct Report {
     /// Print what was written as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// What `--json` prints.
@@ -56,6 +59,7 @@ const SIZE: [u32; 2] = [960, 540];
 const BUDGET: Duration = Duration::from_secs(20);
 
 pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let mut outputs = Outputs::reading([&args.world])?;
     outputs.write("-o", Format::Page, &args.output)?;
     let world = read_world(&args.world)?;
@@ -70,7 +74,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     };
     parts.visible = visible(&world, &mut parts.notes)?;
     let sight = Sight::build(&world).with_context(|| name_of(&args.world))?;
-    let steps = measured(&world, &sight, args.views);
+    let steps = measured(&world, &sight, args.views as usize);
     parts
         .tables
         .push(in_numbers(&world, &sight, &parts.visible));
@@ -244,6 +248,7 @@ fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
 
 fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figure>> {
     let mut studio = Studio::new(gpu, world)?;
+    tell_of_pictures(&studio)?;
     light(&mut studio, world)?;
     let mut out = Vec::new();
     let style = Style::default();

@@ -10,6 +10,7 @@ use enfilade::cpg::World;
 use enfilade::runtime::{Narrowing, SeeOptions, Seen, Sight, SightState, View, Viewer};
 use serde_json::json;
 
+use crate::limits::Limits;
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
 
@@ -41,6 +42,8 @@ pub(crate) struct See {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// How portals narrow the view.
@@ -65,6 +68,7 @@ impl SeeMode {
 const REPEATS: usize = 21;
 
 pub(crate) fn run(args: &See) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let world = read_world(&args.world)?;
     let toward = [0, 1, 2].map(|k| args.look[k] - args.eye[k]);
     let aspect = args.size[0] as f32 / args.size[1] as f32;

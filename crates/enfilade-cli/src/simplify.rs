@@ -12,6 +12,7 @@ use enfilade::import::{PrtFile, read_prt, write_prt};
 use serde::Serialize;
 
 use crate::formats::Format;
+use crate::limits::Limits;
 use crate::output::{Outputs, Warned, Written, print_json, write_whole};
 use crate::pvs::sight_graph;
 use enfilade_cli::input::{name_of, read};
@@ -26,7 +27,7 @@ pub(crate) struct Simplify {
     /// were. `-` for standard output.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Merge until there are no more cells than this, as far as the cost bound allows.
+    /// Merge until there are no more cells than this, as far as the cost bound and the outdoors allow.
     #[arg(long, value_name = "N")]
     max_cells: Option<usize>,
     /// Merge until there are no more portals than this, as far as the cost bound allows.
@@ -41,6 +42,9 @@ pub(crate) struct Simplify {
     /// With `--max-cost`, for worlds: cut the outdoors, too.
     #[arg(long)]
     split_outdoors: bool,
+    /// Merge rooms with the outdoors, too, where a bound cannot be met otherwise; without it, portals that lead outdoors all stay.
+    #[arg(long)]
+    join_outdoors: bool,
     /// How portals are compared [default: expected-triangles]; those of a portal file, which has no surfaces, by
     /// their area.
     #[arg(long, value_enum)]
@@ -60,6 +64,8 @@ pub(crate) struct Simplify {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -89,6 +95,7 @@ fn parse_material(text: &str) -> Result<(String, f64), String> {
 }
 
 pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let numbers = args.max_cells.or(args.max_portals);
     if numbers.is_none() && args.min_cost.or(args.max_cost).is_none() {
         bail!("nothing to do: give --max-cells, --max-portals, --min-cost or --max-cost");
@@ -111,6 +118,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         min_cost: args.min_cost.unwrap_or(0.0),
         max_cost: args.max_cost,
         outdoors: args.split_outdoors,
+        join_outdoors: args.join_outdoors,
         max_cells: args.max_cells,
         max_portals: args.max_portals,
         metric: match args.metric {
@@ -130,11 +138,19 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     }
     let world = decode_glb(&bytes).with_context(|| name_of(&args.input))?;
     settings.cost.check(&world.materials)?;
+    check_portals(args, &world)?;
     let bounded = keep_bounds(&world, &settings);
+    let graph = &bounded.world.graph;
+    let warnings = [
+        bounded.note(),
+        too_many(args.max_cells, graph.cells.len(), "cells"),
+        too_many(args.max_portals, graph.portals.len(), "portals"),
+    ];
+    let warnings: Vec<String> = warnings.into_iter().flatten().collect();
     let done = Done {
         costs: Some(bounded.costs),
         notes: Vec::new(),
-        warning: bounded.note(),
+        warning: (!warnings.is_empty()).then(|| warnings.join("\n")),
     };
     write(
         &outputs,
@@ -143,6 +159,31 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
         done,
         args.json,
     )
+}
+
+/// Refuses a number of portals that is not reached though all rooms became one.
+fn check_portals(args: &Simplify, world: &World) -> anyhow::Result<()> {
+    let graph = &world.graph;
+    let outward = graph.portals.iter().filter(|p| {
+        let [a, b] = p.cells.map(|c| graph[c].outdoor);
+        a != b
+    });
+    let n = outward.count();
+    match args.max_portals {
+        Some(most) if n > most && !args.join_outdoors => bail!(
+            "--max-portals {most}: {n} portals lead outdoors, and stay; give {n} or more, or --join-outdoors, which merges rooms \
+             with the outdoors"
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// That more are left than were asked for, if so.
+fn too_many(most: Option<usize>, n: usize, what: &str) -> Option<String> {
+    let most = most.filter(|&most| n > most)?;
+    Some(format!(
+        "{n} {what} are left, more than {most}: no other two may be merged; a higher --max-cost or --join-outdoors may help"
+    ))
 }
 
 /// That a cell of a portal file costs more than it may, if one does.
@@ -162,11 +203,12 @@ fn simplify_portal_file(
 ) -> anyhow::Result<()> {
     if args.metric.is_some()
         || args.split_outdoors
+        || args.join_outdoors
         || args.area_cost > 0.0
         || !args.material_cost.is_empty()
     {
         bail!(
-            "--metric, --split-outdoors, --area-cost and --material-cost ask for surfaces, which a portal file does not have"
+            "--metric, --split-outdoors, --join-outdoors, --area-cost and --material-cost ask for surfaces, which a portal file does not have"
         );
     }
     let file = read_prt(text).with_context(|| name_of(&args.input))?;

@@ -1,20 +1,21 @@
 //! `enfilade sound`: what a walking listener hears of a source.
 
-use std::io::{BufWriter, Cursor, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::{PortalId, World};
-use enfilade::geom::DVec3;
+use enfilade::geom::{Allowance, DVec3};
 use enfilade::runtime::{Sight, SightState};
 use enfilade::world::{
     Acoustics, DecayLaw, DiffuseFields, Layout, Listener, Reverb, Transmission, absorption_of_name,
     at_ears,
 };
 
-use crate::auralize::{BLOCK, Block, render, test_sound};
+use crate::auralize::{BLOCK, Block, Renderer, test_sound};
 use crate::formats::Format;
-use crate::output::{Outputs, print_json, write_whole};
+use crate::limits::Limits;
+use crate::output::{Outputs, print_json, write_streamed};
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
@@ -24,7 +25,7 @@ use enfilade_cli::world::read_world;
 pub(crate) struct Sound {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where the listener's ears are, in meters: points to walk along, at 1.4 m/s; at one point for 3 seconds.
+    /// Where the listener's ears are, in meters: points to walk along, at 1.4 m/s for an hour at most; at one point for 3 seconds.
     #[arg(long, value_name = "X,Y,Z;…", value_parser = point, value_delimiter = ';', required = true, allow_hyphen_values = true)]
     listener: Vec<[f32; 3]>,
     /// Where the source is, in meters.
@@ -42,13 +43,21 @@ pub(crate) struct Sound {
     /// Print JSON for machines: what is heard along the walk, ten times a second.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 /// [Units: wu/s]
 const SPEED: f64 = 1.4;
 /// How long one stands at a single point. [Units: s]
 const STANDING: f64 = 3.0;
+/// The longest walk: its sound of 192 kHz still is a WAV file, which has at most 4 GiB. [Units: s]
+const LONGEST: f64 = 3600.0;
+/// Samples of `--wav` that are held: 25 minutes of 44.1 kHz.
+const MOST_SAMPLES: usize = 1 << 26;
 const RATE: u32 = 44100;
+/// Work of a block, in units of [`Allowance`]: most of it is the search for ways.
+const WORK_A_BLOCK: u64 = 500;
 
 /// A line of what is heard.
 #[derive(serde::Serialize)]
@@ -65,10 +74,12 @@ struct HeardLine {
 }
 
 pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
+    let allowance = args.limits.begin()?;
     let mut outputs = Outputs::reading(std::iter::once(&args.world).chain(&args.wav))?;
     if let Some(path) = &args.output {
         outputs.write("-o", Format::Sound, path)?;
     }
+    let (points, seconds) = path(&args.listener)?;
     let world = read_world(&args.world)?;
     let n = world.graph.portals.len();
     if let Some(p) = args.closed.iter().find(|p| **p as usize >= n) {
@@ -78,13 +89,34 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
         );
     }
     let (rate, source) = match &args.wav {
-        Some(path) => read_wav(path)?,
+        Some(path) => read_wav(path, seconds)?,
         None => (RATE, test_sound(RATE)),
     };
-    let (rows, blocks) = walk(args, &world, rate)?;
-    if let Some(path) = &args.output {
-        write_whole(path, &wav_of(&render(&source, rate, &blocks), rate)?)?;
-    }
+    let walk = HeardWalk {
+        points: &points,
+        n_blocks: n_blocks(seconds, rate),
+        seconds_of_block: BLOCK as f64 / f64::from(rate),
+        source: exact(args.source),
+    };
+    let rows = match &args.output {
+        None => walk.hear(args, &world, &allowance, |_| Ok(()))?,
+        Some(path) => {
+            let mut rows = Vec::new();
+            let mut renderer = Renderer::new(&source, rate);
+            write_streamed(path, |out| {
+                let mut out = BufWriter::with_capacity(1 << 16, out);
+                out.write_all(&wav_head(walk.n_blocks * BLOCK, rate))?;
+                rows = walk.hear(args, &world, &allowance, |block| {
+                    for sample in renderer.render(block).iter().flatten() {
+                        out.write_all(&((sample * 32767.0).round() as i16).to_le_bytes())?;
+                    }
+                    Ok(())
+                })?;
+                Ok(out.flush()?)
+            })?;
+            rows
+        }
+    };
     let out = BufWriter::new(outputs.printed());
     if args.json {
         return print_json(
@@ -95,69 +127,84 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     print_table(out, &rows)
 }
 
-/// What is heard block by block, and lines for the reader.
-fn walk(args: &Sound, world: &World, rate: u32) -> anyhow::Result<(Vec<HeardLine>, Vec<Block>)> {
-    let layout = Layout::new(world);
-    let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
-    let mut state = SightState::new(&sight);
-    args.closed.iter().for_each(|&p| state.close(PortalId(p)));
-    let acoustics = Acoustics::new(&layout, world, &Transmission::default());
-    let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |material| {
-        let named = material.and_then(|m| world.materials.get(m as usize));
-        absorption_of_name(named.map_or("", |m| m.name.as_str()))
-    });
-    let source = exact(args.source);
-    let source_cell = layout.locate(source).context("the source is in no cell")?;
-    let mut fields = DiffuseFields::new();
-    fields.solve(&reverb, source_cell, |p| acoustics.transmitted(&state, p));
-    let (mut ears, mut rows, mut blocks) = (Listener::new(), Vec::new(), Vec::new());
-    let seconds_of_block = BLOCK as f64 / f64::from(rate);
-    let (points, seconds) = path(&args.listener);
-    let mut is_row_due = 0.0;
-    for k in 0..(seconds / seconds_of_block).ceil() as usize {
-        let time = k as f64 * seconds_of_block;
-        let (at, ahead) = place(&points, time * SPEED, source);
-        // In a doorway's solid frame one hears what one heard before it.
-        let Some(cell) = layout.locate(at) else {
-            match blocks.last().copied() {
-                Some(last) => blocks.push(last),
-                None => bail!("the listener starts in no cell, at {at}"),
-            }
-            continue;
-        };
-        ears.listen(&acoustics, &state, cell, at);
-        let heard = ears.hear(&acoustics, &layout, 0, source_cell, source);
-        let (toward, gain) = heard.map_or((DVec3::ZERO, 0.0), |h| (h.direction, h.gain));
-        let (room, rt60) = (fields.gain(cell), fields.rt60(cell));
-        blocks.push(Block {
-            length: heard.map_or(0.0, |h| h.length),
-            ears: at_ears(toward, ahead, DVec3::Y).map(|(g, late)| (g * gain, late)),
-            room: follow(
-                blocks.last().map(|b: &Block| b.room),
-                room,
-                seconds_of_block,
-            ),
-            rt60: follow(
-                blocks.last().map(|b: &Block| b.rt60),
-                rt60,
-                seconds_of_block,
-            ),
+/// A walk and the source that is heard on it.
+struct HeardWalk<'a> {
+    points: &'a [DVec3],
+    n_blocks: usize,
+    seconds_of_block: f64,
+    source: DVec3,
+}
+
+impl HeardWalk<'_> {
+    /// Hands out what is heard block by block; returns lines for the reader.
+    fn hear(
+        &self,
+        args: &Sound,
+        world: &World,
+        allowance: &Allowance,
+        mut each: impl FnMut(&Block) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<HeardLine>> {
+        let layout = Layout::new(world);
+        let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
+        let mut state = SightState::new(&sight);
+        args.closed.iter().for_each(|&p| state.close(PortalId(p)));
+        let acoustics = Acoustics::new(&layout, world, &Transmission::default());
+        let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |material| {
+            let named = material.and_then(|m| world.materials.get(m as usize));
+            absorption_of_name(named.map_or("", |m| m.name.as_str()))
         });
-        if time >= is_row_due {
-            is_row_due += 0.1;
-            rows.push(HeardLine {
-                seconds: time,
-                position: at.to_array(),
-                cell: cell.0,
-                length: heard.map(|h| h.length),
-                direction: toward.to_array(),
-                gain_db: decibels(gain),
-                room_db: decibels(room),
-                rt60,
-            });
+        let source = self.source;
+        let source_cell = layout.locate(source).context("the source is in no cell")?;
+        let mut fields = DiffuseFields::new();
+        fields.solve(&reverb, source_cell, |p| acoustics.transmitted(&state, p));
+        let (mut ears, mut rows) = (Listener::new(), Vec::new());
+        let mut before: Option<Block> = None;
+        let mut is_row_due = 0.0;
+        for k in 0..self.n_blocks {
+            if !allowance.spend(WORK_A_BLOCK) {
+                return Err(args.limits.time_is_up());
+            }
+            let time = k as f64 * self.seconds_of_block;
+            let (at, ahead) = place(self.points, time * SPEED, source);
+            // In a doorway's solid frame one hears what one heard before it.
+            let Some(cell) = layout.locate(at) else {
+                match &before {
+                    Some(last) => each(last)?,
+                    None => bail!("the listener starts in no cell, at {at}"),
+                }
+                continue;
+            };
+            ears.listen(&acoustics, &state, cell, at);
+            let heard = ears.hear(&acoustics, &layout, 0, source_cell, source);
+            let (toward, gain) = heard.map_or((DVec3::ZERO, 0.0), |h| (h.direction, h.gain));
+            let (room, rt60) = (fields.gain(cell), fields.rt60(cell));
+            let follow = |of: fn(&Block) -> f64, now| {
+                follow(before.as_ref().map(of), now, self.seconds_of_block)
+            };
+            let block = Block {
+                length: heard.map_or(0.0, |h| h.length),
+                ears: at_ears(toward, ahead, DVec3::Y).map(|(g, late)| (g * gain, late)),
+                room: follow(|b| b.room, room),
+                rt60: follow(|b| b.rt60, rt60),
+            };
+            each(&block)?;
+            before = Some(block);
+            if time >= is_row_due {
+                is_row_due += 0.1;
+                rows.push(HeardLine {
+                    seconds: time,
+                    position: at.to_array(),
+                    cell: cell.0,
+                    length: heard.map(|h| h.length),
+                    direction: toward.to_array(),
+                    gain_db: decibels(gain),
+                    room_db: decibels(room),
+                    rt60,
+                });
+            }
         }
+        Ok(rows)
     }
-    Ok((rows, blocks))
 }
 
 /// A room is left and entered over a fifth of a second.
@@ -170,8 +217,8 @@ fn exact(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// The points of a walk, and how long it takes. [Units: wu, s]
-fn path(listener: &[[f32; 3]]) -> (Vec<DVec3>, f64) {
+/// The points of a walk, and how long it takes. [Units: wu, s] Refused where it takes longer than is rendered.
+fn path(listener: &[[f32; 3]]) -> anyhow::Result<(Vec<DVec3>, f64)> {
     let points: Vec<DVec3> = listener.iter().copied().map(exact).collect();
     let length: f64 = points.windows(2).map(|p| p[0].distance(p[1])).sum();
     let seconds = if length > 0.0 {
@@ -179,7 +226,18 @@ fn path(listener: &[[f32; 3]]) -> (Vec<DVec3>, f64) {
     } else {
         STANDING
     };
-    (points, seconds)
+    if seconds > LONGEST {
+        bail!(
+            "--listener: the walk takes longer than {LONGEST} s, {:.2} km, which is the most that is rendered; give nearer points, \
+             or a part of the walk at a time",
+            LONGEST * SPEED / 1000.0
+        );
+    }
+    Ok((points, seconds))
+}
+
+fn n_blocks(seconds: f64, rate: u32) -> usize {
+    (seconds * f64::from(rate) / BLOCK as f64).ceil() as usize
 }
 
 /// Where the walker is after a length, and where the walker looks: ahead, and towards the source if standing.
@@ -203,43 +261,65 @@ fn decibels(gain: f64) -> Option<f64> {
     (gain > 0.0).then(|| 20.0 * gain.log10())
 }
 
-fn read_wav(path: &Path) -> anyhow::Result<(u32, Vec<f32>)> {
+/// The rate of a WAV file, and of its first channel as much as is heard in so many seconds.
+fn read_wav(path: &Path, seconds: f64) -> anyhow::Result<(u32, Vec<f32>)> {
     let name = || path.display().to_string();
     let mut reader = hound::WavReader::open(path).with_context(name)?;
     let spec = reader.spec();
+    if !(8000..=192_000).contains(&spec.sample_rate) {
+        bail!(
+            "{}: a sound of 8 to 192 kHz is needed, not of {} Hz",
+            name(),
+            spec.sample_rate
+        );
+    }
     let channels = usize::from(spec.channels.max(1));
+    // Between the last sample and the one after it, too.
+    let n = n_blocks(seconds, spec.sample_rate) * BLOCK + 1;
+    let most = n.min(MOST_SAMPLES + 1);
     let samples: Result<Vec<f32>, _> = match spec.sample_format {
-        hound::SampleFormat::Float => reader.samples::<f32>().step_by(channels).collect(),
+        hound::SampleFormat::Float => {
+            let all = reader.samples::<f32>();
+            all.step_by(channels).take(most).collect()
+        }
         hound::SampleFormat::Int => {
             let scale = 2f32.powi(1 - i32::from(spec.bits_per_sample));
-            let whole = reader.samples::<i32>().step_by(channels);
+            let whole = reader.samples::<i32>().step_by(channels).take(most);
             whole.map(|s| s.map(|s| s as f32 * scale)).collect()
         }
     };
     let samples = samples.with_context(name)?;
-    if samples.is_empty() || !(8000..=192_000).contains(&spec.sample_rate) {
+    if samples.is_empty() {
+        bail!("{}: a sound of a sample or more is needed", name());
+    }
+    if samples.len() > MOST_SAMPLES {
         bail!(
-            "{}: a sound of 8 to 192 kHz is needed, of a sample or more",
-            name()
+            "{}: more than {MOST_SAMPLES} samples, {} s, are to be heard; cut it, or give it a lower rate",
+            name(),
+            MOST_SAMPLES / spec.sample_rate as usize
         );
     }
     Ok((spec.sample_rate, samples))
 }
 
-fn wav_of(samples: &[[f32; 2]], rate: u32) -> anyhow::Result<Vec<u8>> {
-    let spec = hound::WavSpec {
-        channels: 2,
-        sample_rate: rate,
-        bits_per_sample: 16,
-        sample_format: hound::SampleFormat::Int,
-    };
-    let mut bytes = Cursor::new(Vec::new());
-    let mut writer = hound::WavWriter::new(&mut bytes, spec)?;
-    for sample in samples.iter().flatten() {
-        writer.write_sample((sample * 32767.0).round() as i16)?;
-    }
-    writer.finalize()?;
-    Ok(bytes.into_inner())
+/// The head of a WAV file of two channels of 16 bits: as its length is known before, it can be written to what is read on the way.
+fn wav_head(n_samples: usize, rate: u32) -> Vec<u8> {
+    const FRAME: u32 = 4;
+    let n_bytes = n_samples as u32 * FRAME;
+    let mut out = Vec::with_capacity(44);
+    let number = |out: &mut Vec<u8>, n: u32| out.extend(n.to_le_bytes());
+    out.extend(b"RIFF");
+    number(&mut out, n_bytes + 36);
+    out.extend(b"WAVEfmt ");
+    number(&mut out, 16);
+    // PCM, two channels.
+    out.extend([1, 0, 2, 0]);
+    number(&mut out, rate);
+    number(&mut out, rate * FRAME);
+    out.extend([FRAME as u8, 0, 16, 0]);
+    out.extend(b"data");
+    number(&mut out, n_bytes);
+    out
 }
 
 fn print_table(mut out: impl Write, rows: &[HeardLine]) -> anyhow::Result<()> {

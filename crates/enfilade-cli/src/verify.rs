@@ -14,8 +14,9 @@ use enfilade_verify::{
     verify_views, verify_world_with_progress,
 };
 
-use crate::bake::settings::SceneOptions;
+use crate::bake::settings::{SceneOptions, bound_converter};
 use crate::exact::{Asked, verify_pictures};
+use crate::limits::Limits;
 use crate::output::{Outputs, make_folder};
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
@@ -78,9 +79,12 @@ pub(crate) struct Verify {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let inputs = [&args.world].into_iter().chain(&args.evidence);
     let inputs = inputs.chain(&args.source).chain(&args.detail);
     let mut outputs = Outputs::reading(inputs.chain(&args.scene.config))?;
@@ -92,11 +96,9 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         make_folder("--pictures", folder)?;
     }
     let world = read_world(&args.world)?;
-    let source = if args.source.is_empty() {
-        None
-    } else {
-        Some(read_source(args, &mut outputs)?)
-    };
+    let source = (!args.source.is_empty())
+        .then(|| read_source(args, &mut outputs))
+        .transpose()?;
     let structure = source.as_ref().map(structure_of);
     let options = VerifyOptions {
         rays: args.rays,
@@ -234,7 +236,13 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
 }
 
 fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Scene> {
-    let imported = import_scene(&args.source, &args.detail, &args.scene.resolve()?)?;
+    let mut options = args.scene.resolve()?;
+    bound_converter(
+        &mut options,
+        args.limits.max_time(),
+        args.limits.max_memory(),
+    );
+    let imported = import_scene(&args.source, &args.detail, &options)?;
     outputs.read(&imported.report.references)?;
     Ok(imported.scene)
 }

@@ -220,3 +220,27 @@ fn textures_that_are_missing_or_damaged_are_said_and_drawn_without() {
     let (_, said) = folder.drawn(&[]);
     assert!(said.contains("missing or damaged"), "{said}");
 }
+
+#[test]
+fn pictures_of_more_pixels_than_are_drawn_are_refused_with_the_largest_that_are() {
+    let folder = Folder::new("pixels");
+    folder.write("world.glb", &encode_glb(&grid()).unwrap());
+    let draw = [
+        "render",
+        "world.glb",
+        "-o",
+        "out.png",
+        "--adapter",
+        "software",
+        "--plain",
+    ];
+    let camera = ["--eye", "1,1.6,1", "--look", "3,1.6,3"];
+    for (size, most) in [
+        ("16384x16384", "8192x8192"),
+        ("16384x8192", "11585x5792"),
+        ("4294967295x4294967295", "8192x8192"),
+    ] {
+        let args = [&draw[..], &camera, &["--size", size]].concat();
+        folder.refused(&args, most);
+    }
+}

@@ -6,7 +6,8 @@
 use std::collections::HashMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::builder::Builder;
 use crate::options::IfcConverter;
@@ -16,6 +17,10 @@ use crate::{ImportError, files, gltf};
 const GUID_LENGTH: usize = 22;
 /// Most of what the converter says that goes into an error.
 const SAID_BYTES: u64 = 2000;
+/// Most that it may say.
+const MAX_SAID: u64 = 1 << 26;
+/// Between two looks at it.
+const PAUSE: Duration = Duration::from_millis(5);
 
 /// Whether it is a STEP file of some IFC schema.
 pub(crate) fn is_ifc(bytes: &[u8]) -> bool {
@@ -38,9 +43,10 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         path: converter.folder.clone(),
         reason,
     })?;
-    let glb = convert(converter, &builder.path, &folder.0)
+    let most = builder.limits().max_file_bytes;
+    let glb = convert(converter, &builder.path, &folder.path, most)
         .map_err(|problem| builder.malformed(converter.program.display().to_string(), problem))?;
-    let glb = files::read_file(&glb, builder.limits().max_file_bytes)?;
+    let glb = files::read_file(&glb, most)?;
     drop(folder);
     builder.add_read_bytes(glb.len() as u64);
     let classes = classes(bytes);
@@ -55,25 +61,85 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
 }
 
 /// The GLB that the converter made, or what it said.
-fn convert(converter: &IfcConverter, input: &Path, folder: &Path) -> Result<PathBuf, String> {
+fn convert(
+    converter: &IfcConverter,
+    input: &Path,
+    folder: &Path,
+    most: u64,
+) -> Result<PathBuf, String> {
     let (output, said) = (folder.join("out.glb"), folder.join("said.txt"));
     let text = |e: std::io::Error| e.to_string();
     let stderr = File::create(&said).map_err(text)?;
     // Where it lies, so that a name that begins with a dash is no option.
     let input = fs::canonicalize(input).map_err(text)?;
-    let status = Command::new(&converter.program)
+    let mut child = Command::new(&converter.program)
         .args(["--use-element-guids", "--yes"])
         .args([&input, &output])
         .stdin(Stdio::null())
         .stdout(stderr.try_clone().map_err(text)?)
         .stderr(stderr)
-        .status()
+        .spawn()
         .map_err(|e| format!("cannot be run: {e}; give IfcConvert by --ifc-convert PATH"))?;
-    if status.success() && output.is_file() {
+    let sizes = [(output.as_path(), most), (said.as_path(), MAX_SAID)];
+    let status = match wait(&mut child, converter, sizes) {
+        Ok(status) => status,
+        Err(why) => {
+            // It may have ended by itself meanwhile.
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(why);
+        }
+    };
+    // A link would name any file of the disk.
+    let is_file = fs::symlink_metadata(&output).is_ok_and(|m| m.is_file());
+    if status.success() && is_file {
         return Ok(output);
     }
     let said = tail(&said).unwrap_or_default();
     Err(format!("made no GLB ({status}): {}", said.trim()))
+}
+
+/// Waits for the converter while it keeps within its bounds, and the files that it writes within theirs.
+fn wait(
+    child: &mut Child,
+    converter: &IfcConverter,
+    sizes: [(&Path, u64); 2],
+) -> Result<ExitStatus, String> {
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
+            return Ok(status);
+        }
+        if start.elapsed() >= converter.max_time {
+            return Err(format!(
+                "was not done within {} s and was ended; give it more by --max-time",
+                converter.max_time.as_secs_f64()
+            ));
+        }
+        let most = converter.max_memory.unwrap_or(u64::MAX);
+        if most < u64::MAX && memory(child.id()).is_some_and(|taken| taken > most) {
+            return Err(format!(
+                "took more than {most} bytes of memory and was ended; give it more by --max-memory"
+            ));
+        }
+        for (path, most) in sizes {
+            if fs::symlink_metadata(path).is_ok_and(|m| m.len() > most) {
+                return Err(format!(
+                    "wrote more than {most} bytes to {} and was ended",
+                    path.display()
+                ));
+            }
+        }
+        std::thread::sleep(PAUSE);
+    }
+}
+
+/// Resident memory of a process, where the system has it as text. [Units: bytes]
+fn memory(process: u32) -> Option<u64> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes * 1024)
 }
 
 /// The last bytes of a file, as text.
@@ -193,26 +259,71 @@ fn capitalized(kind: &str) -> String {
 }
 
 /// A folder of our own that goes with all that is in it.
-struct Folder(PathBuf);
+///
+/// A file in it is locked as long as we live: the folder of a run that was killed is known by a lock that nobody holds.
+struct Folder {
+    path: PathBuf,
+    /// `None` once it was let go.
+    lock: Option<File>,
+}
+
+/// Beginning of the names of such folders.
+const PREFIX: &str = "enfilade-ifc-";
+const LOCK: &str = "lock";
 
 impl Folder {
     fn new(parent: &Path) -> std::io::Result<Self> {
+        remove_left(parent);
         let mut n = 0_u32;
         loop {
-            let path = parent.join(format!("enfilade-ifc-{}-{n}", std::process::id()));
+            let path = parent.join(format!("{PREFIX}{}-{n}", std::process::id()));
             match fs::create_dir(&path) {
-                Ok(()) => return Ok(Self(path)),
-                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && n < 1000 => n += 1,
+                Ok(()) => {}
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && n < 1000 => {
+                    n += 1;
+                    continue;
+                }
                 Err(e) => return Err(e),
             }
+            let lock = File::create(path.join(LOCK))?;
+            // A disk that has no locks does without; there, nothing is taken for left either.
+            let is_taken = matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock));
+            // Before it was locked, someone may have taken it for one that was left.
+            if !is_taken && path.join(LOCK).exists() {
+                let lock = Some(lock);
+                return Ok(Self { path, lock });
+            }
+            n += 1;
         }
     }
 }
 
 impl Drop for Folder {
     fn drop(&mut self) {
+        // Some systems remove no file that is open.
+        drop(self.lock.take());
         // What cannot be removed is the system's to remove.
-        let _ = fs::remove_dir_all(&self.0);
+        let _ = fs::remove_dir_all(&self.path);
+    }
+}
+
+/// Removes the folders of runs that were killed. Linear in the folder that they are in.
+fn remove_left(parent: &Path) {
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let is_ours = entry
+            .file_name()
+            .to_str()
+            .is_some_and(|n| n.starts_with(PREFIX));
+        if !is_ours || !entry.file_type().is_ok_and(|t| t.is_dir()) {
+            continue;
+        }
+        // One that has no lock yet is being made.
+        if let Ok(lock) = File::open(entry.path().join(LOCK))
+            && lock.try_lock().is_ok()
+        {
+            drop(lock);
+            let _ = fs::remove_dir_all(entry.path());
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use crate::roles::RoleRules;
 use crate::{ImportError, RepairOptions};
 use enfilade_geom::{DMat4, DVec3};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// The input's up axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +46,25 @@ pub struct ImportOptions {
 pub struct IfcConverter {
     /// The program, by path or by a name that the system finds.
     pub program: PathBuf,
-    /// Where a folder for what it makes may be; it is removed at the end.
+    /// Where a folder for what it makes may be; it is removed at the end, or by the next import where this one was killed.
     pub folder: PathBuf,
+    /// How long it may take.
+    pub max_time: Duration,
+    /// How much memory it may take, where the system tells (Linux). [Units: bytes]
+    pub max_memory: Option<u64>,
+}
+
+impl IfcConverter {
+    /// This program, for an hour at most.
+    #[must_use]
+    pub fn new(program: impl Into<PathBuf>, folder: impl Into<PathBuf>) -> Self {
+        Self {
+            program: program.into(),
+            folder: folder.into(),
+            max_time: Duration::from_secs(3600),
+            max_memory: None,
+        }
+    }
 }
 
 /// What to refuse, so that hostile input ends in an error in bounded memory and time.

@@ -5,6 +5,7 @@ mod common;
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use common::{glb, triangle_bin, triangle_json};
 use enfilade_geom::scene::Role;
@@ -34,10 +35,7 @@ fn house(name: &str, script: &str) -> (PathBuf, IfcConverter) {
     )
     .unwrap();
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
-    let converter = IfcConverter {
-        program,
-        folder: folder.join("temporary"),
-    };
+    let converter = IfcConverter::new(program, folder.join("temporary"));
     (folder, converter)
 }
 
@@ -104,4 +102,59 @@ fn a_converter_that_fails_is_quoted_and_leaves_nothing_behind() {
     assert!(error.contains("cannot be run"), "{error}");
     let error = read(&folder, None).unwrap_err().to_string();
     assert!(error.contains("--ifc-convert"), "{error}");
+}
+
+#[test]
+fn a_converter_is_ended_that_takes_too_long_too_much_or_writes_too_much() {
+    let second = Duration::from_secs(1);
+    for (name, script, text) in [
+        // It would end by itself after an hour.
+        ("ifc-endless", "exec sleep 3600", "--max-time"),
+        (
+            "ifc-greedy",
+            "ulimit -v 4000000; exec sh -c 'x=aaaaaaaaaaaaaaaa; while :; do x=$x$x; done'",
+            "--max-memory",
+        ),
+        (
+            "ifc-talks",
+            "dd if=/dev/zero bs=1000000 count=80 >&2; exec sleep 3600",
+            "wrote more than",
+        ),
+    ] {
+        let (folder, mut converter) = house(name, script);
+        let is_slow = name == "ifc-endless";
+        converter.max_time = if is_slow { second } else { 300 * second };
+        converter.max_memory = Some(50_000_000);
+        let error = read(&folder, Some(converter)).unwrap_err().to_string();
+        assert!(error.contains(text) && error.contains("ended"), "{error}");
+    }
+}
+
+#[test]
+fn a_link_in_the_place_of_what_is_made_is_not_followed() {
+    let (folder, converter) = house("ifc-link", "ln -s \"$PWD/made.glb\" \"$4\"");
+    let error = read(&folder, Some(converter)).unwrap_err().to_string();
+    assert!(error.contains("made no GLB"), "{error}");
+}
+
+#[test]
+fn folders_of_killed_runs_go_and_those_in_use_stay() {
+    let (folder, converter) = house("ifc-left", "cp made.glb \"$4\"");
+    let temporary = folder.join("temporary");
+    let [left, used, young] = ["1-0", "2-0", "3-0"].map(|n| {
+        let path = temporary.join(format!("enfilade-ifc-{n}"));
+        std::fs::create_dir(&path).unwrap();
+        path
+    });
+    std::fs::write(left.join("lock"), "").unwrap();
+    std::fs::write(left.join("out.glb"), "half").unwrap();
+    let lock = std::fs::File::create(used.join("lock")).unwrap();
+    lock.lock().unwrap();
+    let options = ImportOptions {
+        ifc: Some(converter),
+        ..ImportOptions::default()
+    };
+    import(&[folder.join("-house.ifc")], &[], &options).unwrap();
+    assert!(!left.exists() && used.exists() && young.exists());
+    assert_eq!(std::fs::read_dir(&temporary).unwrap().count(), 2);
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::{Arc, OnceLock};
 
 use crate::formats::{COLOR, DEPTH, ID};
 
@@ -42,6 +43,17 @@ pub enum RenderError {
         needed: u64,
         /// What there is.
         limit: u64,
+    },
+    /// A picture of more pixels than are drawn at once.
+    #[error(
+        "a picture of {}x{} pixels takes {}, and {} are drawn at once; of this shape, {}x{} are the most",
+        .size[0], .size[1], u64::from(.size[0]) * u64::from(.size[1]), MOST_PIXELS, .most[0], .most[1]
+    )]
+    TooManyPixels {
+        /// The size asked for.
+        size: [u32; 2],
+        /// The largest of this shape.
+        most: [u32; 2],
     },
     /// The device was lost, or ran out of memory, while it drew.
     #[error("the adapter failed while drawing: {0}")]
@@ -98,6 +110,9 @@ impl fmt::Display for AdapterChoice {
     }
 }
 
+/// Pixels of a picture, at most: 8192 x 8192. On the adapter and on their way to a file they take up to 30 bytes each.
+pub(crate) const MOST_PIXELS: u64 = 1 << 26;
+
 /// A point in what was submitted.
 #[derive(Clone, Debug)]
 pub struct Submitted(wgpu::SubmissionIndex);
@@ -112,6 +127,8 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
+    /// The first error that no call returned: too little memory.
+    failed: Arc<OnceLock<String>>,
 }
 
 impl fmt::Debug for Gpu {
@@ -234,11 +251,18 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|why| broken(why.to_string()))?;
+        let failed = Arc::new(OnceLock::new());
+        let first = Arc::clone(&failed);
+        // Without a handler wgpu panics.
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            let _ = first.set(error.to_string());
+        }));
         Ok(Self {
             instance,
             adapter,
             device,
             queue,
+            failed,
         })
     }
 
@@ -275,8 +299,16 @@ impl Gpu {
     pub fn wait(&self) -> Result<(), RenderError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map(|_| ())
-            .map_err(|why| RenderError::Lost(why.to_string()))
+            .map_err(|why| RenderError::Lost(why.to_string()))?;
+        self.check_failed()
+    }
+
+    /// Returns the first error that no call returned.
+    pub(crate) fn check_failed(&self) -> Result<(), RenderError> {
+        match self.failed.get() {
+            Some(why) => Err(RenderError::Lost(why.clone())),
+            None => Ok(()),
+        }
     }
 
     /// A mark after all that was submitted, for [`Gpu::wait_for`].
@@ -299,6 +331,19 @@ impl Gpu {
         let done = self.device.poll(wait);
         done.map(|_| ())
             .map_err(|why| RenderError::Lost(why.to_string()))
+    }
+
+    /// Checks the size of a picture.
+    pub(crate) fn check_picture(&self, size: [u32; 2]) -> Result<(), RenderError> {
+        let n = u64::from(size[0]) * u64::from(size[1]);
+        let side = self.device.limits().max_texture_dimension_2d;
+        if n > MOST_PIXELS {
+            let share = (MOST_PIXELS as f64 / n as f64).sqrt();
+            let share = share.min(f64::from(side) / f64::from(size[0].max(size[1])));
+            let most = size.map(|s| ((f64::from(s) * share) as u32).max(1));
+            return Err(RenderError::TooManyPixels { size, most });
+        }
+        Self::check("a side of the picture", size[0].max(size[1]).into(), side)
     }
 
     /// Checks a size against a limit before the device would refuse it in a less helpful way.

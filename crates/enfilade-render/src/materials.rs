@@ -2,10 +2,17 @@
 
 use enfilade_cpg::World;
 use enfilade_geom::scene::Material;
+use image::ImageDecoder as _;
 use serde_json::Value;
 
 /// A texture of more texels than this a side is scaled down: 8 bytes a texel add up.
 const MAX_SIDE: u32 = 2048;
+
+/// Largest picture: 8192 x 8192 pixels of four bytes. [Units: bytes, decoded]
+const MAX_PICTURE: u64 = 1 << 28;
+/// Most bytes of all pictures of a world, and more for each byte of them in the file: ten times what JPEG packs.
+const MAX_PICTURES: u64 = 1 << 29;
+const MAX_EXPANSION: u64 = 128;
 
 /// What is drawn of one material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,37 +123,69 @@ pub(crate) struct Decoded {
     pub(crate) levels: Vec<image::RgbaImage>,
 }
 
-/// Decodes the picture of a texture; `None` where it is missing or damaged, which is drawn without.
-pub(crate) fn decode(world: &World, texture: u32) -> Option<Decoded> {
-    let image = world.textures.get(texture as usize)?.image?;
-    let bytes = &world.images.get(image as usize)?.bytes;
-    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
-        .with_guessed_format()
-        .ok()?;
-    // A picture of a few bytes may claim to be of any size.
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(1 << 14);
-    limits.max_image_height = Some(1 << 14);
-    limits.max_alloc = Some(1 << 30);
-    reader.limits(limits);
-    let mut picture = reader.decode().ok()?.into_rgba8();
-    let (w, h) = picture.dimensions();
-    if w == 0 || h == 0 {
-        return None;
+/// Why a picture is drawn without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoPicture {
+    /// Missing or damaged.
+    Broken,
+    /// A picture of a few bytes may claim to be of any size.
+    TooLarge,
+}
+
+/// Decodes pictures as long as they come to no more than they may.
+pub(crate) struct Decoder<'w> {
+    world: &'w World,
+    /// [Units: bytes, decoded]
+    left: u64,
+}
+
+impl<'w> Decoder<'w> {
+    pub(crate) fn new(world: &'w World) -> Self {
+        let encoded: u64 = world.images.iter().map(|i| i.bytes.len() as u64).sum();
+        let left = MAX_PICTURES.saturating_add(encoded.saturating_mul(MAX_EXPANSION));
+        Self { world, left }
     }
-    let filter = image::imageops::FilterType::Triangle;
-    if w.max(h) > MAX_SIDE {
-        let scale = |n: u32| (n * MAX_SIDE / w.max(h)).max(1);
-        picture = image::imageops::resize(&picture, scale(w), scale(h), filter);
+
+    /// The picture of a texture. Its size is asked before it is decoded.
+    pub(crate) fn decode(&mut self, texture: u32) -> Result<Decoded, NoPicture> {
+        let texture = self.world.textures.get(texture as usize);
+        let image = texture.and_then(|t| self.world.images.get(t.image? as usize));
+        let bytes = &image.ok_or(NoPicture::Broken)?.bytes;
+        let broken = |_| NoPicture::Broken;
+        let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+            .with_guessed_format()
+            .map_err(|_| NoPicture::Broken)?;
+        let mut limits = image::Limits::default();
+        // The decoder holds far less beside the picture.
+        limits.max_alloc = Some(2 * MAX_PICTURE);
+        reader.limits(limits);
+        let decoder = reader.into_decoder().map_err(broken)?;
+        let (w, h) = decoder.dimensions();
+        // As they will be, four bytes a pixel, or more.
+        let size = decoder.total_bytes().max(u64::from(w) * u64::from(h) * 4);
+        if size > MAX_PICTURE.min(self.left) {
+            return Err(NoPicture::TooLarge);
+        }
+        self.left -= size;
+        let mut picture = image::DynamicImage::from_decoder(decoder).map_err(broken)?;
+        if w == 0 || h == 0 {
+            return Err(NoPicture::Broken);
+        }
+        if w.max(h) > MAX_SIDE {
+            let scale = |n: u32| (n * MAX_SIDE / w.max(h)).max(1);
+            // In whole numbers: floats take four times as much.
+            picture = picture.thumbnail_exact(scale(w), scale(h));
+        }
+        let mut levels = vec![picture.into_rgba8()];
+        let filter = image::imageops::FilterType::Triangle;
+        while let Some(last) = levels.last()
+            && last.width().max(last.height()) > 1
+        {
+            let (w, h) = ((last.width() / 2).max(1), (last.height() / 2).max(1));
+            levels.push(image::imageops::resize(last, w, h, filter));
+        }
+        Ok(Decoded { levels })
     }
-    let mut levels = vec![picture];
-    while let Some(last) = levels.last()
-        && last.width().max(last.height()) > 1
-    {
-        let (w, h) = ((last.width() / 2).max(1), (last.height() / 2).max(1));
-        levels.push(image::imageops::resize(last, w, h, filter));
-    }
-    Some(Decoded { levels })
 }
 
 /// Whether a texture repeats beyond 0 … 1 along u and v, or is clamped or mirrored.
@@ -229,39 +268,82 @@ mod tests {
             ],
             ..World::default()
         };
-        assert!(decode(&world, 0).is_none(), "no image");
-        assert!(decode(&world, 1).is_none(), "no such image");
-        assert!(decode(&world, 9).is_none(), "no such texture");
+        let broken = |world: &World, texture| {
+            matches!(Decoder::new(world).decode(texture), Err(NoPicture::Broken))
+        };
+        assert!(broken(&world, 0), "no image");
+        assert!(broken(&world, 1), "no such image");
+        assert!(broken(&world, 9), "no such texture");
         world.images.push(Image {
             bytes: b"\x89PNG\r\n\x1a\n and nothing".to_vec(),
             ..Image::default()
         });
-        assert!(decode(&world, 1).is_none(), "cut off");
+        assert!(broken(&world, 1), "cut off");
+    }
+
+    /// A world of one texture for each of some pictures, and their files.
+    fn textured(pictures: Vec<Vec<u8>>) -> World {
+        World {
+            textures: (0..pictures.len() as u32)
+                .map(|i| Texture {
+                    image: Some(i),
+                    ..Texture::default()
+                })
+                .collect(),
+            images: (pictures.into_iter())
+                .map(|bytes| Image {
+                    bytes,
+                    ..Image::default()
+                })
+                .collect(),
+            ..World::default()
+        }
+    }
+
+    fn png(w: u32, h: u32) -> Vec<u8> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image::GrayImage::new(w, h)
+            .write_to(&mut bytes, image::ImageFormat::Png)
+            .unwrap();
+        bytes.into_inner()
     }
 
     #[test]
     fn levels_end_at_one_texel() {
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        image::RgbaImage::new(5, 3)
-            .write_to(&mut bytes, image::ImageFormat::Png)
-            .unwrap();
-        let world = World {
-            textures: vec![Texture {
-                image: Some(0),
-                ..Texture::default()
-            }],
-            images: vec![Image {
-                bytes: bytes.into_inner(),
-                ..Image::default()
-            }],
-            ..World::default()
-        };
-        let sizes: Vec<_> = decode(&world, 0)
-            .unwrap()
-            .levels
-            .iter()
-            .map(image::RgbaImage::dimensions)
-            .collect();
+        let world = textured(vec![png(5, 3)]);
+        let decoded = Decoder::new(&world).decode(0);
+        let levels = decoded.map_or_else(|why| panic!("{why:?}"), |d| d.levels);
+        let sizes: Vec<_> = levels.iter().map(image::RgbaImage::dimensions).collect();
         assert_eq!(sizes, [(5, 3), (2, 1), (1, 1)]);
+    }
+
+    #[test]
+    fn pictures_that_claim_to_be_huge_are_told_before_they_are_decoded() {
+        // The head says so: what comes after it is that of a picture of a pixel.
+        let mut claims = std::io::Cursor::new(Vec::new());
+        image::GrayImage::new(1, 1)
+            .write_to(&mut claims, image::ImageFormat::Jpeg)
+            .unwrap();
+        let mut claims = claims.into_inner();
+        let frame = claims.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
+        claims[frame + 5..frame + 9].copy_from_slice(&[0x80, 0, 0x80, 0]);
+        let world = textured(vec![claims]);
+        let found = Decoder::new(&world).decode(0).map(|d| d.levels.len());
+        assert_eq!(found, Err(NoPicture::TooLarge));
+        // Each may be as large as it is, all together may not.
+        let sheet = png(4096, 4096);
+        let world = textured(vec![sheet; 12]);
+        let mut decoder = Decoder::new(&world);
+        // No picture has been decoded here.
+        let all = decoder.left;
+        assert!(
+            all > 8 * 4 * 4096 * 4096 && all < 12 * 4 * 4096 * 4096,
+            "{all}"
+        );
+        decoder.left = 4 * 4096 * 4096;
+        let found = decoder.decode(0).map(|d| d.levels[0].dimensions());
+        assert_eq!(found, Ok((2048, 2048)));
+        let found = decoder.decode(1).map(|d| d.levels.len());
+        assert_eq!(found, Err(NoPicture::TooLarge));
     }
 }

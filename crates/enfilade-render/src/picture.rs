@@ -21,11 +21,13 @@ impl Picture {
     /// A picture whose bytes are not as many as its sides say.
     pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         let mut bytes = std::io::Cursor::new(Vec::new());
-        let image = image::RgbaImage::from_raw(self.width, self.height, self.rgba.clone())
-            .ok_or_else(|| RenderError::Encode("too few bytes for its size".into()))?;
         // Nothing shines through: three bytes a pixel do.
-        image::DynamicImage::ImageRgba8(image)
-            .into_rgb8()
+        let mut rgb = Vec::with_capacity(self.rgba.len() / 4 * 3);
+        for pixel in self.rgba.chunks_exact(4) {
+            rgb.extend_from_slice(&pixel[..3]);
+        }
+        image::RgbImage::from_raw(self.width, self.height, rgb)
+            .ok_or_else(|| RenderError::Encode("too few bytes for its size".into()))?
             .write_to(&mut bytes, image::ImageFormat::Png)
             .map_err(|why| RenderError::Decode(why.to_string()))?;
         Ok(bytes.into_inner())

@@ -280,12 +280,7 @@ impl Renderer {
         if self.targets.as_ref().is_some_and(|t| t.size == size) {
             return Ok(());
         }
-        let side = u64::from(size[0].max(size[1]));
-        Gpu::check(
-            "a side of the picture",
-            side,
-            gpu.device.limits().max_texture_dimension_2d,
-        )?;
+        gpu.check_picture(size)?;
         let usage = wgpu::TextureUsages::TEXTURE_BINDING;
         let view = |label, format| {
             texture(gpu, label, size, format, usage)

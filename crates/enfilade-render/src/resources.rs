@@ -129,17 +129,29 @@ pub(crate) fn read_texture(
         },
     );
     gpu.queue.submit([encoder.finish()]);
-    let mapped = map_bytes(gpu, &buffer)?;
-    let mut out = Vec::with_capacity((row * height) as usize);
-    for line in mapped.chunks_exact(stride as usize) {
-        out.extend_from_slice(&line[..row as usize]);
-    }
-    Ok(out)
+    with_bytes(gpu, &buffer, |mapped| {
+        let mut out = Vec::with_capacity(row as usize * height as usize);
+        for line in mapped.chunks_exact(stride as usize) {
+            out.extend_from_slice(&line[..row as usize]);
+        }
+        out
+    })
 }
 
 /// The bytes of a buffer, once all that was submitted is done.
 pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
+    with_bytes(gpu, buffer, <[u8]>::to_vec)
+}
+
+/// Returns what `read` makes of the bytes of a buffer, once all that was submitted is done.
+fn with_bytes<T>(
+    gpu: &Gpu,
+    buffer: &wgpu::Buffer,
+    read: impl FnOnce(&[u8]) -> T,
+) -> Result<T, RenderError> {
     let lost = |why: String| RenderError::Lost(why);
+    // A buffer that there was no memory for is not mapped.
+    gpu.check_failed()?;
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
         // Nobody listens any more where waiting failed.
@@ -153,5 +165,5 @@ pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, Ren
     let mapped = buffer
         .get_mapped_range(..)
         .map_err(|why| lost(why.to_string()))?;
-    Ok(mapped.to_vec())
+    Ok(read(&mapped))
 }

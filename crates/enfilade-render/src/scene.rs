@@ -61,12 +61,13 @@ pub struct GpuWorld {
     pub(crate) cell_looks: Vec<[f32; 3]>,
     pub(crate) n_triangles: u64,
     n_missing_pictures: u32,
+    n_large_pictures: u32,
 }
 
 impl GpuWorld {
     /// Puts a world on the adapter. `sight` was made of the same world.
     ///
-    /// Pictures that are missing or damaged are drawn as their material's color.
+    /// Pictures that are missing, damaged or too large are drawn as their material's color.
     ///
     /// # Errors
     ///
@@ -93,11 +94,11 @@ impl GpuWorld {
     ) -> Result<Self, RenderError> {
         let mut looks: Vec<Look> = looks_of(world);
         looks.push(Look::default());
-        let (textures, texture_of, n_missing_pictures) = load_textures(gpu, world, &looks)?;
+        let textures = load_textures(gpu, world, &looks)?;
         let mut filling = Filling {
             world,
             looks,
-            texture_of,
+            texture_of: textures.of,
             corners: Vec::new(),
             indices: Vec::new(),
         };
@@ -147,7 +148,7 @@ impl GpuWorld {
                 )?)
             },
             instances,
-            textures,
+            textures: textures.groups,
             chunks,
             batch_of: sight.chunks().iter().map(|c| c.batch).collect(),
             batch_cells: world.batches.iter().map(|b| b.cells.clone()).collect(),
@@ -165,7 +166,8 @@ impl GpuWorld {
                 .collect(),
             cell_looks: filling.cell_looks(),
             n_triangles: sight.n_triangles(),
-            n_missing_pictures,
+            n_missing_pictures: textures.n_missing,
+            n_large_pictures: textures.n_too_large,
         })
     }
 
@@ -219,6 +221,13 @@ impl GpuWorld {
     #[must_use]
     pub fn n_missing_pictures(&self) -> u32 {
         self.n_missing_pictures
+    }
+
+    /// Pictures of textures that are larger than 8192 x 8192 pixels, or would come to more than 512 MiB together and 128 bytes for each
+    /// byte of the file.
+    #[must_use]
+    pub fn n_large_pictures(&self) -> u32 {
+        self.n_large_pictures
     }
 
     /// Least and greatest corner of all that is drawn; of an empty world, a box around its origin.

@@ -204,8 +204,7 @@ impl Studio {
     ///
     /// A size beyond the adapter's limit.
     pub fn target(&self, size: [u32; 2]) -> Result<Target, RenderError> {
-        let limit = self.gpu.device.limits().max_texture_dimension_2d;
-        Gpu::check("a side of the picture", size[0].max(size[1]).into(), limit)?;
+        self.gpu.check_picture(size)?;
         let texture = crate::resources::texture(
             &self.gpu,
             "target",

@@ -11,6 +11,7 @@ use enfilade_geom::DVec2;
 use force_graph::{ForceGraph, NodeData, SimulationParameters};
 
 use crate::drawing::color;
+use crate::label::shortened;
 use crate::storeys::Storey;
 use crate::svg::{escaped, hex};
 
@@ -73,8 +74,8 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
             q.x,
             q.y,
             stroke(*kind),
-            escaped(&world.graph[*a].name),
-            escaped(&world.graph[*b].name)
+            escaped(&shortened(&world.graph[*a].name)),
+            escaped(&shortened(&world.graph[*b].name))
         );
     }
     let openings = openings(world);
@@ -95,7 +96,7 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
             p.x,
             p.y + 4.2,
             cell.0,
-            escaped(&world.graph[*cell].name)
+            escaped(&shortened(&world.graph[*cell].name))
         );
     }
     out.push_str("</svg>\n");

@@ -7,6 +7,7 @@ use base64::prelude::BASE64_STANDARD;
 use enfilade_cpg::{CellId, PortalKind, Pvs, World};
 
 use crate::graph::graph_svg;
+use crate::label::shortened;
 use crate::matrix::{Order, matrix_svg};
 use crate::plan::{PlanOptions, Plans};
 use crate::storeys::Storey;
@@ -232,7 +233,7 @@ fn rooms(world: &World, storeys: &[&Storey]) -> (Table, Vec<CellId>) {
     rows.extend(cells.iter().map(|&(id, c)| {
         let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
         vec![
-            c.name.clone(),
+            shortened(&c.name).into_owned(),
             of(id),
             format!("{:.1}", c.volume),
             format!("{x:.1} × {y:.1} × {z:.1}"),

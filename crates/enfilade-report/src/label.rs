@@ -1,5 +1,7 @@
 //! Finds a place and a size for the name of a cell, inside the cell.
 
+use std::borrow::Cow;
+
 use enfilade_geom::DVec2;
 
 use crate::section::{Label, Region, Section};
@@ -14,6 +16,19 @@ const SMALLER: f64 = 0.88;
 const AREA: f64 = 0.7;
 /// A number may be this much smaller than what is readable without a magnifying glass, rather than not be there.
 const TINY: f64 = 0.5;
+
+/// Letters of a name in drawings and pages, at most.
+const LONGEST: usize = 64;
+
+/// A name as it is drawn: of more than 64 letters the first 63, and an ellipsis.
+pub(crate) fn shortened(name: &str) -> Cow<'_, str> {
+    let mut ends = name.char_indices().map(|(at, _)| at);
+    let (last, beyond) = (ends.nth(LONGEST - 1), ends.next());
+    match (last, beyond) {
+        (Some(last), Some(_)) => format!("{}…", &name[..last]).into(),
+        _ => name.into(),
+    }
+}
 
 /// The sizes that letters may have. [Units: wu]
 #[derive(Clone, Copy)]

@@ -5,6 +5,7 @@ use enfilade_geom::{Aabb, DVec2, DVec3, Plane, Winding};
 
 use crate::clip::clipped;
 use crate::drawing::{Class, Item, Path};
+use crate::label::shortened;
 use crate::section::{Section, cell_of};
 use crate::storeys::Page;
 
@@ -107,7 +108,7 @@ impl View<'_> {
             PortalKind::Window => Class::Window,
             PortalKind::Crack => Class::Crack,
         };
-        let [one, other] = portal.cells.map(|c| &self.world.graph[c].name);
+        let [one, other] = portal.cells.map(|c| shortened(&self.world.graph[c].name));
         let hint = Some(format!("{id}, {one} and {other}"));
         let flat: Vec<DVec2> = outline.iter().map(|p| DVec2::new(p.x, p.z)).collect();
         if portal.normal[1].abs() > 0.7 {
@@ -248,7 +249,7 @@ impl View<'_> {
             Class::Detail,
             vec![flat],
             true,
-            Some(detail.name.clone()),
+            Some(shortened(&detail.name).into_owned()),
         ))
     }
 

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use enfilade_cpg::{CellId, Pvs, World};
 
+use crate::label::shortened;
 use crate::storeys::Storey;
 use crate::svg::escaped;
 
@@ -89,7 +90,7 @@ pub(crate) fn matrix_svg(world: &World, visible: &Pvs, order: &Order) -> String 
         } else {
             cell.0.to_string()
         };
-        let name = escaped(&world.graph[cell].name);
+        let name = escaped(&shortened(&world.graph[cell].name));
         let (near, base) = (k * side, k * side + side - 2);
         let _ = writeln!(
             out,

@@ -6,7 +6,7 @@ use enfilade_cpg::{CellId, World};
 use enfilade_geom::DVec2;
 
 use crate::drawing::{Class, Drawing, Item, Path, Words, color};
-use crate::label::{Sizes, fit, line_height, line_size, width};
+use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
 use crate::marks::View;
 use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
@@ -219,14 +219,14 @@ impl<'a> Plans<'a> {
             let Some((cell, is_own)) = cell_of(*label) else {
                 continue;
             };
-            let name = &self.world.graph[cell].name;
+            let name = shortened(&self.world.graph[cell].name);
             let area = if is_own {
                 format!("{:.1} m²", region.area)
             } else {
                 String::new()
             };
             let number = cell.0.to_string();
-            let words = [name.as_str(), area.as_str(), number.as_str()];
+            let words = [&*name, area.as_str(), number.as_str()];
             let fitted = fit(&drawn.section, (*label, region), words, sheet.sizes);
             if fitted.is_number {
                 sheet.numbered.insert(cell);
@@ -276,7 +276,7 @@ impl<'a> Plans<'a> {
             lines: region.borders.clone(),
             is_closed: true,
             cell,
-            hint: cell.map(|c| self.world.graph[c].name.clone()),
+            hint: cell.map(|c| shortened(&self.world.graph[c].name).into_owned()),
         })
     }
 
@@ -297,7 +297,7 @@ impl<'a> Plans<'a> {
             lines: vec![corners],
             is_closed: true,
             cell: Some(cell),
-            hint: Some(self.world.graph[cell].name.clone()),
+            hint: Some(shortened(&self.world.graph[cell].name).into_owned()),
         }));
         sheet.numbered.insert(cell);
         sheet.items.push(Item::Words(Words {
@@ -461,7 +461,7 @@ impl Sheet {
         for &cell in &self.numbered {
             let name = &world.graph[cell].name;
             if *name != format!("cell-{}", cell.0) {
-                rows.push(format!("{}  {name}", cell.0));
+                rows.push(format!("{}  {}", cell.0, shortened(name)));
             }
         }
         // The usual names hold their numbers.

@@ -7,7 +7,9 @@ use common::{batch, cell, house, locator_of_boxes, moved, portal, wall};
 use enfilade_cpg::{CellId, CellPortalGraph, DetailObject, PortalKind, World};
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DMat4, DVec3};
-use enfilade_report::{PlanOptions, find_storeys, plan_svg};
+use enfilade_report::{
+    PAPERS, PlanOptions, Plans, ReportParts, find_storeys, plan_svg, report_html, to_pdf,
+};
 
 fn plan(world: &World) -> String {
     plan_svg(world, &PlanOptions::default())
@@ -285,5 +287,29 @@ fn plans_of_houses_that_are_turned_or_high_are_valid_xml() {
         if let Ok(dir) = std::env::var("PLAN_DIR") {
             std::fs::write(format!("{dir}/{name}.svg"), svg).unwrap();
         }
+    }
+}
+
+#[test]
+fn names_that_are_too_long_are_cut() {
+    let mut world = two_storeys();
+    let sizes = |world: &World| {
+        let plans = Plans::new(world, &PlanOptions::default());
+        let pdf = to_pdf(&[plans.sheet(&[0])], PAPERS[1], None).unwrap();
+        let page = report_html(world, &ReportParts::default());
+        [plan(world).len(), pdf.len(), page.len()]
+    };
+    let usual = sizes(&world);
+    // Letters of several bytes, and one more than are drawn.
+    world.graph.cells[0].name = "ä".repeat(65);
+    assert!(plan(&world).contains(&format!("{}…", "ä".repeat(63))));
+    assert!(!plan(&world).contains(&"ä".repeat(64)));
+    world.graph.cells[0].name = "ä".repeat(64);
+    assert!(plan(&world).contains(&"ä".repeat(64)));
+    for cell in &mut world.graph.cells {
+        cell.name = "long ".repeat(100_000);
+    }
+    for (long, usual) in sizes(&world).into_iter().zip(usual) {
+        assert!(long < usual + 20_000, "{long} {usual}");
     }
 }

@@ -50,6 +50,13 @@ pub(crate) const NONE: u32 = u32::MAX;
 /// Squares at most: more make them wider.
 const MAX_SQUARES: f64 = 8e6;
 
+/// For the sake of a small walker alone, squares are no finer than this where there would be more of them than that. [Units: wu]
+const FINE: f64 = 0.05;
+const MAX_FINE_SQUARES: f64 = 5e5;
+
+/// Squares that triangles cover at most, each counted: more make them wider.
+const MAX_COVERED: f64 = 3e7;
+
 /// Floors outdoors are laid out this far around the rooms. [Units: wu]
 const GROUND: f64 = 30.0;
 
@@ -92,8 +99,9 @@ struct Ground {
 }
 
 impl Floors {
-    /// Of the structure of a world, without its objects, outdoors included as far as there is ground. Squares are a quarter of the walker's radius
-    /// wide, but wider where there would be more than 8 million; the ground is laid out to 30 m around the rooms.
+    /// Floors of the structure of a world, without its objects, outdoors included as far as there is ground, which is laid out to 30 m around
+    /// the rooms. Squares are a quarter of the walker's radius wide, but wider where there would be more than 8 million, and up to 5 cm
+    /// wide where there would be more than half a million: somebody thin walks the same floors as somebody of 0.2 m.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let triangles = || {
@@ -103,7 +111,7 @@ impl Floors {
                 .flat_map(|b| triangles_of(&b.primitive))
         };
         let bounds = bounds_of(layout, triangles().flatten());
-        let squares = squares_of(&bounds, walker.radius / 4.0);
+        let squares = squares_of(&bounds, walker.radius / 4.0, triangles());
         let spans = spans(&squares, triangles(), walker.slope);
         let mut grounds = grounds(&spans, walker.height as f32);
         drop(spans);
@@ -169,7 +177,9 @@ impl Floors {
                 let between = layout.exits(floor.cell).iter();
                 let open = between.filter(|e| e.to == other.cell && is_open(e.portal));
                 let nearest = open.min_by(|a, b| near(&a.portal).total_cmp(&near(&b.portal)));
-                let is_there = |p: &PortalId| near(p) <= self.walker.radius.powi(2);
+                // A square is as near as a step can tell.
+                let reach = self.walker.radius.max(self.squares.side);
+                let is_there = |p: &PortalId| near(p) <= reach.powi(2);
                 let portal = nearest.map(|e| e.portal).filter(is_there);
                 match portal {
                     Some(portal) => {
@@ -205,6 +215,12 @@ impl Floors {
     #[must_use]
     pub fn walker(&self) -> &Agent {
         &self.walker
+    }
+
+    /// How wide its squares are. [Units: wu]
+    #[must_use]
+    pub fn side(&self) -> f64 {
+        self.squares.side
     }
 
     pub(crate) fn squares(&self) -> &Squares {
@@ -322,10 +338,26 @@ fn bounds_of(layout: &Layout, corners: impl Iterator<Item = DVec3>) -> Aabb {
     }
 }
 
-fn squares_of(bounds: &Aabb, side: f64) -> Squares {
+/// As wide as asked for, or wider.
+fn squares_of(bounds: &Aabb, side: f64, triangles: impl Iterator<Item = Triangle>) -> Squares {
     let size = bounds.size().max(DVec3::ZERO);
-    let least = (size.x * size.z / MAX_SQUARES).sqrt();
-    let side = side.max(least).max(1e-3);
+    let side_of = |area: f64, n: f64| (area / n).sqrt();
+    let all = size.x * size.z;
+    // Squares that triangles cover within the bounds: areas in plan, and lengths along the axes, as borders cover squares, too.
+    let (mut areas, mut lengths) = (0.0, 0.0);
+    for t in triangles.filter(|t| t.iter().all(|p| p.is_finite())) {
+        let whole = t.into_iter().fold(Aabb::EMPTY, Aabb::including);
+        let size = whole.intersection(*bounds).size().max(DVec3::ZERO);
+        let own = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]).y.abs();
+        areas += own.min(size.x * size.z);
+        lengths += size.x + size.z;
+    }
+    let side = side
+        .max(side_of(all, MAX_FINE_SQUARES).min(FINE))
+        .max(side_of(all, MAX_SQUARES))
+        .max(side_of(2.0 * areas, MAX_COVERED))
+        .max(4.0 * lengths / MAX_COVERED)
+        .max(1e-3);
     let n = |size: f64| (size / side).floor() as usize + 1;
     let origin = if bounds.is_empty() {
         [0.0; 2]

@@ -466,3 +466,34 @@ fn a_path_to_where_one_stands_has_no_length() {
         .unwrap();
     assert!(path.length < 1e-9 && path.portals.is_empty() && !path.points.is_empty());
 }
+
+/// W10: somebody thin walks where somebody of 0.1 m does, and takes no more squares for it.
+#[test]
+fn a_thin_walker_finds_a_way_on_no_finer_floors() {
+    let world = room_grid(&GridParams {
+        windows: 0.0,
+        ..GridParams::two_rooms()
+    });
+    let layout = Layout::new(&world);
+    let ends = [0, 1].map(|c| {
+        let bounds = layout.cell(CellId(c)).bounds;
+        bounds.center().with_y(bounds.min.y)
+    });
+    let found = |radius: f64| {
+        let walker = Agent {
+            radius,
+            ..Agent::default()
+        };
+        let map = WalkMap::new(&layout, &world, walker);
+        let mut path = Path::default();
+        let way = PathSearch::new().find(&map, &layout, ends, |_| true, &mut path);
+        way.unwrap_or_else(|why| panic!("{radius}: {why}"));
+        (path.length, map.floors().n_floors())
+    };
+    let (length, _) = found(0.1);
+    for radius in [1e-9, 0.01] {
+        let (thin, n) = found(radius);
+        assert!(thin < length + 1e-6 && thin > ends[0].distance(ends[1]) - 1e-6);
+        assert!(n < 600_000, "{radius}: {n} floors");
+    }
+}

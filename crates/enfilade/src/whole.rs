@@ -23,14 +23,26 @@ const MOST_TRIES: usize = 100;
 ///
 /// When the file cannot be written; what was there is left as it was.
 pub fn write(path: impl AsRef<Path>, bytes: &[u8]) -> io::Result<()> {
+    write_with(path, |out| out.write_all(bytes))
+}
+
+/// The same for what is made while it is written; `fill` had best write many bytes at a time.
+///
+/// # Errors
+///
+/// As [`write()`], and those of `fill`; what was there is left as it was.
+pub fn write_with<E: From<io::Error>>(
+    path: impl AsRef<Path>,
+    fill: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+) -> Result<(), E> {
     let path = followed(path.as_ref());
     if fs::metadata(&path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        return OpenOptions::new().write(true).open(&path)?.write_all(bytes);
+        return fill(&mut OpenOptions::new().write(true).open(&path)?);
     }
     let (aside, mut file) = open_aside(&path)?;
-    let filled = file.write_all(bytes).and_then(|()| file.sync_all());
+    let filled = fill(&mut file).and_then(|()| Ok(file.sync_all()?));
     // The lock is held until the name is the target's: nobody takes the file for one that was left.
-    let written = filled.and_then(|()| fs::rename(&aside, &path));
+    let written = filled.and_then(|()| Ok(fs::rename(&aside, &path)?));
     if written.is_err() {
         // The first error is the one to report.
         let _ = fs::remove_file(&aside);
@@ -168,6 +180,13 @@ mod tests {
         let path = folder.join("taken");
         fs::create_dir_all(path.join("full")).unwrap();
         assert!(write(&path, b"new").is_err() && try_write(&path).is_err());
+        // Nor what ends in the middle.
+        let half = |out: &mut dyn Write| {
+            out.write_all(b"half")?;
+            Err(io::Error::other("no more"))
+        };
+        assert!(write_with(folder.join("taken/half"), half).is_err());
+        assert_eq!(fs::read_dir(&path).unwrap().count(), 1);
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
         fs::remove_dir_all(&folder).unwrap();
     }

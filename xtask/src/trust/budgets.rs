@@ -78,7 +78,7 @@ pub(super) fn large(rows: &mut Figures) -> anyhow::Result<()> {
 pub(super) type Triangle = [[f64; 3]; 3];
 
 /// Scenes of at most 2,000 triangles, but for one with copies.
-fn scenes() -> Vec<(&'static str, String)> {
+pub(super) fn scenes() -> Vec<(&'static str, String)> {
     let mut random = Random(7);
     let mut all = Vec::new();
     for (name, n) in [
@@ -156,7 +156,7 @@ pub(super) fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
     faces.iter().flat_map(|f| quad(f.map(corner))).collect()
 }
 
-fn obj(triangles: &[Triangle]) -> String {
+pub(super) fn obj(triangles: &[Triangle]) -> String {
     let mut text = String::new();
     for triangle in triangles {
         for [x, y, z] in triangle {

@@ -4,6 +4,7 @@
 //! something that it needs is not there, and `note` then says what.
 
 mod budgets;
+mod commands;
 mod gate;
 mod inputs;
 mod mutate;
@@ -38,6 +39,7 @@ pub(crate) struct TrustOptions {
 /// The parts by the first word of their rows: a module and a line here for each.
 const PARTS: &[(&str, Part)] = &[
     ("case", budgets::cases),
+    ("commands", commands::run),
     ("gate", gate::run),
     ("large", budgets::large),
     ("mutated", mutated::run),

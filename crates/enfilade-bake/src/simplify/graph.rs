@@ -82,6 +82,7 @@ pub fn simplify_graph(
         max_cost: settings.max_cost.unwrap_or(f64::INFINITY),
         max_cells: settings.max_cells.unwrap_or(usize::MAX),
         max_portals: settings.max_portals.unwrap_or(usize::MAX),
+        joins_outdoors: settings.join_outdoors,
     };
     let whole = CostGraph {
         weights: costs.to_vec(),

@@ -15,7 +15,7 @@ pub(super) struct CostGraph {
     pub(super) items: Vec<Vec<u32>>,
     /// Cells that have a portal between them.
     pub(super) pairs: Vec<[u32; 2]>,
-    /// Cells that merge with others only if nothing else is left to them: the outdoors.
+    /// The outdoors: cells that merge with others only where that is asked for.
     pub(super) aloof: Vec<bool>,
 }
 
@@ -27,6 +27,8 @@ pub(super) struct Bounds {
     pub(super) max_cost: f64,
     pub(super) max_cells: usize,
     pub(super) max_portals: usize,
+    /// Lets rooms and the outdoors become one.
+    pub(super) joins_outdoors: bool,
 }
 
 /// How good the portals between two cells are. Higher is worse: removed first.
@@ -38,6 +40,12 @@ pub(super) trait Badness {
 }
 
 impl CostGraph {
+    /// Tells if two cells may become one as far as the outdoors and the cost go.
+    pub(super) fn may_join(&self, [a, b]: [u32; 2], both: f64, bounds: &Bounds) -> bool {
+        let is_alike = self.aloof[a as usize] == self.aloof[b as usize];
+        both <= bounds.max_cost && (is_alike || bounds.joins_outdoors)
+    }
+
     pub(super) fn cost(&self, cell: u32) -> f64 {
         self.sum(self.items[cell as usize].iter().copied())
     }
@@ -113,80 +121,163 @@ fn union<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = u32> + 'a {
 
 /// The cell that each cell becomes part of: itself, or a lesser one of its group.
 ///
-/// No merged cell costs more than `max_cost` (one that did so alone stays alone). Every merge lowers
-/// the number of cells, so it ends; time `O(m log n)` merges times the items and neighbors of a cell.
-pub(super) fn merge(mut graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness) -> Vec<u32> {
-    let n = graph.items.len();
-    let mut into: Vec<u32> = (0..n as u32).collect();
-    // How many portals lead from one cell to another.
-    let mut neighbors: Vec<BTreeMap<u32, usize>> = vec![BTreeMap::new(); n];
-    let mut n_portals = 0;
-    for &[a, b] in &graph.pairs {
-        if a != b {
-            *neighbors[a as usize].entry(b).or_default() += 1;
-            *neighbors[b as usize].entry(a).or_default() += 1;
-            n_portals += 1;
-        }
-    }
-    let mut shares = graph.shares();
-    let mut n_alive = n;
+/// No merged cell costs more than `max_cost` (one that did so alone stays alone). A merge that is made for the number of portals alone
+/// takes no more of them away than are too many, as long as there is one. Every merge lowers the number of cells, so it ends;
+/// time `O(m log n)` merges times the items and neighbors of a cell.
+pub(super) fn merge(graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness) -> Vec<u32> {
+    let mut merger = Merger::new(graph, bounds);
     // They are not negative, so their bits compare like the numbers.
-    let mut queue: BinaryHeap<Reverse<(u64, u32)>> = (0..n as u32)
-        .map(|c| Reverse((shares[c as usize].to_bits(), c)))
+    let key = |merger: &Merger<'_>, c: u32| Reverse((merger.shares[c as usize].to_bits(), c));
+    let mut queue: BinaryHeap<_> = (0..merger.into.len() as u32)
+        .map(|c| key(&merger, c))
         .collect();
-    while let Some(Reverse((bits, cell))) = queue.pop() {
-        let is_current = into[cell as usize] == cell && shares[cell as usize].to_bits() == bits;
-        if !is_current {
-            continue;
-        }
-        let is_few = n_alive <= bounds.max_cells && n_portals <= bounds.max_portals;
-        if is_few && shares[cell as usize] >= bounds.min_cost {
-            break;
-        }
-        let mut best: Option<((bool, f64), u32)> = None;
-        for &other in neighbors[cell as usize].keys() {
-            let both = graph.cost_of_both(cell, other);
-            if both > bounds.max_cost {
-                continue;
+    // Cells all of whose merges take too many portals. So they always will: pairs of cells only gain portals.
+    let mut waiting: Vec<u32> = Vec::new();
+    loop {
+        let merge = match queue.pop() {
+            Some(Reverse((bits, cell))) => {
+                let share = merger.shares[cell as usize];
+                if merger.into[cell as usize] != cell || share.to_bits() != bits {
+                    continue;
+                }
+                let is_small = share < bounds.min_cost;
+                if merger.is_few() && !is_small {
+                    break;
+                }
+                let is_for_portals = !is_small && merger.n_alive <= bounds.max_cells;
+                let most = if is_for_portals {
+                    merger.n_too_many()
+                } else {
+                    usize::MAX
+                };
+                let worst = merger.worst(cell, most, badness);
+                if worst.is_none() && is_for_portals {
+                    waiting.push(cell);
+                }
+                // One that fits nowhere never will: its neighbors only grow.
+                worst.map(|other| (cell, other))
             }
-            let is_near = !graph.aloof[cell as usize] && !graph.aloof[other as usize];
-            let key = (is_near, badness.of(&graph, cell, other));
-            let is_worse = best
-                .as_ref()
-                .is_none_or(|(k, ..)| key.0.cmp(&k.0).then(key.1.total_cmp(&k.1)).is_gt());
-            if is_worse {
-                best = Some((key, other));
-            }
-        }
-        // One that fits nowhere never will: its neighbors only grow.
-        let Some((_, other)) = best else {
-            continue;
+            None if merger.is_few() => break,
+            None => match merger.least_beyond(&waiting, badness) {
+                None => break,
+                pair => pair,
+            },
         };
-        let (kept, gone) = (cell.min(other), cell.max(other));
-        into[gone as usize] = kept;
-        let items = graph.union(kept, gone);
-        graph.items[kept as usize] = items;
-        graph.items[gone as usize] = Vec::new();
-        graph.aloof[kept as usize] |= graph.aloof[gone as usize];
-        shares[kept as usize] += shares[gone as usize];
-        for (next, n) in std::mem::take(&mut neighbors[gone as usize]) {
-            neighbors[next as usize].remove(&gone);
-            if next == kept {
-                n_portals -= n;
-            } else {
-                *neighbors[next as usize].entry(kept).or_default() += n;
-                *neighbors[kept as usize].entry(next).or_default() += n;
-            }
+        if let Some((a, b)) = merge {
+            merger.join(a.min(b), a.max(b));
+            badness.merged(a.min(b), a.max(b));
+            queue.push(key(&merger, a.min(b)));
         }
-        badness.merged(kept, gone);
-        n_alive -= 1;
-        queue.push(Reverse((shares[kept as usize].to_bits(), kept)));
     }
-    for c in 0..n {
+    let mut into = merger.into;
+    for c in 0..into.len() {
         // A cell's host has a lesser number, so it is settled already.
         into[c] = into[into[c] as usize];
     }
     into
+}
+
+struct Merger<'a> {
+    graph: CostGraph,
+    bounds: &'a Bounds,
+    into: Vec<u32>,
+    shares: Vec<f64>,
+    /// How many portals lead from one cell to another.
+    neighbors: Vec<BTreeMap<u32, usize>>,
+    n_portals: usize,
+    n_alive: usize,
+    /// Rooms are merged with each other first: not where the bound is below the portals that lead outdoors. All rooms would become one.
+    prefers_rooms: bool,
+}
+
+impl<'a> Merger<'a> {
+    fn new(graph: CostGraph, bounds: &'a Bounds) -> Self {
+        let n = graph.items.len();
+        let mut neighbors: Vec<BTreeMap<u32, usize>> = vec![BTreeMap::new(); n];
+        let (mut n_portals, mut n_outward) = (0, 0);
+        for &[a, b] in &graph.pairs {
+            n_outward += usize::from(graph.aloof[a as usize] != graph.aloof[b as usize]);
+            if a != b {
+                *neighbors[a as usize].entry(b).or_default() += 1;
+                *neighbors[b as usize].entry(a).or_default() += 1;
+                n_portals += 1;
+            }
+        }
+        Self {
+            shares: graph.shares(),
+            graph,
+            bounds,
+            into: (0..n as u32).collect(),
+            neighbors,
+            n_portals,
+            n_alive: n,
+            prefers_rooms: n_outward <= bounds.max_portals,
+        }
+    }
+
+    /// Portals.
+    fn n_too_many(&self) -> usize {
+        self.n_portals.saturating_sub(self.bounds.max_portals)
+    }
+
+    fn is_few(&self) -> bool {
+        self.n_alive <= self.bounds.max_cells && self.n_too_many() == 0
+    }
+
+    /// The neighbors that a cell may be merged with, and how many portals that takes away.
+    fn partners(&self, cell: u32) -> impl Iterator<Item = (u32, usize)> {
+        let all = self.neighbors[cell as usize].iter();
+        all.map(|(&other, &n)| (other, n))
+            .filter(move |&(other, _)| {
+                let both = self.graph.cost_of_both(cell, other);
+                self.graph.may_join([cell, other], both, self.bounds)
+            })
+    }
+
+    /// The neighbor with the worst portals, of those whose merge takes away at most so many.
+    fn worst(&self, cell: u32, most: usize, badness: &mut dyn Badness) -> Option<u32> {
+        let aloof = &self.graph.aloof;
+        let mut best: Option<((bool, f64), u32)> = None;
+        for (other, _) in self.partners(cell).filter(|p| p.1 <= most) {
+            let is_room = !aloof[cell as usize] && !aloof[other as usize];
+            let is_first = is_room || !self.prefers_rooms;
+            let key = (is_first, badness.of(&self.graph, cell, other));
+            let is_worse =
+                best.is_none_or(|(k, _)| key.0.cmp(&k.0).then(key.1.total_cmp(&k.1)).is_gt());
+            if is_worse {
+                best = Some((key, other));
+            }
+        }
+        best.map(|(_, other)| other)
+    }
+
+    /// The merge of one of `cells` that takes the fewest portals away; of such, the worst.
+    fn least_beyond(&self, cells: &[u32], badness: &mut dyn Badness) -> Option<(u32, u32)> {
+        let alive = cells.iter().filter(|&&c| self.into[c as usize] == c);
+        let pairs = alive.flat_map(|&c| self.partners(c).map(move |(other, n)| (n, c, other)));
+        let keyed =
+            pairs.map(|(n, c, other)| ((n, -badness.of(&self.graph, c, other)), (c, other)));
+        let least = keyed.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        least.map(|(_, pair)| pair)
+    }
+
+    fn join(&mut self, kept: u32, gone: u32) {
+        self.into[gone as usize] = kept;
+        self.graph.items[kept as usize] = self.graph.union(kept, gone);
+        self.graph.items[gone as usize] = Vec::new();
+        self.graph.aloof[kept as usize] |= self.graph.aloof[gone as usize];
+        self.shares[kept as usize] += self.shares[gone as usize];
+        for (next, n) in std::mem::take(&mut self.neighbors[gone as usize]) {
+            self.neighbors[next as usize].remove(&gone);
+            if next == kept {
+                self.n_portals -= n;
+            } else {
+                *self.neighbors[next as usize].entry(kept).or_default() += n;
+                *self.neighbors[kept as usize].entry(next).or_default() += n;
+            }
+        }
+        self.n_alive -= 1;
+    }
 }
 
 /// A score a pair that does not change but by adding up: what portals have by themselves.
@@ -295,6 +386,38 @@ pub(super) mod tests {
             .collect()
     }
 
+    #[test]
+    fn merges_for_the_number_of_portals_stop_at_it() {
+        // Cells of equal cost in a row; the cheapest opens to the next by five portals, worst of all.
+        let pairs = [[0, 1]; 5].into_iter().chain((1..6).map(|i| [i, i + 1]));
+        let graph = CostGraph {
+            weights: (1..=7).map(f64::from).collect(),
+            items: (0..7).map(|c| vec![c]).collect(),
+            pairs: pairs.collect(),
+            aloof: vec![false; 7],
+        };
+        let scores = |[a, b]: [u32; 2]| ([a, b], if a == 0 { 9.0 } else { 1.0 });
+        let n_left = |max_portals| {
+            let bounds = Bounds {
+                min_cost: 0.0,
+                max_cost: f64::INFINITY,
+                max_cells: usize::MAX,
+                max_portals,
+                joins_outdoors: false,
+            };
+            let mut badness = PairScores(graph.pairs.iter().map(|&pair| scores(pair)).collect());
+            let into = merge(graph.clone(), &bounds, &mut badness);
+            let left = graph
+                .pairs
+                .iter()
+                .filter(|p| into[p[0] as usize] != into[p[1] as usize]);
+            left.count()
+        };
+        for most in 0..10 {
+            assert_eq!(n_left(most), most);
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
 
@@ -302,10 +425,10 @@ pub(super) mod tests {
         fn bounds_are_kept_and_groups_are_connected(
             graph in graphs(), min in 0_u32..200, extra in 0_u32..300, max_cells in 1_usize..30,
             max_portals in 0_usize..60,
-            by_eyes in any::<bool>(), seed in any::<u64>(),
+            by_eyes in any::<bool>(), joins_outdoors in any::<bool>(), seed in any::<u64>(),
         ) {
             let max_cost = f64::from(min + extra);
-            let bounds = Bounds { min_cost: min.into(), max_cost, max_cells, max_portals };
+            let bounds = Bounds { min_cost: min.into(), max_cost, max_cells, max_portals, joins_outdoors };
             let n = graph.items.len();
             let mut state = seed;
             let mut bits = || { state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1); state };
@@ -319,6 +442,11 @@ pub(super) mod tests {
             // The upper bound holds for whatever was merged, never mind how.
             for (&g, &(cost, n)) in &groups {
                 prop_assert!(n == 1 || cost <= bounds.max_cost, "group {g} costs {cost}");
+            }
+            // The outdoors stays apart unless asked for.
+            for c in 0..n {
+                let is_alike = graph.aloof[c] == graph.aloof[into[c] as usize];
+                prop_assert!(joins_outdoors || is_alike, "{c} and {}", into[c]);
             }
             // Groups are joined by portals: each member reaches its host within the group.
             for c in 0..n {
@@ -353,7 +481,8 @@ pub(super) mod tests {
                 let (ga, gb) = (into[a as usize], into[b as usize]);
                 if ga == gb { continue; }
                 let is_small = share(ga) < bounds.min_cost || share(gb) < bounds.min_cost;
-                if wants_more || is_small {
+                let is_apart = !joins_outdoors && graph.aloof[a as usize] != graph.aloof[b as usize];
+                if (wants_more || is_small) && !is_apart {
                     let items: BTreeSet<u32> = (0..n)
                         .filter(|&c| into[c] == ga || into[c] == gb)
                         .flat_map(|c| graph.items[c].iter().copied())

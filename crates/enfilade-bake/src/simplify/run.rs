@@ -33,6 +33,7 @@ pub fn simplify(world: &World, settings: &SimplifySettings) -> Simplified {
         max_cost: settings.max_cost.unwrap_or(f64::INFINITY),
         max_cells: settings.max_cells.unwrap_or(usize::MAX),
         max_portals: settings.max_portals.unwrap_or(usize::MAX),
+        joins_outdoors: settings.join_outdoors,
     };
     let (n, n_portals) = (world.graph.cells.len(), world.graph.portals.len());
     let is_few = n <= bounds.max_cells && n_portals <= bounds.max_portals;

@@ -28,6 +28,9 @@ pub struct SimplifySettings {
     pub max_cells: Option<usize>,
     /// Cells are merged until there are no more portals than this, where that keeps the upper bound.
     pub max_portals: Option<usize>,
+    /// Lets rooms and the outdoors become one cell, where a bound cannot be met otherwise. Without it, portals that lead outdoors
+    /// all stay.
+    pub join_outdoors: bool,
     /// How portals are compared.
     pub metric: Metric,
     /// What drawing costs.
@@ -59,6 +62,9 @@ impl SimplifySettings {
         .into();
         if self.outdoors {
             out.insert("simplify.outdoors".to_owned(), "true".to_owned());
+        }
+        if self.join_outdoors {
+            out.insert("simplify.join_outdoors".to_owned(), "true".to_owned());
         }
         for (name, weight) in &self.cost.materials {
             out.insert(format!("cost.material.{name}"), weight.to_string());

@@ -15,7 +15,7 @@ use super::merge::{self, Bounds, CostGraph, Eyes};
 /// Which of two merges comes first.
 #[derive(Clone, Copy, Debug)]
 struct Order {
-    /// Rooms join the outdoors only when nothing else is left to them.
+    /// Rooms join the outdoors, where they may, only when nothing else is left to them.
     is_outdoors_last: bool,
     /// While there are too many portals, what a merge adds is weighed by those that go; else as a whole.
     by_portal: bool,
@@ -182,8 +182,7 @@ impl ViewMerger {
     fn merge_in(&mut self, order: Order, bounds: &Bounds) {
         while self.n_too_many(bounds) > 0 {
             let by_portal = order.by_portal && self.n_portals > bounds.max_portals;
-            let Some((kept, gone)) = self.best(by_portal, order.is_outdoors_last, bounds.max_cost)
-            else {
+            let Some((kept, gone)) = self.best(by_portal, order.is_outdoors_last, bounds) else {
                 break;
             };
             self.merge(kept, gone);
@@ -217,12 +216,12 @@ impl ViewMerger {
         &mut self,
         by_portal: bool,
         is_outdoors_last: bool,
-        max_cost: f64,
+        bounds: &Bounds,
     ) -> Option<(u32, u32)> {
         self.weigh();
         let mut best: Option<(MergeKey, (u32, u32))> = None;
         for (&(a, b), pair) in &self.pairs {
-            if pair.both > max_cost {
+            if !self.graph.may_join([a, b], pair.both, bounds) {
                 continue;
             }
             let is_outdoors = self.graph.aloof[a as usize] || self.graph.aloof[b as usize];
@@ -382,6 +381,7 @@ mod tests {
             for pair @ [a, b] in between.iter().copied().collect::<BTreeSet<_>>() {
                 let joined: Vec<u32> = into.iter().map(|&g| if g == b { a } else { g }).collect();
                 let both = cost(graph, &items(graph, &joined, a));
+                let is_apart = !bounds.joins_outdoors && is_outdoors(a) != is_outdoors(b);
                 let n_same = between.iter().filter(|p| **p == pair).count();
                 let share = if by_portal { n_same } else { 1 } as f64;
                 let more = drawn(graph, sees, &joined) - drawn(graph, sees, &into);
@@ -389,7 +389,10 @@ mod tests {
                     (is_aloof(a) || is_aloof(b), more / share, both / share),
                     pair,
                 );
-                if both <= bounds.max_cost && best.as_ref().is_none_or(|(k, _)| key < *k) {
+                if both <= bounds.max_cost
+                    && !is_apart
+                    && best.as_ref().is_none_or(|(k, _)| key < *k)
+                {
                     best = Some((key, joined));
                 }
             }
@@ -406,7 +409,7 @@ mod tests {
         #[test]
         fn the_pair_that_adds_least_to_all_views_is_next_in_each_order(
             graph in graphs(), max_cost in prop_oneof![50_u32..400, Just(u32::MAX)], max_cells in 1_usize..20,
-            max_portals in 0_usize..40, seeds in prop::collection::vec((any::<u64>(), any::<u64>()), 24),
+            max_portals in 0_usize..40, joins_outdoors in any::<bool>(), seeds in prop::collection::vec((any::<u64>(), any::<u64>()), 24),
         ) {
             // Two random words at once: an eye sees a quarter of the cells.
             let eyes: Vec<Vec<u64>> = (0..graph.items.len())
@@ -416,7 +419,7 @@ mod tests {
                 .map(|e| (0..128).filter(|i| e[i / 64] >> (i % 64) & 1 == 1).collect())
                 .collect();
             // Whole weights: sums do not depend on their order.
-            let bounds = Bounds { min_cost: 0.0, max_cost: max_cost.into(), max_cells, max_portals };
+            let bounds = Bounds { min_cost: 0.0, max_cost: max_cost.into(), max_cells, max_portals, joins_outdoors };
             let start = ViewMerger::new(graph.clone(), eyes.clone(), (0..graph.items.len() as u32).collect());
             let mut least = f64::INFINITY;
             for order in ORDERS {

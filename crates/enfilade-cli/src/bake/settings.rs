@@ -343,10 +343,23 @@ impl BakeOptions {
     }
 }
 
+/// The converter of IFC, which is a process of its own, keeps to what the command may take.
+pub(crate) fn bound_converter(
+    options: &mut ImportOptions,
+    max_time: Option<Duration>,
+    max_memory: Option<u64>,
+) {
+    if let Some(ifc) = &mut options.ifc {
+        ifc.max_time = max_time.unwrap_or(ifc.max_time);
+        ifc.max_memory = max_memory;
+    }
+}
+
 /// Command line and settings file, resolved.
 pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let file = options.scene.file()?;
-    let import_options = options.scene.resolve_with(&file);
+    let mut import_options = options.scene.resolve_with(&file);
+    bound_converter(&mut import_options, options.max_time, options.max_memory);
     let mut config = BakeConfig {
         voxel: options.voxel.or(file.voxel.map(|v| v.0)),
         ..BakeConfig::default()
@@ -432,10 +445,8 @@ impl SceneOptions {
             let mut programs = std::env::split_paths(&folders).map(|f| f.join(&name));
             programs.find(|p| p.is_file())
         };
-        Some(IfcConverter {
-            program: self.ifc_convert.clone().or_else(on_path)?,
-            folder: std::env::temp_dir(),
-        })
+        let program = self.ifc_convert.clone().or_else(on_path)?;
+        Some(IfcConverter::new(program, std::env::temp_dir()))
     }
 
     fn resolve_with(&self, file: &ConfigFile) -> ImportOptions {

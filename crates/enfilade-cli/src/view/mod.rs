@@ -30,6 +30,7 @@ use self::open::{Open, name_ahead};
 use self::panel::{Panel, Shown};
 use self::walker::Walker;
 use crate::formats::Format;
+use crate::limits::Limits;
 use crate::output::{Outputs, refuse_stream, write_whole};
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
@@ -71,9 +72,12 @@ pub(crate) struct View {
     /// What draws: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
+    #[command(flatten)]
+    limits: Limits,
 }
 
 pub(crate) fn run(args: &View) -> anyhow::Result<()> {
+    args.limits.begin()?;
     let outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
     // Where they may be written is asked when a key asks for them: most walks write nothing.
     for (option, format, path) in [

@@ -4,9 +4,13 @@ use enfilade_geom::scene::FixtureKind;
 
 use crate::World;
 
+/// Sources above one another, at most: importers read no more than 1,024 nodes so, and paths of names are as long.
+const MAX_DEPTH: u32 = 4096;
+
 /// Checks the tree of sources and all that refers to it.
 pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
     let n = world.sources.len();
+    let mut depths: Vec<u32> = Vec::with_capacity(n);
     for (i, node) in world.sources.iter().enumerate() {
         if let Some(parent) = node.parent.filter(|&p| p as usize >= i) {
             broken(
@@ -14,6 +18,15 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
                 format!("its parent {parent} does not come before it"),
             );
         }
+        let above = node.parent.and_then(|p| depths.get(p as usize));
+        let depth = above.map_or(0, |d| d + 1);
+        if depth == MAX_DEPTH {
+            broken(
+                format!("source {i} ({})", node.name),
+                format!("more than {MAX_DEPTH} sources are above one another"),
+            );
+        }
+        depths.push(depth);
         if let Err(why) = check_json(&node.extras) {
             broken(
                 format!("source {i} ({})", node.name),

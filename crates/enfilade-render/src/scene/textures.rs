@@ -4,7 +4,7 @@ use enfilade_cpg::World;
 use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
-use crate::materials::{Look, decode, wrapping};
+use crate::materials::{Decoder, Look, NoPicture, wrapping};
 
 /// The layout of a texture's bind group.
 pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
@@ -32,33 +32,60 @@ pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
         })
 }
 
-/// The textures that materials use; by texture of the world, which of them; how many are missing.
+/// Textures on the adapter.
+pub(super) struct Textures {
+    /// The textures that materials use; the first is white.
+    pub(super) groups: Vec<wgpu::BindGroup>,
+    /// Indices into these by texture of the world.
+    pub(super) of: Vec<u32>,
+    /// Pictures that are missing or damaged.
+    pub(super) n_missing: u32,
+    /// Pictures that would take more than they may.
+    pub(super) n_too_large: u32,
+}
+
+/// The textures that materials use.
 pub(super) fn load_textures(
     gpu: &Gpu,
     world: &World,
     looks: &[Look],
-) -> Result<(Vec<wgpu::BindGroup>, Vec<u32>, u32), RenderError> {
+) -> Result<Textures, RenderError> {
     let layout = texture_layout(gpu);
     let white = image::RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
     let repeat = [wgpu::AddressMode::Repeat; 2];
     let mut groups = vec![texture_group(gpu, &layout, &[white], repeat)?];
     let mut texture_of = vec![0; world.textures.len()];
-    let mut n_missing = 0;
+    let (mut n_missing, mut n_too_large) = (0, 0);
+    let mut decoder = Decoder::new(world);
+    // A texture without a picture is asked once.
+    let mut is_without = vec![false; world.textures.len()];
     for look in looks {
         let Some(t) = look.texture else { continue };
-        if texture_of.get(t as usize).is_none_or(|&g| g != 0) {
+        let is_known = |of: &u32| *of != 0 || is_without[t as usize];
+        if texture_of.get(t as usize).is_none_or(is_known) {
             continue;
         }
-        match decode(world, t) {
-            Some(picture) => {
+        match decoder.decode(t) {
+            Ok(picture) => {
                 texture_of[t as usize] = groups.len() as u32;
                 let wrap = wrapping(world, t);
                 groups.push(texture_group(gpu, &layout, &picture.levels, wrap)?);
             }
-            None => n_missing += 1,
+            Err(why) => {
+                is_without[t as usize] = true;
+                match why {
+                    NoPicture::Broken => n_missing += 1,
+                    NoPicture::TooLarge => n_too_large += 1,
+                }
+            }
         }
     }
-    Ok((groups, texture_of, n_missing))
+    Ok(Textures {
+        groups,
+        of: texture_of,
+        n_missing,
+        n_too_large,
+    })
 }
 
 fn texture_group(

@@ -1,0 +1,132 @@
+//! Limits of a command's time and memory, as its caller sets them.
+//!
+//! Loops that can end early spend from an [`Allowance`]; what a scene or an argument would take out of all proportion is refused
+//! before, whatever is said here. Beyond both, a thread looks at clock and memory, so that the bounds hold for code that asks neither:
+//! decoders, drivers of graphics cards. It ends the process, but not in the middle of an output.
+
+use std::io::Write;
+use std::sync::TryLockError;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use enfilade::geom::Allowance;
+
+use crate::output::{WRITING, Warned};
+use enfilade_cli::values::{bytes, seconds};
+
+/// Options of all commands that can take long.
+#[derive(clap::Args, Clone, Copy, Default)]
+pub(crate) struct Limits {
+    /// End without a result after this long.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    max_time: Option<Duration>,
+    /// End without a result rather than take more memory: a number and K, M, G or T.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    max_memory: Option<u64>,
+}
+
+/// Between two looks: memory grows by some 10 MB in that time at most.
+const PAUSE: Duration = Duration::from_millis(5);
+/// Returns the time that a command gets if it does not end by itself: promised is half as much again and a second.
+fn with_grace(time: Duration) -> Duration {
+    (time.saturating_add(time / 5)).saturating_add(Duration::from_millis(400))
+}
+
+/// An output that is being written is waited for.
+const WRITING_TIME: Duration = Duration::from_secs(1);
+
+impl Limits {
+    /// Holds the bounds from now on; what loops may spend.
+    pub(crate) fn begin(&self) -> anyhow::Result<Allowance> {
+        watch(self.max_time, self.max_memory)?;
+        Ok(self.allowance())
+    }
+
+    fn allowance(&self) -> Allowance {
+        // A time too long to be counted is no bound.
+        let end = self.max_time.and_then(|t| Instant::now().checked_add(t));
+        Allowance::new(u64::MAX, end)
+    }
+
+    pub(crate) fn max_time(&self) -> Option<Duration> {
+        self.max_time
+    }
+
+    pub(crate) fn max_memory(&self) -> Option<u64> {
+        self.max_memory
+    }
+
+    /// The error of a loop that ended because its time was up.
+    pub(crate) fn time_is_up(&self) -> anyhow::Error {
+        anyhow::Error::msg(late(self.max_time.unwrap_or_default()))
+    }
+}
+
+fn late(time: Duration) -> String {
+    format!(
+        "not done within {} s (--max-time); give it more, or less to do",
+        time.as_secs_f64()
+    )
+}
+
+/// Ends the process once it takes longer or more than it may.
+pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyhow::Result<()> {
+    if max_memory.is_some() && memory().is_none() {
+        bail!("--max-memory: this system does not say how much memory a process takes");
+    }
+    if max_time.is_none() && max_memory.is_none() {
+        return Ok(());
+    }
+    let start = Instant::now();
+    let hard = max_time.map(with_grace);
+    let look = move || loop {
+        if hard.is_some_and(|t| start.elapsed() >= t) {
+            end(&late(max_time.unwrap_or_default()));
+        }
+        if let Some((taken, most)) = memory()
+            .zip(max_memory)
+            .filter(|(taken, most)| taken > most)
+        {
+            let [taken, most] = [taken, most].map(|b| b as f64 / f64::from(1 << 20));
+            end(&format!(
+                "takes {taken:.0} MiB, and {most:.0} MiB were allowed (--max-memory); give it more, or less to do"
+            ));
+        }
+        // Without a bound on memory, there is nothing to see before the time is up.
+        let left = hard.map_or(Duration::MAX, |t| t.saturating_sub(start.elapsed()));
+        let pause = if max_memory.is_some() {
+            PAUSE.min(left)
+        } else {
+            left
+        };
+        thread::sleep(pause.max(Duration::from_millis(1)));
+    };
+    thread::Builder::new()
+        .name("limits".into())
+        .spawn(look)
+        .context("cannot watch over time and memory")?;
+    Ok(())
+}
+
+/// Says why, and ends the process once no output is being written any more.
+fn end(why: &str) -> ! {
+    let start = Instant::now();
+    // Held to the end, so that none begins.
+    let _none_is_written = loop {
+        match WRITING.try_lock() {
+            Err(TryLockError::WouldBlock) if start.elapsed() < WRITING_TIME => {
+                thread::sleep(Duration::from_millis(1));
+            }
+            lock => break lock,
+        }
+    };
+    let _ = writeln!(Warned, "enfilade: {why}");
+    // Without the handlers that drivers left for the end: their threads are still at work, and would be freed under.
+    signal_hook::low_level::exit(1);
+}
+
+/// Resident memory. [Units: bytes]
+fn memory() -> Option<u64> {
+    Some(memory_stats::memory_stats()?.physical_mem as u64)
+}
