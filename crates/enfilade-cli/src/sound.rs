@@ -1,6 +1,6 @@
 //! `enfilade sound`: what a walking listener hears of a source.
 
-use std::io::{BufWriter, Cursor, Write};
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -14,7 +14,8 @@ use enfilade::world::{
 
 use crate::auralize::{BLOCK, Block, render, test_sound};
 use crate::formats::Format;
-use crate::output::{Outputs, print_json, write_whole};
+use crate::output::{Outputs, write_whole};
+use crate::screen::print_json;
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
@@ -85,11 +86,11 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         write_whole(path, &wav_of(&render(&source, rate, &blocks), rate)?)?;
     }
-    let out = BufWriter::new(outputs.printed());
+    let out = outputs.printed();
     if args.json {
         return print_json(
             out,
-            &serde_json::json!({ "file": args.output, "heard": rows }),
+            &serde_json::json!({ "file": args.output.as_ref().map(|p| p.display().to_string()), "heard": rows }),
         );
     }
     print_table(out, &rows)

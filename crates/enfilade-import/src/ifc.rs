@@ -73,7 +73,13 @@ fn convert(converter: &IfcConverter, input: &Path, folder: &Path) -> Result<Path
         return Ok(output);
     }
     let said = tail(&said).unwrap_or_default();
-    Err(format!("made no GLB ({status}): {}", said.trim()))
+    // Lines of its own would be lines of ours.
+    let said: Vec<&str> = said
+        .lines()
+        .map(str::trim)
+        .filter(|l| !l.is_empty())
+        .collect();
+    Err(format!("made no GLB ({status}): {}", said.join(" | ")))
 }
 
 /// The last bytes of a file, as text.

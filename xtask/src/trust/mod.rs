@@ -5,6 +5,7 @@
 
 mod budgets;
 mod gate;
+mod habits;
 mod inputs;
 mod mutate;
 mod mutated;
@@ -34,6 +35,7 @@ pub(crate) struct TrustOptions {
 const PARTS: &[(&str, Part)] = &[
     ("case", budgets::cases),
     ("gate", gate::run),
+    ("habits", habits::run),
     ("large", budgets::large),
     ("mutated", mutated::run),
     ("nasty", budgets::nasty),
