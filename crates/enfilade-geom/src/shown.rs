@@ -20,7 +20,7 @@ pub fn shown<T: fmt::Display>(value: T) -> Shown<T> {
     Shown(value)
 }
 
-/// What [`shown`] gives.
+/// A value as [`shown`] shows it.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<T>(T);
 
@@ -40,7 +40,7 @@ struct Escaper<W>(W);
 
 impl<W: Write> Write for Escaper<W> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        // What stands between hidden characters goes in one piece.
+        // All between two hidden characters goes in one piece.
         let mut rest = text;
         while let Some((at, c)) = rest.char_indices().find(|(_, c)| is_hidden(*c)) {
             self.0.write_str(&rest[..at])?;
@@ -51,7 +51,7 @@ impl<W: Write> Write for Escaper<W> {
     }
 }
 
-/// Whether a character does something else than to be seen: control characters (C0, DEL, C1), line and paragraph separators, marks and
+/// Tells characters that do something else than to be seen: control characters (C0, DEL, C1), line and paragraph separators, marks and
 /// overrides of direction, and all that Unicode lets a font ignore, such as zero-width spaces and tags.
 ///
 /// Selectors of a look (U+FE00 to U+FE0F) are none: they stand behind many a visible emoji and change nothing but its look. Joiners are
@@ -106,7 +106,6 @@ mod tests {
         }
     }
 
-    /// Another's list: what the standard library's `Debug` shows as it is.
     #[test]
     fn what_is_escaped_is_no_letter_and_no_control_is_left() {
         let mut n_hidden = 0;
