@@ -100,7 +100,7 @@ pub(super) const INPUTS: [Input; 22] = [
             "pvs @ -o out.pvs --into out.glb --statistics out.json --mutual out.txt --evidence out.ev",
             "pvs @ -o out.pvs --into out.glb --parts --volumes",
             "locate @ < points.txt",
-            "locate @ --object *wall*",
+            "locate @ --object *west*",
             "path @ --from 1,1,2 --to 7,1,2",
             "sound @ --listener 1,1.5,2;3,1.5,2 --source 6,1.5,3 -o out.wav",
             "see @ --eye 1,1.5,2 --look 7,1.5,2",
