@@ -202,6 +202,8 @@ fn package() -> anyhow::Result<()> {
 
 fn demo() -> anyhow::Result<()> {
     let dir = target_dir().join("demo");
+    // Files of an earlier version are in the way.
+    let _ = std::fs::remove_dir_all(&dir);
     let mut demo = Command::new(GATE.binary("enfilade"));
     print!("{}", output_of(demo.arg("demo").arg("-o").arg(&dir), None)?);
     let world = dir.join("world.glb");

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::{Aabb, DVec3, Plane, Winding};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding, shown};
 
 use crate::complex::poly;
 use crate::edit::{Added, cut_cell};
@@ -106,7 +106,9 @@ impl Bounded {
             let [x, y, z] = [0, 1, 2].map(|k| low[k].midpoint(high[k]));
             text += &format!(
                 "\n  {} about {x:.2} {y:.2} {z:.2} costs {:.0}: {}",
-                cell.name, o.cost, o.reason
+                shown(&cell.name),
+                o.cost,
+                o.reason
             );
         }
         if self.over.len() > TOLD {

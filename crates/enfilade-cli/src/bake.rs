@@ -9,7 +9,7 @@ pub(crate) mod settings;
 mod values;
 
 use std::collections::BTreeMap;
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -23,8 +23,9 @@ use serde::Serialize;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
-use crate::output::{Outputs, Told, Warned, Written, print_json, write_whole};
+use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
+use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use enfilade_cli::input::import_scene;
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
@@ -189,9 +190,9 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         Resolution::Voxels { .. } | Resolution::Planes => {}
     }
     for note in &baked.notes {
-        writeln!(Warned, "{note}")?;
+        write_lines(&mut Warned, note)?;
     }
-    if verbose || io::stderr().is_terminal() {
+    if verbose || is_watched() {
         for (stage, time) in &baked.times {
             writeln!(err, "{:>20} {:>8.3} s", stage.name(), time.as_secs_f64())?;
         }

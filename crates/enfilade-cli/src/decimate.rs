@@ -16,7 +16,8 @@ use enfilade::geom::scene::Scene;
 use crate::bake::delaunay::choices_text;
 use crate::bake::{Summary, print_summary, settings};
 use crate::formats::Format;
-use crate::output::{Outputs, Warned, Written, print_json, refuse_stream, write_whole};
+use crate::output::{Outputs, Written, refuse_stream, write_whole};
+use crate::screen::{Warned, print_json, write_lines};
 use enfilade_cli::input::{import_scene, is_stream};
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
@@ -219,7 +220,7 @@ impl Walk<'_> {
             Some(file @ ("save" | "bake")) => {
                 writeln!(out, "'{file}' needs the name of one file to write")?;
             }
-            Some("help" | "h" | "?") => writeln!(out, "{HELP}")?,
+            Some("help" | "h" | "?") => write_lines(out, &HELP)?,
             Some(other) => writeln!(out, "'{other}' is no command; `help` lists them")?,
         }
         self.show(out)?;
@@ -331,7 +332,7 @@ impl Walk<'_> {
     fn bake(&self, path: &Path, out: &mut impl Write) -> anyhow::Result<()> {
         let (baked, written) = self.bake_to(path)?;
         for note in &baked.notes {
-            writeln!(out, "{note}")?;
+            write_lines(out, note)?;
         }
         print_summary(out, &baked.world)?;
         writeln!(out, "{written}")?;

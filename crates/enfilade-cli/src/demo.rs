@@ -1,23 +1,25 @@
 //! `enfilade demo`: a house of our own, baked.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
 use enfilade::cpg::wire::encode_glb;
+use enfilade::geom::shown;
 use enfilade::import::{export_glb, sort_scene};
 use enfilade_report::{PlanOptions, plan_svg};
 use enfilade_testkit::furnished_house;
 
 use crate::bake::{Summary, bake_scene, print_summary};
 use crate::formats::Format;
-use crate::output::{Outputs, make_folder, print_json, write_whole};
+use crate::output::{Outputs, make_folder, write_unnamed};
+use crate::screen::{print_json, printed, write_lines};
 
 /// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
 #[derive(clap::Args)]
 pub(crate) struct Demo {
-    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to.
+    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to; files of these names that are not the demo's stay as they are, and
+    /// the demo says so and ends.
     #[arg(short, long, default_value = ".", value_name = "DIR")]
     output: PathBuf,
     /// Print JSON for machines.
@@ -28,7 +30,8 @@ pub(crate) struct Demo {
 /// What `--json` prints.
 #[derive(serde::Serialize)]
 struct DemoReport {
-    files: [PathBuf; 3],
+    /// As text: JSON holds no other names.
+    files: [String; 3],
     #[serde(flatten)]
     summary: Summary,
 }
@@ -47,25 +50,26 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
     ] {
         outputs.write("-o", format, &path(name))?;
     }
-    write_whole(&path("house.glb"), &export_glb(&scene))?;
     let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
-    write_whole(&path("world.glb"), &bytes)?;
     let plan = plan_svg(&baked.world, &PlanOptions::default());
-    write_whole(&path("plan.svg"), plan.as_bytes())?;
-    let mut out = io::stdout().lock();
+    let files = [
+        (path("house.glb"), export_glb(&scene)),
+        (path("world.glb"), bytes),
+        (path("plan.svg"), plan.into_bytes()),
+    ];
+    write_unnamed("-o", &files, |_, _| false)?;
+    let mut out = printed();
     if args.json {
         let report = DemoReport {
-            files: ["house.glb", "world.glb", "plan.svg"].map(path),
+            files: files.map(|(path, _)| path.display().to_string()),
             summary: Summary::of(&baked.world),
         };
         return print_json(out, &report);
     }
     print_summary(&mut out, &baked.world)?;
-    let (house, world, plan) = (path("house.glb"), path("world.glb"), path("plan.svg"));
-    let (house, world, plan) = (house.display(), world.display(), plan.display());
-    writeln!(
-        out,
+    let [house, world, plan] = files.map(|(path, _)| shown(path.display()).to_string());
+    let hints = format!(
         "\nwrote {house}, {world}, {plan}\n\nTry next:\n  \
          enfilade inspect {world}\n  \
          echo '2 1 2' | enfilade locate {world}\n  \
@@ -73,6 +77,6 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
          enfilade view {world}\n  \
          enfilade bake YOUR.glb -o your-world.glb\n\
          and open {plan} in a browser, {world} in any glTF viewer."
-    )?;
-    Ok(())
+    );
+    Ok(write_lines(&mut out, &hints)?)
 }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use enfilade::cpg::{CellId, World};
+use enfilade::geom::shown;
 use enfilade_render::{
     AdapterChoice, Camera, Culling, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio, Style,
 };
@@ -105,15 +106,15 @@ impl fmt::Display for Exactness {
                 l.pixels,
                 l.at[0],
                 l.at[1],
-                l.expected,
-                l.cell_names.join(" "),
+                shown(&l.expected),
+                shown(l.cell_names.join(" ")),
                 l.depths[0],
-                l.found,
+                shown(&l.found),
                 l.depths[1],
                 p(l.eye),
                 p(l.look),
                 l.fov_degrees,
-                l.cell_name.as_deref().unwrap_or("no cell")
+                shown(l.cell_name.as_deref().unwrap_or("no cell"))
             )?;
         }
         Ok(())

@@ -75,11 +75,20 @@ const TABLE: [Row; 15] = [
     row(Format::Manual, "a manual page", &["1"]),
 ];
 
-/// Extensions of what no command writes.
-const FOREIGN: [&str; 37] = [
-    "3ds", "avif", "blend", "bmp", "bsp", "csv", "dae", "dxf", "exr", "fbx", "gif", "gltf", "gz",
-    "ifc", "jpeg", "jpg", "ktx2", "map", "md", "mtl", "obj", "ply", "ppm", "stl", "svgz", "tga",
-    "tif", "tiff", "usd", "usda", "usdc", "usdz", "webp", "xml", "yaml", "yml", "zip",
+/// Extensions of what no command writes: pictures, models, sounds, films, documents, archives, programs.
+const FOREIGN: [&str; 154] = [
+    "3ds", "3mf", "7z", "aac", "abc", "ac3", "aif", "aiff", "amr", "ape", "au", "avi", "avif",
+    "bam", "blend", "bmp", "bsp", "bz2", "c", "cpp", "css", "csv", "cub", "dae", "dds", "dll",
+    "doc", "docx", "dwg", "dxf", "e57", "eps", "epub", "exe", "exr", "fbx", "flac", "flv", "gif",
+    "gltf", "gz", "h", "hdr", "heic", "ico", "ifc", "ini", "jar", "jfif", "jpeg", "jpg", "js",
+    "jxl", "ktx", "ktx2", "las", "laz", "lwo", "lz4", "m4a", "m4v", "map", "md", "mdl", "mid",
+    "midi", "mkv", "mov", "mp2", "mp3", "mp4", "mpeg", "mpg", "mtl", "obj", "odp", "ods", "odt",
+    "off", "oga", "ogg", "ogv", "opus", "pak", "pbm", "pcd", "pcx", "pgm", "php", "pk3", "ply",
+    "pnm", "ppm", "ppt", "pptx", "ps", "psd", "py", "rar", "raw", "rm", "rs", "rst", "rtf", "sh",
+    "skp", "sldprt", "so", "spx", "sql", "step", "stl", "stp", "svgz", "swf", "tar", "tex", "tga",
+    "tgz", "tif", "tiff", "ts", "tsv", "tta", "usd", "usda", "usdc", "usdz", "vmf", "vox", "vrml",
+    "vtk", "wad", "wasm", "webm", "webp", "wma", "wmv", "woff", "woff2", "wrl", "wv", "x3d", "xcf",
+    "xhtml", "xls", "xlsx", "xml", "xyz", "xz", "yaml", "yml", "zip", "zst",
 ];
 
 impl Format {
@@ -153,6 +162,9 @@ mod tests {
             (Format::Page, "x.svg", ".html or .htm fits"),
             (Format::Picture, "x.jpg", ".png fits"),
             (Format::Statistics, "x.txt", ".json fits"),
+            (Format::Page, "x.docx", ".html or .htm fits"),
+            (Format::Sound, "x.MP3", ".wav fits"),
+            (Format::Visible, "x.mp3", ".pvs or .txt fits"),
         ] {
             let error = refused(format, path).unwrap();
             assert!(error.ends_with(fits), "{error}");

@@ -23,16 +23,23 @@ pub fn name_of(path: &Path) -> String {
     }
 }
 
-/// Reads a file, or standard input, of at most as many bytes as a scene may have ([`Limits::max_file_bytes`]).
+/// Reads a world, a portal file or evidence, from a file or standard input, of at most as many bytes as a scene may have
+/// ([`Limits::max_file_bytes`]).
 ///
-/// A GLB says in its head how long it is: of what does not end there, no more than a byte is read.
+/// A GLB says in its head how long it is: of what does not end there, no more than a byte is read. Of what is none of the three, only the
+/// beginning.
 ///
 /// # Errors
 ///
 /// What cannot be read, or is longer; the error names it.
 pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    read_headed(path, |head| glb_length(head).unwrap_or(u64::MAX))
-        .with_context(|| cannot_read(path))
+    let length = |head: &[u8]| {
+        let is_known = head.trim_ascii_start().is_empty()
+            || head.trim_ascii_start().starts_with(b"PRT")
+            || head.starts_with(b"ENFEVID");
+        glb_length(head).unwrap_or(if is_known { u64::MAX } else { BEGINNING })
+    };
+    read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
 }
 
 /// [`read`], of what is nothing but a GLB: of anything else, only the head is read.
@@ -41,17 +48,18 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
 ///
 /// As [`read`]; not for what is no GLB, of which a decoder has more to say.
 pub fn read_glb(path: &Path) -> anyhow::Result<Vec<u8>> {
-    read_headed(path, |head| glb_length(head).unwrap_or(0)).with_context(|| cannot_read(path))
+    let length = |head: &[u8]| glb_length(head).unwrap_or(0);
+    read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
 }
 
-/// [`read`], as text. `what` it is stands in the errors, as in "cannot read settings a.toml".
+/// Reads a short text that somebody wrote. `what` it is stands in the errors, as in "cannot read settings a.toml".
 ///
 /// # Errors
 ///
-/// As [`read`], and what is no UTF-8.
+/// What cannot be read, is no UTF-8, or is longer than 64 MiB; the error names it.
 pub fn read_text(what: &str, path: &Path) -> anyhow::Result<String> {
     let read = || {
-        let bytes = read_headed(path, |_| u64::MAX)?;
+        let bytes = read_headed(path, |_| u64::MAX, MAX_TEXT)?;
         String::from_utf8(bytes).map_err(io::Error::other)
     };
     read().with_context(|| format!("cannot read {what} {}", name_of(path)))
@@ -86,6 +94,10 @@ pub fn import_scene(
 }
 
 const HEAD: u64 = 12;
+/// As much as an error repeats of what is no file of ours.
+const BEGINNING: u64 = 4096;
+/// No settings and no path of cameras are longer. [Units: bytes]
+const MAX_TEXT: u64 = 64 << 20;
 
 /// The length that a GLB says it has.
 fn glb_length(head: &[u8]) -> Option<u64> {
@@ -97,8 +109,7 @@ fn cannot_read(path: &Path) -> String {
     format!("cannot read {}", name_of(path))
 }
 
-fn read_headed(path: &Path, length: impl Fn(&[u8]) -> u64) -> io::Result<Vec<u8>> {
-    let limit = Limits::default().max_file_bytes;
+fn read_headed(path: &Path, length: impl Fn(&[u8]) -> u64, limit: u64) -> io::Result<Vec<u8>> {
     let mut from: Box<dyn Read> = if is_stream(path) {
         Box::new(io::stdin().lock())
     } else {

@@ -4,7 +4,7 @@ mod doors;
 mod objects;
 
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -14,6 +14,7 @@ use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
 use serde::Serialize;
 
 use crate::limits::Limits;
+use crate::screen::{print_json, printed_at_once};
 use enfilade_cli::world::read_world;
 
 /// Shows the cells, portals and statistics of a world.
@@ -34,12 +35,11 @@ pub(crate) struct Inspect {
 pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
     args.limits.begin()?;
     let world = read_world(&args.world)?;
-    let mut out = BufWriter::new(io::stdout().lock());
+    let mut out = printed_at_once();
     if let Some(cell) = &args.objects {
         objects::write(&mut out, &world, cell, args.json)?;
     } else if args.json {
-        serde_json::to_writer(&mut out, &report(&world)).map_err(io::Error::from)?;
-        writeln!(out)?;
+        print_json(&mut out, &report(&world))?;
     } else {
         write_tables(&mut out, &world)?;
     }
@@ -219,9 +219,10 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
             c.portals.len()
         )?;
     }
+    writeln!(out)?;
     writeln!(
         out,
-        "\n{:>12}  {:<8} {:>21} {:>9} {:>9} {:>10} {:>7} {:>10} {:>8} {:>9}  middle in m",
+        "{:>12}  {:<8} {:>21} {:>9} {:>9} {:>10} {:>7} {:>10} {:>8} {:>9}  middle in m",
         "portal",
         "kind",
         "cells",

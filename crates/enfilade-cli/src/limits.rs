@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use enfilade::geom::Allowance;
 
-use crate::output::{WRITING, Warned};
+use crate::output::WRITING;
+use crate::screen::Warned;
 use enfilade_cli::values::{bytes, seconds};
 
 /// Options of all commands that can take long.

@@ -1,6 +1,6 @@
 //! `enfilade locate`: points in, cells out.
 
-use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -9,7 +9,7 @@ use enfilade::geom::DVec3;
 use enfilade::import::{Glob, GlobState};
 
 use crate::limits::Limits;
-use crate::output::print_json;
+use crate::screen::{print_json, printed_at_once};
 use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
 
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     }
     let world = read_world(&args.world)?;
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
-    let output = BufWriter::with_capacity(1 << 16, io::stdout().lock());
+    let output = printed_at_once();
     let locator = &world.graph.locator;
     if args.json {
         let mut cells = Vec::new();
@@ -79,7 +79,7 @@ fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()>
         );
     }
     let cells = world.cells_of_sources(|source| found[source as usize]);
-    let mut output = BufWriter::new(io::stdout().lock());
+    let mut output = printed_at_once();
     if json {
         let cells = cells.into_iter().map(|c| Some(c.0)).collect();
         return print_json(output, &LocateReport { cells });

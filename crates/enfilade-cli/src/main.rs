@@ -24,6 +24,7 @@ mod progress_lines;
 mod pvs;
 mod render;
 mod report;
+mod screen;
 mod see;
 mod simplify;
 mod sound;
@@ -36,7 +37,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use output::{Warned, be_quiet};
+use enfilade::geom::{is_hidden, shown};
+use screen::{Warned, be_quiet, is_broken_pipe};
 
 /// Finds the rooms and doorways of a 3D scene; answers what can be seen from where.
 #[derive(Parser)]
@@ -101,7 +103,11 @@ fn run(cli: Cli) -> anyhow::Result<()> {
 }
 
 fn main() -> ExitCode {
-    match run(Cli::parse()) {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => wrong_usage(&error),
+    };
+    match run(cli) {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of our output has seen enough, as in `enfilade inspect X.glb | head`.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
@@ -112,9 +118,19 @@ fn main() -> ExitCode {
     }
 }
 
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<io::Error>())
-        .any(|e| e.kind() == io::ErrorKind::BrokenPipe)
+/// Ends with what is wrong, or with the help that was asked for. The message repeats arguments, and a shell makes arguments of the names
+/// of files: of those that hold hidden characters, it is told by names that can be shown.
+fn wrong_usage(error: &clap::Error) -> ! {
+    let args = || std::env::args_os().map(|a| a.to_string_lossy().into_owned());
+    if args().any(|a| a.contains(is_hidden)) {
+        let args = args().map(|a| shown(a).to_string());
+        match Cli::try_parse_from(args) {
+            Err(error) => error.exit(),
+            Ok(_) => {
+                let _ = writeln!(Warned, "{}", error.render());
+                std::process::exit(error.exit_code());
+            }
+        }
+    }
+    error.exit()
 }

@@ -1,13 +1,13 @@
 //! `enfilade completions` and `enfilade man`: what shells and manuals know of the commands, from the commands themselves.
 
-use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap_complete::Shell;
 
 use crate::formats::Format;
-use crate::output::{Outputs, make_folder, write_whole};
+use crate::output::{Outputs, make_folder, write_unnamed};
+use crate::screen::pass_on;
 
 /// Prints what a shell needs to complete commands and options.
 #[derive(clap::Args)]
@@ -16,7 +16,7 @@ pub(crate) struct Completions {
     shell: Shell,
 }
 
-/// Writes manual pages, one for each command.
+/// Writes manual pages, one for each command; over earlier ones of its own, and over no other file.
 #[derive(clap::Args)]
 pub(crate) struct Man {
     /// Folder to write `enfilade.1`, `enfilade-bake.1` and so on to; made if it is not there.
@@ -28,10 +28,7 @@ pub(crate) fn completions(args: &Completions, mut command: clap::Command) -> any
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "enfilade", &mut script);
     // By ourselves: the generator ends the program where the reader went away.
-    let mut out = io::stdout().lock();
-    out.write_all(&script)
-        .and_then(|()| out.flush())
-        .context("cannot write to standard output")
+    pass_on(|out| Ok(out.write_all(&script)?)).context("cannot write to standard output")
 }
 
 pub(crate) fn man(args: &Man, command: clap::Command) -> anyhow::Result<()> {
@@ -45,10 +42,18 @@ pub(crate) fn man(args: &Man, command: clap::Command) -> anyhow::Result<()> {
         .map(|page| args.folder.join(page.get_filename()))
         .collect();
     Outputs::default().write_all("DIR", Format::Manual, &paths)?;
-    for (page, path) in pages.iter().zip(&paths) {
+    let texts = pages.iter().map(|page| {
         let mut text = Vec::new();
-        page.render(&mut text)?;
-        write_whole(path, &text)?;
-    }
-    Ok(())
+        page.render(&mut text).map(|()| text)
+    });
+    let texts = texts.collect::<Result<Vec<_>, _>>()?;
+    let files: Vec<(PathBuf, Vec<u8>)> = paths.into_iter().zip(texts).collect();
+    write_unnamed("DIR", &files, is_page)
+}
+
+/// Whether a file is a page of this program's, of any version.
+fn is_page(path: &Path, bytes: &[u8]) -> bool {
+    let title = format!(".TH {} 1", path.file_stem().unwrap_or_default().display());
+    let mut lines = bytes.split(|&b| b == b'\n');
+    lines.any(|line| line.starts_with(title.as_bytes()))
 }

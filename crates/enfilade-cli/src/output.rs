@@ -6,13 +6,13 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, bail};
 use enfilade::whole;
 use enfilade_cli::input::is_stream;
 
 use crate::formats::Format;
+use crate::screen::{Told, is_broken_pipe, pass_on, printed};
 
 /// Held while an output is written.
 pub(crate) static WRITING: Mutex<()> = Mutex::new(());
@@ -29,9 +29,13 @@ pub(crate) fn write_streamed(
 ) -> anyhow::Result<()> {
     let _is_writing = WRITING.lock();
     if is_stream(path) {
-        let mut out = io::stdout().lock();
-        let filled = fill(&mut out).and_then(|()| Ok(out.flush()?));
-        return filled.map_err(|e| explained(e, || "cannot write to standard output".into()));
+        return match pass_on(fill) {
+            // Who prints a table may stop where the reader does; half a file is none.
+            Err(e) if is_broken_pipe(&e) => bail!(
+                "standard output was closed before the whole file was written; what was read of it is cut off"
+            ),
+            done => done.map_err(|e| explained(e, || "cannot write to standard output".to_owned())),
+        };
     }
     let written = whole::write_with(path, fill);
     written.map_err(|e| {
@@ -53,31 +57,18 @@ fn explained(error: anyhow::Error, what: impl FnOnce() -> String) -> anyhow::Err
     }
 }
 
-/// Whether `--quiet` was given: once, before any command runs.
-static IS_QUIET: AtomicBool = AtomicBool::new(false);
-
-/// From now on [`Told`] says nothing.
-pub(crate) fn be_quiet() {
-    IS_QUIET.store(true, Ordering::Relaxed);
-}
-
-/// Whether nothing but errors and warnings is to be said.
-pub(crate) fn is_quiet() -> bool {
-    IS_QUIET.load(Ordering::Relaxed)
-}
-
 /// What was written.
 #[derive(serde::Serialize)]
 pub(crate) struct Written {
-    /// `None` for standard output.
-    file: Option<PathBuf>,
+    /// `None` for standard output. As text: JSON holds no other names.
+    file: Option<String>,
     bytes: usize,
 }
 
 impl Written {
     pub(crate) fn new(path: &Path, bytes: &[u8]) -> Self {
         Self {
-            file: (!is_stream(path)).then(|| path.to_owned()),
+            file: (!is_stream(path)).then(|| path.display().to_string()),
             bytes: bytes.len(),
         }
     }
@@ -88,49 +79,10 @@ impl fmt::Display for Written {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "wrote ")?;
         match &self.file {
-            Some(file) => write!(f, "{}", file.display())?,
+            Some(file) => write!(f, "{file}")?,
             None => write!(f, "to standard output")?,
         }
         write!(f, " ({:.1} MB)", self.bytes as f64 / 1e6)
-    }
-}
-
-/// Prints one object as one line.
-pub(crate) fn print_json(mut out: impl Write, value: &impl serde::Serialize) -> anyhow::Result<()> {
-    serde_json::to_writer(&mut out, value).map_err(io::Error::from)?;
-    writeln!(out)
-        .and_then(|()| out.flush())
-        .context("cannot write to standard output")
-}
-
-/// Standard error, for what is said beside the work; `--quiet` silences it. Where nobody reads it any more, as in
-/// `enfilade bake … 2>&1 | head -2`, the work goes on.
-pub(crate) struct Told;
-
-/// The same for errors, and for warnings: the result is not what was asked for, or probably not what was meant.
-pub(crate) struct Warned;
-
-impl Write for Told {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if is_quiet() {
-            return Ok(bytes.len());
-        }
-        Warned.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Write for Warned {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let _ = io::stderr().write_all(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
     }
 }
 
@@ -158,7 +110,8 @@ impl Outputs {
         let mut is_read = false;
         for path in inputs {
             if !is_stream(path) {
-                out.known.insert(resolved(path), Known::Input(path.clone()));
+                out.known
+                    .insert(whole::followed(path), Known::Input(path.clone()));
             } else if std::mem::replace(&mut is_read, true) {
                 bail!(
                     "standard input can be read once only; give '-' for one input, and files for the others"
@@ -171,7 +124,7 @@ impl Outputs {
     /// Takes down what the inputs turned out to refer to. Refused where one of these is an output.
     pub(crate) fn read(&mut self, references: &[PathBuf]) -> anyhow::Result<()> {
         for path in references {
-            let resolved = resolved(path);
+            let resolved = whole::followed(path);
             if let Some(Known::Output(option)) = self.known.get(&resolved) {
                 bail!(
                     "the scene refers to {}, so that is the input, too; choose another name with {option}",
@@ -215,7 +168,7 @@ impl Outputs {
             if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
                 continue;
             }
-            let resolved = resolved(path);
+            let resolved = whole::followed(path);
             match self.known.get(&resolved) {
                 Some(Known::Input(input)) => bail!(
                     "{} is the input {}; choose another name with {option}",
@@ -243,9 +196,45 @@ impl Outputs {
         if self.streamed.is_some() {
             Box::new(Told)
         } else {
-            Box::new(io::stdout().lock())
+            Box::new(printed())
         }
     }
+}
+
+/// Writes files into the folder that `option` names. Nobody named the files, so none is written over that may be somebody's: what
+/// is there already stays if it is the same, and is refused, before any is written, if it is a link or not an earlier one of ours.
+pub(crate) fn write_unnamed(
+    option: &str,
+    files: &[(PathBuf, Vec<u8>)],
+    is_ours: impl Fn(&Path, &[u8]) -> bool,
+) -> anyhow::Result<()> {
+    let mut changed = Vec::new();
+    for (path, bytes) in files {
+        let refused = match fs::symlink_metadata(path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
+            Ok(meta) if meta.is_file() => {
+                let found =
+                    fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+                if found == *bytes {
+                    continue;
+                }
+                (!is_ours(path, &found))
+                    .then_some("is there, and is another file than would be written")
+            }
+            Ok(meta) if meta.is_symlink() => Some("is a link, and what it leads to would be lost"),
+            _ => Some("is there, and is no file"),
+        };
+        if let Some(why) = refused {
+            bail!(
+                "{} {why}; move it away, or choose another folder with {option}",
+                path.display()
+            );
+        }
+        changed.push((path, bytes));
+    }
+    changed
+        .into_iter()
+        .try_for_each(|(path, bytes)| write_whole(path, bytes))
 }
 
 /// Makes the folder that `option` names, unless it is there.
@@ -269,25 +258,8 @@ pub(crate) fn refuse_stream(option: &str, path: &Path, what: &str) -> anyhow::Re
     Ok(())
 }
 
-/// The file that a path means once links are followed; of one that does not exist, as its folder does.
-fn resolved(path: &Path) -> PathBuf {
-    let by_folder = || {
-        let folder = path.parent()?;
-        let folder = if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        };
-        Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
-    };
-    fs::canonicalize(path)
-        .ok()
-        .or_else(by_folder)
-        .unwrap_or_else(|| path.to_owned())
-}
-
 pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
-    resolved(a) == resolved(b)
+    whole::followed(a) == whole::followed(b)
 }
 
 /// Whether `path` can be written.

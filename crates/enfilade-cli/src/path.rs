@@ -1,6 +1,6 @@
 //! `enfilade path`: how one walks from a point to another.
 
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -9,7 +9,7 @@ use enfilade::geom::DVec3;
 use enfilade::world::{Agent, Layout, NoPath, Path, PathSearch, WalkMap};
 
 use crate::limits::Limits;
-use crate::output::print_json;
+use crate::screen::{print_json, printed_at_once};
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         portals: path.portals.iter().map(|e| e.portal.0).collect(),
         points: path.points.iter().map(DVec3::to_array).collect(),
     };
-    let mut out = BufWriter::new(io::stdout().lock());
+    let mut out = printed_at_once();
     if args.json {
         return print_json(out, &report);
     }

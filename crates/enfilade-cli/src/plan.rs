@@ -8,7 +8,8 @@ use enfilade_report::{Drawing, PAPERS, Paper, PlanOptions, Plans, Storey, to_pdf
 
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::output::{Outputs, Written, print_json, write_whole};
+use crate::output::{Outputs, Written, write_whole};
+use crate::screen::print_json;
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 

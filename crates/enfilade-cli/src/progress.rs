@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar on a terminal, lines now and then in a log.
 
-use std::io::{IsTerminal, Write as _, stderr};
+use std::io::Write as _;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -9,17 +9,17 @@ use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
-use crate::output::{Told, Warned, is_quiet};
 use crate::progress_lines::{Now, Pace, Ticker};
+use crate::screen::{Told, Warned, is_quiet, is_watched};
 
 /// Whether bars are drawn.
 fn is_shown() -> bool {
-    stderr().is_terminal() && !is_quiet()
+    is_watched() && !is_quiet()
 }
 
 /// Writes what is under way into a log now and then, where there is one to write to and no bar.
 fn log(now: impl Fn() -> Option<Now> + Send + 'static) -> Option<Ticker> {
-    let is_logged = !stderr().is_terminal() && !is_quiet();
+    let is_logged = !is_watched() && !is_quiet();
     is_logged.then(|| Ticker::start(Pace::default(), now, Told))
 }
 

@@ -1,7 +1,7 @@
 //! `enfilade pvs`: what can be seen from where, before run-time.
 
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -19,6 +19,7 @@ use crate::formats::Format;
 use crate::limits::watch;
 use crate::output::{Outputs, is_same_file, write_whole};
 use crate::progress::StageBar;
+use crate::screen::{json_text, print_json};
 use enfilade_cli::input::{is_stream, name_of, read};
 use enfilade_cli::values::{bytes, seconds};
 
@@ -165,8 +166,8 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         write_whole(path, evidence)?;
     }
     if let Some(path) = &args.statistics {
-        let text = serde_json::to_vec_pretty(&statistics)?;
-        write_whole(path, &text)?;
+        let text = json_text(&serde_json::to_string_pretty(&statistics)?);
+        write_whole(path, text.as_bytes())?;
     }
     if let Some(path) = &args.mutual {
         let text = statistics::mutual(&vis.cells, input.world.as_ref());
@@ -412,52 +413,49 @@ fn notes(report: &PvsReport, mode: PvsMode) -> Vec<String> {
     ]
 }
 
-fn print(to: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
-    let mut out = BufWriter::new(to);
+fn print(mut out: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::Result<()> {
     if is_json {
-        serde_json::to_writer(&mut out, report).map_err(io::Error::from)?;
-        writeln!(out)?;
-    } else {
-        let r = report;
-        let percent = |n: usize| 100.0 * n as f64 / r.pairs.max(1) as f64;
-        writeln!(out, "{} cells, {} portals", r.cells, r.portals)?;
-        writeln!(
-            out,
-            "{} pairs of cells see each other: {:.2} cells on average, {:.2} %",
-            r.pairs, r.mean_visible, r.mean_visible_percent
-        )?;
-        writeln!(
-            out,
-            "tightness: {:.2} % of them proved by {} lines, {} undecided; {} by sides of planes alone",
-            percent(r.proved_visible),
-            r.lines,
-            r.undecided,
-            r.base_pairs
-        )?;
-        if let (Some(seen), Some(of_cells), Some(n)) =
-            (r.mean_triangles, r.mean_triangles_of_cells, r.triangles)
-        {
-            let share = 100.0 * seen / n.max(1) as f64;
-            writeln!(
-                out,
-                "a cell sees {seen:.0} of {n} triangles on average, {share:.1} %; the cells that it sees hold {of_cells:.0}"
-            )?;
-        }
-        if !r.complete {
-            writeln!(
-                out,
-                "stopped by --budget: the answer is larger than need be"
-            )?;
-        }
-        let worst: Vec<String> = r
-            .worst
-            .iter()
-            .zip(&r.worst_names)
-            .map(|(&c, name)| format!("{name} ({})", r.visible_cells[c]))
-            .collect();
-        writeln!(out, "cells that see most: {}", worst.join(", "))?;
-        writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;
+        return print_json(out, report);
     }
+    let r = report;
+    let percent = |n: usize| 100.0 * n as f64 / r.pairs.max(1) as f64;
+    writeln!(out, "{} cells, {} portals", r.cells, r.portals)?;
+    writeln!(
+        out,
+        "{} pairs of cells see each other: {:.2} cells on average, {:.2} %",
+        r.pairs, r.mean_visible, r.mean_visible_percent
+    )?;
+    writeln!(
+        out,
+        "tightness: {:.2} % of them proved by {} lines, {} undecided; {} by sides of planes alone",
+        percent(r.proved_visible),
+        r.lines,
+        r.undecided,
+        r.base_pairs
+    )?;
+    if let (Some(seen), Some(of_cells), Some(n)) =
+        (r.mean_triangles, r.mean_triangles_of_cells, r.triangles)
+    {
+        let share = 100.0 * seen / n.max(1) as f64;
+        writeln!(
+            out,
+            "a cell sees {seen:.0} of {n} triangles on average, {share:.1} %; the cells that it sees hold {of_cells:.0}"
+        )?;
+    }
+    if !r.complete {
+        writeln!(
+            out,
+            "stopped by --budget: the answer is larger than need be"
+        )?;
+    }
+    let worst: Vec<String> = r
+        .worst
+        .iter()
+        .zip(&r.worst_names)
+        .map(|(&c, name)| format!("{name} ({})", r.visible_cells[c]))
+        .collect();
+    writeln!(out, "cells that see most: {}", worst.join(", "))?;
+    writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;
     out.flush().context("cannot write to standard output")
 }
 

@@ -15,7 +15,8 @@ use serde_json::json;
 
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::output::{Outputs, Warned, print_json, refuse_stream, write_whole};
+use crate::output::{Outputs, refuse_stream, write_whole};
+use crate::screen::{Warned, print_json};
 use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
 use enfilade_cli::input::name_of;
 use enfilade_cli::values::{door, point, size};
@@ -330,7 +331,8 @@ fn numbered(path: &Path, n: usize) -> PathBuf {
 /// What was drawn.
 #[derive(serde::Serialize)]
 struct Drawn {
-    file: PathBuf,
+    /// As text: JSON holds no other names.
+    file: String,
     eye: [f32; 3],
     look: [f32; 3],
     cell: Option<u32>,
@@ -356,7 +358,7 @@ impl Drawn {
         let (triangles, draws) = (list.n_triangles(), list.n_draws());
         let cell = studio.sight.locate(camera.eye);
         Ok(Self {
-            file,
+            file: file.display().to_string(),
             eye: camera.eye,
             look: [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]),
             cell: cell.map(|c| c.0),
@@ -375,7 +377,7 @@ impl fmt::Display for Drawn {
         write!(
             f,
             "{}: --eye {} --look {}, in {}, {} of {} triangles in {} draws, {}",
-            self.file.display(),
+            self.file,
             text(self.eye),
             text(self.look),
             self.cell_name.as_deref().unwrap_or("no cell"),

@@ -1,6 +1,6 @@
 //! `enfilade see`: what one view sees.
 
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -11,6 +11,7 @@ use enfilade::runtime::{Narrowing, SeeOptions, Seen, Sight, SightState, View, Vi
 use serde_json::json;
 
 use crate::limits::Limits;
+use crate::screen::{self, printed_at_once};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
 
@@ -92,7 +93,7 @@ pub(crate) fn run(args: &See) -> anyhow::Result<()> {
     }
     let seen = viewer.see(&sight, &state, &view);
     let eye_cell = sight.locate(args.eye).map(|c| c.0);
-    let mut out = BufWriter::new(io::stdout().lock());
+    let mut out = printed_at_once();
     if args.json {
         print_json(&mut out, &world, &sight, &seen, eye_cell, seconds)?;
     } else {
@@ -154,9 +155,7 @@ fn print_json(
         },
         "seconds": seconds,
     });
-    serde_json::to_writer(&mut *out, &report).map_err(io::Error::from)?;
-    writeln!(out)?;
-    Ok(())
+    screen::print_json(out, &report)
 }
 
 fn print_table(

@@ -13,8 +13,9 @@ use serde::Serialize;
 
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::output::{Outputs, Warned, Written, print_json, write_whole};
+use crate::output::{Outputs, Written, write_whole};
 use crate::pvs::sight_graph;
+use crate::screen::{Warned, print_json, write_lines};
 use enfilade_cli::input::{name_of, read};
 
 /// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
@@ -263,7 +264,7 @@ impl Compared {
     /// Prints what differs; what could not be met is a warning, too.
     fn print(&self, mut out: Box<dyn Write>, is_json: bool, what: [&str; 2]) -> anyhow::Result<()> {
         if let Some(warning) = &self.warning {
-            writeln!(Warned, "{warning}")?;
+            write_lines(&mut Warned, warning)?;
         }
         if is_json {
             return print_json(out, self);

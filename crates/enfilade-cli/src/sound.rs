@@ -15,7 +15,8 @@ use enfilade::world::{
 use crate::auralize::{BLOCK, Block, Renderer, test_sound};
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::output::{Outputs, print_json, write_streamed};
+use crate::output::{Outputs, write_streamed};
+use crate::screen::print_json;
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
@@ -117,11 +118,11 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
             rows
         }
     };
-    let out = BufWriter::new(outputs.printed());
+    let out = outputs.printed();
     if args.json {
         return print_json(
             out,
-            &serde_json::json!({ "file": args.output, "heard": rows }),
+            &serde_json::json!({ "file": args.output.as_ref().map(|p| p.display().to_string()), "heard": rows }),
         );
     }
     print_table(out, &rows)

@@ -1,6 +1,6 @@
 //! `enfilade verify`: does a world keep its promises?
 
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -20,6 +20,7 @@ use crate::limits::Limits;
 use crate::output::{Outputs, make_folder};
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
+use crate::screen::{print_json, printed, printed_at_once, write_lines};
 use enfilade_cli::answers::Answers;
 use enfilade_cli::input::{import_scene, name_of, read};
 use enfilade_cli::values::size;
@@ -134,7 +135,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             verify_pictures(&world, &mut asked).with_context(|| name_of(&args.world))
         })
         .transpose()?;
-    let mut out = BufWriter::new(io::stdout().lock());
+    let mut out = printed_at_once();
     if args.json {
         let mut value = serde_json::to_value(&report)?;
         if let Some(sight) = &sight {
@@ -143,18 +144,17 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         if let Some(exact) = &exact {
             value["exact"] = serde_json::to_value(exact)?;
         }
-        serde_json::to_writer(&mut out, &value).map_err(io::Error::from)?;
-        writeln!(out)?;
+        print_json(out, &value)?;
     } else {
-        write!(out, "{report}")?;
+        write_lines(&mut out, &report)?;
         if let Some(sight) = &sight {
-            write!(out, "{sight}")?;
+            write_lines(&mut out, sight)?;
         }
         if let Some(exact) = &exact {
-            write!(out, "{exact}")?;
+            write_lines(&mut out, exact)?;
         }
+        out.flush().context("cannot write to standard output")?;
     }
-    out.flush().context("cannot write to standard output")?;
     if !report.holds() {
         bail!(
             "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} hidden cells seen, {} problems",
@@ -207,7 +207,7 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     let bytes = read(evidence)?;
     let report = verify_evidence(&graph, &bytes, walls.as_deref())
         .with_context(|| format!("{} is not accepted", name_of(evidence)))?;
-    let mut out = io::stdout().lock();
+    let mut out = printed();
     if args.json {
         let value = serde_json::json!({
             "visible_pairs": report.n_visible,
@@ -219,7 +219,7 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
             "trace_bytes": report.n_trace,
             "clearance": report.clearance,
         });
-        writeln!(out, "{value}")?;
+        print_json(out, &value)?;
     } else {
         let share = 100.0 * report.n_proved as f64 / report.n_visible.max(1) as f64;
         writeln!(

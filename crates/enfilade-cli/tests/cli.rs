@@ -105,6 +105,8 @@ fn inspect_tells_machines_of_suspected_holes() {
 #[test]
 fn the_demo_makes_a_house_and_its_hints_work() {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("demo");
+    // Files of an earlier version are in the way.
+    let _ = fs::remove_dir_all(&dir);
     let done = enfilade(&["demo", "-o", dir.to_str().unwrap()], "");
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
     for name in ["house.glb", "world.glb", "plan.svg"] {
@@ -217,6 +219,7 @@ fn the_command_and_the_worlds_that_it_makes_name_one_version() {
     let version = text(&done.stdout).trim_end();
     assert!(version.starts_with("enfilade 0."), "{version}");
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("version");
+    let _ = fs::remove_dir_all(&dir);
     fs::create_dir_all(&dir).unwrap();
     let dir = dir.to_str().unwrap();
     let done = enfilade(&["demo", "-q", "-o", dir], "");

@@ -64,6 +64,12 @@ fn no_command_writes_over_an_input_or_twice() {
         cases.push(("plan w.glb -o here/w.glb", is_input));
         cases.push(("plan link.glb -o w.glb", is_input));
         cases.push(("pvs w.glb -o a --mutual here/a", twice));
+        // Links to what is not there yet, one of them through another link.
+        std::os::unix::fs::symlink("new", dir.join("to-new")).unwrap();
+        std::os::unix::fs::symlink("here/to-new", dir.join("to-link")).unwrap();
+        cases.push(("pvs w.glb -o a --evidence new --mutual to-new", twice));
+        cases.push(("pvs w.glb -o a --evidence to-link --mutual new", twice));
+        cases.push(("render w.glb -o to-new --record to-link", twice));
     }
     let files = || fs::read_dir(&dir).unwrap().count();
     let n_files = files();
@@ -176,6 +182,16 @@ fn an_extension_that_contradicts_is_refused_before_the_work() {
         ("simplify g.prt --max-cells 1 -o x.glb", ".prt fits"),
         ("plan w.glb -o x.jpg", ".svg or .png or .pdf fits"),
         ("report w.glb --no-pictures -o x.pdf", ".html or .htm fits"),
+        ("report w.glb --no-pictures -o x.mp3", ".html or .htm fits"),
+        (
+            "sound w.glb --listener 2,1,2 --source 3,1,2 -o x.mp3",
+            ".wav fits",
+        ),
+        (
+            "sound w.glb --listener 2,1,2 --source 3,1,2 -o x.ogg",
+            ".wav fits",
+        ),
+        ("pvs w.glb -o x.mp3", ".pvs or .txt fits"),
         ("render w.glb -o x.jpg", ".png fits"),
         ("render w.glb --walk 3 -o x.jpg", ".png fits"),
         (
@@ -225,5 +241,79 @@ fn a_walk_in_a_window_writes_pictures_and_paths_alone() {
         assert_eq!(done.status.code(), Some(1), "{line}: {said}");
         assert!(said.contains(says), "{line}: {said}");
     }
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn files_that_nobody_named_are_not_written_over() {
+    let (dir, _) = folder("unnamed");
+    let run = |line: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+        let done = command.args(line.split(' ')).current_dir(&dir).output();
+        let done = done.unwrap();
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        (done.status.code(), said)
+    };
+    let n_pages = if cfg!(feature = "view") { 19 } else { 18 };
+    for (line, file, n_files) in [
+        ("demo -o d", "house.glb", 3),
+        ("demo -o d", "world.glb", 3),
+        ("demo -o d", "plan.svg", 3),
+        ("man d", "enfilade.1", n_pages),
+        ("man d", "enfilade-sound.1", n_pages),
+    ] {
+        let target = dir.join("d").join(file);
+        let others = || fs::read_dir(dir.join("d")).unwrap().count() - 1;
+        fs::create_dir(dir.join("d")).unwrap();
+        fs::write(&target, "mine").unwrap();
+        let (code, said) = run(line);
+        assert_eq!(code, Some(1), "{line}: {said}");
+        assert!(said.contains(&format!("d/{file} is there")), "{said}");
+        assert!(said.contains("or choose another folder with"), "{said}");
+        assert_eq!(fs::read(&target).unwrap(), b"mine");
+        assert_eq!(others(), 0, "nothing is written before all can be");
+        #[cfg(unix)]
+        {
+            // What a link leads to is not the demo's to write, be it there or not.
+            for other in ["w.glb", "none"] {
+                let before = fs::read(dir.join(other)).ok();
+                fs::remove_file(&target).unwrap();
+                std::os::unix::fs::symlink(dir.join(other), &target).unwrap();
+                let (code, said) = run(line);
+                assert_eq!(code, Some(1), "{line}: {said}");
+                assert!(said.contains(&format!("d/{file} is a link")), "{said}");
+                assert!(fs::read(dir.join(other)).ok() == before, "{line}");
+                assert_eq!(others(), 0);
+            }
+        }
+        fs::remove_file(&target).unwrap();
+        // Twice, and once more over a page of another version.
+        assert_eq!(run(line), run(line));
+        let written = fs::read(&target).unwrap();
+        if line.starts_with("man") {
+            let text = String::from_utf8(written.clone()).unwrap();
+            fs::write(&target, text.replace("NAME", "NAMES")).unwrap();
+            assert_eq!(run(line).0, Some(0));
+            assert!(fs::read(&target).unwrap() == written);
+        }
+        assert_eq!(others() + 1, n_files, "{line}");
+        fs::remove_dir_all(dir.join("d")).unwrap();
+    }
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn two_reports_on_a_world_are_the_same() {
+    let (dir, _) = folder("same");
+    let page = |threads: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+        let command = command.env("RAYON_NUM_THREADS", threads);
+        let line = "report w.glb --no-pictures --views 20 -o -";
+        let done = command.args(line.split(' ')).current_dir(&dir).output();
+        done.unwrap().stdout
+    };
+    let pages = [page("1"), page("1"), page("3")];
+    assert!(pages[0].len() > 10_000);
+    assert!(pages[0] == pages[1] && pages[0] == pages[2]);
     fs::remove_dir_all(&dir).unwrap();
 }

@@ -183,12 +183,19 @@ fn a_stream_is_one_input_and_one_output() {
 #[test]
 fn an_endless_stream_is_no_world_and_takes_no_memory() {
     let dir = folder("endless");
+    fs::write(dir.join("c.toml"), "voxel = 0.2\n").unwrap();
     for line in [
         "inspect - < /dev/zero",
         "plan /dev/zero -o x.svg",
         "verify - < /dev/zero",
+        "pvs - < /dev/zero",
+        "simplify - --max-cells 2 -o x.prt < /dev/zero",
+        "bake - -o x.glb < /dev/zero",
+        "decimate - < /dev/zero",
+        "verify w.glb --source - < /dev/zero",
+        "bake - -o x.glb --config c.toml < /dev/zero",
     ] {
-        let shell = format!("ulimit -v 4194304 && exec \"$0\" {line}");
+        let shell = format!("ulimit -v 2097152 && exec \"$0\" {line}");
         let done = Command::new("sh")
             .args(["-c", &shell, env!("CARGO_BIN_EXE_enfilade")])
             .current_dir(&dir)
@@ -197,6 +204,48 @@ fn an_endless_stream_is_no_world_and_takes_no_memory() {
         assert_eq!(done.status.code(), Some(1), "{line}: {}", said(&done));
         // Its head is enough to tell.
         assert!(!said(&done).contains("cannot read"), "{}", said(&done));
+    }
+    for (line, says) in [
+        ("bake - -o x.glb", "standard input: not a glTF"),
+        ("bake w.glb --config - -o x.glb", "more than 67108864 bytes"),
+    ] {
+        let shell = format!("ulimit -v 2097152 && yes hello | \"$0\" {line}");
+        let done = Command::new("sh")
+            .args(["-c", &shell, env!("CARGO_BIN_EXE_enfilade")])
+            .current_dir(&dir)
+            .output()
+            .unwrap();
+        assert_eq!(done.status.code(), Some(1), "{line}: {}", said(&done));
+        assert!(said(&done).contains(says), "{line}: {}", said(&done));
+    }
+    fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
+fn a_file_cut_short_by_its_reader_is_a_failure_and_a_list_is_none() {
+    let dir = folder("cut");
+    for (line, code) in [
+        ("bake house.glb --voxel 0.2 -o -", 1),
+        ("simplify house-world.glb --max-cells 2 -o -", 1),
+        ("plan house-world.glb -o -", 1),
+        ("completions bash", 0),
+        ("inspect house-world.glb", 0),
+        ("bake house.glb --voxel 0.2 -o house-world.glb", 0),
+    ]
+    .iter()
+    .rev()
+    {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(line.split(' '))
+            .current_dir(&dir)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let done = child.wait_with_output().unwrap();
+        assert_eq!(done.status.code(), Some(*code), "{line}: {}", said(&done));
+        assert_eq!(said(&done).contains("is cut off"), *code == 1, "{line}");
     }
     fs::remove_dir_all(&dir).unwrap();
 }

@@ -9,7 +9,7 @@ use crate::shells::Shells;
 use crate::{ImportError, ImportReport};
 use crate::{crossing, tjunction};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene, TriangleSource};
-use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{DVec3, Triangle, shown, triangle_area_normal};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -137,7 +137,7 @@ impl fmt::Display for CleaningReport {
                 let p = e.position;
                 write!(f, "  {:.3} {:.3} {:.3}", p.x, p.y, p.z)?;
                 if !e.name.is_empty() {
-                    write!(f, " in '{}'", e.name)?;
+                    write!(f, " in '{}'", shown(&e.name))?;
                 }
             }
             writeln!(f)?;

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use enfilade_geom::shown;
+
 /// Why an import stopped. Every text says what was found, where, and what to change.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
     /// A file could not be read.
-    #[error("cannot read {path}: {reason}", path = path.display())]
+    #[error("cannot read {}: {reason}", shown(path.display()))]
     Read {
         /// The file.
         path: PathBuf,
@@ -16,15 +18,15 @@ pub enum ImportError {
     },
     /// The file is of no format that is read here.
     #[error(
-        "{path}: not a glTF, GLB, OBJ, PLY, STL, IFC or Quake map file; convert it to GLB (Blender and most modelers export it)",
-        path = path.display()
+        "{}: not a glTF, GLB, OBJ, PLY, STL, IFC or Quake map file; convert it to GLB (Blender and most modelers export it)",
+        shown(path.display())
     )]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
     /// The file breaks its format.
-    #[error("{path}: {place}: {problem}", path = path.display())]
+    #[error("{}: {}: {}", shown(path.display()), shown(place), shown(problem))]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -34,7 +36,7 @@ pub enum ImportError {
         problem: String,
     },
     /// The file is sound but uses something that is not read here.
-    #[error("{path}: {feature} is not supported; {advice}", path = path.display())]
+    #[error("{}: {} is not supported; {}", shown(path.display()), shown(feature), shown(advice))]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -45,8 +47,8 @@ pub enum ImportError {
     },
     /// A limit of [`crate::Limits`] would be passed.
     #[error(
-        "{path}: {place}: {n} {what}, more than the limit of {limit}; split the input or raise the limit",
-        path = path.display()
+        "{}: {}: {n} {what}, more than the limit of {limit}; split the input or raise the limit",
+        shown(path.display()), shown(place)
     )]
     TooMuch {
         /// The file.
@@ -62,10 +64,10 @@ pub enum ImportError {
     },
     /// The input asks for far more memory than its size explains.
     #[error(
-        "{path}: {place}: asks for {n} bytes of memory, over {limit}, the most for input of this size; \
+        "{}: {}: asks for {n} bytes of memory, over {limit}, the most for input of this size; \
          it is damaged or made to harm, or places large structural meshes very often: split it, or \
          make those detail",
-        path = path.display()
+        shown(path.display()), shown(place)
     )]
     Bomb {
         /// The file.
@@ -78,7 +80,7 @@ pub enum ImportError {
         limit: u64,
     },
     /// No triangle was found in any file.
-    #[error("no triangles in {paths}; {advice}")]
+    #[error("no triangles in {}; {}", shown(paths), shown(advice))]
     NoTriangles {
         /// The files, comma separated.
         paths: String,
@@ -88,8 +90,8 @@ pub enum ImportError {
     /// The scene is far larger or smaller than a building: the unit is probably wrong.
     #[error(
         "{paths}: the scene is {x} x {y} x {z} m, {bound}{offender}; {advice}",
-        x = meters(size[0]), y = meters(size[1]), z = meters(size[2]),
-        offender = offender.as_ref().map(|name| format!(", because object '{name}' sticks out")).unwrap_or_default()
+        paths = shown(paths), x = meters(size[0]), y = meters(size[1]), z = meters(size[2]),
+        offender = offender.as_ref().map(|name| format!(", because object '{}' sticks out", shown(name))).unwrap_or_default()
     )]
     Extent {
         /// The files, comma separated.

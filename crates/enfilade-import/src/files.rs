@@ -7,6 +7,11 @@ use std::path::{Component, Path, PathBuf};
 
 /// Reads a whole regular file of at most `limit` bytes.
 pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
+    read_up_to(open_file(path, limit)?, path, limit)
+}
+
+/// Opens a regular file of at most `limit` bytes.
+pub(crate) fn open_file(path: &Path, limit: u64) -> Result<File, ImportError> {
     let read_error = |reason| ImportError::Read {
         path: path.to_path_buf(),
         reason,
@@ -19,7 +24,31 @@ pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, ImportError>
     if meta.len() > limit {
         return Err(too_large(path, meta.len(), limit));
     }
-    read_up_to(File::open(path).map_err(read_error)?, path, limit)
+    File::open(path).map_err(read_error)
+}
+
+/// Bytes that tell what something is.
+const HEAD: u64 = 1 << 16;
+
+/// Reads all of what has at most `limit` bytes, if its head is worth it: `length` says of that, and whether it is all there is, how many
+/// bytes there can be. Of what has more, one more is read.
+pub(crate) fn read_headed(
+    mut from: impl Read,
+    path: &Path,
+    limit: u64,
+    length: impl Fn(&[u8], bool) -> Result<u64, ImportError>,
+) -> Result<Vec<u8>, ImportError> {
+    let mut bytes = read_up_to(from.by_ref().take(HEAD.min(limit)), path, limit)?;
+    let n = bytes.len() as u64;
+    let most = length(&bytes, n < HEAD)?;
+    if n == HEAD.min(limit) {
+        let rest = most.min(limit).saturating_add(1).saturating_sub(n);
+        bytes.extend(read_up_to(from.take(rest), path, limit)?);
+    }
+    if bytes.len() as u64 > limit {
+        return Err(too_large(path, bytes.len() as u64, limit));
+    }
+    Ok(bytes)
 }
 
 /// Reads all of what has at most `limit` bytes; `path` is its name in messages.

@@ -96,7 +96,13 @@ fn convert(
         return Ok(output);
     }
     let said = tail(&said).unwrap_or_default();
-    Err(format!("made no GLB ({status}): {}", said.trim()))
+    // Lines of its own would be lines of ours.
+    let said: Vec<&str> = said
+        .lines()
+        .map(str::trim)
+        .filter(|l| !l.is_empty())
+        .collect();
+    Err(format!("made no GLB ({status}): {}", said.join(" | ")))
 }
 
 /// Waits for the converter while it keeps within its bounds, and the files that it writes within theirs.

@@ -136,10 +136,15 @@ pub fn import_sources<'a>(
     let mut builder = Builder::new(options)?;
     for source in sources {
         let (path, limit) = (&source.path, options.limits.max_file_bytes);
-        let (bytes, folder) = match source.stream {
-            None => (files::read_file(path, limit)?, path.parent()),
-            Some(stream) => (files::read_up_to(stream, path, limit)?, None),
+        let (from, folder): (Box<dyn Read>, _) = match source.stream {
+            None => (Box::new(files::open_file(path, limit)?), path.parent()),
+            Some(stream) => (stream, None),
         };
+        let length = |head: &[u8], is_all| {
+            let format = format_of(head, path, if is_all { 0 } else { limit })?;
+            Ok(format.length(head, &options.limits))
+        };
+        let bytes = files::read_headed(from, path, limit, length)?;
         builder.begin_file(path, folder, source.is_detail);
         builder.add_read_bytes(bytes.len() as u64);
         read_any(&bytes, path, &mut builder)?;
@@ -148,39 +153,74 @@ pub fn import_sources<'a>(
 }
 
 fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    match format_of(bytes, path, 0)? {
+        Format::Gltf => gltf::read(bytes, builder),
+        Format::Ply => ply::read(bytes, builder),
+        Format::Obj => obj::read(bytes, builder),
+        Format::Map => map::read(bytes, builder),
+        Format::Stl => stl::read(bytes, builder),
+        Format::Ifc => ifc::read(bytes, builder),
+    }
+}
+
+/// What is read here.
+#[derive(Clone, Copy)]
+enum Format {
+    Gltf,
+    Ply,
+    Obj,
+    Map,
+    Stl,
+    Ifc,
+}
+
+impl Format {
+    /// How many bytes the head says that there are, where it does.
+    fn length(self, head: &[u8], limits: &Limits) -> u64 {
+        match self {
+            // One byte more than is allowed tells that it is too much.
+            Self::Gltf => gltf::length(head).unwrap_or(limits.max_json_bytes.saturating_add(1)),
+            Self::Stl => stl::length(head).unwrap_or(u64::MAX),
+            Self::Ply | Self::Obj | Self::Map | Self::Ifc => u64::MAX,
+        }
+    }
+}
+
+/// The format of a file that begins with these bytes and may go on up to so many, or is them.
+fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError> {
     let ending = path
         .extension()
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
     // Content first, where it leaves no doubt; then the name; then a guess.
-    if bytes.starts_with(b"glTF") {
-        gltf::read(bytes, builder)
+    Ok(if bytes.starts_with(b"glTF") {
+        Format::Gltf
     } else if ply::is_ply(bytes) {
-        ply::read(bytes, builder)
+        Format::Ply
     } else if ending == "obj" {
-        obj::read(bytes, builder)
+        Format::Obj
     } else if ending == "map" {
-        map::read(bytes, builder)
+        Format::Map
     } else if ending == "stl" {
-        stl::read(bytes, builder)
+        Format::Stl
     } else if ifc::is_ifc(bytes) {
-        ifc::read(bytes, builder)
+        Format::Ifc
     } else if let Some(error) = foreign::unsupported(bytes, path) {
-        Err(error)
+        return Err(error);
     } else if gltf::is_gltf(bytes) {
-        gltf::read(bytes, builder)
-    } else if stl::is_stl(bytes) {
-        stl::read(bytes, builder)
+        Format::Gltf
+    } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
+        Format::Stl
     } else if map::is_map(bytes) {
-        map::read(bytes, builder)
+        Format::Map
     } else if obj::is_obj(bytes) {
-        obj::read(bytes, builder)
+        Format::Obj
     } else {
-        Err(ImportError::UnknownFormat {
+        return Err(ImportError::UnknownFormat {
             path: path.to_path_buf(),
-        })
-    }
+        });
+    })
 }
 
 /// Reads a glTF or GLB file from memory; it may refer to no other file.

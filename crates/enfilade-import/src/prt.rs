@@ -57,7 +57,7 @@ pub struct PrtFile {
 
 /// Why text is no portal file or no PVS: the line, the word on it, and what is wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}, word {word}: {problem}")]
+#[error("line {line}, word {word}: {}", enfilade_geom::shown(problem))]
 pub struct PrtError {
     /// Line, from 1.
     pub line: usize,

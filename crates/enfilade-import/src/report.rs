@@ -1,6 +1,6 @@
 //! What the importer noticed and did. Nothing is changed without a line here.
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, shown};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -119,7 +119,8 @@ impl ImportReport {
 
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}: {}", self.path.display(), self.place, self.text)?;
+        let (path, place) = (shown(self.path.display()), shown(&self.place));
+        write!(f, "{path}: {place}: {}", shown(&self.text))?;
         if self.n > 1 {
             write!(f, " ({} times)", self.n)?;
         }
@@ -133,7 +134,7 @@ impl fmt::Display for ImportReport {
             writeln!(
                 f,
                 "{}: {}, {} objects, {} triangles",
-                file.path.display(),
+                shown(file.path.display()),
                 file.format,
                 file.n_objects,
                 file.n_triangles

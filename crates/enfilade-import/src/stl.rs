@@ -19,9 +19,14 @@ fn n_facets(bytes: &[u8]) -> Option<u64> {
     Some(u32::from_le_bytes([count[0], count[1], count[2], count[3]]).into())
 }
 
+/// The length that a binary file says it has.
+fn binary_length(bytes: &[u8]) -> Option<u64> {
+    Some(HEADER as u64 + n_facets(bytes)? * FACET as u64)
+}
+
 fn is_binary(bytes: &[u8]) -> bool {
     // Some binary headers start with "solid", so the length decides first.
-    n_facets(bytes).is_some_and(|n| bytes.len() as u64 == HEADER as u64 + n * FACET as u64)
+    binary_length(bytes) == Some(bytes.len() as u64)
 }
 
 fn is_ascii(bytes: &[u8]) -> bool {
@@ -34,6 +39,16 @@ fn is_ascii(bytes: &[u8]) -> bool {
 /// Whether the bytes look like STL.
 pub(crate) fn is_stl(bytes: &[u8]) -> bool {
     is_ascii(bytes) || is_binary(bytes)
+}
+
+/// Whether the bytes may be the beginning of a binary file of at most so many.
+pub(crate) fn may_go_on(head: &[u8], most: u64) -> bool {
+    binary_length(head).is_some_and(|length| length > head.len() as u64 && length <= most)
+}
+
+/// The length that the head says a file has; none of ASCII.
+pub(crate) fn length(head: &[u8]) -> Option<u64> {
+    binary_length(head).filter(|_| !is_ascii(head))
 }
 
 /// Reads one file into the builder.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::DVec2;
+use enfilade_geom::{DVec2, shown};
 
 use crate::drawing::{Class, Drawing, Item, Path, Words, color};
 use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
@@ -219,7 +219,7 @@ impl<'a> Plans<'a> {
             let Some((cell, is_own)) = cell_of(*label) else {
                 continue;
             };
-            let name = shortened(&self.world.graph[cell].name);
+            let name = shown(&shortened(&self.world.graph[cell].name)).to_string();
             let area = if is_own {
                 format!("{:.1} m²", region.area)
             } else {
@@ -461,7 +461,7 @@ impl Sheet {
         for &cell in &self.numbered {
             let name = &world.graph[cell].name;
             if *name != format!("cell-{}", cell.0) {
-                rows.push(format!("{}  {}", cell.0, shortened(name)));
+                rows.push(format!("{}  {}", cell.0, shown(shortened(name))));
             }
         }
         // The usual names hold their numbers.

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use enfilade_cpg::CellId;
-use enfilade_geom::DVec2;
+use enfilade_geom::{DVec2, shown};
 
 use crate::drawing::{CLASSES, Class, Drawing, INK, Item, Path, Rgb, Words};
 
@@ -27,17 +27,15 @@ pub(crate) fn point(p: DVec2) -> String {
     format!("{} {}", number(p.x * SCALE), number(p.y * SCALE))
 }
 
-/// Text safe between tags and in attributes; what XML cannot hold at all is replaced.
+/// Text safe between tags and in attributes: [shown], and so free of what XML cannot hold at all.
 pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in shown(text).to_string().chars() {
         match c {
             '&' => out.push_str("&amp;"),
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            '\t' | '\n' | '\r' => out.push(' '),
-            '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
             c => out.push(c),
         }
     }

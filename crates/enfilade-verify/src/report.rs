@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, shown};
 use serde::Serialize;
 
 use crate::options::VerifyOptions;
@@ -362,7 +362,7 @@ impl VerifyReport {
     /// The name that other commands print for a cell, too.
     fn name(&self, cell: u32) -> String {
         let name = self.names.get(cell as usize);
-        name.map_or_else(|| CellId(cell).to_string(), Clone::clone)
+        name.map_or_else(|| CellId(cell).to_string(), |n| shown(n).to_string())
     }
 
     pub(crate) fn new(
@@ -444,7 +444,7 @@ impl fmt::Display for VerifyReport {
         )?;
         writeln!(f, "outlines, numbers {:>3} problems", self.problems.len())?;
         for problem in &self.problems {
-            writeln!(f, "  {problem}")?;
+            writeln!(f, "  {}", shown(problem))?;
         }
         if !self.unsampled_cells.is_empty() {
             let shown: Vec<String> = self

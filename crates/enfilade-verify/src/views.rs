@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use enfilade_geom::{Bvh, DVec3, Ray, Triangle, shown};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -219,7 +219,7 @@ impl fmt::Display for ViewReport {
                 m.at,
                 m.number,
                 m.view.eye,
-                m.eye_cell_name.as_deref().unwrap_or("no cell"),
+                shown(m.eye_cell_name.as_deref().unwrap_or("no cell")),
                 m.view.toward,
                 m.view.fov_y,
                 m.view.aspect

@@ -5,6 +5,7 @@ use std::{fs, io};
 
 use enfilade_cpg::World;
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+use enfilade_geom::shown;
 
 use crate::whole;
 
@@ -13,7 +14,7 @@ use crate::whole;
 #[non_exhaustive]
 pub enum FileError {
     /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}", shown(path.display()))]
     Read {
         /// The file.
         path: PathBuf,
@@ -21,7 +22,7 @@ pub enum FileError {
         source: io::Error,
     },
     /// The file cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {source}", shown(path.display()))]
     Write {
         /// The file.
         path: PathBuf,
@@ -29,7 +30,7 @@ pub enum FileError {
         source: io::Error,
     },
     /// The file is no world, or the world breaks an invariant.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", shown(path.display()))]
     World {
         /// The file.
         path: PathBuf,

@@ -16,7 +16,7 @@ const MOST_TRIES: usize = 100;
 /// Writes `bytes` to `path`: aside first, then renamed, so that a reader sees the old file or the new one and never half of
 /// one, whatever happens in between.
 ///
-/// Follows symbolic links. What exists and is no regular file (`/dev/stdout`, a named pipe) is written to directly, because
+/// [Follows](followed) symbolic links. What exists and is no regular file (`/dev/stdout`, a named pipe) is written to directly, because
 /// nothing can be renamed over it. Several threads and processes may write to one path: the last one's file is left.
 ///
 /// # Errors
@@ -35,7 +35,7 @@ pub fn write_with<E: From<io::Error>>(
     path: impl AsRef<Path>,
     fill: impl FnOnce(&mut dyn Write) -> Result<(), E>,
 ) -> Result<(), E> {
-    let path = followed(path.as_ref());
+    let path = followed(path);
     if fs::metadata(&path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
         return fill(&mut OpenOptions::new().write(true).open(&path)?);
     }
@@ -56,8 +56,12 @@ pub fn write_with<E: From<io::Error>>(
 ///
 /// Why not: a folder that is missing, is read-only or is `path` itself.
 pub fn try_write(path: impl AsRef<Path>) -> io::Result<()> {
-    let path = followed(path.as_ref());
+    let path = followed(path);
     match fs::metadata(&path) {
+        // What is left of a link is one that leads in a circle.
+        Err(_) if path.is_symlink() => {
+            Err(io::Error::other("it is a link that leads back to itself"))
+        }
         Ok(m) if m.is_dir() => Err(io::Error::other("it is a folder")),
         Ok(m) if !m.is_file() => Ok(()),
         _ => {
@@ -73,7 +77,7 @@ pub fn try_write(path: impl AsRef<Path>) -> io::Result<()> {
 ///
 /// What cannot be removed is passed over: it does no harm but to take room.
 pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
-    let paths: Vec<PathBuf> = paths.iter().map(|p| followed(p.as_ref())).collect();
+    let paths: Vec<PathBuf> = paths.iter().map(followed).collect();
     let Some(entries) = paths.first().and_then(|p| fs::read_dir(folder_of(p)).ok()) else {
         return;
     };
@@ -91,9 +95,32 @@ pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
     }
 }
 
-/// The file that is meant once links are followed.
-fn followed(path: &Path) -> PathBuf {
-    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+/// Links in a row that lead somewhere; systems follow about as many.
+const MOST_LINKS: usize = 40;
+
+/// The file that a path means once links are followed, also of a link to what is not there yet. Links that lead in a circle mean none:
+/// the path itself is returned.
+pub fn followed(path: impl AsRef<Path>) -> PathBuf {
+    let path = path.as_ref();
+    let mut at = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Ok(found) = fs::canonicalize(&at) {
+            return found;
+        }
+        match fs::read_link(&at) {
+            // Relative to where the link lies.
+            Ok(target) => at = folder_of(&at).join(target),
+            // Nothing is there. Its folder may be reached by links, too.
+            Err(_) => {
+                let name = at.file_name().map(OsStr::to_owned);
+                let folder = fs::canonicalize(folder_of(&at)).ok();
+                return folder
+                    .zip(name)
+                    .map_or(at, |(folder, name)| folder.join(name));
+            }
+        }
+    }
+    path.to_owned()
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -228,6 +255,19 @@ mod tests {
         write(&link, b"new").unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&target).unwrap(), b"new");
+        // One to a file that is not there yet, through another; and two that lead to each other.
+        fs::remove_file(&target).unwrap();
+        let other = folder.join("other");
+        std::os::unix::fs::symlink("./link", &other).unwrap();
+        assert_eq!(followed(&other), followed(&target));
+        write(&other, b"made").unwrap();
+        assert!(fs::symlink_metadata(&other).unwrap().is_symlink());
+        assert_eq!(fs::read(&target).unwrap(), b"made");
+        let circle = ["one", "two"].map(|name| folder.join(name));
+        std::os::unix::fs::symlink("two", &circle[0]).unwrap();
+        std::os::unix::fs::symlink("one", &circle[1]).unwrap();
+        assert_eq!(followed(&circle[0]), circle[0]);
+        assert!(try_write(&circle[0]).is_err());
         fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -36,7 +36,7 @@ const BAKE: &[&str] = &[
     "bake two.gltf -o out.glb --method bsp",
 ];
 
-pub(super) const INPUTS: [Input; 20] = [
+pub(super) const INPUTS: [Input; 22] = [
     Input {
         file: "two.obj",
         commands: SCENE,
@@ -54,6 +54,11 @@ pub(super) const INPUTS: [Input; 20] = [
     },
     Input {
         file: "two.ply",
+        commands: BARE,
+        weight: 5,
+    },
+    Input {
+        file: "binary.ply",
         commands: BARE,
         weight: 5,
     },
@@ -87,10 +92,17 @@ pub(super) const INPUTS: [Input; 20] = [
         commands: &[
             "inspect @",
             "inspect @ --json",
+            "inspect @ --objects 0",
             "plan @ -o out.svg",
+            "plan @ -o out.pdf",
+            "plan @ -o out.png --width 300",
             "pvs @ -o out.pvs --mode fast",
             "pvs @ -o out.pvs --into out.glb --statistics out.json --mutual out.txt --evidence out.ev",
+            "pvs @ -o out.pvs --into out.glb --parts --volumes",
             "locate @ < points.txt",
+            "locate @ --object *west*",
+            "path @ --from 1,1,2 --to 7,1,2",
+            "sound @ --listener 1,1.5,2;3,1.5,2 --source 6,1.5,3 -o out.wav",
             "see @ --eye 1,1.5,2 --look 7,1.5,2",
             "simplify @ -o out.glb --max-cells 2",
             "simplify @ -o out.glb --max-cost 40 --split-outdoors",
@@ -98,11 +110,12 @@ pub(super) const INPUTS: [Input; 20] = [
             "edit @ -o out.glb --add-portal 2,-1,-1;2,-1,6;2,4,6;2,4,-1",
             "report @ -o out.html --no-pictures --views 5",
             "verify @ --rays 500 --sight 20",
+            "verify @ --source two.obj --rays 500 --sight 0",
             "verify @ --evidence world.ev",
             "bake @ -o out.glb",
             "decimate @",
         ],
-        weight: 24,
+        weight: 32,
     },
     Input {
         file: "world.glb",
@@ -155,6 +168,11 @@ pub(super) const INPUTS: [Input; 20] = [
         weight: 2,
     },
     Input {
+        file: "tone.wav",
+        commands: &["sound world.glb --listener 1,1.5,2 --source 6,1.5,3 -o out.wav --wav @"],
+        weight: 1,
+    },
+    Input {
         file: "points.txt",
         commands: &["locate world.glb < @"],
         weight: 1,
@@ -174,7 +192,7 @@ pub(super) const INPUTS: [Input; 20] = [
 /// What is made of these by the command itself, in order.
 pub(super) const MADE: [&str; 4] = [
     "bake two.obj -o world.glb --method watershed",
-    "pvs world.glb -o out.pvs --into world.glb --evidence world.ev",
+    "pvs world.glb -o out.pvs --into world.glb --parts --volumes --evidence world.ev",
     "pvs grid.prt -o out.pvs --evidence grid.ev",
     "pvs grid.prt -o out.pvs --checkpoint grid.search --budget 0",
 ];
@@ -191,7 +209,7 @@ pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
     let n = bin.len();
     let inline = with_buffer(json!({"byteLength": n}));
     let outside = with_buffer(json!({"byteLength": n, "uri": "two.bin"}));
-    let files: [(&str, Vec<u8>); 14] = [
+    let files: [(&str, Vec<u8>); 16] = [
         ("two.obj", obj(&boxes).into()),
         (
             "two.mtl",
@@ -203,6 +221,8 @@ pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
         ("two.bin", bin),
         ("picture.png", PICTURE.into()),
         ("two.ply", ply(&boxes).into()),
+        ("binary.ply", binary_ply(&boxes)),
+        ("tone.wav", wav()),
         ("two.stl", stl(&boxes)),
         ("two.map", map(&boxes).into()),
         ("grid.prt", prt().into()),
@@ -304,6 +324,44 @@ fn ply(boxes: &[(&str, Corners)]) -> String {
         let _ = writeln!(text, "3 {} {} {}", 3 * i, 3 * i + 1, 3 * i + 2);
     }
     text
+}
+
+/// With the highest byte of each number first.
+fn binary_ply(boxes: &[(&str, Corners)]) -> Vec<u8> {
+    let all = triangles(boxes);
+    let mut bytes = format!(
+        "ply\nformat binary_big_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty double z\n\
+         property uchar red\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        3 * all.len(),
+        all.len()
+    )
+    .into_bytes();
+    for [x, y, z] in all.as_flattened() {
+        bytes.extend((*x as f32).to_be_bytes());
+        bytes.extend((*y as f32).to_be_bytes());
+        bytes.extend(z.to_be_bytes());
+        bytes.push(200);
+    }
+    for i in (0..3 * all.len() as u32).step_by(3) {
+        bytes.push(3);
+        bytes.extend([i, i + 1, i + 2].into_iter().flat_map(u32::to_be_bytes));
+    }
+    bytes
+}
+
+/// A tenth of a second of a tone, in 16 bits.
+fn wav() -> Vec<u8> {
+    let samples = (0..800).map(|i| (f64::from(i) * 0.3).sin() * 20_000.0);
+    let body: Vec<u8> = samples.flat_map(|s| (s as i16).to_le_bytes()).collect();
+    let mut bytes = b"RIFF".to_vec();
+    bytes.extend((36 + body.len() as u32).to_le_bytes());
+    bytes.extend(b"WAVEfmt \x10\0\0\0\x01\0\x01\0");
+    bytes.extend(8000_u32.to_le_bytes());
+    bytes.extend(16_000_u32.to_le_bytes());
+    bytes.extend(b"\x02\0\x10\0data");
+    bytes.extend((body.len() as u32).to_le_bytes());
+    bytes.extend(body);
+    bytes
 }
 
 fn stl(boxes: &[(&str, Corners)]) -> Vec<u8> {

@@ -6,6 +6,7 @@
 mod budgets;
 mod commands;
 mod gate;
+mod habits;
 mod inputs;
 mod mutate;
 mod mutated;
@@ -41,6 +42,7 @@ const PARTS: &[(&str, Part)] = &[
     ("case", budgets::cases),
     ("commands", commands::run),
     ("gate", gate::run),
+    ("habits", habits::run),
     ("large", budgets::large),
     ("mutated", mutated::run),
     ("nasty", budgets::nasty),

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, DetailObject, World};
 use enfilade_geom::scene::{Material, Primitive};
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, shown};
 
 use super::merge::CostGraph;
 
@@ -36,7 +36,11 @@ impl Default for CostModel {
 
 /// A material that a cost is given for and no surface has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no material of the scene is named '{name}'; there are {known}")]
+#[error(
+    "no material of the scene is named '{}'; there are {}",
+    shown(name),
+    shown(known)
+)]
 pub struct UnknownMaterial {
     /// Its name.
     pub name: String,

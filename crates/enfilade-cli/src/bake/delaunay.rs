@@ -8,6 +8,8 @@ use enfilade::bake::delaunay::{Choices, DelaunayConfig, Weight};
 use enfilade::geom::DVec3;
 use enfilade_cli::input::{name_of, read_text};
 
+use super::values::parse_toml;
+
 #[derive(clap::Args)]
 pub(crate) struct DelaunayOptions {
     /// With the Delaunay builder: how portals are weighed.
@@ -66,7 +68,7 @@ struct ChoicesFile {
 
 fn read_choices(path: &Path) -> anyhow::Result<Choices> {
     let text = read_text("choices", path)?;
-    let file: ChoicesFile = toml::from_str(&text).with_context(|| {
+    let file: ChoicesFile = parse_toml(&text).with_context(|| {
         format!(
             "choices {} are not understood; correct or remove the line",
             name_of(path)

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 use std::io::Write;
 
 use enfilade::geom::scene::{Role, Scene};
+use enfilade::geom::shown;
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
 
-use crate::output::{Told, Warned};
+use crate::screen::{Told, Warned, write_lines};
 
 /// Says what was read; with `verbose`, the roles of the objects and all that was noticed, too.
 pub(super) fn report_import(
@@ -17,8 +18,8 @@ pub(super) fn report_import(
 ) -> anyhow::Result<()> {
     let mut err = Told;
     if verbose {
-        writeln!(err, "{report}")?;
-        write!(err, "{}", roles(scene))?;
+        write_lines(&mut err, report)?;
+        write_lines(&mut err, &roles(scene))?;
     }
     if let Some(doubt) = &report.unit_doubt {
         writeln!(Warned, "{doubt}")?;
@@ -26,15 +27,17 @@ pub(super) fn report_import(
     let title = if let Some(repair) = &report.repair {
         writeln!(
             err,
-            "repaired (leave out --repair to have the model as it was):\n{repair}"
+            "repaired (leave out --repair to have the model as it was):"
         )?;
+        write_lines(&mut err, repair)?;
         "what is left of the model's faults"
     } else {
         "the model as found (nothing was changed)"
     };
     let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
     if cleaning.findings().iter().any(|(_, f)| f.n > 0) {
-        writeln!(err, "{title}:\n{cleaning}")?;
+        writeln!(err, "{title}:")?;
+        write_lines(&mut err, &cleaning)?;
     }
     if let Some(hole) = cleaning.holes.examples.first() {
         let (n, p) = (cleaning.holes.n, hole.position);
@@ -74,7 +77,12 @@ fn roles(scene: &Scene) -> String {
             let reason = if g.is_mixed { &masked } else { g.reason };
             let more = if g.has_more_names { ", …" } else { "" };
             let names = g.names.join(", ");
-            let _ = writeln!(text, "{name:<10} {:>7}  {reason}: {names}{more}", g.n);
+            let _ = writeln!(
+                text,
+                "{name:<10} {:>7}  {}",
+                g.n,
+                shown(format!("{reason}: {names}{more}"))
+            );
         }
         let rest = groups.get(REASONS..).unwrap_or_default();
         if !rest.is_empty() {

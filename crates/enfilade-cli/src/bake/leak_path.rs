@@ -7,8 +7,8 @@ use enfilade::bake::leak::{LeakTrail, NoTrail, find_leak_trail};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::Scene;
 
-use crate::output::{Told, Warned};
 use crate::progress::StageBar;
+use crate::screen::{Told, Warned};
 
 /// A way out that was looked for, or why there is none to show.
 pub(super) struct LeakPath {

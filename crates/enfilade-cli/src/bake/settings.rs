@@ -16,8 +16,8 @@ use enfilade::import::{IfcConverter, ImportOptions, RepairOptions, RoleRules, Up
 use enfilade_cli::input::{name_of, read_text};
 
 use super::values::{
-    Amount, Budget, Hole, Length, Unit, Weld, parse_hole, parse_length, parse_point, parse_unit,
-    parse_weld,
+    Amount, Budget, Hole, Length, Unit, Weld, parse_hole, parse_length, parse_point, parse_toml,
+    parse_unit, parse_weld,
 };
 
 /// How scenes are read: the same for what is baked and what it is compared with.
@@ -221,7 +221,7 @@ struct MergeTable {
 impl ConfigFile {
     fn read(path: &Path) -> anyhow::Result<Self> {
         let text = read_text("settings", path)?;
-        toml::from_str(&text).with_context(|| {
+        parse_toml(&text).with_context(|| {
             format!(
                 "settings {} are not understood; correct or remove the line",
                 name_of(path)
@@ -484,12 +484,7 @@ mod tests {
 
     #[test]
     fn the_settings_file_says_which_line_is_wrong() {
-        let problem = |text: &str| {
-            toml::from_str::<ConfigFile>(text)
-                .err()
-                .unwrap()
-                .to_string()
-        };
+        let problem = |text: &str| parse_toml::<ConfigFile>(text).err().unwrap().to_string();
         let of_line = |text, line: usize, word| {
             let problem = problem(text);
             assert!(problem.contains(&format!("line {line}")), "{problem}");

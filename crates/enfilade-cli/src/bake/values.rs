@@ -4,10 +4,24 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use enfilade::geom::DVec3;
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 
 /// The longest voxel and the widest "narrowest opening": past it no room is left to find.
 const LONGEST: f64 = 10.0;
+
+/// Reads TOML; where it is not understood, the error says so on one line, by line and column.
+pub(super) fn parse_toml<T: DeserializeOwned>(text: &str) -> anyhow::Result<T> {
+    toml::from_str(text).map_err(|error: toml::de::Error| {
+        let before = error.span().and_then(|at| text.get(..at.start));
+        let before = before.unwrap_or_default();
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+        let problem = error.message().replace('\n', ", ");
+        let wrong = text.lines().nth(line - 1).unwrap_or_default().trim();
+        let wrong: String = wrong.chars().take(80).collect();
+        anyhow::anyhow!("line {line}, column {column}, `{wrong}`: {problem}")
+    })
+}
 
 pub(super) fn check_length(value: f64) -> Result<f64, String> {
     if value > 0.0 && value <= LONGEST {

@@ -8,7 +8,7 @@ use enfilade::cpg::{CellId, CellPortalGraph, World};
 use serde::Serialize;
 use serde_json::value::RawValue;
 
-use crate::output::print_json;
+use crate::screen::print_json;
 
 /// What `--json` prints.
 #[derive(Serialize)]

@@ -102,13 +102,13 @@ impl Open {
 
     /// In the window, and on standard error for who comes back to the terminal.
     pub(super) fn say(&mut self, message: String) {
-        let _ = writeln!(crate::output::Told, "enfilade: {message}");
+        let _ = writeln!(crate::screen::Told, "enfilade: {message}");
         self.shown.message = message;
     }
 
     /// The same for what could not be done.
     pub(super) fn warn(&mut self, message: String) {
-        let _ = writeln!(crate::output::Warned, "enfilade: {message}");
+        let _ = writeln!(crate::screen::Warned, "enfilade: {message}");
         self.shown.message = message;
     }
 

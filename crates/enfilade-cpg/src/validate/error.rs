@@ -1,5 +1,7 @@
 //! What can be broken, and the list of what is.
 
+use enfilade_geom::shown;
+
 /// Most problems that one call reports; a world with more is broken in the same way many times.
 pub const MAX_REPORTED: usize = 64;
 
@@ -51,7 +53,7 @@ pub enum GraphError {
     #[error("the leak path must be of two finite points or more, or empty")]
     LeakPath,
     /// What says where something comes from does not hold together.
-    #[error("{owner}: {problem}")]
+    #[error("{}: {}", shown(owner), shown(problem))]
     Source {
         /// Whose source it is.
         owner: String,
@@ -59,7 +61,7 @@ pub enum GraphError {
         problem: String,
     },
     /// What fills an opening is not there or moves by no number.
-    #[error("{owner}: {problem}")]
+    #[error("{}: {}", shown(owner), shown(problem))]
     Fitting {
         /// The portal or detail.
         owner: String,
@@ -222,7 +224,7 @@ pub enum GraphError {
         outdoors: Option<u32>,
     },
     /// A box lies, or reaches, where nothing of the world can be.
-    #[error("{owner}: the box {min:?} to {max:?} reaches out of {of}")]
+    #[error("{}: the box {min:?} to {max:?} reaches out of {of}", shown(owner))]
     FarBox {
         /// Whose box it is, e.g. `cell 3`, `the locator`.
         owner: String,
@@ -242,7 +244,10 @@ pub enum GraphError {
         value: f64,
     },
     /// A list of cells is not ascending, repeats one, or names a cell that does not exist.
-    #[error("{owner}: cells must ascend, none twice, all below {n_cells}; {cell} does not fit")]
+    #[error(
+        "{}: cells must ascend, none twice, all below {n_cells}; {cell} does not fit",
+        shown(owner)
+    )]
     CellList {
         /// Whose list it is, e.g. `batch 3` or `detail 7 (chair)`.
         owner: String,
@@ -252,7 +257,7 @@ pub enum GraphError {
         n_cells: usize,
     },
     /// A list of triangles is broken.
-    #[error("{owner}: {problem}")]
+    #[error("{}: {}", shown(owner), shown(problem))]
     Primitive {
         /// Whose triangles they are, e.g. `batch 3` or `detail mesh 2, primitive 0`.
         owner: String,
@@ -260,7 +265,7 @@ pub enum GraphError {
         problem: String,
     },
     /// A detail object names a mesh that does not exist or has a transform that is none.
-    #[error("detail {detail} ({name}): {problem}")]
+    #[error("detail {detail} ({}): {}", shown(name), shown(problem))]
     Detail {
         /// The detail object.
         detail: u32,
@@ -270,7 +275,7 @@ pub enum GraphError {
         problem: String,
     },
     /// A material, texture or sampler is broken.
-    #[error("{owner}: {problem}")]
+    #[error("{}: {}", shown(owner), shown(problem))]
     Look {
         /// What it is, e.g. `material 3`.
         owner: String,

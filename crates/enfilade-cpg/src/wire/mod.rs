@@ -45,6 +45,7 @@ pub use decode::decode_glb;
 pub use encode::encode_glb;
 
 use crate::GraphError;
+use enfilade_geom::shown;
 
 /// Name of the glTF extension.
 pub const EXTENSION: &str = "ENFILADE_cell_portal_graph";
@@ -79,7 +80,7 @@ pub enum WireError {
         problem: &'static str,
     },
     /// The JSON part cannot be parsed, or a field of ours is missing or of the wrong type.
-    #[error("the file's JSON is damaged: {0}")]
+    #[error("the file's JSON is damaged: {}", shown(.0))]
     Json(String),
     /// A GLB without our extension.
     #[error(
@@ -97,7 +98,7 @@ pub enum WireError {
         found: u64,
     },
     /// A reference or a size within the file does not fit.
-    #[error("the file is damaged: {at}: {problem}")]
+    #[error("the file is damaged: {}: {}", shown(at), shown(problem))]
     Structure {
         /// Where, e.g. `accessor 12` or `portal 3`.
         at: String,

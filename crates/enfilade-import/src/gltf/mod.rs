@@ -59,6 +59,12 @@ pub(crate) fn is_gltf(bytes: &[u8]) -> bool {
             == Some(&b'{')
 }
 
+/// The length that a GLB says it has.
+pub(crate) fn length(head: &[u8]) -> Option<u64> {
+    let length = head.strip_prefix(GLB_MAGIC)?.get(4..8)?;
+    Some(u32::from_le_bytes(length.try_into().ok()?).into())
+}
+
 /// Reads one file into the builder.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     read_renamed(bytes, builder, &|_| None)
