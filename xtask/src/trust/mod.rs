@@ -9,6 +9,7 @@ mod inputs;
 mod mutate;
 mod mutated;
 mod random;
+mod scenes;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -32,7 +33,9 @@ pub(crate) struct TrustOptions {
 
 /// The parts by the first word of their rows: a module and a line here for each.
 const PARTS: &[(&str, Part)] = &[
+    ("bound", budgets::bounds),
     ("case", budgets::cases),
+    ("estimate", budgets::estimates),
     ("gate", gate::run),
     ("large", budgets::large),
     ("mutated", mutated::run),
