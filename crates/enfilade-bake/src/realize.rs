@@ -76,6 +76,7 @@ pub(crate) fn realize(
         candidates: &proposal.candidates,
         outward,
         closed_share: config.merge.closed_share,
+        allowance: context.allowance(),
     };
     let world = world_of(&cut, method, &proposal);
     context.check()?;
@@ -85,13 +86,14 @@ pub(crate) fn realize(
         method,
         resolution: proposal.resolution,
         times: context.times(),
+        work: context.work(),
         leaks,
         notes: proposal.notes,
     })
 }
 
 /// Divides the leaves of the complex among cells.
-fn part(complex: &Complex, proposal: &mut Proposal) -> Partition {
+fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     let Proposal {
         votes,
         voids,

@@ -54,7 +54,7 @@ mod tree;
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, Winding};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Triangle, Winding};
 
 use facet::Visitor;
 use graph::{Clearance, LeafGraph};
@@ -140,10 +140,10 @@ impl Default for LabelSettings {
 }
 
 /// A convex partition of a box, cut by every surface in it.
-pub struct Complex {
+pub struct Complex<'a> {
     set: SurfaceSet,
     tree: Tree,
-    graph: LeafGraph,
+    graph: LeafGraph<'a>,
     tolerance: Tolerance,
     n_triangles: usize,
     /// Those after them stand for triangles that are missing.
@@ -158,13 +158,17 @@ pub struct Complex {
 /// Time `O(n log n)` for `n` surfaces spread out in space; uses rayon's current pool, and the
 /// result is the same for any number of threads.
 #[must_use]
-pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
-    build_complex_within(input, &Allowance::default())
+pub fn build_complex(input: &ComplexInput<'_>) -> Complex<'static> {
+    build_complex_of(input, Purse::endless())
 }
 
-/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used.
+/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used, nor what is made of it.
 #[must_use]
-pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> Complex {
+pub fn build_complex_within<'a>(input: &ComplexInput<'_>, allowance: &'a Allowance) -> Complex<'a> {
+    build_complex_of(input, allowance.into())
+}
+
+fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'a> {
     let mut surfaces: Vec<Surface> =
         Vec::with_capacity(input.triangles.len() + input.candidates.len() + input.missing.len());
     let mut add = |source, points: &[DVec3]| {
@@ -201,23 +205,23 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
         bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     }
     let tolerance = Tolerance::for_extent(bounds.extent());
-    let set = surface::gather(surfaces, &bounds, &tolerance);
+    let set = surface::gather(surfaces, &bounds, &tolerance, purse);
     let visitor = |tree| Visitor {
         tree,
         surfaces: &set.surfaces,
         tolerance,
-        allowance: Some(allowance),
+        purse,
     };
-    let tree = tree::build(&set, bounds, &tolerance, allowance);
+    let tree = tree::build(&set, bounds, &tolerance, purse);
     let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap);
     let bvh = Bvh::build(input.triangles);
     let hole = input.gap;
     let clearance = Clearance {
         bvh: &bvh,
         hole,
-        allowance: Some(allowance),
+        purse,
     };
-    let graph = LeafGraph::of(&visitor(&tree), &clearance);
+    let graph = LeafGraph::of(&visitor(&tree), &clearance, purse);
     Complex {
         set,
         tree,
@@ -230,7 +234,7 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
     }
 }
 
-impl Complex {
+impl Complex<'_> {
     /// The box that the leaves fill.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
@@ -253,7 +257,7 @@ impl Complex {
         Clearance {
             bvh: &self.bvh,
             hole: self.graph.hole,
-            allowance: None,
+            purse: self.graph.purse,
         }
     }
 

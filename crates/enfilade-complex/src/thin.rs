@@ -20,7 +20,7 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, DVec3, Plane};
+use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 
 use super::facet::{CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::surface::Tolerance;
@@ -65,6 +65,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
         edges: &edges,
         gap,
         tolerance: visitor.tolerance,
+        purse: visitor.purse,
         planes: tree.planes.clone(),
         nodes: Vec::with_capacity(tree.nodes.len()),
         on_plane: Vec::with_capacity(tree.on_plane.len()),
@@ -169,6 +170,7 @@ struct LeafCutter<'a> {
     /// Leaves are cut where they are thinner. [Units: wu]
     gap: f64,
     tolerance: Tolerance,
+    purse: Purse<'a>,
     planes: Vec<Plane>,
     nodes: Vec<Node>,
     on_plane: Vec<u32>,
@@ -255,7 +257,7 @@ impl LeafCutter<'_> {
 
     /// Splits a leaf by the planes of strips, each only where it lies.
     fn split(&mut self, mut strips: Vec<Strip>) -> i32 {
-        if strips.is_empty() {
+        if strips.is_empty() || !self.purse.spend(2 * strips.len() as u64) {
             self.n_leaves += 1;
             return -(self.n_leaves as i32);
         }

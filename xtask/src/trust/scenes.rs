@@ -108,6 +108,12 @@ fn more(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
         });
         all.push((name, obj(&boxes.collect::<Vec<_>>())));
     }
+    built(random, all);
+    thin(random, all);
+}
+
+/// Shapes that are built like rooms, but for their sizes.
+fn built(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     for (name, n) in [("balls 12", 12), ("balls 3", 3)] {
         let balls = (0..n).flat_map(|_| ball(random.point(6.0), 1.0 + 2.0 * random.next(), 12));
         all.push((name, obj(&balls.collect::<Vec<_>>())));
@@ -142,6 +148,10 @@ fn more(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
         }));
         all.push((name, obj(&hall)));
     }
+}
+
+/// Sheets, needles and slits.
+fn thin(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     let comb = (0..400).flat_map(|i| {
         let x = 0.05 * f64::from(i);
         quad([[x, 0.0, 0.0], [x, 3.0, 0.0], [x, 3.0, 5.0], [x, 0.0, 5.0]])
