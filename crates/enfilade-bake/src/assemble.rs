@@ -14,7 +14,7 @@ use enfilade_cpg::{
     Provenance, SourceRuns, Statistics, World,
 };
 use enfilade_geom::scene::{Mesh, Primitive, Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
+use enfilade_geom::{Aabb, Allowance, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
 use rayon::prelude::*;
 
 use crate::complex::{Partition, PartitionPortal};
@@ -33,6 +33,8 @@ pub(crate) struct Cut<'a> {
     pub(crate) outward: f64,
     /// Share of an opening that a leaf or pane must fill to make a door of it.
     pub(crate) closed_share: f64,
+    /// What handing out spends from.
+    pub(crate) allowance: &'a Allowance,
 }
 
 /// A portal and its classification.
@@ -66,7 +68,8 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
             }
         })
         .collect();
-    let judged = partition.portals.par_iter().map(|p| {
+    let in_turn = partition.portals.par_iter();
+    let judged = in_turn.filter(cut.allowance.each(WORK_A_PORTAL)).map(|p| {
         let (kind, is_on_floor) = kind_of(cut, p);
         Judged {
             portal: p.clone(),
@@ -85,7 +88,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     }
     let mut batches = batches(cut, &mut cells);
     batches.extend(seals::batches(cut));
-    let (details, detail_meshes) = details(scene, &partition.locator, &mut cells);
+    let (details, detail_meshes) = details(scene, &partition.locator, &mut cells, cut.allowance);
     let mut world = World {
         graph: CellPortalGraph {
             cells,
@@ -106,7 +109,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         about: scene.about.clone(),
         pvs: None,
     };
-    fittings::fit(&mut world, cut.bvh);
+    fittings::fit(&mut world, cut.bvh, cut.allowance);
     world
 }
 
@@ -266,6 +269,10 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
     }
 }
 
+/// What it costs to judge a portal and to find the cells of a triangle, in units of [`Allowance`].
+const WORK_A_PORTAL: u64 = 50;
+const WORK_A_TRIANGLE: u64 = 10;
+
 /// Parapets higher than this make a window of an opening. [Units: wu]
 const PARAPET: f64 = 0.4;
 
@@ -390,13 +397,18 @@ fn turned(n: [f32; 3], by: impl Fn(DVec3) -> DVec3) -> [f32; 3] {
     by(v).try_normalize().map_or(n, |v| v.as_vec3().to_array())
 }
 
-fn details(scene: &Scene, locator: &Locator, cells: &mut [Cell]) -> (Vec<DetailObject>, Vec<Mesh>) {
+fn details(
+    scene: &Scene,
+    locator: &Locator,
+    cells: &mut [Cell],
+    allowance: &Allowance,
+) -> (Vec<DetailObject>, Vec<Mesh>) {
     let ids: Vec<usize> = (0..scene.objects.len())
         .filter(|&i| scene.objects[i].role == Role::Detail)
         .collect();
     let touched: Vec<Vec<CellId>> = ids
         .par_iter()
-        .map(|&i| cells_of_object(scene, i, locator))
+        .map(|&i| cells_of_object(scene, i, locator, allowance))
         .collect();
     let mut meshes = Vec::new();
     let mut new_index: HashMap<u32, u32> = HashMap::new();
@@ -426,11 +438,17 @@ fn details(scene: &Scene, locator: &Locator, cells: &mut [Cell]) -> (Vec<DetailO
 
 /// The cells that an object's triangles touch; when all of it is buried in solid matter (a door
 /// frame in its wall), the cells around it.
-fn cells_of_object(scene: &Scene, object: usize, locator: &Locator) -> Vec<CellId> {
+fn cells_of_object(
+    scene: &Scene,
+    object: usize,
+    locator: &Locator,
+    allowance: &Allowance,
+) -> Vec<CellId> {
     let o = &scene.objects[object];
     let mut cells = Vec::new();
     for p in &scene.meshes[o.mesh as usize].primitives {
-        for t in p.indices.chunks_exact(3) {
+        let triangles = p.indices.chunks_exact(3);
+        for t in triangles.filter(allowance.each(WORK_A_TRIANGLE)) {
             let corners = [0, 1, 2].map(|i| {
                 let [x, y, z] = p.positions[t[i] as usize];
                 o.transform

@@ -60,7 +60,7 @@ fn bake_by(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin_method(method, reason)?;
-    let structure = method.structure_of(scene)?;
+    let structure = method.structure_of(scene, context.allowance())?;
     let proposal = match method {
         Method::Bsp => bsp::propose(&structure, config, context)?,
         Method::Delaunay => delaunay::propose(&structure, config, context)?,

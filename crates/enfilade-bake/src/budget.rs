@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use enfilade_geom::Allowance;
 use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Allowance, MemoryProbe};
 
 /// What a bake may take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,21 +12,26 @@ pub struct Budget {
     /// given, 8 GiB, and less for few triangles: those of 2,000 get no more voxels or points than fit 1 GiB. [Units: bytes]
     pub memory: Option<u64>,
     /// Time, after which a bake is refused. Without it, a bake ends where its work is out of all proportion to its
-    /// triangles and voxels, which depends on no clock: what a minute does for 2,000 triangles, and seven times or more what
+    /// triangles and voxels, which depends on no clock: what a minute does for 2,000 triangles, and four times or more what
     /// ordinary scenes take.
     pub time: Option<Duration>,
+    /// When that time began; with the bake if not given.
+    pub began: Option<Instant>,
+    /// Work, in units of about 100 ns: where a bake ends then depends on no clock. If neither this nor a time is given, it is
+    /// what the triangles and voxels are worth.
+    pub work: Option<u64>,
 }
 
 /// Memory that a bake may take if nothing is said. [Units: bytes]
 const MEMORY: u64 = 8 << 30;
 
-/// Work that any scene is worth, and each triangle of it more, in units of [`Allowance`]. Of real scenes the one that takes most
-/// of it, an office of 4,000 triangles by tetrahedra, takes a seventh; by the watershed none takes more than that.
+/// Work that any scene is worth, and each triangle of it more, in units of [`Allowance`]. Of real scenes those that take most
+/// of it, a house by tetrahedra and a vessel by the partition, take a quarter; by the watershed none takes more than a tenth.
 const WORK: u64 = 80_000_000;
 const WORK_A_TRIANGLE: u64 = 200_000;
 
 /// Work that each voxel is worth besides.
-pub(crate) const WORK_A_VOXEL: u64 = 5;
+const WORK_A_VOXEL: u64 = 5;
 
 /// Voxels that any scene is worth, and each triangle of it more: a few triangles far apart are not worth gigabytes.
 const VOXELS: f64 = 120e6;
@@ -38,13 +43,27 @@ const POINT_BYTES: u64 = 800_000_000;
 const POINT_BYTES_A_TRIANGLE: u64 = 100_000;
 
 impl Budget {
-    /// What a bake of so many triangles that begins now may spend.
-    pub(crate) fn allowance(&self, n_triangles: usize) -> Allowance {
-        match self.time {
-            None => Allowance::new(WORK + WORK_A_TRIANGLE * n_triangles as u64, None),
-            // What is too long to be counted is no bound.
-            Some(time) => Allowance::new(u64::MAX, Instant::now().checked_add(time)),
+    /// What a bake of so many triangles may spend. Memory is watched where there is a probe.
+    #[must_use]
+    pub fn allowance(&self, n_triangles: usize, probe: Option<MemoryProbe>) -> Allowance {
+        let work = match (self.work, self.time) {
+            (Some(work), _) => work,
+            (None, Some(_)) => u64::MAX,
+            (None, None) => WORK + WORK_A_TRIANGLE * n_triangles as u64,
+        };
+        // What is too long to be counted is no bound.
+        let began = self.began.unwrap_or_else(Instant::now);
+        let until = self.time.and_then(|t| began.checked_add(t));
+        let allowance = Allowance::new(work, until);
+        match (self.memory, probe) {
+            (Some(bytes), Some(probe)) => allowance.holding(bytes, probe),
+            _ => allowance,
         }
+    }
+
+    /// Work that so many voxels are worth besides.
+    pub(crate) fn work_of_voxels(&self, n_voxels: u64) -> u64 {
+        self.work.map_or(WORK_A_VOXEL * n_voxels, |_| 0)
     }
 
     /// Most voxels of `bytes_each` for so many triangles.
@@ -140,7 +159,7 @@ mod tests {
         assert!(budget.voxels(50_000, 3.0) > 1.6e9);
         assert!(budget.points(50_000, 5000) >= 1_000_000);
         assert!(budget.points(2_000, 5000) * 5000 <= 1 << 30);
-        let small = budget.allowance(2000);
+        let small = budget.allowance(2000, None);
         assert!(!small.spend(u64::MAX / 2) && small.is_over());
     }
 }

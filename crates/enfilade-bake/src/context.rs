@@ -1,13 +1,15 @@
 //! What surrounds a bake: progress, stage times and the wish to stop.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use enfilade_geom::Allowance;
+use enfilade_geom::{Allowance, End, MemoryProbe};
 
-use crate::budget::WORK_A_VOXEL;
 use crate::{BakeError, Budget, Method, Resolution, Stage};
+
+/// Memory of the complex for each structural triangle, more or less. [Units: bytes]
+const BYTES_A_TRIANGLE: f64 = 5e3;
 
 /// Hears of a bake's progress.
 pub trait Progress: Sync {
@@ -28,12 +30,21 @@ impl Progress for Silent {
     fn stage(&self, _stage: Stage) {}
 }
 
+/// What the stages so far took.
+#[derive(Default)]
+struct Stages {
+    times: Vec<(Stage, Duration)>,
+    work: Vec<(Stage, u64)>,
+    /// The stage under way, when it began, and what was spent before.
+    running: Option<(Stage, Instant, u64)>,
+}
+
 /// Carried through a bake. Threads come from the rayon pool that the bake is called in.
 pub struct BakeContext<'a> {
     progress: &'a dyn Progress,
     cancel: Option<&'a AtomicBool>,
-    times: Mutex<Vec<(Stage, Duration)>>,
-    running: Mutex<Option<(Stage, Instant)>>,
+    probe: Option<MemoryProbe>,
+    stages: Mutex<Stages>,
     allowance: Allowance,
     budget: Budget,
     n_triangles: usize,
@@ -53,18 +64,26 @@ impl<'a> BakeContext<'a> {
         Self {
             progress,
             cancel,
-            times: Mutex::default(),
-            running: Mutex::default(),
+            probe: None,
+            stages: Mutex::default(),
             allowance: Allowance::default(),
             budget: Budget::default(),
             n_triangles: 0,
         }
     }
 
+    /// Adds what tells the memory that the process holds: a bake ends then when it holds more than [`Budget::memory`].
+    #[must_use]
+    pub fn measured_by(mut self, probe: MemoryProbe) -> Self {
+        self.probe = Some(probe);
+        self
+    }
+
     /// A context of its own for a bake of so many triangles, within a budget.
     pub(crate) fn within(&self, budget: &Budget, n_triangles: usize) -> Self {
         Self {
-            allowance: budget.allowance(n_triangles),
+            allowance: budget.allowance(n_triangles, self.probe),
+            probe: self.probe,
             budget: *budget,
             n_triangles,
             ..Self::new(self.progress, self.cancel)
@@ -84,18 +103,30 @@ impl<'a> BakeContext<'a> {
         if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Err(BakeError::Cancelled);
         }
-        if !self.allowance.is_over() {
+        let Some(end) = self.allowance.end() else {
             return Ok(());
-        }
-        let running = *self.running.lock().expect("no panic holds it");
-        let stage = running.map_or(Stage::Structure, |(stage, _)| stage);
-        Err(match self.budget.time {
-            Some(time) => BakeError::TimeIsUp { stage, time },
-            None => BakeError::TooMuchWork {
+        };
+        let running = self.stages().running;
+        let stage = running.map_or(Stage::Structure, |(stage, ..)| stage);
+        Err(match end {
+            End::Time => BakeError::TimeIsUp {
+                stage,
+                time: self.budget.time.unwrap_or_default(),
+            },
+            End::Memory => BakeError::TooMuchMemory {
+                stage,
+                memory: self.budget.memory.unwrap_or_default(),
+            },
+            End::Work => BakeError::TooMuchWork {
                 stage,
                 n_triangles: self.n_triangles,
+                spent: self.allowance.spent(),
             },
         })
+    }
+
+    fn stages(&self) -> MutexGuard<'_, Stages> {
+        self.stages.lock().expect("no panic holds it")
     }
 
     /// Begins a method with its first stage.
@@ -108,10 +139,18 @@ impl<'a> BakeContext<'a> {
     pub(crate) fn tell(&self, resolution: Resolution, memory: f64) {
         // Memory bounds the voxels; what is open between them grows with their number, not with that of the triangles.
         if let Resolution::Voxels { dims, .. } = resolution {
-            let n_voxels = dims.iter().map(|&n| n as u64).product::<u64>();
-            self.allowance.grant(WORK_A_VOXEL * n_voxels);
+            self.grant_voxels(dims.iter().map(|&n| n as u64).product());
         }
-        self.progress.resolution(resolution, memory);
+        // What is held by now, the scene above all, stays; leaves of the complex come when the voxels have gone.
+        let held = self.probe.and_then(|probe| probe()).unwrap_or(0) as f64;
+        let of_complex = BYTES_A_TRIANGLE * self.n_triangles as f64;
+        self.progress
+            .resolution(resolution, held + memory.max(of_complex));
+    }
+
+    /// Grants the work that so many voxels are worth.
+    pub(crate) fn grant_voxels(&self, n_voxels: u64) {
+        self.allowance.grant(self.budget.work_of_voxels(n_voxels));
     }
 
     /// Ends the stage under way and begins the next.
@@ -119,22 +158,27 @@ impl<'a> BakeContext<'a> {
         self.check()?;
         self.end_stage();
         self.progress.stage(stage);
-        *self.running.lock().expect("no panic holds it") = Some((stage, Instant::now()));
+        self.stages().running = Some((stage, Instant::now(), self.allowance.spent()));
         Ok(())
     }
 
     pub(crate) fn end_stage(&self) {
-        if let Some((stage, start)) = self.running.lock().expect("no panic holds it").take() {
-            self.times
-                .lock()
-                .expect("no panic holds it")
-                .push((stage, start.elapsed()));
+        let mut stages = self.stages();
+        if let Some((stage, start, before)) = stages.running.take() {
+            stages.times.push((stage, start.elapsed()));
+            let work = self.allowance.spent().saturating_sub(before);
+            stages.work.push((stage, work));
         }
     }
 
     /// Wall time of each stage so far.
     pub(crate) fn times(&self) -> Vec<(Stage, Duration)> {
-        self.times.lock().expect("no panic holds it").clone()
+        self.stages().times.clone()
+    }
+
+    /// What each stage so far has spent, see [`Allowance`].
+    pub(crate) fn work(&self) -> Vec<(Stage, u64)> {
+        self.stages().work.clone()
     }
 }
 
@@ -145,7 +189,7 @@ mod tests {
     #[test]
     fn a_scene_of_many_voxels_may_do_more() {
         let context = BakeContext::default().within(&Budget::default(), 12);
-        let of_triangles = Budget::default().allowance(12);
+        let of_triangles = Budget::default().allowance(12, None);
         let work = 100_000_000;
         assert!(!of_triangles.spend(work) && of_triangles.is_over());
         let dims = [700, 240, 880];

@@ -75,6 +75,8 @@ pub enum BakeError {
         stage: Stage,
         /// Structural triangles.
         n_triangles: usize,
+        /// What was spent by then, in units of about 100 ns.
+        spent: u64,
     },
     /// The time is up.
     #[error(
@@ -87,6 +89,18 @@ pub enum BakeError {
         stage: Stage,
         /// What was allowed.
         time: Duration,
+    },
+    /// More memory was taken than was allowed.
+    #[error(
+        "the stage '{}' took more memory than the {:.0} MB that are allowed (--max-memory); allow more, mark as detail what \
+         bounds no room, or ask for less with a wider --min-opening or --voxel",
+        .stage.name(), *.memory as f64 / 1e6
+    )]
+    TooMuchMemory {
+        /// The stage that was under way.
+        stage: Stage,
+        /// What was allowed. [Units: bytes]
+        memory: u64,
     },
     /// A cost is given for a material that the scene has not.
     #[error(transparent)]

@@ -97,7 +97,7 @@ const MAX_LEAK: f64 = 1.0;
 /// stairs, say), the border between them would follow whatever planes the cell complex happens to
 /// have: dozens of portals that mean nothing. Such regions are one room.
 pub(crate) fn join_unparted(
-    complex: &Complex,
+    complex: &Complex<'_>,
     cells: &LeafCells,
     votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],

@@ -17,7 +17,8 @@ use crate::voxel::{
     widest_path,
 };
 
-use crate::{BakeConfig, BakeError};
+use crate::budget::n_structural;
+use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// A way from air that should be a room to the outdoors, as wide as can be.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,12 +111,16 @@ pub enum NoTrail {
 /// front. Uses the voxel size of a bake by watershed with the same settings.
 ///
 /// # Errors
-/// When there is nothing to tell: see [`NoTrail`].
+/// When there is nothing to tell, or the budget is spent: see [`NoTrail`].
 pub fn find_leak_trail(
     scene: &Scene,
     config: &BakeConfig,
     from: Option<DVec3>,
+    context: &BakeContext<'_>,
 ) -> Result<LeakTrail, NoTrail> {
+    let context = &context.within(&config.budget, n_structural(scene));
+    context.begin(Stage::WayOut)?;
+    let allowance = context.allowance();
     let (_, mut matter) = structural_triangles(scene);
     if matter.is_empty() {
         return Err(NoTrail::Bake(BakeError::NothingStructural {
@@ -127,26 +132,31 @@ pub fn find_leak_trail(
     // Leaves that stand open, too: a room ends at its doorways.
     matter.extend(plates(scene).concat());
     let matter = frame.triangles_to_grid(&matter);
-    let distances = distance_squared(&voxelize(&grid, &matter));
-    let enclosure = enclosure(grid.dims, &distances);
+    context.grant_voxels(grid.n_voxels() as u64);
+    let distances = distance_squared(&voxelize(&grid, &matter, allowance), allowance);
+    let enclosure = enclosure(grid.dims, &distances, allowance);
+    context.check()?;
     let start = match from {
         Some(point) => {
             let near = free_voxel(&grid, &distances, frame.to_grid(point), point)?;
-            ascend(grid.dims, &distances, &enclosure, near)
+            ascend(grid.dims, &distances, &enclosure, near, allowance)
         }
         None => {
             // A voxel next to a wall is one voxel away from it already.
             let radius = config.merge.min_radius / grid.voxel + 0.5;
             let depth = (radius * radius).ceil() as u16;
-            deepest_enclosed(grid.dims, &distances, &enclosure, depth)
-                .ok_or(NoTrail::NothingEnclosed)?
+            let deepest = deepest_enclosed(grid.dims, &distances, &enclosure, depth, allowance);
+            context.check()?;
+            deepest.ok_or(NoTrail::NothingEnclosed)?
         }
     };
     let scene_point = |i: usize| {
         let [x, y, z] = grid.coords(i);
         frame.to_scene(grid.center(x, y, z))
     };
-    let path = widest_path(grid.dims, &distances, start).ok_or_else(|| NoTrail::Closed {
+    let path = widest_path(grid.dims, &distances, start, allowance);
+    context.check()?;
+    let path = path.ok_or_else(|| NoTrail::Closed {
         from: scene_point(start),
         hole: 2.0 * grid.voxel,
     })?;

@@ -1,5 +1,6 @@
 //! How cells are found, and what chooses.
 
+use enfilade_geom::Allowance;
 use enfilade_geom::scene::Scene;
 
 use crate::structure::{Frame, Stairs, Structure};
@@ -68,7 +69,11 @@ impl Method {
     }
 
     /// The structure of a scene as this method sees it.
-    pub(crate) fn structure_of(self, scene: &Scene) -> Result<Structure<'_>, BakeError> {
+    pub(crate) fn structure_of<'a>(
+        self,
+        scene: &'a Scene,
+        allowance: &'a Allowance,
+    ) -> Result<Structure<'a>, BakeError> {
         let stairs = if self == Self::Bsp && !scene.solids.is_empty() {
             Stairs::AreWalls
         } else {
@@ -76,8 +81,8 @@ impl Method {
         };
         match self {
             // Voxels lie along the walls, however the building is turned.
-            Self::Watershed | Self::Auto => Structure::of(scene, Frame::of, stairs),
-            Self::Bsp | Self::Delaunay => Structure::of(scene, |_| Frame::SCENE, stairs),
+            Self::Watershed | Self::Auto => Structure::of(scene, Frame::of, stairs, allowance),
+            Self::Bsp | Self::Delaunay => Structure::of(scene, |_| Frame::SCENE, stairs, allowance),
         }
     }
 }

@@ -18,6 +18,8 @@ pub struct BakeOutput {
     pub resolution: Resolution,
     /// Wall time of each stage.
     pub times: Vec<(Stage, Duration)>,
+    /// Work that each stage spent from the [`Budget`](crate::Budget), in units of about 100 ns. Depends on no clock.
+    pub work: Vec<(Stage, u64)>,
     /// Where cells meet though no opening was foreseen: cracks and holes of the model.
     pub leaks: Vec<Leak>,
     /// What the builder assumed or decided in doubt, one sentence each.

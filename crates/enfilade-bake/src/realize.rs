@@ -71,6 +71,7 @@ pub(crate) fn realize(
         candidates: &proposal.candidates,
         outward,
         closed_share: config.merge.closed_share,
+        allowance: context.allowance(),
     };
     let world = world_of(&cut, method, &proposal);
     context.check()?;
@@ -80,6 +81,7 @@ pub(crate) fn realize(
         method,
         resolution: proposal.resolution,
         times: context.times(),
+        work: context.work(),
         leaks,
         notes: proposal.notes,
     })
@@ -115,7 +117,7 @@ fn note_of_wide_seals(partition: &Partition, hole: SmallestHole) -> Option<Strin
 }
 
 /// Divides the leaves of the complex among cells.
-fn part(complex: &Complex, proposal: &mut Proposal) -> Partition {
+fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     let Proposal {
         votes,
         voids,

@@ -30,6 +30,8 @@ pub enum Stage {
     Partition,
     /// Geometry to the cells that see it.
     Geometry,
+    /// After a bake or before: the way out of a room that leaks, see [`crate::leak`].
+    WayOut,
 }
 
 impl Stage {
@@ -50,6 +52,7 @@ impl Stage {
             Self::Complex => "cell complex",
             Self::Partition => "cells and portals",
             Self::Geometry => "hand out geometry",
+            Self::WayOut => "way out",
         }
     }
 }

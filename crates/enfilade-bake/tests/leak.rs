@@ -1,7 +1,7 @@
 //! The widest way out of buildings with a hole, and that it goes through the hole.
 
-use enfilade_bake::BakeConfig;
 use enfilade_bake::leak::{LeakTrail, NoTrail, find_leak_trail};
+use enfilade_bake::{BakeConfig, BakeContext};
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 use enfilade_testkit::solid::{MeshBuilder, aabb};
@@ -34,7 +34,7 @@ fn west_wall() -> Aabb {
 }
 
 fn trail(scene: &Scene, from: Option<DVec3>) -> LeakTrail {
-    let found = find_leak_trail(scene, &BakeConfig::default(), from);
+    let found = find_leak_trail(scene, &BakeConfig::default(), from, &BakeContext::default());
     let trail = found.unwrap_or_else(|e| panic!("{e}"));
     assert!(trail.points.contains(&trail.narrowest) && trail.points.contains(&trail.exit));
     let structure: Vec<Triangle> = scene
@@ -132,7 +132,8 @@ fn panes_and_leaves_close_a_house_and_a_missing_pane_opens_it() {
         .unwrap();
     let inside = rooms[living].sample_points[0];
     let config = BakeConfig::default();
-    let closed = find_leak_trail(&g.scene, &config, Some(inside)).unwrap_err();
+    let closed =
+        find_leak_trail(&g.scene, &config, Some(inside), &BakeContext::default()).unwrap_err();
     assert!(matches!(closed, NoTrail::Closed { .. }), "{closed}");
     let window = g
         .truth
@@ -177,7 +178,13 @@ fn where_there_is_nothing_to_tell_it_is_said_why() {
     let config = BakeConfig::default();
     let scene = two_rooms(west_wall()).scene;
     let answer = |scene: &Scene, from: Option<[f64; 3]>| {
-        find_leak_trail(scene, &config, from.map(DVec3::from_array)).unwrap_err()
+        find_leak_trail(
+            scene,
+            &config,
+            from.map(DVec3::from_array),
+            &BakeContext::default(),
+        )
+        .unwrap_err()
     };
     let beyond = answer(&scene, Some([100.0, 1.0, 1.0]));
     assert!(matches!(beyond, NoTrail::Outside { .. }), "{beyond}");
@@ -196,7 +203,12 @@ fn where_there_is_nothing_to_tell_it_is_said_why() {
     );
     assert!(matches!(closed, NoTrail::Closed { .. }), "{closed}");
     // Half of the voxels within reach are air, but on both sides of a slab.
-    let near = find_leak_trail(&block, &config, Some(DVec3::new(3.0, 0.31, 3.0)));
+    let near = find_leak_trail(
+        &block,
+        &config,
+        Some(DVec3::new(3.0, 0.31, 3.0)),
+        &BakeContext::default(),
+    );
     assert!(near.is_ok(), "{near:?}");
     let solid = Scene {
         meshes: {

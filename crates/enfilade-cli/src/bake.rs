@@ -11,6 +11,7 @@ mod values;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::time::Instant;
 
 use anyhow::{Context, bail};
 use enfilade::bake::bsp::find_leak;
@@ -27,6 +28,7 @@ use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use enfilade_cli::input::import_scene;
+use enfilade_cli::memory::held_memory;
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
@@ -45,6 +47,7 @@ pub(crate) struct Bake {
 }
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
+    let began = Instant::now();
     let options = &args.options;
     let mut outputs = Outputs::reading(options.inputs(&args.inputs))?;
     outputs.write("-o", Format::World, &args.output)?;
@@ -59,9 +62,11 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     outputs.read(&imported.report.references)?;
     found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
-    let config = &settings.config_for(scene);
+    let mut config = settings.config_for(scene);
+    config.budget.began = Some(began);
+    let config = &config;
     config.costs.cost.check(&scene.materials)?;
-    refuse_leak(scene, options)?;
+    refuse_leak(scene, config, options)?;
     let mut leak_path = match options.leak_path {
         Some(from) => Some(leak_path::look_as_asked(
             scene,
@@ -108,8 +113,16 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
 }
 
 /// Ends the bake of a map whose inside is open to the void, with the way out.
-fn refuse_leak(scene: &Scene, options: &settings::BakeOptions) -> anyhow::Result<()> {
-    let Some(leak) = find_leak(scene) else {
+fn refuse_leak(
+    scene: &Scene,
+    config: &BakeConfig,
+    options: &settings::BakeOptions,
+) -> anyhow::Result<()> {
+    let n_faces = scene.solids.iter().map(|s| s.faces.len()).sum();
+    let allowance = config.budget.allowance(n_faces, Some(held_memory));
+    let leak = find_leak(scene, (&allowance).into());
+    // What was found beyond it is not to be used; the bake ends at once, and says so.
+    let Some(leak) = leak.filter(|_| !allowance.is_over()) else {
         return Ok(());
     };
     let lines: String = leak
@@ -161,7 +174,8 @@ pub(crate) fn bake_scene(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.map_or(0, usize::from))
         .build()?;
-    let baked = pool.install(|| bake(scene, config, &BakeContext::new(&bar, None)))?;
+    let context = BakeContext::new(&bar, None).measured_by(held_memory);
+    let baked = pool.install(|| bake(scene, config, &context))?;
     drop(bar);
     Ok(baked)
 }
@@ -193,8 +207,13 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         write_lines(&mut Warned, note)?;
     }
     if verbose || is_watched() {
-        for (stage, time) in &baked.times {
-            writeln!(err, "{:>20} {:>8.3} s", stage.name(), time.as_secs_f64())?;
+        for ((stage, time), (_, work)) in baked.times.iter().zip(&baked.work) {
+            let (seconds, work) = (time.as_secs_f64(), *work as f64 / 1e6);
+            writeln!(
+                err,
+                "{:>20} {seconds:>8.3} s {work:>8.1} M of work",
+                stage.name()
+            )?;
         }
     }
     if !baked.leaks.is_empty() {

@@ -19,6 +19,7 @@ use crate::formats::Format;
 use crate::output::{Outputs, Written, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json, write_lines};
 use enfilade_cli::input::{import_scene, is_stream};
+use enfilade_cli::memory::held_memory;
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
 #[derive(clap::Args)]
@@ -63,7 +64,8 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     let scene = &imported.scene;
     let config = settings.config_for(scene);
     config.costs.cost.check(&scene.materials)?;
-    let session = Session::begin(scene, &config, &BakeContext::new(&Silent, None))?;
+    let context = BakeContext::new(&Silent, None).measured_by(held_memory);
+    let session = Session::begin(scene, &config, &context)?;
     let n = session.decimation.steps.len();
     if let Some(at) = args.at.filter(|&at| at > n) {
         bail!("--at {at} is past the last step; there are {n}");

@@ -7,5 +7,6 @@ pub mod answers;
 pub mod cameras;
 pub mod doors;
 pub mod input;
+pub mod memory;
 pub mod values;
 pub mod world;

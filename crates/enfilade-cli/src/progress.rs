@@ -155,13 +155,26 @@ impl TimeLeft {
 
     /// Seconds to go, `elapsed` seconds into the stage under way.
     fn left(&self, elapsed: f64) -> f64 {
-        let done: f64 = self.expected[..self.at].iter().sum();
         let rest: f64 = self.expected[self.at..].iter().skip(1).sum();
         let now = self.expected.get(self.at).copied().unwrap_or(0.0);
-        let pace = (self.spent + Self::TRUST) / (done + Self::TRUST);
         // A stage that is late tells about those behind it, too.
-        let pace = pace.max(elapsed / now.max(1e-3) * 0.5);
+        let pace = self.pace().max(elapsed / now.max(1e-3) * 0.5);
         (pace * now - elapsed).max(0.1 * elapsed) + pace * rest
+    }
+
+    /// The time left in words, `elapsed` seconds into the stage under way: none where it has taken longer than it should.
+    fn in_words(&self, elapsed: f64) -> String {
+        let now = self.expected.get(self.at).copied().unwrap_or(0.0);
+        if elapsed > self.pace() * now + Self::TRUST {
+            return "longer than expected".to_owned();
+        }
+        format!("about {} left", clock(self.left(elapsed)))
+    }
+
+    /// How many times as long the stages before took as they should have.
+    fn pace(&self) -> f64 {
+        let done: f64 = self.expected[..self.at].iter().sum();
+        (self.spent + Self::TRUST) / (done + Self::TRUST)
     }
 
     /// The share that is done, from 0 to 1, `elapsed` seconds into the stage under way.
@@ -220,11 +233,11 @@ impl Clock {
         Some(Now {
             stage: stage.to_owned(),
             line: format!(
-                "{}/{} {stage}, {} gone, about {} left",
+                "{}/{} {stage}, {} gone, {}",
                 at + 1,
                 self.stages.len(),
                 clock(self.began.elapsed().as_secs_f64()),
-                clock(self.left.left(self.elapsed()))
+                self.left.in_words(self.elapsed())
             ),
         })
     }
@@ -257,7 +270,7 @@ impl BakeBar {
             }
         };
         // The template is a constant; one that does not parse would be seen at once.
-        if let Ok(style) = ProgressStyle::with_template("{msg:>24} {share} {left} left") {
+        if let Ok(style) = ProgressStyle::with_template("{msg:>24} {share} {left}") {
             let style = style
                 .with_key(
                     "share",
@@ -277,7 +290,7 @@ impl BakeBar {
                 .with_key(
                     "left",
                     read(|c, out| {
-                        let _ = write!(out, "{}", clock(c.left.left(c.elapsed())));
+                        let _ = write!(out, "{}", c.left.in_words(c.elapsed()));
                     }),
                 );
             bar.set_style(style);
@@ -435,6 +448,18 @@ mod tests {
             assert!(left > last && t.share(late) < 1.0, "{late}: {left}");
             last = left;
         }
+    }
+
+    #[test]
+    fn a_stage_that_is_late_gives_no_time_left() {
+        let mut t = of_stages(&[2.0, 1.0, 3.0]);
+        t.begin(1, 2.0);
+        assert_eq!(t.in_words(0.5), "about 0:04 left");
+        assert_eq!(t.in_words(1.6), "longer than expected");
+        // A machine twice as slow is not late so soon.
+        t.begin(1, 4.5);
+        assert!(t.in_words(1.6).ends_with("left"));
+        assert_eq!(t.in_words(10.0), "longer than expected");
     }
 
     #[test]

@@ -33,11 +33,14 @@ const UNIT: f64 = 1e-7;
 const INFINITE: u64 = 1 << 60;
 
 /// Moves the borders between cells that leak into each other.
-pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tally) {
+pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: &Tally) {
     let votes = |leaf: u32, cell: u32| {
         let label = cells.label_of_cell[cell as usize];
         tally.get(&(leaf, label)).copied().unwrap_or(0.0)
     };
+    if !graph.spend_pass() {
+        return;
+    }
     let mut leaks: BTreeMap<[u32; 2], (f64, Vec<u32>)> = BTreeMap::new();
     for (i, f) in graph.facets.iter().enumerate() {
         let [a, b] = f.leaves.map(|l| cells.cell_of_leaf[l as usize]);
@@ -77,7 +80,10 @@ pub(super) fn move_borders(graph: &LeafGraph, cells: &mut LeafCells, tally: &Tal
 /// that they open to most. [Units: wu³]
 ///
 /// Borders that moved can cut a chip off, and a chip has portals all around. O(leaves + facets).
-pub(super) fn absorb_chips(graph: &LeafGraph, cells: &mut LeafCells, min_volume: f64) {
+pub(super) fn absorb_chips(graph: &LeafGraph<'_>, cells: &mut LeafCells, min_volume: f64) {
+    if !graph.spend_pass() {
+        return;
+    }
     let n = cells.cell_of_leaf.len();
     let mut sets = Sets::new(n);
     for f in &graph.facets {
@@ -146,7 +152,7 @@ const SLIVER: f64 = 1e-4;
 /// Gives the leaves of slivers to the cells that they open to most; those that open to none are solid.
 ///
 /// O(leaves + facets), but for chains of slivers.
-pub(super) fn dissolve_slivers(graph: &LeafGraph, cells: &mut LeafCells) {
+pub(super) fn dissolve_slivers(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     let is_sliver: Vec<bool> = (0..)
         .zip(&cells.volumes)
         .map(|(c, &volume)| volume < SLIVER && cells.outside != Some(c))
@@ -167,6 +173,9 @@ pub(super) fn dissolve_slivers(graph: &LeafGraph, cells: &mut LeafCells) {
     }
     loop {
         let n = around.len();
+        if !graph.purse.spend(n as u64) {
+            return;
+        }
         around.retain(|&leaf, facets| {
             let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
             for &(other, area) in facets.iter() {
@@ -203,7 +212,7 @@ struct Adjacency {
 
 impl Adjacency {
     fn of(
-        graph: &LeafGraph,
+        graph: &LeafGraph<'_>,
         cell_of_leaf: &[u32],
         leaks: &BTreeMap<[u32; 2], (f64, Vec<u32>)>,
     ) -> Self {
@@ -247,7 +256,7 @@ const NO_NODE: u32 = u32::MAX;
 
 /// The leaves that change sides, with the cell they go to. `node_of` has no node for any leaf, before and after.
 fn cut(
-    graph: &LeafGraph,
+    graph: &LeafGraph<'_>,
     cell_of_leaf: &[u32],
     adjacency: &Adjacency,
     node_of: &mut [u32],
@@ -278,6 +287,12 @@ fn cut(
             }
         }
         at += 1;
+    }
+    if !graph.purse.spend(5 * leaves.len() as u64) {
+        for &leaf in &leaves {
+            node_of[leaf as usize] = NO_NODE;
+        }
+        return Vec::new();
     }
     let units = |cost: f64| (cost / UNIT).round() as u64;
     let n = leaves.len();
@@ -323,7 +338,7 @@ fn cut(
     for &leaf in &leaves {
         node_of[leaf as usize] = NO_NODE;
     }
-    let (after, is_a) = flow.cut();
+    let (after, is_a) = flow.cut(graph.purse);
     if after >= before {
         return Vec::new();
     }
@@ -340,6 +355,7 @@ fn cut(
 mod tests {
     use super::super::graph::OpenFacet;
     use super::*;
+    use enfilade_geom::Purse;
 
     #[test]
     fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
@@ -359,6 +375,7 @@ mod tests {
             faces: vec![1.0; 5],
             hole: 0.01,
             rounding: 1e-5,
+            purse: Purse::endless(),
         };
         let cells = || LeafCells {
             cell_of_leaf: vec![0, 1, 2, 1, 1],

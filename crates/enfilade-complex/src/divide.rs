@@ -59,7 +59,7 @@ struct LeafOpening {
     at: DVec3,
 }
 
-impl Complex {
+impl Complex<'_> {
     /// Parts what `is_ours` holds of by the cutter's candidates.
     ///
     /// The partition has two cells, [`FRONT`] and [`BACK`]; all else counts as solid. Linear in leaves and openings.
@@ -216,7 +216,7 @@ impl Complex {
             tree: &self.tree,
             surfaces: &self.set.surfaces,
             tolerance: self.tolerance,
-            allowance: None,
+            purse: self.graph.purse,
         };
         let n = self.tree.n_leaves as usize;
         let mut sink = OpeningSink {

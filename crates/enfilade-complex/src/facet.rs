@@ -6,7 +6,7 @@
 //! two cells meet.
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Allowance, DVec3, Plane};
+use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 use smallvec::SmallVec;
 
 use super::surface::{MIN_AREA, Source, Surface, Tolerance, projected};
@@ -84,7 +84,7 @@ pub(super) struct Visitor<'a> {
     pub(super) surfaces: &'a [Surface],
     pub(super) tolerance: Tolerance,
     /// What a visit may cost; facets are left out once that is over.
-    pub(super) allowance: Option<&'a Allowance>,
+    pub(super) purse: Purse<'a>,
 }
 
 /// A node's region: a box, cut by the oblique planes above the node, facing inwards.
@@ -123,7 +123,7 @@ impl Visitor<'_> {
     }
 
     fn visit_node<S: FacetSink + Sync>(&self, child: i32, region: &CutBox, sink: &mut S) {
-        if child < 0 || !sink.wants_subtree(child) || !self.may_spend(1) {
+        if child < 0 || !sink.wants_subtree(child) || !self.purse.spend(1) {
             return;
         }
         let node = self.tree.nodes[child as usize];
@@ -177,10 +177,6 @@ impl Visitor<'_> {
         self.push_down(node.plane, &points, covers, [f, b], sink);
     }
 
-    fn may_spend(&self, work: u64) -> bool {
-        self.allowance.is_none_or(|a| a.spend(work))
-    }
-
     fn section(&self, plane: &Plane, region: &CutBox) -> Option<Poly> {
         let mut points = poly::section_of_box(plane, &region.bounds, self.tolerance.cut)?;
         let eps = self.tolerance.cut;
@@ -198,7 +194,7 @@ impl Visitor<'_> {
         sink: &mut S,
     ) {
         if !sink.wants_pair(children[0], children[1])
-            || !self.may_spend(1 + covers.near.len() as u64)
+            || !self.purse.spend(1 + covers.near.len() as u64)
         {
             return;
         }

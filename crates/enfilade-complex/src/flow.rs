@@ -12,6 +12,8 @@
 
 use std::collections::VecDeque;
 
+use enfilade_geom::Purse;
+
 const NONE: u32 = u32::MAX;
 /// Parent of a node that hangs on its terminal.
 const ROOT: u32 = u32::MAX - 1;
@@ -66,10 +68,11 @@ impl Flow {
     }
 
     /// The cost of the minimum cut, and whether each node is on the source's side of it.
-    pub(super) fn cut(self) -> (u64, Vec<bool>) {
+    /// No minimum once the purse is empty.
+    pub(super) fn cut(self, purse: Purse<'_>) -> (u64, Vec<bool>) {
         let total = self.total;
         let mut search = Search::of(self);
-        let pushed = search.run();
+        let pushed = search.run(purse);
         let sides = search.parent.iter().zip(&search.tree);
         let is_source = sides.map(|(&p, &tree)| p != NONE && tree == Terminal::Source);
         (total.saturating_add(pushed), is_source.collect())
@@ -175,9 +178,12 @@ impl Search {
         }
     }
 
-    fn run(&mut self) -> u64 {
+    fn run(&mut self, purse: Purse<'_>) -> u64 {
         let mut total = 0_u64;
         while let Some(&node) = self.active.front() {
+            if !purse.spend(1) {
+                break;
+            }
             let meeting = if self.parent[node as usize] == NONE {
                 None
             } else {
@@ -192,6 +198,7 @@ impl Search {
             self.time += 1;
             total = total.saturating_add(self.augment(arc));
             while let Some(orphan) = self.orphans.pop_front() {
+                purse.spend(1);
                 self.adopt(orphan);
             }
         }
@@ -387,7 +394,7 @@ mod tests {
             for (v, &(from_source, to_sink)) in ties.iter().enumerate() {
                 flow.tie(v, from_source, to_sink);
             }
-            let (found, side) = flow.cut();
+            let (found, side) = flow.cut(Purse::endless());
             prop_assert_eq!(found, least);
             prop_assert_eq!(cost(&|v| side[v]), least);
             prop_assert!((0..n).all(|v| side[v] == (common >> v & 1 == 1)));

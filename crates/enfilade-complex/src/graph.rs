@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, NearSeries};
+use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Purse};
 
 use smallvec::SmallVec;
 
@@ -50,7 +50,7 @@ impl OpenFacet {
 }
 
 /// What the first visit finds out.
-pub(super) struct LeafGraph {
+pub(super) struct LeafGraph<'a> {
     /// Openings, in the order of the tree.
     pub(super) facets: Vec<OpenFacet>,
     /// Volume of each leaf.
@@ -63,11 +63,13 @@ pub(super) struct LeafGraph {
     pub(super) hole: f64,
     /// Openings narrower than this may be steps between surfaces that were put into planes. [Units: wu]
     pub(super) rounding: f64,
+    /// What those who go through it spend from.
+    pub(super) purse: Purse<'a>,
 }
 
-impl LeafGraph {
+impl<'a> LeafGraph<'a> {
     /// Visits the whole tree.
-    pub(super) fn of(visitor: &Visitor<'_>, clearance: &Clearance<'_>) -> Self {
+    pub(super) fn of(visitor: &Visitor<'_>, clearance: &Clearance<'_>, purse: Purse<'a>) -> Self {
         let tree = visitor.tree;
         let origin = tree.bounds.center();
         let mut sink = LeafSink {
@@ -110,6 +112,7 @@ impl LeafGraph {
             at_border,
             hole: clearance.hole,
             rounding: visitor.tolerance.width,
+            purse,
         };
         for i in 0..graph.facets.len() {
             let mut f = graph.facets[i];
@@ -119,6 +122,12 @@ impl LeafGraph {
             graph.facets[i] = f;
         }
         graph
+    }
+
+    /// Spends what one pass over all leaves and openings costs; says whether to go on.
+    pub(super) fn spend_pass(&self) -> bool {
+        let n = self.volumes.len() + self.facets.len();
+        self.purse.spend(n as u64 / 4)
     }
 
     /// Whether an opening of this width, narrower than `limit`, is at the rim of a leaf thinner than that, or no wider than
@@ -146,7 +155,7 @@ pub(super) struct Clearance<'a> {
     /// Diameter of the smallest hole. [Units: wu]
     pub(super) hole: f64,
     /// What looking may cost.
-    pub(super) allowance: Option<&'a Allowance>,
+    pub(super) purse: Purse<'a>,
 }
 
 impl Clearance<'_> {
@@ -185,9 +194,7 @@ impl Clearance<'_> {
 
     /// Takes what queries cost from what may be spent.
     fn spend(&self, series: &NearSeries) {
-        if let Some(allowance) = self.allowance {
-            allowance.spend(series.n_looked / 4);
-        }
+        self.purse.spend(series.n_looked / 4);
     }
 
     /// Whether an opening lets no ball of so large a diameter pass; by its middle alone where the rest does not count.

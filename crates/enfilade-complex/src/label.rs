@@ -49,9 +49,12 @@ struct Group {
     leak: f64,
 }
 
+/// What it costs to locate a vote and to count it, in units of [`enfilade_geom::Allowance`].
+const WORK_A_VOTE: u64 = 2;
+
 /// Divides the leaves among cells. `leaf_of` locates votes.
 pub(super) fn label_leaves(
-    graph: &LeafGraph,
+    graph: &LeafGraph<'_>,
     votes: &[Vote],
     settings: &LabelSettings,
     has_seals: bool,
@@ -60,6 +63,10 @@ pub(super) fn label_leaves(
     let n_leaves = graph.volumes.len();
     let mut tally = Tally::new();
     // Located in parallel, counted in order, so that sums round alike on any number of threads.
+    let leaf_of = |v: &Vote| {
+        let may_look = graph.purse.spend(WORK_A_VOTE);
+        may_look.then(|| leaf_of(v)).flatten()
+    };
     let leaves: Vec<Option<u32>> = votes.par_iter().with_min_len(1024).map(leaf_of).collect();
     for (vote, leaf) in votes.iter().zip(leaves) {
         if let Some(leaf) = leaf
@@ -127,7 +134,7 @@ pub(super) fn label_leaves(
 }
 
 /// Gives leaves at the border that came to other cells back to the outside.
-fn keep_border_outside(graph: &LeafGraph, cells: &mut LeafCells) {
+fn keep_border_outside(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     let Some(outside) = cells.outside else { return };
     for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
         let cell = std::mem::replace(&mut cells.cell_of_leaf[leaf], outside);
@@ -142,7 +149,8 @@ fn keep_border_outside(graph: &LeafGraph, cells: &mut LeafCells) {
 
 /// The component of each leaf: what hangs together other than through candidates, gaps and, where `parts_cracks` says so of
 /// a leaf, cracks.
-fn components(graph: &LeafGraph, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
+fn components(graph: &LeafGraph<'_>, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
+    graph.spend_pass();
     let n_leaves = graph.volumes.len() as u32;
     let mut sets = Sets::new(n_leaves as usize);
     for f in &graph.facets {
@@ -156,7 +164,7 @@ fn components(graph: &LeafGraph, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32>
 
 /// The labels that stand for a region in each component; components without any are left out.
 fn strong_labels(
-    graph: &LeafGraph,
+    graph: &LeafGraph<'_>,
     tally: &Tally,
     component_of: &[u32],
     settings: &LabelSettings,
@@ -188,12 +196,13 @@ fn strong_labels(
 
 /// Kruskal's forest over the openings of leaked components, two labels never in one tree.
 fn grow_together(
-    graph: &LeafGraph,
+    graph: &LeafGraph<'_>,
     sets: &mut Sets,
     label_of_set: &mut [u32],
     component_of: &[u32],
     leaked: impl Fn(u32) -> bool,
 ) {
+    graph.spend_pass();
     let mut order: Vec<u32> = (0..graph.facets.len() as u32)
         .filter(|&i| {
             let f = &graph.facets[i as usize];
@@ -218,7 +227,7 @@ fn grow_together(
 
 /// Joins parts of one region that only a candidate parts: a candidate reaches beyond its opening, and two
 /// candidates of one opening have a slice of a room between them.
-fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
+fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [u32]) {
     for f in &graph.facets {
         let [a, b] = f.leaves.map(|l| sets.find(l));
         let label = label_of_set[a as usize];
@@ -229,7 +238,8 @@ fn rejoin(graph: &LeafGraph, sets: &mut Sets, label_of_set: &mut [u32]) {
 }
 
 /// The sets that have a label, or an opening to another set that is no gap: by their least leaves.
-fn open_sets(graph: &LeafGraph, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
+fn open_sets(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
+    graph.spend_pass();
     let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != SOLID).collect();
     for f in graph.facets.iter().filter(|f| !f.is_gap) {
         let [a, b] = f.leaves.map(|l| sets.find(l));
@@ -241,9 +251,15 @@ fn open_sets(graph: &LeafGraph, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bo
     is_open
 }
 
+/// Spends what it costs to merge two groups; says whether to go on.
+fn may_merge(graph: &LeafGraph<'_>, a: &Group, b: &Group) -> bool {
+    let n_neighbors = a.neighbors.len() + b.neighbors.len();
+    graph.purse.spend(2 + n_neighbors as u64)
+}
+
 /// Lets groups without a label, and small doubles of a label, join their neighbors.
 fn merge_groups(
-    graph: &LeafGraph,
+    graph: &LeafGraph<'_>,
     sets: &mut Sets,
     label_of_set: &[u32],
     settings: &LabelSettings,
@@ -321,6 +337,9 @@ fn merge_groups(
         let (Some(merged), Some(mut host)) = (groups.remove(&id), groups.remove(&to)) else {
             continue;
         };
+        if !may_merge(graph, &merged, &host) {
+            break;
+        }
         host.root = sets.join(merged.root, host.root);
         host.volume += merged.volume;
         host.label = host.label.or(merged.label);
@@ -346,11 +365,12 @@ fn merge_groups(
 /// Kruskal's forest over the gaps, largest first, never two in one tree that are cells or matter: little is left to be
 /// sealed. `O(F log F)` in gaps.
 fn give_away_crumbs(
-    graph: &LeafGraph,
+    graph: &LeafGraph<'_>,
     sets: &mut Sets,
     groups: BTreeMap<u32, Group>,
     has_seals: bool,
 ) -> BTreeMap<u32, Group> {
+    graph.spend_pass();
     let n = graph.volumes.len();
     let mut stays = vec![false; n];
     for (&id, _) in groups.iter().filter(|g| g.1.keeps) {
@@ -389,7 +409,11 @@ fn give_away_crumbs(
 }
 
 /// Numbers the groups that are cells by label, then by falling volume; the rest is solid.
-fn number_cells(graph: &LeafGraph, sets: &mut Sets, groups: &BTreeMap<u32, Group>) -> LeafCells {
+fn number_cells(
+    graph: &LeafGraph<'_>,
+    sets: &mut Sets,
+    groups: &BTreeMap<u32, Group>,
+) -> LeafCells {
     let mut cells: Vec<(&u32, &Group)> = groups.iter().filter(|(_, g)| g.keeps).collect();
     cells.sort_by(|a, b| {
         a.1.label
@@ -442,6 +466,7 @@ fn number_cells(graph: &LeafGraph, sets: &mut Sets, groups: &BTreeMap<u32, Group
 mod tests {
     use super::super::graph::OpenFacet;
     use super::*;
+    use enfilade_geom::Purse;
 
     /// A band above the floor of one room, which only cracks join to the rest of it, beneath a door to another.
     #[test]
@@ -461,9 +486,10 @@ mod tests {
             at_border: vec![false; 3],
             hole: 0.023,
             rounding: 1e-5,
+            purse: Purse::endless(),
         };
         let settings = LabelSettings::default();
-        let home = |graph: &LeafGraph| {
+        let home = |graph: &LeafGraph<'_>| {
             let mut sets = Sets::new(3);
             merge_groups(graph, &mut sets, &[10, 20, SOLID], &settings);
             (0..2).find(|&room| sets.find(room) == sets.find(2))

@@ -55,7 +55,7 @@ mod wide;
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, Winding, world_tolerance};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Triangle, Winding, world_tolerance};
 
 use facet::Visitor;
 use graph::{Clearance, LeafGraph};
@@ -141,10 +141,10 @@ impl Default for LabelSettings {
 }
 
 /// A convex partition of a box, cut by every surface in it.
-pub struct Complex {
+pub struct Complex<'a> {
     set: SurfaceSet,
     tree: Tree,
-    graph: LeafGraph,
+    graph: LeafGraph<'a>,
     tolerance: Tolerance,
     n_triangles: usize,
     /// Those after them stand for triangles that are missing.
@@ -159,13 +159,17 @@ pub struct Complex {
 /// Time `O(n log n)` for `n` surfaces spread out in space; uses rayon's current pool, and the
 /// result is the same for any number of threads.
 #[must_use]
-pub fn build_complex(input: &ComplexInput<'_>) -> Complex {
-    build_complex_within(input, &Allowance::default())
+pub fn build_complex(input: &ComplexInput<'_>) -> Complex<'static> {
+    build_complex_of(input, Purse::endless())
 }
 
-/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used.
+/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used, nor what is made of it.
 #[must_use]
-pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> Complex {
+pub fn build_complex_within<'a>(input: &ComplexInput<'_>, allowance: &'a Allowance) -> Complex<'a> {
+    build_complex_of(input, allowance.into())
+}
+
+fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'a> {
     let mut surfaces: Vec<Surface> =
         Vec::with_capacity(input.triangles.len() + input.candidates.len() + input.missing.len());
     let mut add = |source, points: &[DVec3]| {
@@ -202,14 +206,14 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
         bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     }
     let tolerance = Tolerance::for_extent(bounds.extent());
-    let set = surface::gather(surfaces, &bounds, &tolerance);
+    let set = surface::gather(surfaces, &bounds, &tolerance, purse);
     let visitor = |tree| Visitor {
         tree,
         surfaces: &set.surfaces,
         tolerance,
-        allowance: Some(allowance),
+        purse,
     };
-    let tree = tree::build(&set, bounds, &tolerance, allowance);
+    let tree = tree::build(&set, bounds, &tolerance, purse);
     let finest = (!input.has_seals).then(|| least_unsealed(&bounds));
     let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap, finest);
     let bvh = Bvh::build(input.triangles);
@@ -217,9 +221,9 @@ pub fn build_complex_within(input: &ComplexInput<'_>, allowance: &Allowance) -> 
     let clearance = Clearance {
         bvh: &bvh,
         hole,
-        allowance: Some(allowance),
+        purse,
     };
-    let graph = LeafGraph::of(&visitor(&tree), &clearance);
+    let graph = LeafGraph::of(&visitor(&tree), &clearance, purse);
     Complex {
         set,
         tree,
@@ -240,7 +244,7 @@ fn least_unsealed(bounds: &Aabb) -> f64 {
     2.0 * world_tolerance(bounds.extent())
 }
 
-impl Complex {
+impl Complex<'_> {
     /// The box that the leaves fill.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
@@ -263,7 +267,7 @@ impl Complex {
         Clearance {
             bvh: &self.bvh,
             hole: self.graph.hole,
-            allowance: None,
+            purse: self.graph.purse,
         }
     }
 

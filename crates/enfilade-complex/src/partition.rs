@@ -98,7 +98,7 @@ struct PieceSink<'a> {
     has_seals: bool,
     /// The plane of each candidate's surface.
     plane_of_candidate: &'a [u32],
-    graph: &'a LeafGraph,
+    graph: &'a LeafGraph<'a>,
     clearance: Clearance<'a>,
     pieces: Vec<Piece>,
     boxes: BTreeMap<u32, Aabb>,
@@ -183,7 +183,7 @@ impl FacetSink for PieceSink<'_> {
 }
 
 /// Makes the partition that a labelling stands for.
-pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
+pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
     let tagged = TaggedTree::new(&complex.tree, &cells.cell_of_leaf);
     let (pieces, boxes) = gather_pieces(complex, &tagged);
     let rules = Rules {
@@ -191,6 +191,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         hole: complex.graph.hole,
         has_seals: complex.has_seals,
         n_candidates: complex.n_candidates,
+        purse: complex.graph.purse,
     };
     let (gaps, openings): (Vec<Opening>, Vec<Opening>) = pieces::group(pieces, &rules)
         .into_iter()
@@ -214,6 +215,7 @@ pub(super) fn realize(complex: &Complex, cells: LeafCells) -> Partition {
         &complex.set,
         &complex.tolerance,
         complex.n_triangles,
+        complex.graph.purse,
     );
     Partition {
         label_of_cell: cells.label_of_cell,
@@ -261,13 +263,16 @@ fn without_holes(
 }
 
 /// The open pieces between leaves of different cells, and the box of each cell.
-fn gather_pieces(complex: &Complex, tagged: &TaggedTree<'_>) -> (Vec<Piece>, BTreeMap<u32, Aabb>) {
+fn gather_pieces(
+    complex: &Complex<'_>,
+    tagged: &TaggedTree<'_>,
+) -> (Vec<Piece>, BTreeMap<u32, Aabb>) {
     let tree = &complex.tree;
     let visitor = Visitor {
         tree,
         surfaces: &complex.set.surfaces,
         tolerance: complex.tolerance,
-        allowance: None,
+        purse: complex.graph.purse,
     };
     let plane_of_candidate = planes_of_candidates(&complex.set.surfaces);
     let mut sink = PieceSink {

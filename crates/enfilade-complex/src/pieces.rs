@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_geom::poly::Poly;
-use enfilade_geom::{DVec2, DVec3, Plane, Sets, Winding};
+use enfilade_geom::{DVec2, DVec3, Plane, Purse, Sets, Winding};
 use rayon::prelude::*;
 
 use super::CRACK_WIDTH;
@@ -67,6 +67,8 @@ pub(super) struct Rules<'a> {
     pub(super) has_seals: bool,
     /// Candidates from this number on stand for triangles that are missing.
     pub(super) n_candidates: u32,
+    /// What grouping spends from.
+    pub(super) purse: Purse<'a>,
 }
 
 /// Groups pieces into openings, ordered by cells, then plane, then the order of the tree.
@@ -211,7 +213,7 @@ fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
 
 /// Merges until no two neighbors have a convex union. Candidates come from a sweep, each piece
 /// tried with the next few only, so that a crack in a thousand pieces stays affordable.
-fn merge_convex(mut flats: Vec<Flat>) -> Vec<Flat> {
+fn merge_convex(mut flats: Vec<Flat>, purse: Purse<'_>) -> Vec<Flat> {
     const NEXT: usize = 48;
     loop {
         let before = flats.len();
@@ -224,7 +226,7 @@ fn merge_convex(mut flats: Vec<Flat>) -> Vec<Flat> {
             });
             let mut gone = vec![false; flats.len()];
             for i in 0..flats.len() {
-                if gone[i] {
+                if gone[i] || !purse.spend(10) {
                     continue;
                 }
                 let mut j = i + 1;
@@ -318,6 +320,9 @@ impl<'a> Sheet<'a> {
         order.sort_by(|&a, &b| left(a).total_cmp(&left(b)).then(a.cmp(&b)));
         for (k, &i) in order.iter().enumerate() {
             for &j in &order[k + 1..] {
+                if !self.rules.purse.spend(1) {
+                    break;
+                }
                 if left(j) > self.flats[i].max.x + TOGETHER {
                     break;
                 }
@@ -347,11 +352,18 @@ impl<'a> Sheet<'a> {
         let area = |part: &[usize]| part.iter().map(|&i| self.flats[i].area).sum::<f64>();
         parts.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a.cmp(b)));
         parts.retain(|part| {
+            let purse = self.rules.purse;
+            if !purse.spend(10 + openings.len() as u64 / 8) {
+                return true;
+            }
             let own = self.hull_of(part);
             let is_beside = |o: usize| {
                 let is_near =
                     |&i: &usize| part.iter().any(|&j| self.flats[i].is_near(&self.flats[j]));
-                hulls[o].touches(&own, TOGETHER) && openings[o].iter().any(is_near)
+                let n_pairs = openings[o].len() * part.len();
+                hulls[o].touches(&own, TOGETHER)
+                    && purse.spend(1 + n_pairs as u64 / 2)
+                    && openings[o].iter().any(is_near)
             };
             let wider = (0..openings.len()).filter(|&o| is_beside(o)).map(|o| {
                 let points = hulls[o].points.iter().chain(&own.points);
@@ -392,7 +404,7 @@ impl<'a> Sheet<'a> {
             .iter()
             .partition(|&&i| is_seal && self.pieces[i].is_rim);
         let flats = |of: Vec<usize>| of.into_iter().map(|i| self.flats[i].clone()).collect();
-        let mut merged = merge_convex(flats(together));
+        let mut merged = merge_convex(flats(together), self.rules.purse);
         merged.extend::<Vec<Flat>>(flats(apart));
         merged.sort_by(|a, b| b.area.total_cmp(&a.area));
         Opening {
@@ -479,6 +491,7 @@ mod tests {
             hole: 0.01,
             has_seals: true,
             n_candidates: 2,
+            purse: Purse::endless(),
         };
         // A window on two candidates, and triangles that are missing below.
         let pieces = vec![

@@ -15,6 +15,7 @@ pub struct PlaneList {
     center: DVec3,
     /// What lies this near to a plane lies in it. [Units: wu]
     tolerance: f64,
+    n_looked: u64,
 }
 
 impl PlaneList {
@@ -27,6 +28,7 @@ impl PlaneList {
             buckets: HashMap::new(),
             center,
             tolerance,
+            n_looked: 0,
         }
     }
 
@@ -34,6 +36,12 @@ impl PlaneList {
     #[must_use]
     pub fn planes(&self) -> &[Plane] {
         &self.planes
+    }
+
+    /// How many buckets and planes were looked at so far: what it cost.
+    #[must_use]
+    pub fn n_looked(&self) -> u64 {
+        self.n_looked
     }
 
     /// The planes, by id.
@@ -56,7 +64,9 @@ impl PlaneList {
         for choice in 0..16_u32 {
             let key: [i32; 4] =
                 std::array::from_fn(|i| (at[i] - 0.5).floor() as i32 + (choice >> i & 1) as i32);
-            for &id in self.buckets.get(&key).into_iter().flatten() {
+            let near = self.buckets.get(&key).map_or(&[][..], Vec::as_slice);
+            self.n_looked += 1 + near.len() as u64;
+            for &id in near {
                 let p = &self.planes[id as usize];
                 let stray = points
                     .iter()

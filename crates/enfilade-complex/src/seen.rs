@@ -3,7 +3,7 @@
 //! **Errs to "seen":** where a triangle lies nearly in a plane of the tree, both sides see it.
 
 use enfilade_geom::poly::{self, Sides};
-use enfilade_geom::{DVec3, Plane};
+use enfilade_geom::{DVec3, Plane, Purse};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
@@ -94,6 +94,7 @@ pub(super) fn cells_of_triangles(
     set: &SurfaceSet,
     tolerance: &Tolerance,
     n_triangles: usize,
+    purse: Purse<'_>,
 ) -> TriangleCells {
     let mut surface_of: Vec<Option<&Surface>> = vec![None; n_triangles];
     for surface in set.surfaces.iter().chain(&set.copies) {
@@ -105,7 +106,7 @@ pub(super) fn cells_of_triangles(
         .par_iter()
         .with_min_len(64)
         .map(|&surface| match surface {
-            Some(surface) => Descent::of(tagged, surface, tolerance),
+            Some(surface) => Descent::of(tagged, surface, tolerance, purse),
             None => Sides2::default(),
         })
         .collect();
@@ -124,6 +125,7 @@ pub(super) fn cells_of_triangles(
 struct Descent<'a> {
     tagged: &'a TaggedTree<'a>,
     tolerance: &'a Tolerance,
+    purse: Purse<'a>,
     plane: u32,
     normal: DVec3,
     /// Parts narrower than this are rounding.
@@ -132,7 +134,12 @@ struct Descent<'a> {
 }
 
 impl<'a> Descent<'a> {
-    fn of(tagged: &'a TaggedTree<'a>, surface: &Surface, tolerance: &'a Tolerance) -> Sides2 {
+    fn of(
+        tagged: &'a TaggedTree<'a>,
+        surface: &Surface,
+        tolerance: &'a Tolerance,
+        purse: Purse<'a>,
+    ) -> Sides2 {
         let Some(normal) = poly::area_normal(&surface.points).try_normalize() else {
             return Sides2::default();
         };
@@ -145,6 +152,7 @@ impl<'a> Descent<'a> {
         let mut descent = Self {
             tagged,
             tolerance,
+            purse,
             plane,
             normal,
             min_width,
@@ -161,6 +169,9 @@ impl<'a> Descent<'a> {
 
     /// `side` is set where the points lie in a plane above: 0 for the triangle's front.
     fn go(&mut self, child: i32, points: &[DVec3], side: Option<usize>) {
+        if !self.purse.spend(1) {
+            return;
+        }
         let tag = self.tagged.tag(child);
         if tag != MIXED {
             if tag != SOLID {

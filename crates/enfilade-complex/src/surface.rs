@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use enfilade_geom::poly::{self, Poly};
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, plane_tolerance};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Purse, Triangle, plane_tolerance};
 use rayon::prelude::*;
 
 use super::planes::{PlaneList, faces_ahead};
@@ -86,6 +86,9 @@ pub(super) struct SurfaceSet {
 /// account of them; more only cost.
 const MOST_COPIES: usize = 4;
 
+/// What a surface, or an edge of it, costs to look at, in units of [`enfilade_geom::Allowance`].
+const WORK_A_SURFACE: u64 = 2;
+
 /// Orders by area, then coordinates, so that the input's order has no say.
 fn canonical_order(surfaces: &mut [Surface]) {
     let key = |s: &Surface| {
@@ -146,17 +149,19 @@ pub(super) fn gather(
     mut surfaces: Vec<Surface>,
     bounds: &Aabb,
     tolerance: &Tolerance,
+    purse: Purse<'_>,
 ) -> SurfaceSet {
     canonical_order(&mut surfaces);
     let mut copies = take_copies(&mut surfaces);
     let mut planes = PlaneList::new(bounds.center(), tolerance.plane);
-    for s in &mut surfaces {
+    for s in surfaces.iter_mut().chain(&mut copies) {
+        let before = planes.n_looked();
         s.plane = plane_of(&s.points, &mut planes, tolerance);
+        if !purse.spend(WORK_A_SURFACE + (planes.n_looked() - before) / 4) {
+            break;
+        }
     }
-    for copy in &mut copies {
-        copy.plane = plane_of(&copy.points, &mut planes, tolerance);
-    }
-    for mut seam in seams(&surfaces, planes.planes(), tolerance) {
+    for mut seam in seams(&surfaces, planes.planes(), tolerance, purse) {
         seam.plane = plane_of(&seam.points, &mut planes, tolerance);
         surfaces.push(seam);
     }
@@ -211,7 +216,12 @@ fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> 
 /// beside it, and between them is a wedge: at the edge thinner than any opening, yet open to one side
 /// before it and to the other behind it. A strip across the edge, a little higher than the
 /// wedge, closes it where the scene is closed. One query of a box tree for each edge moved.
-fn seams(surfaces: &[Surface], planes: &[Plane], tolerance: &Tolerance) -> Vec<Surface> {
+fn seams(
+    surfaces: &[Surface],
+    planes: &[Plane],
+    tolerance: &Tolerance,
+    purse: Purse<'_>,
+) -> Vec<Surface> {
     let flat: Vec<&Surface> = surfaces
         .iter()
         .filter(|s| s.plane != NO_PLANE && matches!(s.source, Source::Triangle(_)))
@@ -241,8 +251,9 @@ fn seams(surfaces: &[Surface], planes: &[Plane], tolerance: &Tolerance) -> Vec<S
             (0..3).filter_map(move |i| {
                 let (a, b) = (s.points[i], s.points[(i + 1) % 3]);
                 let reach = Aabb::of_points(&[a, b]).expanded(tolerance.width);
-                let mut is_apart = false;
+                let (mut is_apart, mut n_looked) = (false, 0);
                 bvh.for_each_in_box(&reach, |t| {
+                    n_looked += 1;
                     let other = flat[t as usize];
                     is_apart |= other.plane != s.plane
                         && planes[other.plane as usize]
@@ -252,7 +263,8 @@ fn seams(surfaces: &[Surface], planes: &[Plane], tolerance: &Tolerance) -> Vec<S
                             < SHALLOW * SHALLOW
                         && run_along(&other.points, a, b, tolerance.width);
                 });
-                is_apart.then(|| {
+                let is_wanted = purse.spend(WORK_A_SURFACE + n_looked) && is_apart;
+                is_wanted.then(|| {
                     let up = normal * (1.5 * tolerance.width);
                     let seam = Surface {
                         source: Source::Seam,

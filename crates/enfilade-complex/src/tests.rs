@@ -190,7 +190,7 @@ fn votes(b: &Aabb, step: f64, label: impl Fn(DVec3) -> Option<u32>) -> Vec<Vote>
     out
 }
 
-fn build(triangles: &[Triangle], candidates: &[Winding]) -> Complex {
+fn build(triangles: &[Triangle], candidates: &[Winding]) -> Complex<'static> {
     let bounds = triangles
         .iter()
         .flatten()

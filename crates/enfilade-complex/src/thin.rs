@@ -20,7 +20,7 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, DVec3, Plane};
+use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 
 use super::facet::{CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::surface::Tolerance;
@@ -71,6 +71,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64, finest: Option<f6
         gap,
         finest,
         tolerance: visitor.tolerance,
+        purse: visitor.purse,
         planes: tree.planes.clone(),
         nodes: Vec::with_capacity(tree.nodes.len()),
         on_plane: Vec::with_capacity(tree.on_plane.len()),
@@ -177,6 +178,7 @@ struct LeafCutter<'a> {
     /// See [`cut_thin_leaves`].
     finest: Option<f64>,
     tolerance: Tolerance,
+    purse: Purse<'a>,
     planes: Vec<Plane>,
     nodes: Vec<Node>,
     on_plane: Vec<u32>,
@@ -268,7 +270,7 @@ impl LeafCutter<'_> {
 
     /// Splits a leaf by the planes of strips, each only where it lies.
     fn split(&mut self, mut strips: Vec<Strip>) -> i32 {
-        if strips.is_empty() {
+        if strips.is_empty() || !self.purse.spend(2 * strips.len() as u64) {
             self.n_leaves += 1;
             return -(self.n_leaves as i32);
         }

@@ -8,7 +8,7 @@
 //! where there is one, as that surface then needs no split of its own.
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Allowance, DVec3, Plane};
+use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 
 use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
@@ -154,7 +154,7 @@ pub(super) fn build(
     set: &SurfaceSet,
     bounds: Aabb,
     tolerance: &Tolerance,
-    allowance: &Allowance,
+    purse: Purse<'_>,
 ) -> Tree {
     let fragments: Vec<Fragment> = (0..set.surfaces.len() as u32)
         .filter_map(|surface| {
@@ -175,7 +175,7 @@ pub(super) fn build(
         set,
         axis_of,
         tolerance: *tolerance,
-        allowance,
+        purse,
     };
     let mut part = Part::default();
     let root = builder.split_box(fragments, bounds, &mut part);
@@ -214,7 +214,7 @@ struct Builder<'a> {
     set: &'a SurfaceSet,
     axis_of: Vec<Option<u8>>,
     tolerance: Tolerance,
-    allowance: &'a Allowance,
+    purse: Purse<'a>,
 }
 
 /// How a box is to be split.
@@ -231,7 +231,7 @@ impl Builder<'_> {
 
     fn split_box(&self, fragments: Vec<Fragment>, bounds: Aabb, out: &mut Part) -> i32 {
         let n = fragments.len();
-        if !self.allowance.spend(2 * n as u64) {
+        if !self.purse.spend(2 * n as u64) {
             return out.leaf();
         }
         let split = if n > MAX_BOX_FRAGMENTS {
@@ -458,7 +458,7 @@ impl Builder<'_> {
         }
         let fragments = bounded(fragments);
         // Choosing a plane looks at most of them several times.
-        if !self.allowance.spend(3 * fragments.len() as u64) {
+        if !self.purse.spend(3 * fragments.len() as u64) {
             return out.leaf();
         }
         let plane = self.choose_plane(&fragments);

@@ -1,23 +1,48 @@
 //! How much work may be done: asked inside long loops, so that no input makes them run away.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::Instant;
 
-/// How much work looks at the clock once. About ten milliseconds.
-const LOOK: u64 = 1 << 16;
+/// How much work looks at the clock once. About half a millisecond.
+const LOOK: u64 = 1 << 12;
+
+/// How much work looks once at the memory that is held, which takes longer. About ten milliseconds.
+const LOOK_AT_MEMORY: u64 = 1 << 16;
+
+/// Memory of a program before it has any work: its code, and the libraries that it links. [Units: bytes]
+pub const PROGRAM: u64 = 64 << 20;
+
+/// Tells the memory that the process holds, where the system says. [Units: bytes]
+pub type MemoryProbe = fn() -> Option<u64>;
 
 /// What is left to be spent on one task, by all its threads.
 ///
 /// Work is counted in units of about 100 ns, the cut of a polygon. Whether it suffices does not depend on threads: what is
 /// spent is a sum. Once it is over, loops end early with a result that makes no sense, and who gave it must ask
-/// [`Allowance::is_over`].
+/// [`Allowance::end`].
 #[derive(Debug)]
 pub struct Allowance {
     spent: AtomicU64,
     most: AtomicU64,
-    end: Option<Instant>,
-    is_late: AtomicBool,
+    until: Option<Instant>,
+    memory: Option<(u64, MemoryProbe)>,
+    /// The end that was seen at a look, [`LATE`] or [`FULL`]; 0 for none.
+    seen: AtomicU8,
 }
+
+/// Why an allowance is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// All the work is done that was allowed.
+    Work,
+    /// The time is up.
+    Time,
+    /// More memory is held than was allowed.
+    Memory,
+}
+
+const LATE: u8 = 1;
+const FULL: u8 = 2;
 
 impl Default for Allowance {
     fn default() -> Self {
@@ -28,13 +53,21 @@ impl Default for Allowance {
 impl Allowance {
     /// An allowance of so much work, until then.
     #[must_use]
-    pub fn new(most: u64, end: Option<Instant>) -> Self {
+    pub fn new(most: u64, until: Option<Instant>) -> Self {
         Self {
             spent: AtomicU64::new(0),
             most: AtomicU64::new(most),
-            end,
-            is_late: AtomicBool::new(false),
+            until,
+            memory: None,
+            seen: AtomicU8::new(0),
         }
+    }
+
+    /// Adds that it is over when the process holds more than so many bytes by the probe, and [`PROGRAM`] besides.
+    #[must_use]
+    pub fn holding(mut self, bytes: u64, probe: MemoryProbe) -> Self {
+        self.memory = Some((bytes.saturating_add(PROGRAM), probe));
+        self
     }
 
     /// Adds some: the task has turned out larger, by what is bounded elsewhere.
@@ -47,41 +80,90 @@ impl Allowance {
         self.most.load(Ordering::Relaxed)
     }
 
-    /// Spends some; says whether to go on. A few nanoseconds, and a look at the clock now and then.
+    /// Spends some; says whether to go on. A few nanoseconds, and a look at clock and memory now and then.
     #[inline]
     pub fn spend(&self, work: u64) -> bool {
+        // What is not done any more is not counted.
+        if self.spent() > self.most() || self.seen.load(Ordering::Relaxed) != 0 {
+            return false;
+        }
         let before = self.spent.fetch_add(work, Ordering::Relaxed);
         let after = before.saturating_add(work);
         if before / LOOK != after / LOOK {
-            self.look();
+            self.look(before / LOOK_AT_MEMORY != after / LOOK_AT_MEMORY);
         }
-        after <= self.most() && !self.is_late()
+        after <= self.most() && self.seen.load(Ordering::Relaxed) == 0
+    }
+
+    /// A filter for what a loop goes through: spends so much on each item, and lets none pass once all is over.
+    pub fn each<T: ?Sized>(&self, work: u64) -> impl Fn(&T) -> bool + Copy + '_ {
+        move |_| self.spend(work)
     }
 
     #[cold]
-    fn look(&self) {
-        if self.end.is_some_and(|end| Instant::now() >= end) {
-            self.is_late.store(true, Ordering::Relaxed);
+    fn look(&self, at_memory: bool) {
+        if self.until.is_some_and(|until| Instant::now() >= until) {
+            self.seen.store(LATE, Ordering::Relaxed);
+        } else if let Some((most, probe)) = self.memory
+            && at_memory
+            && probe().is_some_and(|held| held > most)
+        {
+            self.seen.store(FULL, Ordering::Relaxed);
         }
     }
 
-    /// Whether the time is up.
+    /// Why it is over, if it is; looks at clock and memory. What was once seen stays.
     #[must_use]
-    pub fn is_late(&self) -> bool {
-        self.is_late.load(Ordering::Relaxed)
+    pub fn end(&self) -> Option<End> {
+        if self.seen.load(Ordering::Relaxed) == 0 {
+            self.look(true);
+        }
+        match self.seen.load(Ordering::Relaxed) {
+            LATE => Some(End::Time),
+            FULL => Some(End::Memory),
+            _ => (self.spent() > self.most()).then_some(End::Work),
+        }
     }
 
-    /// Whether all is spent or the time is up, at the last look; looks at the clock.
+    /// Whether it is over; looks at clock and memory.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.look();
-        self.is_late() || self.spent() > self.most()
+        self.end().is_some()
     }
 
     /// What was spent.
     #[must_use]
     pub fn spent(&self) -> u64 {
         self.spent.load(Ordering::Relaxed)
+    }
+}
+
+/// An allowance, or none for loops that may spend as much as they want.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Purse<'a>(Option<&'a Allowance>);
+
+impl<'a> From<&'a Allowance> for Purse<'a> {
+    fn from(allowance: &'a Allowance) -> Self {
+        Self(Some(allowance))
+    }
+}
+
+impl<'a> Purse<'a> {
+    /// A purse without an allowance.
+    #[must_use]
+    pub fn endless() -> Self {
+        Self(None)
+    }
+
+    /// Spends some; says whether to go on.
+    #[inline]
+    pub fn spend(self, work: u64) -> bool {
+        self.0.is_none_or(|allowance| allowance.spend(work))
+    }
+
+    /// A filter as [`Allowance::each`].
+    pub fn each<T: ?Sized>(self, work: u64) -> impl Fn(&T) -> bool + Copy + 'a {
+        move |_| self.spend(work)
     }
 }
 
@@ -94,13 +176,34 @@ mod tests {
     fn it_is_over_when_all_is_spent_and_when_time_is_up() {
         let some = Allowance::new(10, None);
         assert!(some.spend(10) && !some.is_over());
-        assert!(!some.spend(1) && some.is_over() && !some.is_late());
+        assert!(!some.spend(1));
+        assert_eq!(some.end(), Some(End::Work));
         some.grant(2);
         assert!(!some.is_over() && some.spend(1) && !some.spend(1));
         let late = Allowance::new(u64::MAX, Some(Instant::now()));
-        assert!(!late.spend(LOOK) && late.is_late());
+        assert!(!late.spend(LOOK));
+        assert_eq!(late.end(), Some(End::Time));
         let early = Allowance::new(u64::MAX, Some(Instant::now() + Duration::from_secs(1000)));
         assert!(early.spend(10 * LOOK) && !early.is_over());
         assert!(Allowance::default().spend(u64::MAX / 2));
+    }
+
+    #[test]
+    fn it_is_over_when_more_memory_is_held() {
+        let of = |most| Allowance::default().holding(most, || Some(PROGRAM + 1000));
+        assert!(of(1000).spend(LOOK_AT_MEMORY) && !of(1000).is_over());
+        let full = of(999);
+        assert!(full.spend(LOOK), "not yet looked");
+        assert!(!full.spend(LOOK_AT_MEMORY));
+        assert_eq!(full.end(), Some(End::Memory));
+        let unknown = Allowance::default().holding(0, || None);
+        assert!(unknown.spend(LOOK_AT_MEMORY) && !unknown.is_over());
+    }
+
+    #[test]
+    fn a_loop_ends_with_its_allowance() {
+        let some = Allowance::new(10, None);
+        let n = (0..100).filter(some.each(3)).count();
+        assert_eq!(n, 3);
     }
 }

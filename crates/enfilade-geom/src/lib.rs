@@ -18,7 +18,7 @@ mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
-pub use allowance::Allowance;
+pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
 pub use plane::Plane;

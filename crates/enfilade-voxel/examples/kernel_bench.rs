@@ -11,7 +11,7 @@
 
 use std::time::Instant;
 
-use enfilade_geom::{DVec3, Triangle};
+use enfilade_geom::{Allowance, DVec3, Triangle};
 use enfilade_voxel::{
     BitVolume, Connectivity, Grid, WatershedOptions, components, distance, distance_squared, flood,
     mark_dams, voxelize, watershed,
@@ -139,7 +139,11 @@ impl Run<'_> {
         let (times, result) = match self.kernel {
             "edt-u16" => {
                 let set = occupied();
-                let (times, field) = measure(self.repeats, || (), |()| distance_squared(&set));
+                let (times, field) = measure(
+                    self.repeats,
+                    || (),
+                    |()| distance_squared(&set, &Allowance::default()),
+                );
                 let sum: u64 = field.iter().map(|&d| u64::from(d)).sum();
                 (times, format!("\"sum\":{sum}"))
             }
@@ -178,7 +182,7 @@ impl Run<'_> {
                 (times, format!("\"voxels\":{}", wet.count()))
             }
             "watershed" => {
-                let field = distance_squared(&occupied());
+                let field = distance_squared(&occupied(), &Allowance::default());
                 let (times, (answer, dams)) = measure(
                     self.repeats,
                     || field.clone(),
@@ -190,6 +194,7 @@ impl Run<'_> {
                                 h: self.h,
                                 outdoors: None,
                             },
+                            &Allowance::default(),
                         );
                         let dams = mark_dams(dims, &answer.labels);
                         (answer, dams)
@@ -226,7 +231,11 @@ impl Run<'_> {
             voxel: 1.0,
             dims: self.dims,
         };
-        let (times, set) = measure(self.repeats, || (), |()| voxelize(&grid, &triangles));
+        let (times, set) = measure(
+            self.repeats,
+            || (),
+            |()| voxelize(&grid, &triangles, &Allowance::default()),
+        );
         (
             times,
             format!("\"triangles\":{},\"set\":{}", triangles.len(), set.count()),

@@ -11,6 +11,7 @@
 //! all lanes. In 16 bits the loop ends after 255 steps at most. In floating point it need not, so a block
 //! that runs for [`PATIENCE`] steps falls back to the envelope, and the time stays linear in the voxels.
 
+use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, for_runs};
@@ -132,8 +133,8 @@ impl Squared for f32 {
 /// Exact below 65,535. Voxels outside the box are not occupied. Takes 2 bytes per voxel for the answer, 16
 /// bytes per row along x, and `2 * nx * max(ny, nz)` bytes per thread.
 #[must_use]
-pub fn distance_squared(occupied: &BitVolume) -> Vec<u16> {
-    transform(occupied, None)
+pub fn distance_squared(occupied: &BitVolume, allowance: &Allowance) -> Vec<u16> {
+    transform(occupied, None, allowance)
 }
 
 /// As [`distance_squared`], with less work in the voxels of `far`. [Units: vx²]
@@ -147,9 +148,13 @@ pub fn distance_squared(occupied: &BitVolume) -> Vec<u16> {
 // Exact, because the nearest occupied voxel is found through voxels that lie no farther from it: in its row, then in its
 // slice.
 #[must_use]
-pub fn distance_squared_near(occupied: &BitVolume, far: &BitVolume) -> Vec<u16> {
+pub fn distance_squared_near(
+    occupied: &BitVolume,
+    far: &BitVolume,
+    allowance: &Allowance,
+) -> Vec<u16> {
     assert_eq!(occupied.dims(), far.dims(), "boxes of one size");
-    transform(occupied, Some(far))
+    transform(occupied, Some(far), allowance)
 }
 
 /// Returns the distance from each voxel to the nearest one set in `occupied`; infinite if there is none.
@@ -159,7 +164,7 @@ pub fn distance_squared_near(occupied: &BitVolume, far: &BitVolume) -> Vec<u16> 
 /// occupied. Takes 4 bytes per voxel and scratch memory as in [`distance_squared`].
 #[must_use]
 pub fn distance(occupied: &BitVolume) -> Vec<f32> {
-    let mut out: Vec<f32> = transform(occupied, None);
+    let mut out: Vec<f32> = transform(occupied, None, &Allowance::default());
     out.par_chunks_mut(1 << 14).for_each(|part| {
         for d in part {
             *d = d.sqrt();
@@ -168,7 +173,16 @@ pub fn distance(occupied: &BitVolume) -> Vec<f32> {
     out
 }
 
-fn transform<T: Squared>(occupied: &BitVolume, far: Option<&BitVolume>) -> Vec<T> {
+/// Work of transforming so many voxels along one axis or two, in units of [`Allowance`].
+fn work_of(n_voxels: usize) -> u64 {
+    1 + n_voxels as u64 / 16
+}
+
+fn transform<T: Squared>(
+    occupied: &BitVolume,
+    far: Option<&BitVolume>,
+    allowance: &Allowance,
+) -> Vec<T> {
     let [nx, ny, nz] = occupied.dims();
     let mut field = vec![T::ZERO; nx * ny * nz];
     if field.is_empty() {
@@ -181,6 +195,9 @@ fn transform<T: Squared>(occupied: &BitVolume, far: Option<&BitVolume>) -> Vec<T
         .par_chunks_mut(nx * ny)
         .enumerate()
         .for_each_init(Vec::new, |scratch, (k, slice)| {
+            if !allowance.spend(work_of(slice.len())) {
+                return;
+            }
             let mut rows: Vec<&mut [T]> = slice.chunks_mut(nx).collect();
             for (j, row) in rows.iter_mut().enumerate() {
                 distances_in_row(occupied.row(j + ny * k), row, &squares, &falling);
@@ -198,6 +215,9 @@ fn transform<T: Squared>(occupied: &BitVolume, far: Option<&BitVolume>) -> Vec<T
             .par_iter_mut()
             .enumerate()
             .for_each_init(Vec::new, |scratch, (j, rows)| {
+                if !allowance.spend(work_of(nx * nz)) {
+                    return;
+                }
                 along_rows(rows, scratch, &|k, b| {
                     far.map_or(0, |f| f.row(j + ny * k)[b])
                 });
@@ -371,7 +391,7 @@ mod tests {
 
     fn check(occupied: &BitVolume) {
         let exact = oracle(occupied);
-        let squared = distance_squared(occupied);
+        let squared = distance_squared(occupied, &Allowance::default());
         let plain = distance(occupied);
         for (v, e) in exact.iter().enumerate() {
             assert_eq!(
@@ -420,11 +440,11 @@ mod tests {
             from in 0u16..300, left_out in 1usize..9,
         ) {
             let occupied = scattered([nx, ny, nz], &places);
-            let exact = distance_squared(&occupied);
+            let exact = distance_squared(&occupied, &Allowance::default());
             // Some of the voxels at least that far away.
             let far = BitVolume::from_fn([nx, ny, nz], |i| exact[i] >= from && i % 9 >= left_out);
             let least = far.iter_set().map(|i| exact[i]).min().unwrap_or(u16::MAX);
-            for (i, &d) in distance_squared_near(&occupied, &far).iter().enumerate() {
+            for (i, &d) in distance_squared_near(&occupied, &far, &Allowance::default()).iter().enumerate() {
                 prop_assert!(d >= exact[i]);
                 prop_assert!(exact[i] >= least || d == exact[i], "voxel {i}");
             }
@@ -439,7 +459,7 @@ mod tests {
             check(&scattered(dims, &[]));
         }
         assert_eq!(
-            distance_squared(&BitVolume::new([0, 3, 3])),
+            distance_squared(&BitVolume::new([0, 3, 3]), &Allowance::default()),
             Vec::<u16>::new()
         );
     }
@@ -456,8 +476,8 @@ mod tests {
             .build()
             .unwrap();
         assert_eq!(
-            one.install(|| distance_squared(&bits)),
-            many.install(|| distance_squared(&bits))
+            one.install(|| distance_squared(&bits, &Allowance::default())),
+            many.install(|| distance_squared(&bits, &Allowance::default()))
         );
     }
 }

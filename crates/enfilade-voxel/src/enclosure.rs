@@ -6,6 +6,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use enfilade_geom::Allowance;
+
 use super::components::{Connectivity, flood};
 use super::grid::BitVolume;
 use super::widest::{border, coords};
@@ -15,7 +17,7 @@ use super::widest::{border, coords};
 ///
 /// Linear in voxels. Takes a byte per voxel and a byte per column.
 #[must_use]
-pub fn enclosure([nx, ny, _]: [usize; 3], distances: &[u16]) -> Vec<u8> {
+pub fn enclosure([nx, ny, _]: [usize; 3], distances: &[u16], allowance: &Allowance) -> Vec<u8> {
     let n = distances.len();
     let mut out = vec![0; n];
     for is_upwards in [true, false] {
@@ -28,6 +30,9 @@ pub fn enclosure([nx, ny, _]: [usize; 3], distances: &[u16]) -> Vec<u8> {
                 x_blocked = 0;
             }
             if k % (nx * ny) == 0 {
+                if !allowance.spend(1 + (nx * ny / 16) as u64) {
+                    return out;
+                }
                 y_blocked.fill(0);
             }
             let (row, layer) = (&mut y_blocked[i % nx], &mut z_blocked[i % (nx * ny)]);
@@ -58,6 +63,7 @@ pub fn deepest_enclosed(
     distances: &[u16],
     enclosure: &[u8],
     least_depth: u16,
+    allowance: &Allowance,
 ) -> Option<usize> {
     let air = BitVolume::from_fn(dims, |i| distances[i] > 0);
     let open = flood(&air, &border(dims), Connectivity::Faces6);
@@ -66,7 +72,8 @@ pub fn deepest_enclosed(
         |level: u8| BitVolume::from_fn(dims, |i| enclosure[i] >= level && open.get_index(i));
     let mut best: Option<(usize, usize, u8)> = None;
     for level in ENCLOSED {
-        let Some((volume, seed)) = largest(&mut air_of(level), distances, least_depth) else {
+        let Some((volume, seed)) = largest(&mut air_of(level), distances, least_depth, allowance)
+        else {
             continue;
         };
         if best.is_none_or(|(of, ..)| volume as f64 >= SHARE * of as f64) {
@@ -75,7 +82,7 @@ pub fn deepest_enclosed(
     }
     let (_, seed, level) = best?;
     let (mut deepest, mut depth) = (Vec::new(), 0);
-    gather(&mut air_of(level), seed, |i| {
+    gather(&mut air_of(level), seed, allowance, |i| {
         if distances[i] > depth {
             depth = distances[i];
             deepest.clear();
@@ -90,21 +97,26 @@ pub fn deepest_enclosed(
         let [x, y, z] = coords(dims, i);
         floors.set(x, y, z, true);
     }
-    let (_, seed) = largest(&mut floors.clone(), distances, 0)?;
+    let (_, seed) = largest(&mut floors.clone(), distances, 0, allowance)?;
     deepest.clear();
-    gather(&mut floors, seed, |i| deepest.push(i));
+    gather(&mut floors, seed, allowance, |i| deepest.push(i));
     middle_of(dims, &deepest)
 }
 
 /// Returns the volume and a voxel of the largest connected part that is deep enough; ties by index. Clears `set`.
-fn largest(set: &mut BitVolume, distances: &[u16], least_depth: u16) -> Option<(usize, usize)> {
+fn largest(
+    set: &mut BitVolume,
+    distances: &[u16],
+    least_depth: u16,
+    allowance: &Allowance,
+) -> Option<(usize, usize)> {
     let mut best: Option<(usize, usize)> = None;
     for seed in 0..set.n_voxels() {
         if !set.get_index(seed) {
             continue;
         }
         let (mut volume, mut depth) = (0, 0);
-        gather(set, seed, |i| {
+        gather(set, seed, allowance, |i| {
             volume += 1;
             depth = depth.max(distances[i]);
         });
@@ -116,12 +128,12 @@ fn largest(set: &mut BitVolume, distances: &[u16], least_depth: u16) -> Option<(
 }
 
 /// Visits all voxels connected to `seed` through faces within `set`, and removes them from it.
-fn gather(set: &mut BitVolume, seed: usize, mut visit: impl FnMut(usize)) {
+fn gather(set: &mut BitVolume, seed: usize, allowance: &Allowance, mut visit: impl FnMut(usize)) {
     let dims = set.dims();
     let [x, y, z] = coords(dims, seed);
     set.set(x, y, z, false);
     let mut front = vec![seed];
-    while let Some(i) = front.pop() {
+    while let Some(i) = front.pop().filter(allowance.each(1)) {
         visit(i);
         for [x, y, z] in neighbors(dims, i) {
             if set.get(x, y, z) {
@@ -151,11 +163,20 @@ const PINCH: f64 = 0.6;
 ///
 /// `O(n log n)` in the voxels flooded. Takes a bit per voxel, and 16 bytes per voxel of the front.
 #[must_use]
-pub fn ascend(dims: [usize; 3], distances: &[u16], enclosure: &[u8], start: usize) -> usize {
+pub fn ascend(
+    dims: [usize; 3],
+    distances: &[u16],
+    enclosure: &[u8],
+    start: usize,
+    allowance: &Allowance,
+) -> usize {
     let mut seen = BitVolume::new(dims);
     let mut front = BinaryHeap::from([(distances[start], Reverse(start))]);
     let mut best = start;
     while let Some((depth, Reverse(v))) = front.pop() {
+        if !allowance.spend(2) {
+            break;
+        }
         if f64::from(depth) < PINCH * PINCH * f64::from(distances[best]) {
             break;
         }
@@ -202,11 +223,17 @@ mod tests {
             let is_in = |by: usize| (0..3).all(|k| lo[k] + by <= at[k] && at[k] + by <= hi[k]);
             is_in(0) && !is_in(1) && !hole(at)
         });
-        distance_squared(&bits)
+        distance_squared(&bits, &Allowance::default())
     }
 
     fn start(distances: &[u16]) -> Option<[usize; 3]> {
-        let found = deepest_enclosed(N, distances, &enclosure(N, distances), 9)?;
+        let found = deepest_enclosed(
+            N,
+            distances,
+            &enclosure(N, distances, &Allowance::default()),
+            9,
+            &Allowance::default(),
+        )?;
         Some([found % N[0], found / N[0] % N[1], found / (N[0] * N[1])])
     }
 
@@ -215,7 +242,7 @@ mod tests {
         let distances = shell([4, 3, 5], [30, 15, 21], |[x, y, z]| {
             x == 30 || (y == 15 && z < 12)
         });
-        let found = enclosure(N, &distances);
+        let found = enclosure(N, &distances, &Allowance::default());
         let at = |p: [isize; 3]| (0..3).all(|k| (0..N[k] as isize).contains(&p[k]));
         for (i, &sides) in found.iter().enumerate() {
             let from = [i % N[0], i / N[0] % N[1], i / (N[0] * N[1])].map(|c| c as isize);
@@ -253,10 +280,10 @@ mod tests {
     #[test]
     fn a_point_by_the_wall_rises_to_the_middle_of_its_room_and_not_out_of_it() {
         let room = shell([4, 3, 5], [30, 15, 21], |at| at[0] == 30);
-        let sides = enclosure(N, &room);
+        let sides = enclosure(N, &room, &Allowance::default());
         for p in [[5, 4, 6], [29, 14, 20], [29, 9, 13], [17, 4, 20]] {
             let i = p[0] + N[0] * (p[1] + N[1] * p[2]);
-            let top = ascend(N, &room, &sides, i);
+            let top = ascend(N, &room, &sides, i, &Allowance::default());
             assert!(room[top] >= room[i] && room[top] >= 25, "{p:?}");
             assert!(top % N[0] < 30, "{p:?}");
         }

@@ -8,6 +8,7 @@
 //! outdoor basin, and in no ball of air centered in another basin. Distances in all other air remain exact, and with them
 //! all peaks and saddles.
 
+use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::edt::distance_squared;
@@ -31,15 +32,15 @@ const NOISE: f64 = 0.5;
 ///
 /// Linear in voxels; takes an eighth of a byte per voxel for the answer, and a tenth more during the search.
 #[must_use]
-pub fn far_outdoors(blocked: &BitVolume) -> BitVolume {
+pub fn far_outdoors(blocked: &BitVolume, allowance: &Allowance) -> BitVolume {
     let blocks = blocks_of(blocked);
     let dims = blocks.dims();
-    let squared = distance_squared(&blocks);
+    let squared = distance_squared(&blocks, allowance);
     let options = WatershedOptions {
         h: NOISE,
         outdoors: Some(border(dims)),
     };
-    let flood = watershed(dims, squared.clone(), options);
+    let flood = watershed(dims, squared.clone(), options, allowance);
     let depth = |v: usize| f64::from(squared[v]).sqrt();
     // Reach of the ball around each block of another basin, rounded up.
     let mut reach: Vec<u16> = (0..squared.len())
@@ -209,7 +210,7 @@ mod tests {
             outdoors: Some(outdoors),
         };
         assert_eq!(squared.len(), voxels.n_voxels());
-        watershed(DIMS, squared, options)
+        watershed(DIMS, squared, options, &Allowance::default())
     }
 
     proptest! {
@@ -218,13 +219,13 @@ mod tests {
         fn far_air_is_free_and_hangs_together_with_the_border_and_no_hall_is_lost(
             voxels in halls()
         ) {
-            let squared = distance_squared(&voxels);
-            let far = far_outdoors(&voxels);
+            let squared = distance_squared(&voxels, &Allowance::default());
+            let far = far_outdoors(&voxels, &Allowance::default());
             prop_assert!(far.iter_set().all(|v| squared[v] >= 64), "eight voxels away");
             let open = flood(&voxels.complement(), &border(DIMS), Connectivity::Faces6);
             prop_assert!(far.iter_set().all(|v| open.get_index(v)), "open to the border");
 
-            let near = distance_squared_near(&voxels, &far);
+            let near = distance_squared_near(&voxels, &far, &Allowance::default());
             let plain = flooded(&voxels, squared.clone(), None, 0.5);
             let fast = flooded(&voxels, near.clone(), Some(&far), 0.5);
             for v in 0..squared.len() {
@@ -255,7 +256,7 @@ mod tests {
     fn most_of_a_sky_is_found_and_nothing_of_a_closed_hall() {
         let mut voxels = BitVolume::new(DIMS);
         hall(&mut voxels, [20, 3, 20], [80, 40, 80], [20, 9]);
-        let far = far_outdoors(&voxels);
+        let far = far_outdoors(&voxels, &Allowance::default());
         let inside = far.iter_set().filter(|&v| {
             let at = [v % DIMS[0], v / DIMS[0] % DIMS[1], v / (DIMS[0] * DIMS[1])];
             (20..80).contains(&at[0]) && (3..40).contains(&at[1]) && (20..80).contains(&at[2])

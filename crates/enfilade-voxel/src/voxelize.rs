@@ -11,7 +11,7 @@
 //! touched cube is never missed; a cube is marked wrongly only if the triangle passes within that slack of
 //! it.
 
-use enfilade_geom::{DVec3, Triangle};
+use enfilade_geom::{Allowance, DVec3, Triangle};
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, Grid, set_bits};
@@ -35,7 +35,7 @@ const SLAB: usize = 8;
 /// # Panics
 /// If there are 2³² triangles or more.
 #[must_use]
-pub fn voxelize(grid: &Grid, triangles: &[Triangle]) -> BitVolume {
+pub fn voxelize(grid: &Grid, triangles: &[Triangle], allowance: &Allowance) -> BitVolume {
     let mut out = BitVolume::new(grid.dims);
     let [nx, ny, nz] = grid.dims;
     if out.words().is_empty() {
@@ -79,11 +79,16 @@ pub fn voxelize(grid: &Grid, triangles: &[Triangle]) -> BitVolume {
             let first = slab * SLAB;
             let layers = words.len() / (row_words * ny);
             for &t in &entries[starts[slab]..starts[slab + 1]] {
+                let mut n_rows = 0;
                 if let Some(setup) = Setup::new(grid, &triangles[t as usize]) {
                     setup.mark(first, first + layers - 1, |x0, x1, y, z| {
+                        n_rows += 1;
                         let row = (y + ny * (z - first)) * row_words;
                         set_bits(&mut words[row..row + row_words], x0, x1 + 1);
                     });
+                }
+                if !allowance.spend(2 + n_rows / 2) {
+                    return;
                 }
             }
         });
@@ -268,7 +273,11 @@ mod tests {
     fn check(dims: [usize; 3], t: &Triangle) {
         // Clipping rounds, too, by about 1e-15 of coordinates below 100 and a few steps.
         let margin = 1e-9;
-        let bits = voxelize(&unit_grid(dims), std::slice::from_ref(t));
+        let bits = voxelize(
+            &unit_grid(dims),
+            std::slice::from_ref(t),
+            &Allowance::default(),
+        );
         for z in 0..dims[2] {
             for y in 0..dims[1] {
                 for x in 0..dims[0] {
@@ -305,7 +314,14 @@ mod tests {
     #[test]
     fn contact_counts_on_faces_edges_and_vertices() {
         // A point at a lattice vertex touches eight cubes, one in a face two.
-        let at = |x, y, z| voxelize(&unit_grid([4; 3]), &[[DVec3::new(x, y, z); 3]]).count();
+        let at = |x, y, z| {
+            voxelize(
+                &unit_grid([4; 3]),
+                &[[DVec3::new(x, y, z); 3]],
+                &Allowance::default(),
+            )
+            .count()
+        };
         assert_eq!(at(2.0, 2.0, 2.0), 8);
         assert_eq!(at(2.0, 2.0, 1.5), 4);
         assert_eq!(at(2.0, 1.5, 1.5), 2);
@@ -318,7 +334,10 @@ mod tests {
             [c(0.5, 0.5), c(3.5, 0.5), c(3.5, 3.5)],
             [c(0.5, 0.5), c(3.5, 3.5), c(0.5, 3.5)],
         ];
-        assert_eq!(voxelize(&unit_grid([4; 3]), &square).count(), 32);
+        assert_eq!(
+            voxelize(&unit_grid([4; 3]), &square, &Allowance::default()).count(),
+            32
+        );
     }
 
     #[test]
@@ -329,15 +348,21 @@ mod tests {
             for axis in 0..3 {
                 let mut q = p;
                 q[axis] = bad;
-                assert_eq!(voxelize(&grid, &[[p, q, DVec3::ZERO]]).count(), 0);
+                assert_eq!(
+                    voxelize(&grid, &[[p, q, DVec3::ZERO]], &Allowance::default()).count(),
+                    0
+                );
             }
         }
         // Overflowing products may mark too much, never too little.
         let huge = [p, DVec3::new(1e300, 4.5, 4.5), DVec3::new(1e300, 5.5, 4.5)];
-        let bits = voxelize(&grid, &[huge]);
+        let bits = voxelize(&grid, &[huge], &Allowance::default());
         assert!((4..9).all(|x| bits.get(x, 4, 4)));
-        assert_eq!(voxelize(&unit_grid([0, 5, 5]), &[huge]).count(), 0);
-        assert_eq!(voxelize(&grid, &[]).count(), 0);
+        assert_eq!(
+            voxelize(&unit_grid([0, 5, 5]), &[huge], &Allowance::default()).count(),
+            0
+        );
+        assert_eq!(voxelize(&grid, &[], &Allowance::default()).count(), 0);
     }
 
     #[test]
@@ -361,9 +386,12 @@ mod tests {
                 .build()
                 .unwrap()
         };
-        let one = pool(1).install(|| voxelize(&grid, &soup));
+        let one = pool(1).install(|| voxelize(&grid, &soup, &Allowance::default()));
         soup.reverse();
-        assert_eq!(one, pool(4).install(|| voxelize(&grid, &soup)));
+        assert_eq!(
+            one,
+            pool(4).install(|| voxelize(&grid, &soup, &Allowance::default()))
+        );
         assert!(one.count() > 1000);
     }
 }

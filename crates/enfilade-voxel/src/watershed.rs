@@ -21,6 +21,7 @@ mod basins;
 mod flood;
 mod queue;
 
+use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::grid::BitVolume;
@@ -53,7 +54,12 @@ pub struct WatershedOptions {
 /// If `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is negative or
 /// NaN.
 #[must_use]
-pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions) -> Watershed {
+pub fn watershed(
+    dims: [usize; 3],
+    squared: Vec<u16>,
+    options: WatershedOptions,
+    allowance: &Allowance,
+) -> Watershed {
     let n: usize = dims.iter().product();
     assert_eq!(squared.len(), n, "a distance for each of {dims:?} voxels");
     assert!(u32::try_from(n).is_ok(), "fewer than 2^32 voxels");
@@ -64,7 +70,7 @@ pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions)
     );
     let mut words = squared;
     to_levels(&mut words);
-    let starts = local_maxima(dims, &words, options.outdoors.as_ref());
+    let starts = local_maxima(dims, &words, options.outdoors.as_ref(), allowance);
     let h = (options.h * f64::from(STEPS))
         .ceil()
         .min(f64::from(u32::MAX)) as u32;
@@ -74,14 +80,20 @@ pub fn watershed(dims: [usize; 3], squared: Vec<u16>, options: WatershedOptions)
         assert_eq!(seeds.dims(), dims, "outdoors of the same size");
         flood.seed(&seeds);
     }
-    if flood.run() {
+    if flood.run(allowance) {
+        if allowance.is_over() {
+            return Watershed::unflooded(n);
+        }
         return flood.finish(outdoors);
     }
     let mut wide = flood.widened();
     assert!(
-        wide.run(),
+        wide.run(allowance),
         "30 bits number more basins than there are voxels"
     );
+    if allowance.is_over() {
+        return Watershed::unflooded(n);
+    }
     wide.finish(outdoors)
 }
 
@@ -168,11 +180,17 @@ fn to_levels(words: &mut [u16]) {
 ///
 /// No neighbor is higher, and no earlier neighbor in the scan is equal: every regional maximum has such a
 /// voxel, its first. None is in `outdoors`.
-fn local_maxima(dims: [usize; 3], levels: &[u16], outdoors: Option<&BitVolume>) -> Vec<u32> {
+fn local_maxima(
+    dims: [usize; 3],
+    levels: &[u16],
+    outdoors: Option<&BitVolume>,
+    allowance: &Allowance,
+) -> Vec<u32> {
     let [nx, ny, nz] = dims;
     let mut found: Vec<u32> = (0..ny * nz)
         .into_par_iter()
         .with_min_len(16)
+        .filter(allowance.each(1 + nx as u64 / 32))
         .fold(Vec::new, |mut found, row| {
             let rows = Neighbors::of(levels, dims, row, ny);
             let [y0, z0, y1, z1] = rows.around;

@@ -10,6 +10,8 @@
 //! A step goes to one of 26 neighbors, and only if all voxels of the box around both are wide enough: a
 //! path never slips between two voxels that touch at an edge or a vertex.
 
+use enfilade_geom::Allowance;
+
 use super::components::{Connectivity, flood};
 use super::grid::BitVolume;
 
@@ -38,14 +40,19 @@ pub struct WidestPath {
 /// # Panics
 /// If `distances` does not have one value per voxel, or `start` is out of range.
 #[must_use]
-pub fn widest_path(dims: [usize; 3], distances: &[u16], start: usize) -> Option<WidestPath> {
+pub fn widest_path(
+    dims: [usize; 3],
+    distances: &[u16],
+    start: usize,
+    allowance: &Allowance,
+) -> Option<WidestPath> {
     assert_eq!(
         dims.iter().product::<usize>(),
         distances.len(),
         "one distance a voxel"
     );
-    let bottleneck = bottleneck(dims, distances, start)?;
-    let voxels = shortest(dims, distances, start, bottleneck);
+    let bottleneck = bottleneck(dims, distances, start, allowance)?;
+    let voxels = shortest(dims, distances, start, bottleneck, allowance);
     let beyond = flood(
         &BitVolume::from_fn(dims, |i| distances[i] > bottleneck),
         &border(dims),
@@ -166,7 +173,12 @@ pub(super) fn coords([nx, ny, _]: [usize; 3], index: usize) -> [usize; 3] {
 }
 
 /// Returns the greatest squared distance at which air connects `start` to the outermost layer.
-fn bottleneck(dims: [usize; 3], distances: &[u16], start: usize) -> Option<u16> {
+fn bottleneck(
+    dims: [usize; 3],
+    distances: &[u16],
+    start: usize,
+    allowance: &Allowance,
+) -> Option<u16> {
     let mut seen = BitVolume::new(dims);
     let mut mark = |at: [usize; 3]| {
         let is_new = !seen.get(at[0], at[1], at[2]);
@@ -183,6 +195,9 @@ fn bottleneck(dims: [usize; 3], distances: &[u16], start: usize) -> Option<u16> 
             level -= 1;
             continue;
         };
+        if !allowance.spend(1) {
+            return None;
+        }
         let at = coords(dims, v);
         if is_border(dims, at) {
             return Some(level);
@@ -231,7 +246,13 @@ const BEGIN: u8 = 26;
 const UNSEEN: u8 = u8::MAX;
 
 /// Returns the shortest path from `start` to the outermost layer through voxels of at least `least`.
-fn shortest(dims: [usize; 3], distances: &[u16], start: usize, least: u16) -> Vec<usize> {
+fn shortest(
+    dims: [usize; 3],
+    distances: &[u16],
+    start: usize,
+    least: u16,
+    allowance: &Allowance,
+) -> Vec<usize> {
     let strides = [1, dims[0] as isize, (dims[0] * dims[1]) as isize];
     let offset = |step: [isize; 3]| -> isize { (0..3).map(|k| step[k] * strides[k]).sum() };
     let mut came_by = vec![UNSEEN; distances.len()];
@@ -248,6 +269,9 @@ fn shortest(dims: [usize; 3], distances: &[u16], start: usize, least: u16) -> Ve
             continue;
         }
         came_by[v] = step;
+        if !allowance.spend(4) {
+            break;
+        }
         let at = coords(dims, v);
         if is_border(dims, at) {
             return way_to(v, &came_by, &offset);
@@ -340,7 +364,7 @@ mod tests {
     }
 
     fn check(dims: [usize; 3], distances: &[u16], start: usize) {
-        let found = widest_path(dims, distances, start);
+        let found = widest_path(dims, distances, start, &Allowance::default());
         let expected = oracle(dims, distances, start);
         assert_eq!(found.as_ref().map(|p| p.bottleneck), expected);
         let Some(path) = found else { return };
@@ -402,7 +426,7 @@ mod tests {
                 (s >> 11) as f64 / (1_u64 << 53) as f64
             };
             let bits: Vec<bool> = (0..n).map(|_| random() < filled).collect();
-            check(dims, &distance_squared(&BitVolume::from_fn(dims, |i| bits[i])), start % n);
+            check(dims, &distance_squared(&BitVolume::from_fn(dims, |i| bits[i]), &Allowance::default()), start % n);
             // Any numbers will do for distances.
             let numbers: Vec<u16> = (0..n).map(|_| (random() * 7.0) as u16).collect();
             check(dims, &numbers, start % n);
@@ -426,7 +450,7 @@ mod tests {
             set(x, y, d);
         }
         let start = 2 + 6 * (2 + 6);
-        let path = widest_path(dims, &distances, start).unwrap();
+        let path = widest_path(dims, &distances, start, &Allowance::default()).unwrap();
         assert_eq!((path.bottleneck, path.narrowest), (4, 0));
         check(dims, &distances, start);
     }
@@ -437,12 +461,12 @@ mod tests {
         let row = [0, 9, 9, 4, 4, 4, 6, 5, 8];
         let mut distances = vec![0; 9 * 9];
         distances[36..45].copy_from_slice(&row);
-        let path = widest_path([9, 9, 1], &distances, 37).unwrap();
+        let path = widest_path([9, 9, 1], &distances, 37, &Allowance::default()).unwrap();
         // In a single layer, every voxel is at the edge.
         assert_eq!((path.voxels.len(), path.narrowest), (1, 0));
         let mut deep = vec![0; 9 * 9 * 3];
         deep[81..162].copy_from_slice(&distances);
-        let path = widest_path([9, 9, 3], &deep, 81 + 37).unwrap();
+        let path = widest_path([9, 9, 3], &deep, 81 + 37, &Allowance::default()).unwrap();
         assert_eq!(path.voxels, (118..126).collect::<Vec<_>>());
         assert_eq!((path.bottleneck, path.narrowest), (4, 4));
     }
@@ -458,10 +482,10 @@ mod tests {
             let is_hole = [8, 30].iter().any(|&h| x.abs_diff(h) < 3) && z.abs_diff(10) < 3;
             is_wall && !is_room && !(is_hole && y == 15)
         };
-        let distances = distance_squared(&BitVolume::from_fn(dims, inside));
+        let distances = distance_squared(&BitVolume::from_fn(dims, inside), &Allowance::default());
         let at = |x: usize| x + dims[0] * (10 + dims[1] * 10);
         for (start, hole) in [(12, 8), (27, 30)] {
-            let path = widest_path(dims, &distances, at(start)).unwrap();
+            let path = widest_path(dims, &distances, at(start), &Allowance::default()).unwrap();
             let narrowest = coords(dims, path.voxels[path.narrowest]);
             assert_eq!(narrowest, [hole, 15, 10], "from {start}");
             assert_eq!(path.bottleneck, 9);

@@ -1,10 +1,7 @@
 //! Budgets and outputs: files that ask for much, small scenes that are hard, large ones.
 
-use std::f64::consts::PI;
-use std::fmt::Write as _;
-
-use super::random::Random;
-use super::{Figures, holds};
+use super::scenes::{cuboid, obj, scenes};
+use super::{Figures, Ran, holds};
 
 /// Files of a few bytes that would take gigabytes, and outputs that would be lost.
 pub(super) fn cases(rows: &mut Figures) -> anyhow::Result<()> {
@@ -75,94 +72,103 @@ pub(super) fn large(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-pub(super) type Triangle = [[f64; 3]; 3];
+/// Seconds and memory that are given to each command on each nasty scene, and what a command may take of them by its word.
+const TIME: f64 = 4.0;
+const MOST_TIME: f64 = 1.5 * TIME + 1.0;
+const MEMORY: &str = "300M";
+const MOST_MEMORY: f64 = 1.2 * 300.0 / 1024.0 + 100e6 / (1u64 << 30) as f64;
 
-/// Scenes of at most 2,000 triangles, but for one with copies.
-pub(super) fn scenes() -> Vec<(&'static str, String)> {
-    let mut random = Random(7);
-    let mut all = Vec::new();
-    for (name, n) in [
-        ("random 100", 100),
-        ("random 400", 400),
-        ("random 800", 800),
-        ("random 2000", 2000),
-    ] {
-        let triangles: Vec<Triangle> = (0..n).map(|_| [0; 3].map(|_| random.point(10.0))).collect();
-        all.push((name, obj(&triangles)));
-    }
-    let confetti: Vec<Triangle> = (0..2000)
-        .map(|_| {
-            let at = random.point(10.0);
-            [0; 3].map(|_| {
-                let by = random.point(1.0);
-                [0, 1, 2].map(|k| at[k] + by[k] - 0.5)
-            })
-        })
-        .collect();
-    all.push(("confetti 2000", obj(&confetti)));
-    let fan = (0..1000).flat_map(|i| {
-        let (s, c) = (PI * f64::from(i) / 1000.0).sin_cos();
-        let (x, z) = (5.0 * c, 5.0 * s);
-        quad([[-x, 0.0, -z], [x, 0.0, z], [x, 3.0, z], [-x, 3.0, -z]])
-    });
-    all.push(("fan 2000", obj(&fan.collect::<Vec<_>>())));
-    let sheets = (0..1000).flat_map(|i| {
-        let (y, lift) = (f64::from(i) * 0.01, random.next() * 0.1 - 0.05);
-        quad([
-            [0.0, y, 0.0],
-            [10.0, y + lift, 0.0],
-            [10.0, y, 10.0],
-            [0.0, y, 10.0],
-        ])
-    });
-    all.push(("sheets 2000", obj(&sheets.collect::<Vec<_>>())));
-    let slivers: Vec<Triangle> = (0..2000)
-        .map(|_| {
-            let (a, b) = (10.0 * random.next(), 10.0 * random.next());
-            [random.point(10.0), [a, 0.0, 0.0], [b, 0.001, 0.001]]
-        })
-        .collect();
-    all.push(("slivers 2000", obj(&slivers)));
-    let mut far = cuboid([0.0; 3], [4.0, 3.0, 5.0]);
-    far.extend(cuboid([1000.0, 0.0, 1000.0], [1004.0, 3.0, 1005.0]));
-    all.push(("rooms in a kilometer", obj(&far)));
-    let mut wide = cuboid([0.0; 3], [1000.0, 3.0, 1000.0]);
-    wide.extend(cuboid([0.0; 3], [4.0, 3.0, 5.0]));
-    all.push(("hall of a kilometer", obj(&wide)));
-    let copies = quad([
-        [0.0, 0.0, 0.0],
-        [4.0, 0.3, 0.0],
-        [4.0, 2.3, 4.0],
-        [0.0, 2.0, 4.0],
-    ]);
-    all.push(("20,000 copies of a quad", obj(&copies.repeat(20_000))));
-    all
-}
-
-fn quad([a, b, c, d]: [[f64; 3]; 4]) -> [Triangle; 2] {
-    [[a, b, c], [a, c, d]]
-}
-
-pub(super) fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
-    let corner = |c: usize| [0, 1, 2].map(|k| if c >> k & 1 == 1 { high[k] } else { low[k] });
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    faces.iter().flat_map(|f| quad(f.map(corner))).collect()
-}
-
-pub(super) fn obj(triangles: &[Triangle]) -> String {
-    let mut text = String::new();
-    for triangle in triangles {
-        for [x, y, z] in triangle {
-            let _ = writeln!(text, "v {x} {y} {z}");
+/// Nasty scenes by the commands that build worlds from them, within a time and within memory: done, or refused with a way out.
+pub(super) fn bounds(rows: &mut Figures) -> anyhow::Result<()> {
+    let methods = ["watershed", "bsp", "delaunay"];
+    for (scene, text) in scenes() {
+        rows.write("nasty.obj", &text)?;
+        for method in methods {
+            let bake = ["bake", "nasty.obj", "--method", method, "-o", "nasty.glb"];
+            bound(rows, &format!("{scene} {method}"), &bake)?;
         }
-        text.push_str("f -3 -2 -1\n");
+        bound(
+            rows,
+            &format!("{scene} decimate"),
+            &["decimate", "nasty.obj"],
+        )?;
     }
-    text
+    Ok(())
+}
+
+fn bound(rows: &mut Figures, name: &str, args: &[&str]) -> anyhow::Result<()> {
+    let ends = |ran: &Ran| matches!(ran.code, Some(0 | 1));
+    let time = TIME.to_string();
+    let ran = rows.enfilade(&[args, &["--max-time", &time]].concat(), 120)?;
+    rows.is("bound time ends", name, ends(&ran));
+    rows.at_most("bound time s", name, ran.seconds, MOST_TIME);
+    let ran = rows.enfilade(&[args, &["--max-memory", MEMORY]].concat(), 120)?;
+    rows.is("bound memory ends", name, ends(&ran));
+    rows.at_most("bound memory GiB", name, ran.gigabytes, MOST_MEMORY);
+    Ok(())
+}
+
+/// What a bake says beforehand that it takes against what it takes, and what its stages charge for their time.
+pub(super) fn estimates(rows: &mut Figures) -> anyhow::Result<()> {
+    let dirs = crate::scenes();
+    let files = dirs.iter().map(|dir| dir.join("scene.glb"));
+    for path in files.filter(|path| path.exists()) {
+        let path = path.canonicalize()?;
+        let scene = path.parent().and_then(|dir| dir.file_name());
+        let scene = scene.unwrap_or_default().to_string_lossy().into_owned();
+        let path = path.to_string_lossy();
+        for method in ["watershed", "bsp", "delaunay"] {
+            let args = [
+                "bake",
+                &path,
+                "--method",
+                method,
+                "-v",
+                "-o",
+                "estimate.glb",
+            ];
+            let ran = rows.enfilade(&args, 600)?;
+            let scene = format!("{scene} {method}");
+            // Of several, the last.
+            let said = ran.said.lines().rev().find_map(|line| {
+                let (_, rest) = line.split_once("about ")?;
+                rest.split_once(" MB")?.0.parse::<f64>().ok()
+            });
+            let ratio = said.map(|mb| mb * 1e6 / (ran.gigabytes * (1u64 << 30) as f64));
+            let ok = ratio.map(|r| (0.5..=2.0).contains(&r));
+            rows.print("estimate / peak", &scene, ratio, "0.5 to 2", ok);
+            if let Some(worst) = dearest_unit(&ran.said) {
+                rows.at_most("charge ns a unit", &scene, worst, 1000.0);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Of the stages that took a while, the most time that one took for a unit of work, as `bake -v` says. [Units: ns]
+fn dearest_unit(said: &str) -> Option<f64> {
+    let of_line = |line: &str| {
+        let words: Vec<&str> = line
+            .strip_suffix(" M of work")?
+            .split_whitespace()
+            .collect();
+        let [.., seconds, "s", work] = words[..] else {
+            return None;
+        };
+        let (seconds, work) = (seconds.parse::<f64>().ok()?, work.parse::<f64>().ok()?);
+        (seconds > 0.2).then(|| 1e3 * seconds / work.max(1e-9))
+    };
+    said.lines().filter_map(of_line).max_by(f64::total_cmp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dearest_unit_is_of_the_stages_that_took_a_while() {
+        let said = "  structure 0.100 s 0.0 M of work\n  merge basins 2.000 s 40.0 M of work\n  tree 1.0 s 4.0 M of work\n";
+        assert_eq!(dearest_unit(said), Some(250.0));
+        assert_eq!(dearest_unit("wrote a world"), None);
+    }
 }

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use flate2::Crc;
 use flate2::write::ZlibEncoder;
 
-use super::budgets::{cuboid, obj, scenes};
+use super::scenes::{Triangle, cuboid, obj, scenes};
 use super::{Figures, Ran};
 
 /// Limits that each command is given. [Units: s, MiB]
@@ -115,7 +115,7 @@ fn inputs() -> Vec<Input> {
 }
 
 /// A room of 10 m and one beside it, with a doorway between.
-fn rooms() -> Vec<super::budgets::Triangle> {
+fn rooms() -> Vec<Triangle> {
     let mut out = cuboid([0.0; 3], [10.0, 3.0, 10.0]);
     for (low, high) in [
         ([5.0, 0.0, 0.0], [5.2, 3.0, 4.0]),

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context;
 use serde_json::json;
 
-use super::budgets::{Triangle, cuboid};
+use super::scenes::{Triangle, cuboid};
 
 /// A file that is damaged, the commands that read it (words; `@` is the file, what stands behind `<` is its standard input),
 /// and how often it is chosen.

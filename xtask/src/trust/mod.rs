@@ -12,6 +12,7 @@ mod mutate;
 mod mutated;
 mod order;
 mod random;
+mod scenes;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -39,8 +40,10 @@ pub(crate) struct TrustOptions {
 
 /// The parts by the first word of their rows: a module and a line here for each.
 const PARTS: &[(&str, Part)] = &[
+    ("bound", budgets::bounds),
     ("case", budgets::cases),
     ("commands", commands::run),
+    ("estimate", budgets::estimates),
     ("gate", gate::run),
     ("habits", habits::run),
     ("large", budgets::large),

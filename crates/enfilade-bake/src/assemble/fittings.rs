@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, PortalKind, World};
 use enfilade_geom::scene::Mesh;
-use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, NearSeries, Triangle};
+use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Triangle};
 use rayon::prelude::*;
 
 use opening::Rectangle;
@@ -52,8 +52,11 @@ struct Hung {
     portals: Vec<u32>,
 }
 
+/// What it costs to ask what an object is to an opening, in units of [`Allowance`].
+const WORK_A_ROLE: u64 = 200;
+
 /// Finds what fills each opening, and gives leaves that are one with their frames objects of their own.
-pub(super) fn fit(world: &mut World, walls: &Bvh) {
+pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     let openings: Vec<Option<Aperture>> =
         (world.graph.portals.par_iter()).map(Aperture::of).collect();
     let bounds: Vec<Aabb> = (world.details.par_iter())
@@ -61,8 +64,9 @@ pub(super) fn fit(world: &mut World, walls: &Bvh) {
         .collect();
     let near: Vec<Vec<u32>> = (openings.par_iter())
         .map(|o| {
-            o.as_ref()
-                .map_or_else(Vec::new, |o| touching(&o.reach(), &bounds))
+            let work = 1 + bounds.len() as u64 / 16;
+            let o = o.as_ref().filter(|_| allowance.spend(work));
+            o.map_or_else(Vec::new, |o| touching(&o.reach(), &bounds))
         })
         .collect();
     let mut asked: Vec<u32> = near.iter().flatten().copied().collect();
@@ -73,6 +77,7 @@ pub(super) fn fit(world: &mut World, walls: &Bvh) {
         .filter_map(|(p, (opening, near))| Some((p as u32, opening.as_ref()?, near)))
         .map(|(portal, opening, near)| {
             let near = near.iter().filter_map(|d| asked.binary_search(d).ok());
+            let near = near.filter(allowance.each(WORK_A_ROLE));
             near.map(|o| Role {
                 portal,
                 object: o as u32,

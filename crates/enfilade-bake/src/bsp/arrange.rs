@@ -26,7 +26,7 @@ const TRIALS: usize = 8;
 const AT_ONCE: usize = 64;
 
 /// Cuts the leaves where a surface's plane closes an opening that is narrower than what lies beside it.
-pub(super) fn refine(bsp: &mut Bsp, settings: &MergeSettings) {
+pub(super) fn refine(bsp: &mut Bsp<'_>, settings: &MergeSettings) {
     let mut around: Vec<(Aabb, f64)> = vec![(Aabb::EMPTY, 0.0); bsp.tree.planes.len()];
     for f in &bsp.surfaces {
         let (b, area) = &mut around[f.plane as usize];
@@ -82,22 +82,25 @@ pub(super) fn refine(bsp: &mut Bsp, settings: &MergeSettings) {
     if cuts.is_empty() {
         return;
     }
-    for (plane, points) in cuts {
+    for (plane, points) in cuts.into_iter().filter(bsp.purse.each(100)) {
         let (root, eps) = (bsp.tree.root, bsp.tolerance.cut);
         bsp.tree.root = cut(&mut bsp.tree, &mut bsp.is_open, root, plane, &points, eps);
     }
-    bsp.portals = leaf_portals(&bsp.tree, &bsp.tolerance);
+    bsp.portals = leaf_portals(&bsp.tree, &bsp.tolerance, bsp.purse);
     bsp.drop_closed_portals();
 }
 
 /// What of a polygon in `plane` lies within open leaves and in no node's plane.
 fn sections(
-    bsp: &Bsp,
+    bsp: &Bsp<'_>,
     child: i32,
     plane: u32,
     points: &[enfilade_geom::DVec3],
     out: &mut Vec<LeafPortal>,
 ) {
+    if !bsp.purse.spend(2) {
+        return;
+    }
     if child < 0 {
         let leaf = leaf_index(child);
         if bsp.is_open[leaf as usize] && poly::width(points) > bsp.tolerance.width {

@@ -1,6 +1,6 @@
 //! From surfaces to leaves: gathers, cuts, settles what is matter, and drops what is not reached from inside.
 
-use enfilade_geom::{Aabb, Allowance, BoxTree, ConvexSolid, DVec3};
+use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Purse};
 use rayon::prelude::*;
 
 use super::guide::Guide;
@@ -10,22 +10,22 @@ use super::tolerance::Tolerance;
 use super::tree::{self, Content, Heuristic, Tree};
 use super::{inside, leak, portals, shape, surfaces};
 
-/// What it costs to find out whether a leaf is matter, in units of [`Allowance`].
-const WORK_A_LEAF: u64 = 100;
+/// What it costs to find out whether a leaf is matter, in units of [`Allowance`](enfilade_geom::Allowance).
+const WORK_A_LEAF: u64 = 10;
 
 /// How many different numbers there are; equal ones stand side by side.
 fn n_distinct(numbers: &[u32]) -> usize {
     numbers.chunk_by(|a, b| a == b).count()
 }
 
-impl Bsp {
+impl<'a> Bsp<'a> {
     /// Builds the tree and its portals.
     ///
     /// With solids and points inside it is built twice: once to find out which surfaces are seen from
     /// inside, and once of those. Time near-linear in surfaces that are spread out; deterministic.
     #[must_use]
     pub fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -> Self {
-        Self::build_of(input, heuristic, guide, true, &Allowance::default())
+        Self::build_of(input, heuristic, guide, true, Purse::endless())
     }
 
     /// The same; where triangles bound no matter there is air on both sides of them.
@@ -34,7 +34,7 @@ impl Bsp {
         heuristic: Heuristic,
         guide: &Guide,
         has_matter: bool,
-        allowance: &Allowance,
+        purse: Purse<'a>,
     ) -> Self {
         let surfaces::Gathered {
             planes,
@@ -42,7 +42,7 @@ impl Bsp {
             faces,
             bounds,
             tolerance,
-        } = surfaces::gather(input);
+        } = surfaces::gather(input, purse);
         let boxes: Vec<Aabb> = input.solids.iter().map(ConvexSolid::aabb).collect();
         let solids = BoxTree::new(&boxes);
         let make = |fragments: Vec<tree::Fragment>,
@@ -56,11 +56,11 @@ impl Bsp {
                 heuristic,
                 guide,
                 &tolerance,
-                allowance,
+                purse,
             );
             if !boxes.is_empty() {
                 // A middle on the border of two solids is in matter.
-                settle(&mut tree, &tolerance, has_void, allowance, &|p| {
+                settle(&mut tree, &tolerance, has_void, purse, &|p| {
                     let mut is_inside = false;
                     solids.for_each_in_box(&Aabb::new(p, p), |i| {
                         is_inside |= input.solids[i as usize].contains(p, -10.0 * tolerance.cut);
@@ -69,12 +69,12 @@ impl Bsp {
                 });
             } else if !input.triangles.is_empty() {
                 let soup = inside::Soup::of(input.triangles, input.objects);
-                settle(&mut tree, &tolerance, true, allowance, &|p| {
-                    has_matter && soup.is_inside(p, allowance)
+                settle(&mut tree, &tolerance, true, purse, &|p| {
+                    has_matter && soup.is_inside(p, purse)
                 });
             }
             let mut bsp = Self {
-                portals: portals::leaf_portals(&tree, &tolerance),
+                portals: portals::leaf_portals(&tree, &tolerance, purse),
                 tree,
                 tolerance,
                 surfaces: fragments,
@@ -83,6 +83,7 @@ impl Bsp {
                 is_of_triangles: boxes.is_empty(),
                 is_open: Vec::new(),
                 leak: None,
+                purse,
             };
             bsp.resolve_unknown();
             bsp
@@ -130,13 +131,13 @@ fn settle(
     tree: &mut Tree,
     tolerance: &Tolerance,
     has_void: bool,
-    allowance: &Allowance,
+    purse: Purse<'_>,
     is_inside: &(dyn Fn(DVec3) -> bool + Sync),
 ) {
-    let shapes = shape::shapes(tree, tolerance);
+    let shapes = shape::shapes(tree, tolerance, purse);
     let contents = tree.contents.par_iter_mut().zip(&shapes);
     contents.for_each(|(content, shape)| {
-        if !allowance.spend(WORK_A_LEAF) {
+        if !purse.spend(WORK_A_LEAF) {
             return;
         }
         match shape {

@@ -22,10 +22,12 @@ pub(super) struct LeafCells {
 
 /// Parts the leaves by the separators; of separators that cross, the ones that touch fewest cells go,
 /// largest first among equals, until none cross. Separators with one cell on both sides go, too.
-pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> LeafCells {
+pub(super) fn part(bsp: &Bsp<'_>, separators: Vec<Separator>) -> LeafCells {
     let mut kept = separators;
     let (mut n_crossing, mut n_useless) = (0, 0);
     loop {
+        // All portals are joined anew, and all that are kept asked anew.
+        let may_go_on = bsp.purse.spend(bsp.portals.len() as u64);
         let (of_leaf, n_cells) = components(bsp, &kept);
         let sides: Vec<[Vec<u32>; 2]> = kept.iter().map(|s| sides_of(bsp, s, &of_leaf)).collect();
         // One that parts nothing can go at once: no cell changes by it.
@@ -52,7 +54,7 @@ pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> LeafCells {
                 n_crossing += 1;
             }
         }
-        let is_final = !goes.contains(&true);
+        let is_final = !goes.contains(&true) || !may_go_on;
         for (i, goes) in goes.iter_mut().enumerate() {
             if is_useless(i) {
                 *goes = true;
@@ -74,7 +76,7 @@ pub(super) fn part(bsp: &Bsp, separators: Vec<Separator>) -> LeafCells {
 }
 
 /// Cells on the positive and on the negative side, ascending.
-pub(super) fn sides_of(bsp: &Bsp, s: &Separator, of_leaf: &[u32]) -> [Vec<u32>; 2] {
+pub(super) fn sides_of(bsp: &Bsp<'_>, s: &Separator, of_leaf: &[u32]) -> [Vec<u32>; 2] {
     [0, 1].map(|side| {
         let mut cells: Vec<u32> = s
             .portals
@@ -88,7 +90,7 @@ pub(super) fn sides_of(bsp: &Bsp, s: &Separator, of_leaf: &[u32]) -> [Vec<u32>; 
 }
 
 /// Connected components of the open leaves without the separators' portals, numbered by least leaf.
-pub(super) fn components(bsp: &Bsp, separators: &[Separator]) -> (Vec<u32>, usize) {
+pub(super) fn components(bsp: &Bsp<'_>, separators: &[Separator]) -> (Vec<u32>, usize) {
     let mut is_cut = vec![false; bsp.portals.len()];
     for &p in separators.iter().flat_map(|s| &s.portals) {
         is_cut[p as usize] = true;

@@ -18,7 +18,7 @@ pub struct Grouping {
     pub n_cells: usize,
 }
 
-impl Bsp {
+impl Bsp<'_> {
     /// Finds the separators and the cells that they part, for the numbers only.
     #[must_use]
     pub fn grouping(&self) -> Grouping {

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Allowance, BoxTree, Sets};
+use enfilade_geom::{Aabb, BoxTree, Purse, Sets};
 
 use super::cells::{self, LeafCells, NO_CELL};
 use super::guide::Guide;
@@ -23,13 +23,13 @@ const FLAT: f64 = 1.0 / 3.0;
 
 /// The tree of a scene. Where a guide is given and matter leaves no air but the outdoors, the scene is nothing but a shell,
 /// which somebody wants the inside of, whichever way it faces: then there is no matter.
-pub(super) fn build(
+pub(super) fn build<'a>(
     input: &BspInput<'_>,
     heuristic: Heuristic,
     guide: &Guide,
-    allowance: &Allowance,
-) -> Bsp {
-    let build = |has_matter| Bsp::build_of(input, heuristic, guide, has_matter, allowance);
+    purse: Purse<'a>,
+) -> Bsp<'a> {
+    let build = |has_matter| Bsp::build_of(input, heuristic, guide, has_matter, purse);
     let bsp = build(true);
     let is_shell = || input.solids.is_empty() && cells::components(&bsp, &[]).1 <= 1;
     if !guide.is_empty() && is_shell() {
@@ -39,7 +39,7 @@ pub(super) fn build(
 }
 
 /// Parts rooms further by the separators in planes of guides with a round rim.
-pub(super) fn part(bsp: &Bsp, rooms: LeafCells) -> LeafCells {
+pub(super) fn part(bsp: &Bsp<'_>, rooms: LeafCells) -> LeafCells {
     let found = separator::find_in_guides(bsp);
     if found.is_empty() {
         return rooms;
@@ -91,10 +91,17 @@ pub(super) fn part(bsp: &Bsp, rooms: LeafCells) -> LeafCells {
 
 /// Of separators those that cross none of the others that are kept, the smallest first: they go across a tube and not
 /// along it. Those with one cell on both sides go, too.
-fn uncrossed(bsp: &Bsp, mut found: Vec<Separator>) -> Vec<Separator> {
+fn uncrossed(bsp: &Bsp<'_>, mut found: Vec<Separator>) -> Vec<Separator> {
     found.sort_by(|a, b| a.area.total_cmp(&b.area));
     let mut kept: Vec<Separator> = Vec::new();
     for s in found {
+        // All portals are joined anew, and all that are kept asked anew.
+        if !bsp
+            .purse
+            .spend((bsp.portals.len() / 4 + 10 * kept.len()) as u64)
+        {
+            break;
+        }
         kept.push(s);
         let (of_leaf, _) = cells::components(bsp, &kept);
         let crosses = |s: &Separator| {

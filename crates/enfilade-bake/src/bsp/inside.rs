@@ -6,7 +6,7 @@
 //! ceiling that is a mere sheet says nothing of the wall beside it; where an object has holes, rays
 //! disagree, and the majority of them decides.
 
-use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle};
+use enfilade_geom::{Bvh, DVec3, Purse, Ray, Triangle};
 use smallvec::SmallVec;
 
 /// Directions that no wall of a building runs along; an odd number, so that there is a majority.
@@ -37,7 +37,7 @@ impl<'a> Soup<'a> {
 
     /// Whether there is an object of which most rays from `p` leave more surfaces than they enter. Spends a unit of work for each
     /// surface that a ray crosses, and has no answer when nothing is left.
-    pub(super) fn is_inside(&self, p: DVec3, allowance: &Allowance) -> bool {
+    pub(super) fn is_inside(&self, p: DVec3, purse: Purse<'_>) -> bool {
         let mut n_inside: SmallVec<[(u32, usize); 8]> = SmallVec::new();
         for direction in DIRECTIONS {
             let ray = Ray {
@@ -50,7 +50,7 @@ impl<'a> Soup<'a> {
                 let object = self.objects.get(h.triangle as usize).copied().unwrap_or(0);
                 hits.push((object, if h.front { -1 } else { 1 }));
             });
-            if !allowance.spend(1 + hits.len() as u64) {
+            if !purse.spend(1 + hits.len() as u64) {
                 return false;
             }
             hits.sort_unstable();
@@ -70,7 +70,7 @@ impl<'a> Soup<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade_geom::Aabb;
+    use enfilade_geom::{Aabb, Allowance};
 
     /// A closed box, seen from outside.
     fn boxed(min: DVec3, max: DVec3) -> Vec<Triangle> {
@@ -95,7 +95,7 @@ mod tests {
         // And a sheet in mid-air that faces the floor, as ceilings are modeled.
         let sheet = [[-9.0, 3.9, -9.0], [20.0, 3.9, -9.0], [-9.0, 3.9, 20.0]].map(DVec3::from);
         all.push(sheet);
-        let any = Allowance::default();
+        let any = Purse::endless();
         let objects: Vec<u32> = (0..all.len() as u32).map(|t| t / 12).collect();
         for soup in [Soup::of(&all, &objects), Soup::of(&all[1..], &objects[1..])] {
             for k in 0..1000 {
@@ -106,13 +106,13 @@ mod tests {
                     f64::from(k / 100) * 0.6 - 0.71,
                 );
                 let is_air = p.cmpgt(DVec3::ZERO).all() && p.cmplt(DVec3::splat(4.0)).all();
-                assert_eq!(soup.is_inside(p, &any), !is_air, "{p}");
+                assert_eq!(soup.is_inside(p, any), !is_air, "{p}");
             }
-            assert!(!soup.is_inside(DVec3::splat(7.0), &any));
+            assert!(!soup.is_inside(DVec3::splat(7.0), any));
         }
         // Seven rays that cross a surface each are more than ten units.
         let little = Allowance::new(10, None);
-        assert!(!Soup::of(&all, &objects).is_inside(DVec3::splat(-0.5), &little));
+        assert!(!Soup::of(&all, &objects).is_inside(DVec3::splat(-0.5), (&little).into()));
         assert!(little.is_over());
     }
 }

@@ -39,7 +39,7 @@ pub(super) struct Section {
 }
 
 impl Lattice {
-    pub(super) fn of(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> Self {
+    pub(super) fn of(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSettings) -> Self {
         let plane = &bsp.tree.planes[s.plane as usize];
         let (u, v) = plane.basis();
         let polygon = |p: u32| &bsp.portals[p as usize].points;
@@ -74,6 +74,9 @@ impl Lattice {
                 }
             }
             for j in from[1].ceil() as usize..=to[1].floor() as usize {
+                if !bsp.purse.spend(1 + (to[0] - from[0]) as u64 / 4) {
+                    break;
+                }
                 for i in from[0].ceil() as usize..=to[0].floor() as usize {
                     if contains(points, plane.normal, at(i, j)) {
                         portal_at[j * side[0] + i] = n as u32;
@@ -99,7 +102,7 @@ impl Lattice {
     }
 
     /// Leaves at the points of section `k`; looked up when first asked for, as most measures need few.
-    pub(super) fn slice(&self, bsp: &Bsp, k: usize, settings: &MergeSettings) -> &[u32] {
+    pub(super) fn slice(&self, bsp: &Bsp<'_>, k: usize, settings: &MergeSettings) -> &[u32] {
         self.slices[k].get_or_init(|| {
             let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
             let off = self.across[2] * if k.is_multiple_of(2) { off } else { -off };
@@ -114,12 +117,15 @@ impl Lattice {
     /// its corners are on one side of a plane, all its points are, so that large leaves cost little.
     fn look_up(
         &self,
-        bsp: &Bsp,
+        bsp: &Bsp<'_>,
         off: DVec3,
         mut child: i32,
         [[i0, i1], [j0, j1]]: [[usize; 2]; 2],
         leaves: &mut [u32],
     ) {
+        if !bsp.purse.spend(2) {
+            return;
+        }
         let tree = &bsp.tree;
         let at = |i: usize, j: usize| {
             self.base + self.across[0] * i as f64 + self.across[1] * j as f64 + off
@@ -175,7 +181,7 @@ impl Lattice {
     /// before (0) or behind (1) the plane. One side may be without end.
     pub(super) fn section(
         &self,
-        bsp: &Bsp,
+        bsp: &Bsp<'_>,
         area: f64,
         is_seed: &dyn Fn(u32) -> bool,
         in_side: &dyn Fn(usize, u32) -> u8,
@@ -198,6 +204,9 @@ impl Lattice {
             None => best[0].min(best[1]),
         };
         for k in 0..self.slices.len() {
+            if !bsp.purse.spend(1 + seeds.len() as u64 / 8) {
+                break;
+            }
             let of: Vec<u8> = self
                 .slice(bsp, k, settings)
                 .iter()

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{ConvexSolid, DVec3};
+use enfilade_geom::{ConvexSolid, DVec3, Purse};
 
 use super::guide::Guide;
 use super::input::BspInput;
@@ -18,7 +18,7 @@ pub(super) struct Reached {
 }
 
 /// Floods from the points through the portals; a path where the border is reached.
-pub(super) fn reach(bsp: &Bsp, inside: &[DVec3]) -> Reached {
+pub(super) fn reach(bsp: &Bsp<'_>, inside: &[DVec3]) -> Reached {
     let n = bsp.is_open.len();
     let mut neighbors: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
     for (i, p) in bsp.portals.iter().enumerate() {
@@ -70,7 +70,7 @@ pub(super) fn reach(bsp: &Bsp, inside: &[DVec3]) -> Reached {
 }
 
 fn way_to(
-    bsp: &Bsp,
+    bsp: &Bsp<'_>,
     leaf: u32,
     via: &[Option<(u32, u32)>],
     start: &[Option<usize>],
@@ -113,7 +113,7 @@ pub(super) fn inside_of(scene: &Scene) -> Vec<DVec3> {
 /// The way from an entity of the scene to the void; `None` where the solids close every way, and for
 /// scenes that are not made of solids or have no entities.
 #[must_use]
-pub fn find_leak(scene: &Scene) -> Option<LeakPath> {
+pub fn find_leak(scene: &Scene, purse: Purse<'_>) -> Option<LeakPath> {
     let solids: &[ConvexSolid] = &scene.solids;
     let inside = inside_of(scene);
     if solids.is_empty() || inside.is_empty() {
@@ -125,5 +125,6 @@ pub fn find_leak(scene: &Scene) -> Option<LeakPath> {
         solids,
         inside: &inside,
     };
-    Bsp::build(&input, Heuristic::Default, &Guide::default()).leak
+    let guide = Guide::default();
+    Bsp::build_of(&input, Heuristic::Default, &guide, true, purse).leak
 }

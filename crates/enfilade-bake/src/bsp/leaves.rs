@@ -1,6 +1,6 @@
 //! The leaves of a tree, and what is open between them.
 
-use enfilade_geom::Winding;
+use enfilade_geom::{Purse, Winding};
 
 use super::leak_path::LeakPath;
 use super::portals::LeafPortal;
@@ -8,7 +8,7 @@ use super::tolerance::Tolerance;
 use super::tree::{self, Content, Tree};
 
 /// The leaves of a tree and what is open between them.
-pub struct Bsp {
+pub struct Bsp<'a> {
     pub(super) tree: Tree,
     pub(super) portals: Vec<LeafPortal>,
     pub(super) tolerance: Tolerance,
@@ -24,6 +24,8 @@ pub struct Bsp {
     pub(super) is_open: Vec<bool>,
     /// A way from a point inside to the border of everything.
     pub(super) leak: Option<LeakPath>,
+    /// What those who go through it spend from.
+    pub(super) purse: Purse<'a>,
 }
 
 /// Numbers of a tree.
@@ -45,7 +47,7 @@ pub struct BspCounts {
     pub n_portals: usize,
 }
 
-impl Bsp {
+impl Bsp<'_> {
     /// Its numbers.
     #[must_use]
     pub fn counts(&self) -> BspCounts {

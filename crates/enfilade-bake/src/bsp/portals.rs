@@ -1,7 +1,7 @@
 //! The portals of the leaves: each node's plane, clipped to its region and cut by both subtrees
 //! (Lefebvre & Hornus 2003, notes after §3.0.2).
 
-use enfilade_geom::{DVec3, Plane};
+use enfilade_geom::{DVec3, Plane, Purse};
 use smallvec::SmallVec;
 
 use crate::complex::poly::{self, Poly, Sides};
@@ -21,10 +21,15 @@ pub(super) struct LeafPortal {
 }
 
 /// All openings between leaves that are not solid, with the surfaces in their planes taken out.
-pub(super) fn leaf_portals(tree: &Tree, tolerance: &Tolerance) -> Vec<LeafPortal> {
+pub(super) fn leaf_portals(
+    tree: &Tree,
+    tolerance: &Tolerance,
+    purse: Purse<'_>,
+) -> Vec<LeafPortal> {
     let mut visitor = Visitor {
         tree,
         tolerance: *tolerance,
+        purse,
         all_solid: vec![false; tree.nodes.len()],
         out: Vec::new(),
     };
@@ -39,6 +44,7 @@ pub(super) fn leaf_portals(tree: &Tree, tolerance: &Tolerance) -> Vec<LeafPortal
 struct Visitor<'a> {
     tree: &'a Tree,
     tolerance: Tolerance,
+    purse: Purse<'a>,
     all_solid: Vec<bool>,
     out: Vec<LeafPortal>,
 }
@@ -55,7 +61,7 @@ impl Visitor<'_> {
     }
 
     fn node(&mut self, child: i32, cuts: &mut Cuts) {
-        if child < 0 || self.is_solid(child) {
+        if child < 0 || self.is_solid(child) || !self.purse.spend(2 + cuts.len() as u64) {
             return;
         }
         let node = self.tree.nodes[child as usize];
@@ -84,7 +90,7 @@ impl Visitor<'_> {
     }
 
     fn push_down(&mut self, plane: u32, points: &[DVec3], covers: &[Fragment], children: [i32; 2]) {
-        if children.iter().any(|&c| self.is_solid(c)) {
+        if children.iter().any(|&c| self.is_solid(c)) || !self.purse.spend(2) {
             return;
         }
         let Some(at) = (0..2).find(|&i| children[i] >= 0) else {
@@ -115,6 +121,9 @@ impl Visitor<'_> {
         let normal = self.tree.planes[plane as usize].normal;
         let mut rest: Vec<Poly> = vec![points.into()];
         for c in covers {
+            if !self.purse.spend(1 + rest.len() as u64) {
+                return;
+            }
             let mut cover = c.points.clone();
             if poly::area_normal(&cover).dot(normal) < 0.0 {
                 cover.reverse();

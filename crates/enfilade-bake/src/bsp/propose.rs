@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Winding};
+use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Purse, Winding};
 
 use crate::complex::region::Shape;
 use crate::complex::{LabelSettings, Vote};
@@ -30,7 +30,7 @@ pub(crate) fn propose(
 ) -> Result<Proposal, BakeError> {
     let scene = structure.scene;
     context.begin(Stage::Tree)?;
-    let mut bsp = tree_of(structure, &config.bsp, context.allowance());
+    let mut bsp = tree_of(structure, &config.bsp, context.allowance().into());
     let counts = bsp.counts();
     context.begin(Stage::Separators)?;
     let parted = Parted::of(structure, &mut bsp, config, context.allowance());
@@ -38,7 +38,7 @@ pub(crate) fn propose(
     let mut votes = parted.votes(&bsp);
     if !structure.stairs.is_empty() {
         let matter = Soup::of(&structure.stairs, &[]);
-        votes.retain(|v| !matter.is_inside(v.point, context.allowance()));
+        votes.retain(|v| !matter.is_inside(v.point, bsp.purse));
     }
     let cells = &parted.cells;
     let counts = vec![
@@ -61,14 +61,14 @@ pub(crate) fn propose(
     })
 }
 
-fn tree_of(structure: &Structure<'_>, config: &BspConfig, allowance: &Allowance) -> Bsp {
+fn tree_of<'a>(structure: &Structure<'_>, config: &BspConfig, purse: Purse<'a>) -> Bsp<'a> {
     let numbers = structure.wall_numbers.iter();
     let objects: Vec<u32> = numbers
         .map(|&t| structure.sources[t as usize].object)
         .collect();
     let inside = leak::inside_of(structure.scene);
     let input = input_of(structure.scene, &structure.walls, &objects, &inside);
-    guided::build(&input, config.heuristic, &config.guide, allowance)
+    guided::build(&input, config.heuristic, &config.guide, purse)
 }
 
 fn label_settings(scene: &Scene) -> LabelSettings {
@@ -97,7 +97,7 @@ struct Parted {
 impl Parted {
     fn of(
         structure: &Structure<'_>,
-        bsp: &mut Bsp,
+        bsp: &mut Bsp<'_>,
         config: &BakeConfig,
         allowance: &Allowance,
     ) -> Self {
@@ -108,7 +108,7 @@ impl Parted {
         if !by_shape {
             return Self {
                 cells: cells::part(bsp, separator::find(bsp)),
-                shapes: shape::shapes(&bsp.tree, &bsp.tolerance),
+                shapes: shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse),
                 is_narrow: Vec::new(),
             };
         }
@@ -116,7 +116,7 @@ impl Parted {
         let mut closures = structure.blockers(&Bvh::build(&structure.walls));
         closures.extend(structure.missing(config));
         arrange::refine(bsp, settings);
-        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance);
+        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse);
         let evidence = Evidence {
             shapes: &shapes,
             closures: &Bvh::build(&closures),
@@ -135,7 +135,7 @@ impl Parted {
     }
 
     /// A vote of each leaf for its cell.
-    fn votes(&self, bsp: &Bsp) -> Vec<Vote> {
+    fn votes(&self, bsp: &Bsp<'_>) -> Vec<Vote> {
         let cells = &self.cells;
         // With triangles the air around everything is a cell; its label says so.
         let outer = cells.of_leaf[bsp.outer_leaf() as usize];
@@ -182,7 +182,7 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
 }
 
 /// A candidate for each separator whose portals fill their hull, for each portal otherwise.
-fn candidates_of(bsp: &Bsp, cells: &LeafCells) -> Vec<Candidate> {
+fn candidates_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Candidate> {
     let mut out = Vec::new();
     for s in &cells.separators {
         let plane = bsp.tree.planes[s.plane as usize];

@@ -29,7 +29,7 @@ use super::shape;
 const CLOSURE_REACH: f64 = 0.25;
 /// Whether a separator can be a pinch however space is parted around it: whether the larger of the two
 /// sections beside it is larger than it is, all open space taken together.
-pub(super) fn may_be_pinch(bsp: &Bsp, s: &Separator, settings: &MergeSettings) -> bool {
+pub(super) fn may_be_pinch(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSettings) -> bool {
     let lattice = Lattice::of(bsp, s, settings);
     let all = |_: usize, _: u32| 1;
     let section = lattice.section(bsp, s.area, &|_| true, &all, Some(0), settings);
@@ -53,7 +53,7 @@ const WORK: u64 = 200;
 type SeparatorPart = (u32, Vec<u32>);
 
 struct LeafMerger<'a> {
-    bsp: &'a Bsp,
+    bsp: &'a Bsp<'a>,
     settings: &'a MergeSettings,
     evidence: &'a Evidence<'a>,
     separators: &'a [Separator],
@@ -73,7 +73,7 @@ struct LeafMerger<'a> {
 
 /// Parts the leaves by those separators that are a pinch, and joins what is too thin to be a room.
 pub(super) fn part(
-    bsp: &Bsp,
+    bsp: &Bsp<'_>,
     separators: Vec<Separator>,
     evidence: &Evidence<'_>,
     settings: &MergeSettings,
@@ -173,7 +173,11 @@ const MAX_DIRECTIONS: usize = 16;
 ///
 /// Measured across the planes of the tree, those of the largest portals, so that it does not matter how the building is
 /// turned. Errs to a room: a cell is narrow only where it is so between two planes as a whole.
-pub(super) fn narrow_cells(bsp: &Bsp, cells: &LeafCells, settings: &MergeSettings) -> Vec<bool> {
+pub(super) fn narrow_cells(
+    bsp: &Bsp<'_>,
+    cells: &LeafCells,
+    settings: &MergeSettings,
+) -> Vec<bool> {
     let mut by_area: Vec<(f64, DVec3)> = vec![(f64::INFINITY, DVec3::Y)];
     for portal in &bsp.portals {
         let normal = bsp.tree.planes[portal.plane as usize].normal;
@@ -190,14 +194,21 @@ pub(super) fn narrow_cells(bsp: &Bsp, cells: &LeafCells, settings: &MergeSetting
     by_area.truncate(MAX_DIRECTIONS);
     let directions: Vec<DVec3> = by_area.into_iter().map(|d| d.1).collect();
     let (tree, tolerance) = (&bsp.tree, &bsp.tolerance);
-    let widths = shape::widths(tree, tolerance, &cells.of_leaf, cells.n_cells, &directions);
+    let widths = shape::widths(
+        tree,
+        tolerance,
+        &cells.of_leaf,
+        cells.n_cells,
+        &directions,
+        bsp.purse,
+    );
     let least = 2.0 * settings.min_radius;
     widths.into_iter().map(|width| width < least).collect()
 }
 
 /// The share of each portal that a door leaf or a pane fills.
 fn closed_shares(
-    bsp: &Bsp,
+    bsp: &Bsp<'_>,
     s: &Separator,
     lattice: &Lattice,
     closures: &Bvh,
@@ -220,6 +231,7 @@ fn closed_shares(
             .iter()
             .enumerate()
             .filter(|(_, n)| **n != NONE)
+            .filter(bsp.purse.each(10))
         {
             let [i, j] =
                 [k % lattice.side[0], k / lattice.side[0]].map(|t| t as f64 * lattice.step);
@@ -363,6 +375,9 @@ impl LeafMerger<'_> {
     /// that are narrow by themselves, and would be a way through it.
     fn run_separators(&mut self) {
         let weigh = |merger: &Self, s: u32| {
+            if !merger.may_go_on() {
+                return None;
+            }
             let (pinch, age) = merger.pinch_of_separator(s);
             (pinch >= 1.0).then_some((pinch.to_bits(), std::cmp::Reverse(s), age))
         };
@@ -407,7 +422,7 @@ impl LeafMerger<'_> {
             .map(|o| Aabb::of_points(portals(o).flat_map(|p| &p.points)).expanded(eps))
             .collect();
         for i in 0..n {
-            for j in 0..i {
+            for j in (0..i).filter(self.bsp.purse.each(1)) {
                 let touches = group[i] != group[j]
                     && boxes[i].overlaps(&boxes[j])
                     && portals(&openings[i]).any(|p| {

@@ -32,24 +32,24 @@ pub(super) struct Separator {
 const EPS: f64 = 4.0;
 
 /// All valid separators, ordered by plane and first portal.
-pub(super) fn find(bsp: &Bsp) -> Vec<Separator> {
+pub(super) fn find(bsp: &Bsp<'_>) -> Vec<Separator> {
     find_in(bsp, EPS, &|_| true)
 }
 
 /// The valid separators in planes that may be a wall's.
-pub(super) fn find_in_walls(bsp: &Bsp) -> Vec<Separator> {
+pub(super) fn find_in_walls(bsp: &Bsp<'_>) -> Vec<Separator> {
     let is_wall = bsp.wall_planes();
     find_in(bsp, EPS, &|plane| is_wall[plane as usize])
 }
 
 /// The valid separators in planes that only a guide gave.
-pub(super) fn find_in_guides(bsp: &Bsp) -> Vec<Separator> {
+pub(super) fn find_in_guides(bsp: &Bsp<'_>) -> Vec<Separator> {
     // Of curved surfaces the tree makes many slivers, which are closed; portals beside one are as far apart as it was wide.
     find_in(bsp, 2.0 * EPS, &|plane| plane >= bsp.n_own_planes)
 }
 
 /// How much of a separator's rim lies on surfaces of each plane. [Units: wu]
-pub(super) fn rim(bsp: &Bsp, s: &Separator, solids: &BoxTree) -> BTreeMap<u32, f64> {
+pub(super) fn rim(bsp: &Bsp<'_>, s: &Separator, solids: &BoxTree) -> BTreeMap<u32, f64> {
     let eps = 2.0 * EPS * bsp.tolerance.plane;
     let mut lengths = BTreeMap::new();
     for &p in &s.portals {
@@ -57,6 +57,9 @@ pub(super) fn rim(bsp: &Bsp, s: &Separator, solids: &BoxTree) -> BTreeMap<u32, f
         for (i, &a) in points.iter().enumerate() {
             let b = points[(i + 1) % points.len()];
             solids.for_each_in_box(&Aabb::of_points(&[a, b]).expanded(eps), |surface| {
+                if !bsp.purse.spend(2) {
+                    return;
+                }
                 let f = &bsp.surfaces[surface as usize];
                 if let Some([from, to]) = on_surface(a, b, f, bsp, eps) {
                     *lengths.entry(f.plane).or_default() += (to - from) * a.distance(b);
@@ -67,7 +70,7 @@ pub(super) fn rim(bsp: &Bsp, s: &Separator, solids: &BoxTree) -> BTreeMap<u32, f
     lengths
 }
 
-fn find_in(bsp: &Bsp, reach: f64, is_wanted: &dyn Fn(u32) -> bool) -> Vec<Separator> {
+fn find_in(bsp: &Bsp<'_>, reach: f64, is_wanted: &dyn Fn(u32) -> bool) -> Vec<Separator> {
     let boxes: Vec<Aabb> = bsp
         .surfaces
         .iter()
@@ -99,7 +102,7 @@ struct Edge {
     slack: f64,
 }
 
-fn of_plane(bsp: &Bsp, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
+fn of_plane(bsp: &Bsp<'_>, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
     let eps = reach * bsp.tolerance.plane;
     let points = |k: usize| &bsp.portals[group[k] as usize].points;
     let boxes: Vec<Aabb> = (0..group.len())
@@ -116,6 +119,7 @@ fn of_plane(bsp: &Bsp, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<Separ
                         let around = Aabb::of_points(&[a, b]).expanded(eps);
                         near.for_each_in_box(&around, |o| {
                             if o as usize != k
+                                && bsp.purse.spend(3)
                                 && let Some(i) = shared(a, b, points(o as usize), eps)
                             {
                                 take(o, i);
@@ -129,6 +133,9 @@ fn of_plane(bsp: &Bsp, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<Separ
     let mut is_alive = vec![true; group.len()];
     let mut queue: Vec<u32> = (0..group.len() as u32).collect();
     while let Some(k) = queue.pop() {
+        if !bsp.purse.spend(5) {
+            break;
+        }
         if !is_alive[k as usize] || edges[k as usize].iter().all(|e| e.is_covered(&is_alive)) {
             continue;
         }
@@ -199,7 +206,7 @@ fn edge(
     a: DVec3,
     b: DVec3,
     eps: f64,
-    bsp: &Bsp,
+    bsp: &Bsp<'_>,
     solids: &BoxTree,
     others: impl FnOnce(&mut dyn FnMut(u32, Interval)),
 ) -> Edge {
@@ -215,6 +222,9 @@ fn edge(
         return e;
     }
     solids.for_each_in_box(&Aabb::of_points(&[a, b]).expanded(eps), |s| {
+        if !bsp.purse.spend(2) {
+            return;
+        }
         e.solid
             .extend(on_surface(a, b, &bsp.surfaces[s as usize], bsp, eps));
     });
@@ -225,7 +235,7 @@ fn edge(
 }
 
 /// From where to where an edge lies on a surface.
-fn on_surface(a: DVec3, b: DVec3, f: &Fragment, bsp: &Bsp, eps: f64) -> Option<Interval> {
+fn on_surface(a: DVec3, b: DVec3, f: &Fragment, bsp: &Bsp<'_>, eps: f64) -> Option<Interval> {
     let plane = &bsp.tree.planes[f.plane as usize];
     if plane.signed_distance(a).abs() > eps || plane.signed_distance(b).abs() > eps {
         return None;

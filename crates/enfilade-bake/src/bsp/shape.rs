@@ -1,6 +1,6 @@
 //! Where each leaf is: its box, its volume and a point well inside.
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, Purse};
 
 use crate::complex::region::{Region, Shape, halves, shape_of, whole};
 
@@ -8,13 +8,13 @@ use super::tolerance::Tolerance;
 use super::tree::{Tree, leaf_index};
 
 /// Measures of all leaves; none for those that rounding has left without a volume.
-pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance) -> Vec<Option<Shape>> {
+pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance, purse: Purse<'_>) -> Vec<Option<Shape>> {
     let mut out = vec![None; tree.contents.len()];
     visit(
         tree,
         tree.root,
         whole(&tree.bounds, tolerance.cut),
-        tolerance.cut,
+        (tolerance.cut, purse),
         &mut |leaf, region| {
             out[leaf as usize] = shape_of(&region);
         },
@@ -31,6 +31,7 @@ pub(super) fn widths(
     of_leaf: &[u32],
     n_cells: usize,
     directions: &[DVec3],
+    purse: Purse<'_>,
 ) -> Vec<f64> {
     let n = directions.len();
     let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; n_cells * n];
@@ -39,7 +40,7 @@ pub(super) fn widths(
         tree,
         tree.root,
         region,
-        tolerance.cut,
+        (tolerance.cut, purse),
         &mut |leaf, region| {
             let cell = of_leaf[leaf as usize] as usize;
             if cell >= n_cells || shape_of(&region).is_none() {
@@ -71,7 +72,17 @@ pub(super) fn widths(
         .collect()
 }
 
-fn visit(tree: &Tree, child: i32, region: Region, eps: f64, take: &mut dyn FnMut(u32, Region)) {
+fn visit(
+    tree: &Tree,
+    child: i32,
+    region: Region,
+    (eps, purse): (f64, Purse<'_>),
+    take: &mut dyn FnMut(u32, Region),
+) {
+    // A region is cut face by face.
+    if !purse.spend(5 * region.len() as u64) {
+        return;
+    }
     if child < 0 {
         return take(leaf_index(child), region);
     }
@@ -81,6 +92,6 @@ fn visit(tree: &Tree, child: i32, region: Region, eps: f64, take: &mut dyn FnMut
         .into_iter()
         .zip(node.children)
     {
-        visit(tree, child, region, eps, take);
+        visit(tree, child, region, (eps, purse), take);
     }
 }

@@ -1,7 +1,7 @@
 //! Surfaces of the input as polygons that share one list of planes.
 
 use enfilade_geom::solid::exposed_faces;
-use enfilade_geom::{Aabb, ConvexSolid, DVec3, Plane, Triangle};
+use enfilade_geom::{Aabb, ConvexSolid, DVec3, Plane, Purse, Triangle};
 
 use crate::complex::planes::{PlaneList, faces_ahead};
 use crate::complex::poly::{self, Poly};
@@ -22,7 +22,7 @@ pub(super) struct Gathered {
 }
 
 /// Planes, polygons, the box around them and what counts as touching.
-pub(super) fn gather(input: &BspInput<'_>) -> Gathered {
+pub(super) fn gather(input: &BspInput<'_>, purse: Purse<'_>) -> Gathered {
     let points = input.triangles.iter().flatten().copied().chain(
         input
             .solids
@@ -47,13 +47,20 @@ pub(super) fn gather(input: &BspInput<'_>) -> Gathered {
     let mut face = 0;
     if input.solids.is_empty() {
         for t in &in_own_order(input.triangles) {
+            let before = polygons.planes.n_looked();
             polygons.add_triangle(t);
+            if !purse.spend(10 + (polygons.planes.n_looked() - before) / 4) {
+                break;
+            }
             faces.resize(polygons.fragments.len(), face);
             face += 1;
         }
     } else {
         let solids: Vec<&ConvexSolid> = input.solids.iter().collect();
-        for (solid, exposed) in solids.iter().zip(exposed_faces(&solids, tolerance.plane)) {
+        for (solid, exposed) in solids
+            .iter()
+            .zip(exposed_faces(&solids, tolerance.plane, purse))
+        {
             for (plane, parts) in solid.planes.iter().zip(exposed) {
                 for part in parts {
                     polygons.add(plane, part.points.into());

@@ -48,7 +48,12 @@ fn row(n: usize) -> Vec<ConvexSolid> {
     out
 }
 
-fn bsp_of(solids: &[ConvexSolid], inside: &[DVec3], heuristic: Heuristic, guide: &Guide) -> Bsp {
+fn bsp_of(
+    solids: &[ConvexSolid],
+    inside: &[DVec3],
+    heuristic: Heuristic,
+    guide: &Guide,
+) -> Bsp<'static> {
     Bsp::build(
         &BspInput {
             triangles: &[],
@@ -90,7 +95,7 @@ fn hall(rng: &mut Rng, n: usize) -> Vec<ConvexSolid> {
 }
 
 /// The tree of a random hall, which other modules' tests look into.
-pub(super) fn random_hall(seed: u64) -> Bsp {
+pub(super) fn random_hall(seed: u64) -> Bsp<'static> {
     let solids = hall(&mut Rng::new(seed), 9);
     bsp_of(&solids, &[], Heuristic::Default, &Guide::default())
 }
@@ -123,7 +128,7 @@ fn leaves_fill_what_the_solids_leave_free() {
                 let deep = solids.iter().any(|s| s.contains(p, 1e-3));
                 let leaf = bsp.tree.leaf_of(p) as usize;
                 let is_open = bsp.is_open[leaf];
-                let shape = shape::shapes(&bsp.tree, &bsp.tolerance)[leaf];
+                let shape = shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse)[leaf];
                 assert!(
                     if deep { !is_open } else { near || is_open },
                     "{p} {heuristic:?} deep {deep} {:?} {shape:?}",
@@ -205,8 +210,8 @@ fn guides_cut_first_and_change_no_space() {
     let plain = bsp_of(&row(2), &[INSIDE], Heuristic::Default, &Guide::default());
     let guided = bsp_of(&row(2), &[INSIDE], Heuristic::Default, &guide);
     assert!(guided.counts().n_leaves > 5 * plain.counts().n_leaves);
-    let volume = |b: &Bsp| -> f64 {
-        let shapes = shape::shapes(&b.tree, &b.tolerance);
+    let volume = |b: &Bsp<'_>| -> f64 {
+        let shapes = shape::shapes(&b.tree, &b.tolerance, b.purse);
         shapes
             .iter()
             .zip(&b.is_open)
@@ -447,7 +452,7 @@ fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
         ..Guide::default()
     };
     let mut bsp = bsp_of(&row(2), &[INSIDE], Heuristic::Default, &guide);
-    let faces = |bsp: &Bsp| {
+    let faces = |bsp: &Bsp<'_>| {
         let at = |s: &separator::Separator, x: f64| {
             let plane = &bsp.tree.planes[s.plane as usize];
             plane.normal.x.abs() == 1.0

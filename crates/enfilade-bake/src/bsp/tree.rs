@@ -1,6 +1,6 @@
 //! The tree: space cut by the planes of its surfaces until no leaf holds any.
 
-use enfilade_geom::{Aabb, Allowance, DVec3, Plane};
+use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 use rayon::prelude::*;
 
 use crate::complex::poly::{self, Poly, Sides};
@@ -149,7 +149,7 @@ pub(super) fn build(
     heuristic: Heuristic,
     guide: &Guide,
     tolerance: &Tolerance,
-    allowance: &Allowance,
+    purse: Purse<'_>,
 ) -> Tree {
     let mut builder = Builder {
         tree: Tree {
@@ -165,7 +165,7 @@ pub(super) fn build(
         tolerance: *tolerance,
         n_own_planes: 0,
         guide_ids: Vec::new(),
-        allowance,
+        purse,
     };
     builder.n_own_planes = builder.tree.planes.len() as u32;
     for plane in guide.planes(&bounds) {
@@ -195,7 +195,7 @@ struct Builder<'a> {
     tolerance: Tolerance,
     n_own_planes: u32,
     guide_ids: Vec<u32>,
-    allowance: &'a Allowance,
+    purse: Purse<'a>,
 }
 
 /// Numbers that choose a splitter.
@@ -236,7 +236,8 @@ impl Builder<'_> {
             p.signed_distance(bounds.center()).abs() < reach - self.tolerance.plane
         };
         let inside: Vec<u32> = guides.iter().copied().filter(|&g| crosses(g)).collect();
-        if inside.is_empty() || fragments.is_empty() {
+        let work = 1 + fragments.len() as u64;
+        if inside.is_empty() || fragments.is_empty() || !self.purse.spend(work) {
             return self.split(fragments, content);
         }
         // The middle one, so that a grid makes a balanced tree.
@@ -268,7 +269,7 @@ impl Builder<'_> {
     }
 
     fn split(&mut self, fragments: Vec<Fragment>, content: Content) -> i32 {
-        if fragments.is_empty() || !self.allowance.spend(fragments.len() as u64) {
+        if fragments.is_empty() || !self.purse.spend(2 * fragments.len() as u64) {
             return self.leaf(content);
         }
         let plane = self.choose(&fragments);
@@ -365,7 +366,7 @@ impl Builder<'_> {
         };
         // Two trials take as long as a cut.
         let n_trials = by_plane.len() * fragments.len().div_ceil(stride);
-        self.allowance.spend(n_trials as u64 / 2);
+        self.purse.spend(n_trials as u64 / 2);
         let score = |id: u32, area: f64| {
             let c = self.count(fragments, stride, id, area);
             match self.heuristic {

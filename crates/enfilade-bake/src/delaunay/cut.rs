@@ -5,7 +5,7 @@
 //! the polygons leave of a boundary, as convex pieces. He loops over all pairs; here a BVH
 //! finds those that meet.
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Plane, Triangle};
 use smallvec::{SmallVec, smallvec};
 
 use super::tetrahedra::Delaunay;
@@ -127,6 +127,8 @@ pub(super) struct Knife<'a> {
     pub(super) walls: &'a [Triangle],
     pub(super) bvh: &'a Bvh,
     pub(super) tolerance: CutTolerance,
+    /// What cutting spends from.
+    pub(super) allowance: &'a Allowance,
 }
 
 impl Knife<'_> {
@@ -145,6 +147,7 @@ impl Knife<'_> {
         let facets: [Option<Plane>; 4] =
             std::array::from_fn(|i| Plane::of_triangle(&self.facet(t, i)).map(Plane::flipped));
         let mut cutters: SmallVec<[Cutter; 4]> = SmallVec::new();
+        self.allowance.spend(5 * near.len() as u64);
         for w in near {
             match self.lies(&self.walls[w as usize], &corners, &facets) {
                 Lies::Beside => {}
@@ -214,6 +217,10 @@ impl Knife<'_> {
         let mut cuts: Vec<Plane> = Vec::new();
         let mut n_passed_over = 0;
         for c in cutters {
+            // Each part is clipped.
+            if !self.allowance.spend(10 * parts.len() as u64) {
+                return None;
+            }
             if parts.len() >= MAX_PARTS {
                 n_passed_over += 1;
                 continue;
@@ -265,6 +272,9 @@ impl Knife<'_> {
                 .collect();
             for (b, behind) in backs {
                 for (f, before) in fronts {
+                    if !self.allowance.spend(5 + covers.len() as u64) {
+                        return inner;
+                    }
                     let Some(shared) = shared(behind, before, plane.normal, eps) else {
                         continue;
                     };
@@ -425,6 +435,7 @@ mod tests {
                 width: 1e-7,
             };
             let knife = Knife {
+                allowance: &Allowance::default(),
                 delaunay: &delaunay,
                 walls: &walls,
                 bvh: &Bvh::build(&walls),

@@ -25,13 +25,16 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::f64::consts::PI;
 
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::cells::{CellPortal, Cells};
 
 /// A cell of less than this share of its ball's volume does not hold the ball, which lies in a neighbor: it is
 /// a bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
 const HOLDS: f64 = 0.1;
+/// What a step costs, in units of [`Allowance`], and each portal that it changes.
+const WORK_A_STEP: u64 = 10;
+const WORK_A_PAIR: u64 = 5;
 
 /// Factor on the weight of a crevice's portal that is the mouth of a branch. Weights of crevices are negative, so
 /// crevices behind mouths merge last: only when they have no other way.
@@ -165,13 +168,14 @@ pub fn decimate(
     stop: f64,
     min_radius: f64,
     choices: &Choices,
+    allowance: &Allowance,
 ) -> Decimation {
     let rules = Rules {
         weight,
         stop,
         min_radius,
     };
-    let (undecided, portals) = Merging::new(cells, rules, &BTreeMap::new()).run();
+    let (undecided, portals) = Merging::new(cells, rules, &BTreeMap::new()).run(allowance);
     if *choices == Choices::default() {
         return undecided;
     }
@@ -179,7 +183,7 @@ pub fn decimate(
     let steps = undecided.steps.iter().zip(portals);
     let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
     Merging::new(cells, rules, &choices.by_portal(cells, &portals))
-        .run()
+        .run(allowance)
         .0
 }
 
@@ -380,7 +384,7 @@ impl<'a> Merging<'a> {
     }
 
     /// Merges until no portal is left. Also gives, for each step, the portal before decimation that it removed.
-    fn run(mut self) -> (Decimation, Vec<(u32, u32)>) {
+    fn run(mut self, allowance: &Allowance) -> (Decimation, Vec<(u32, u32)>) {
         while let Some(candidate) = self.queue.pop() {
             if self.is_stale(&candidate) {
                 continue;
@@ -392,6 +396,9 @@ impl<'a> Merging<'a> {
                 }
                 self.stop_at = Some(self.steps.len());
             }
+            if !allowance.spend(WORK_A_STEP + WORK_A_PAIR * self.n_pairs(candidate.pair)) {
+                break;
+            }
             self.remove(&candidate);
         }
         let decimation = Decimation {
@@ -400,6 +407,12 @@ impl<'a> Merging<'a> {
             steps: self.steps,
         };
         (decimation, self.removed)
+    }
+
+    /// How many portals a step may weigh anew.
+    fn n_pairs(&self, (a, b): (u32, u32)) -> u64 {
+        let degrees = [a, b].map(|c| self.neighbors[c as usize].len() as u64);
+        degrees[0] + degrees[1]
     }
 
     fn candidate(&self, pair: (u32, u32), portal: &Live) -> QueuedPortal {
@@ -562,6 +575,7 @@ mod tests {
             default_stop(weight),
             0.3,
             &Choices::default(),
+            &Allowance::default(),
         );
         assert_eq!((done.steps[0].into, done.steps[0].from), (2, 3));
         assert_eq!(done.stop, 1);

@@ -13,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{Allowance, DVec3};
 
 use super::order::insertion_order;
 use super::predicate::{LARGEST, LEAST, Predicates};
@@ -21,6 +21,9 @@ use super::tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, walk};
 
 /// Most points: seven tetrahedra a point, four facets each, must fit 32 bits with room to spare.
 const MOST_POINTS: usize = 100_000_000;
+/// What it costs to put a point in, in units of [`Allowance`], and each tetrahedron that it makes.
+const WORK_A_POINT: u64 = 10;
+const WORK_A_FAN: u64 = 2;
 
 /// For a new point in slot `i`, the edge that is left when vertex `j` is dropped, in such a direction that the
 /// neighbor across has it the other way round.
@@ -38,6 +41,14 @@ const EDGES: [[[usize; 2]; 4]; 4] = [
 /// # Errors
 /// When a coordinate is out of limits, or all points lie in one plane.
 pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
+    tetrahedralize_within(points, &Allowance::default())
+}
+
+/// [`tetrahedralize`], as far as an allowance goes: once that is over, points are left out.
+pub(super) fn tetrahedralize_within(
+    points: &[DVec3],
+    allowance: &Allowance,
+) -> Result<Delaunay, DelaunayError> {
     if points.len() > MOST_POINTS {
         return Err(DelaunayError::TooMany {
             n_points: points.len(),
@@ -67,8 +78,8 @@ pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
     let first = first_four(&vertices, predicates).ok_or(DelaunayError::Flat { n_points })?;
     let mut builder = Insertion::new(vertices, predicates, first);
     for v in 0..builder.vertices.len() as u32 {
-        if !first.contains(&v) {
-            builder.insert(v);
+        if !first.contains(&v) && !builder.insert_within(v, allowance) {
+            break;
         }
     }
     Ok(builder.finished(vertex_of_point))
@@ -82,8 +93,8 @@ pub(super) struct Growing {
 
 impl Growing {
     /// Begins with the tetrahedra of `points`, as [`tetrahedralize`] finds them.
-    pub(super) fn begin(points: &[DVec3]) -> Result<Self, DelaunayError> {
-        let d = tetrahedralize(points)?;
+    pub(super) fn begin(points: &[DVec3], allowance: &Allowance) -> Result<Self, DelaunayError> {
+        let d = tetrahedralize_within(points, allowance)?;
         Ok(Self {
             vertex_of_point: d.vertex_of_point,
             builder: Insertion::of(d.vertices, d.tetrahedra, d.predicates),
@@ -94,7 +105,11 @@ impl Growing {
     ///
     /// # Errors
     /// When there are more points than indices.
-    pub(super) fn add(&mut self, points: &[DVec3]) -> Result<(), DelaunayError> {
+    pub(super) fn add(
+        &mut self,
+        points: &[DVec3],
+        allowance: &Allowance,
+    ) -> Result<(), DelaunayError> {
         let b = &mut self.builder;
         let n_points = b.vertices.len() + points.len();
         if n_points > MOST_POINTS {
@@ -107,7 +122,9 @@ impl Growing {
         }
         b.predicates = Predicates::of(&b.vertices);
         for v in n_points - points.len()..n_points {
-            b.insert(v as u32);
+            if !b.insert_within(v as u32, allowance) {
+                break;
+            }
         }
         Ok(())
     }
@@ -316,6 +333,12 @@ impl Insertion {
     /// The tetrahedron that holds `p`: a finite one, or one at infinity if `p` is outside.
     fn locate(&self, p: DVec3) -> u32 {
         walk(&self.tets, &self.vertices, self.predicates, self.last, p)
+    }
+
+    /// Inserts, and says whether to go on: an insertion costs what it makes.
+    fn insert_within(&mut self, v: u32, allowance: &Allowance) -> bool {
+        self.insert(v);
+        allowance.spend(WORK_A_POINT + WORK_A_FAN * self.fans.len() as u64)
     }
 
     fn insert(&mut self, v: u32) {

@@ -9,6 +9,7 @@ use super::rooms::find_rooms;
 use super::session::Session;
 use super::space::box_points;
 use crate::bound::keep_costs;
+use crate::budget::n_structural;
 use crate::complex::{LabelSettings, Vote};
 use crate::proposal::Proposal;
 use crate::realize::realize;
@@ -64,7 +65,8 @@ pub fn bake_session(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
-    let structure = Method::Delaunay.structure_of(scene)?;
+    let context = &context.within(&config.budget, n_structural(scene));
+    let structure = Method::Delaunay.structure_of(scene, context.allowance())?;
     let proposal = propose_of(&structure, session, n_steps, config, context)?;
     let mut baked = realize(structure, Method::Delaunay, proposal, config, context)?;
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
@@ -83,6 +85,7 @@ fn propose_of(
         session,
         &session.decimation.after(n_steps),
         config.merge.min_radius,
+        context.allowance(),
     );
     let bounds = structure.bounds();
     let around = bounds.expanded(AROUND);

@@ -26,9 +26,8 @@ use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
 const APART: f64 = 0.4;
 /// More rounds of a pass than any scene took. After that, points count as having run out.
 const MAX_ROUNDS: usize = 100;
-/// What it costs to look at a tetrahedron and to add a point, in units of [`enfilade_geom::Allowance`].
+/// What it costs to look at a tetrahedron, in units of [`enfilade_geom::Allowance`].
 const WORK_A_LOOK: u64 = 5;
-const WORK_A_POINT: u64 = 100;
 
 /// Tetrahedra whose balls are balls of air.
 pub(super) struct Refined {
@@ -55,7 +54,7 @@ pub(super) fn refined(
     least: f64,
     limits: &Limits<'_>,
 ) -> Result<Refined, DelaunayError> {
-    let mut growing = Growing::begin(points)?;
+    let mut growing = Growing::begin(points, limits.allowance)?;
     let mut down_to = bounds.size().max_element();
     // Least radius of a ball that gets points, and least distance of its center from surfaces.
     let passes = [8.0, 4.0, 2.0, 1.0].map(|k| (k * least, k * least));
@@ -64,6 +63,7 @@ pub(super) fn refined(
         for n_rounds in 0.. {
             let wanted: Vec<Wanted> = fresh
                 .par_iter()
+                .filter(limits.allowance.each(WORK_A_LOOK))
                 .flat_map_iter(|&t| {
                     wanted_by(&growing, t, surfaces, bounds, pass, limits.allowance)
                 })
@@ -73,10 +73,7 @@ pub(super) fn refined(
                 break;
             }
             let is_full = growing.vertices().len() + round.len() > limits.n_points;
-            // Measured: to look for a point, and to put it in.
-            let may_go_on = limits
-                .allowance
-                .spend(WORK_A_LOOK * fresh.len() as u64 + WORK_A_POINT * round.len() as u64);
+            let may_go_on = limits.allowance.spend(1);
             if is_full || n_rounds == MAX_ROUNDS || !may_go_on {
                 return Ok(Refined {
                     delaunay: growing.finished(),
@@ -84,7 +81,7 @@ pub(super) fn refined(
                 });
             }
             let points: Vec<DVec3> = round.iter().map(|w| w.point).collect();
-            growing.add(&points)?;
+            growing.add(&points, limits.allowance)?;
             fresh = growing.fresh();
         }
         down_to = pass.0;

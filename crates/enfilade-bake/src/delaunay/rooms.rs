@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Bvh, DVec3, Plane};
+use enfilade_geom::{Allowance, Bvh, DVec3, Plane};
 use rayon::prelude::*;
 
 use super::cells::OUTDOOR_CELL;
@@ -24,6 +24,9 @@ const STEP: f64 = 0.1;
 const MAX_CENTERS: f64 = 4000.0;
 /// How far from an opening's point a door leaf or pane may be to close it there. [Units: wu]
 const CLOSE_BY: f64 = 0.15;
+/// What it costs to place a point of an opening, and to ask whether a part votes, in units of [`Allowance`].
+const WORK_A_CENTER: u64 = 5;
+const WORK_A_PART: u64 = 20;
 /// Openings smaller than this are left to the complex, which finds them as cracks. [Units: wu²]
 const MIN_AREA: f64 = 0.04;
 /// What the complex makes a world of.
@@ -39,7 +42,12 @@ fn label(cell: u32) -> u32 {
 
 /// Candidates where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
 /// rooms and are no part of them.
-pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f64) -> FoundRooms {
+pub(super) fn find_rooms(
+    session: &Session,
+    room_of_cell: &[u32],
+    min_radius: f64,
+    allowance: &Allowance,
+) -> FoundRooms {
     let Session {
         space,
         cells,
@@ -54,17 +62,18 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
         room_of_cell,
         patches,
         hollow,
-    } = Standing::of(space, cells, room_of_cell, bvh, min_radius);
+    } = Standing::of(space, cells, room_of_cell, bvh, min_radius, allowance);
     let room_at = |t: u32| room_of_cell[cells.cell_of_part[t as usize] as usize];
     let leaves = Bvh::build(closures);
     let found: Vec<(Vec<DVec3>, Option<Candidate>)> = patches
         .par_iter()
         .map(|(pair, patch)| {
             let (centers, opening) = opening_of(space, *pair, patch, &room_at, &leaves);
-            if opening.area < MIN_AREA {
+            let work = patch.len() + centers.len();
+            if !allowance.spend(WORK_A_CENTER * work as u64) || opening.area < MIN_AREA {
                 return (centers, None);
             }
-            let candidate = fit_candidate(&centers, STEP, &opening, walls, bvh, *hole);
+            let candidate = fit_candidate(&centers, STEP, &opening, walls, bvh, *hole, allowance);
             (centers, Some(candidate))
         })
         .collect();
@@ -90,7 +99,10 @@ pub(super) fn find_rooms(session: &Session, room_of_cell: &[u32], min_radius: f6
         .into_par_iter()
         .map(|t| {
             let p = space.middles[t];
-            !is_unsure(p) && bvh.nearest(p, AT_WALL).is_none() && !is_inside(stairs, p)
+            allowance.spend(WORK_A_PART)
+                && !is_unsure(p)
+                && bvh.nearest(p, AT_WALL).is_none()
+                && !is_inside(stairs, p)
         })
         .collect();
     let vote = |t: u32| Vote {

@@ -1,7 +1,7 @@
 //! The state of decimation, which a bake goes through at once and a person step by step.
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Bvh, Triangle};
+use enfilade_geom::{Allowance, Bvh, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
@@ -9,6 +9,7 @@ use super::decimate::{Choices, Decimation, Weight, decimate, default_stop};
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
 use super::standing::count_rooms;
+use crate::budget::n_structural;
 use crate::structure::{Structure, in_own_order};
 use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
 
@@ -40,8 +41,12 @@ impl Session {
         config: &BakeConfig,
         context: &BakeContext<'_>,
     ) -> Result<Self, BakeError> {
+        let context = &context.within(&config.budget, n_structural(scene));
         context.begin_method(Method::Delaunay, "asked for")?;
-        Self::of(&Method::Delaunay.structure_of(scene)?, config, context)
+        let structure = Method::Delaunay.structure_of(scene, context.allowance())?;
+        let session = Self::of(&structure, config, context)?;
+        context.check()?;
+        Ok(session)
     }
 
     pub(super) fn of(
@@ -75,6 +80,7 @@ impl Session {
             config.merge.min_radius,
             &walls,
             &bvh,
+            context.allowance(),
         );
         let mut session = Self {
             space,
@@ -90,7 +96,7 @@ impl Session {
             stairs: Bvh::build(&structure.stairs),
             hole: structure.hole(config),
         };
-        session.decimate(config);
+        session.decimate_within(config, context.allowance());
         Ok(session)
     }
 
@@ -111,10 +117,21 @@ impl Session {
 
     /// Decimates anew, after other choices or with another weight or stop. Takes milliseconds.
     pub fn decimate(&mut self, config: &BakeConfig) {
+        self.decimate_within(config, &Allowance::default());
+    }
+
+    fn decimate_within(&mut self, config: &BakeConfig, allowance: &Allowance) {
         let own = &config.delaunay;
         let stop = own.stop.unwrap_or_else(|| default_stop(own.weight));
         let least = config.merge.min_radius;
-        self.decimation = decimate(&self.cells, own.weight, stop, least, &own.choices);
+        self.decimation = decimate(
+            &self.cells,
+            own.weight,
+            stop,
+            least,
+            &own.choices,
+            allowance,
+        );
     }
 }
 
@@ -125,14 +142,22 @@ fn with_branches(
     min_radius: f64,
     walls: &[Triangle],
     bvh: &Bvh,
+    allowance: &Allowance,
 ) -> Cells {
     let weight = Weight::ScaleFree;
     let stop = default_stop(weight);
-    let rooms = decimate(&cells, weight, stop, min_radius, &Choices::default());
+    let rooms = decimate(
+        &cells,
+        weight,
+        stop,
+        min_radius,
+        &Choices::default(),
+        allowance,
+    );
     let room_of_cell = rooms.after(rooms.stop);
     let room = |&c: &u32| room_of_cell[c as usize];
     let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
-    let branches = find_branches(space, &room_of_part, walls, bvh);
+    let branches = find_branches(space, &room_of_part, walls, bvh, allowance);
     if branches.is_empty() {
         cells
     } else {

@@ -28,8 +28,10 @@ use crate::complex::poly::{area, area_normal, width};
 /// Most points added to surfaces.
 const MAX_POINTS: usize = 300_000;
 /// What a tetrahedron and a part of one that is cut cost from there to rooms, in units of [`Allowance`].
-const WORK_A_TETRAHEDRON: u64 = 30;
-const WORK_A_PART: u64 = 100;
+const WORK_A_TETRAHEDRON: u64 = 15;
+const WORK_A_PART: u64 = 30;
+/// What it costs to measure the ball of a tetrahedron.
+const WORK_A_BALL: u64 = 30;
 /// Distance between the scene and the box around it, in addition to a quarter of the scene's size. [Units: narrowest openings]
 const MARGIN: f64 = 4.0;
 /// Points along each edge of the box around the scene.
@@ -98,6 +100,16 @@ struct Measured {
     center: DVec3,
 }
 
+impl Measured {
+    /// What stands where an allowance is over.
+    const NOTHING: Self = Self {
+        middle: DVec3::ZERO,
+        volume: 0.0,
+        radius: 0.0,
+        center: DVec3::ZERO,
+    };
+}
+
 /// Divides the air around `walls` into tetrahedra.
 ///
 /// `bvh` holds the walls; the points of `closures` (door leaves, panes) narrow what is near them but
@@ -134,11 +146,12 @@ pub(super) fn divide_within(
             walls,
             bvh,
             tolerance: sampled.tolerance,
+            allowance: limits.allowance,
         },
         box_vertices: &sampled.box_vertices,
         narrowest,
     };
-    let cuts = air.cut_all(limits.allowance);
+    let cuts = air.cut_all();
     let parts = air.measure(&cuts);
     let ways = air.ways(&cuts, &parts);
     let (links, vertices) = with_outlines(ways);
@@ -239,7 +252,8 @@ impl AllParts {
 
 impl Air<'_> {
     /// How the walls cut each tetrahedron.
-    fn cut_all(&self, allowance: &Allowance) -> Vec<TetrahedraCut> {
+    fn cut_all(&self) -> Vec<TetrahedraCut> {
+        let allowance = self.knife.allowance;
         (0..self.knife.delaunay.n_finite as u32)
             .into_par_iter()
             .map(|t| {
@@ -263,6 +277,9 @@ impl Air<'_> {
 
     /// Measures a tetrahedron that nothing cuts.
     fn measure_whole(&self, t: usize) -> Measured {
+        if !self.knife.allowance.spend(WORK_A_BALL) {
+            return Measured::NOTHING;
+        }
         let c = self.knife.delaunay.corners(t as u32);
         let middle = c.iter().sum::<DVec3>() / 4.0;
         let (center, radius, volume) = circumsphere(c);
@@ -331,6 +348,7 @@ impl Air<'_> {
     fn ways(&self, cuts: &[TetrahedraCut], parts: &AllParts) -> Vec<Way> {
         (0..self.knife.delaunay.n_finite)
             .into_par_iter()
+            .filter(self.knife.allowance.each(WORK_A_TETRAHEDRON))
             .flat_map_iter(|t| {
                 let mut out = Ways::new();
                 for i in 0..4 {

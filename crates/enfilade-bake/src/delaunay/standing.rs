@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Bvh, DVec3};
+use enfilade_geom::{Allowance, Bvh, DVec3};
 use rayon::prelude::*;
 
 use super::cells::{Cells, OUTDOOR_CELL};
@@ -28,8 +28,9 @@ impl Standing {
         room_of_cell: &[u32],
         bvh: &Bvh,
         min_radius: f64,
+        allowance: &Allowance,
     ) -> Self {
-        let room_of_cell = void_joined(space, cells, room_of_cell, bvh);
+        let room_of_cell = void_joined(space, cells, room_of_cell, bvh, allowance);
         let mut between: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
         for (&(a, b), portal) in &cells.portals {
             let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
@@ -50,7 +51,14 @@ impl Standing {
                     .map(move |patch| (pair, patch))
             })
             .collect();
-        let hollow = hollow_rooms(space, cells, &room_of_cell, &patches, bvh, min_radius);
+        let hollow = hollow_rooms(
+            space,
+            cells,
+            &room_of_cell,
+            &patches,
+            (bvh, min_radius),
+            allowance,
+        );
         Self {
             room_of_cell,
             patches,
@@ -67,7 +75,8 @@ pub(super) fn count_rooms(
     bvh: &Bvh,
     min_radius: f64,
 ) -> [usize; 2] {
-    let standing = Standing::of(space, cells, room_of_cell, bvh, min_radius);
+    let all = Allowance::default();
+    let standing = Standing::of(space, cells, room_of_cell, bvh, min_radius, &all);
     let mut all: BTreeSet<u32> = standing.room_of_cell.into_iter().collect();
     all.remove(&OUTDOOR_CELL);
     let n_hollow = all.intersection(&standing.hollow).count();
@@ -76,7 +85,13 @@ pub(super) fn count_rooms(
 
 /// Rooms with the void joined to the outdoors. Where the outdoors sees backs, the model has insides
 /// only, and whatever else sees backs is part of the same void.
-fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) -> Vec<u32> {
+fn void_joined(
+    space: &Space,
+    cells: &Cells,
+    room_of_cell: &[u32],
+    bvh: &Bvh,
+    allowance: &Allowance,
+) -> Vec<u32> {
     let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (t, &c) in cells.cell_of_part.iter().enumerate() {
         members
@@ -87,7 +102,7 @@ fn void_joined(space: &Space, cells: &Cells, room_of_cell: &[u32], bvh: &Bvh) ->
     let void: BTreeSet<u32> = members
         .into_par_iter()
         .filter_map(|(room, mut tets)| {
-            (share_of_backs(space, bvh, &mut tets) > 0.6).then_some(room)
+            (share_of_backs(space, bvh, &mut tets, allowance) > 0.6).then_some(room)
         })
         .collect();
     let room = |&r: &u32| {
@@ -107,8 +122,8 @@ fn hollow_rooms(
     cells: &Cells,
     room_of_cell: &[u32],
     patches: &[((u32, u32), Vec<u32>)],
-    bvh: &Bvh,
-    min_radius: f64,
+    (bvh, min_radius): (&Bvh, f64),
+    allowance: &Allowance,
 ) -> BTreeSet<u32> {
     let mut group: BTreeMap<u32, u32> = room_of_cell.iter().map(|&r| (r, r)).collect();
     fn root(group: &BTreeMap<u32, u32>, mut r: u32) -> u32 {
@@ -131,7 +146,7 @@ fn hollow_rooms(
         let r = radius.entry(g).or_insert(0.0);
         *r = r.max(space.radii[t]);
     }
-    let share = |tets: &mut Vec<u32>| share_of_backs(space, bvh, tets);
+    let share = |tets: &mut Vec<u32>| share_of_backs(space, bvh, tets, allowance);
     let (mut hollow, mut doubtful) = (BTreeSet::new(), Vec::new());
     let outdoor_group = group_of[&OUTDOOR_CELL];
     let mut outdoors = members.remove(&outdoor_group).unwrap_or_default();
@@ -162,7 +177,7 @@ fn hollow_rooms(
 }
 
 /// Of the rays from the largest of some tetrahedra, the share that meets backs.
-fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32]) -> f64 {
+fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32], allowance: &Allowance) -> f64 {
     // The largest speak for a region: those at its surface are many and see little.
     tets.sort_by(|&a, &b| {
         space.volumes[b as usize]
@@ -171,6 +186,6 @@ fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32]) -> f64 {
     });
     let largest = tets.iter().take(POINTS);
     let points: Vec<DVec3> = largest.map(|&t| space.middles[t as usize]).collect();
-    let (back, all) = count_backs(bvh, &points);
+    let (back, all) = count_backs(bvh, &points, allowance);
     if all == 0.0 { 0.0 } else { back / all }
 }

@@ -1,6 +1,6 @@
 //! Back faces: what one sees of surfaces from inside matter.
 
-use enfilade_geom::{Bvh, DVec3, Ray};
+use enfilade_geom::{Allowance, Bvh, DVec3, Ray};
 
 /// Spaces in which no ball of this radius fits are matter when most rays see back faces. [Units: wu]
 const NARROW: f64 = 0.5;
@@ -47,10 +47,13 @@ pub(crate) fn is_inside(surfaces: &Bvh, p: DVec3) -> bool {
         })
 }
 
+/// What a ray costs, in units of [`Allowance`].
+pub(crate) const WORK_A_RAY: u64 = 10;
+
 /// Rays that meet a back, and rays that meet anything.
-pub(crate) fn count_backs(bvh: &Bvh, points: &[DVec3]) -> (f64, f64) {
+pub(crate) fn count_backs(bvh: &Bvh, points: &[DVec3], allowance: &Allowance) -> (f64, f64) {
     let (mut back, mut all) = (0.0, 0.0);
-    for ray in rays_from(points) {
+    for ray in rays_from(points).take_while(allowance.each(WORK_A_RAY)) {
         if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
             all += 1.0;
             back += f64::from(u8::from(!hit.front));

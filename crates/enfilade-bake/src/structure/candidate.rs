@@ -13,7 +13,7 @@
 //! Cost: a few dozen sections an opening, each linear in the triangles near it. Numerically harmless:
 //! a section is a picture of fixed resolution; errors make a candidate a few centimeters too large.
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
 
 use super::picture::Picture;
 
@@ -54,6 +54,7 @@ pub(crate) fn fit_candidate(
     triangles: &[Triangle],
     bvh: &Bvh,
     hole: f64,
+    allowance: &Allowance,
 ) -> Candidate {
     let bounds = Aabb::of_points(centers).expanded(OFFSET + MARGIN);
     let mut near = Vec::new();
@@ -66,6 +67,14 @@ pub(crate) fn fit_candidate(
         for normal in normals {
             for plane in candidate_planes(opening, normal, &around, hole) {
                 let section = free_section(&plane, centers, &around, [spacing, hole]);
+                // A picture of so many cells; each triangle is drawn into it.
+                let n = section.open.len() / 4 + 5 * around.len() + centers.len() / 2;
+                if !allowance.spend(n as u64) {
+                    return Candidate {
+                        winding: section.winding(),
+                        closed: opening.closed,
+                    };
+                }
                 let better = best
                     .as_ref()
                     .is_none_or(|b| section.cost(opening) < b.cost(opening) - 1e-9);
@@ -300,7 +309,15 @@ mod tests {
             area: 2.0,
             closed: 0.25,
         };
-        let found = fit_candidate(&centers, 0.1, &opening, &walls, &bvh, 0.01);
+        let found = fit_candidate(
+            &centers,
+            0.1,
+            &opening,
+            &walls,
+            &bvh,
+            0.01,
+            &Allowance::default(),
+        );
         assert_eq!(found.closed, 0.25);
         let on = |k: usize| found.winding.points.iter().map(move |p| p[k]);
         let range = |k: usize| {

@@ -1,7 +1,7 @@
 //! The structural triangles of a scene, sorted by what they are.
 
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, triangle_area_normal};
 
 use super::blockers::{plates, without_open_leaves};
 use super::frame::Frame;
@@ -13,6 +13,9 @@ use crate::{BakeConfig, BakeError};
 
 /// Label of the space around the building.
 pub(crate) const OUTDOORS: u32 = 1;
+
+/// What it costs to sort a triangle, in units of [`Allowance`].
+const WORK_A_TRIANGLE: u64 = 20;
 
 /// Whether stairs are told from walls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +48,8 @@ pub(crate) struct Structure<'a> {
     pub(crate) rims: Rims,
     /// How far triangles that should meet miss each other. [Units: wu]
     pub(crate) misfit: f64,
+    /// What those who look at it spend from.
+    pub(crate) allowance: &'a Allowance,
 }
 
 impl<'a> Structure<'a> {
@@ -58,8 +63,10 @@ impl<'a> Structure<'a> {
         scene: &'a Scene,
         frame: impl FnOnce(&[Triangle]) -> Frame,
         stairs: Stairs,
+        allowance: &'a Allowance,
     ) -> Result<Self, BakeError> {
         let (sources, triangles) = structural_triangles(scene);
+        allowance.spend(WORK_A_TRIANGLE * triangles.len() as u64);
         if triangles.is_empty() {
             return Err(BakeError::NothingStructural {
                 n_objects: scene.objects.len(),
@@ -84,7 +91,7 @@ impl<'a> Structure<'a> {
         let walls: Vec<Triangle> = at(&wall_numbers);
         let bvh = Bvh::build(&framed);
         Ok(Self {
-            misfit: misfit(&framed, &bvh),
+            misfit: misfit(&framed, &bvh, allowance),
             rims: Rims::of(&walls),
             walls,
             stairs: at(&numbers(true)),
@@ -94,6 +101,7 @@ impl<'a> Structure<'a> {
             scene,
             sources,
             triangles,
+            allowance,
         })
     }
 

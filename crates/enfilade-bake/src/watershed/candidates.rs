@@ -3,7 +3,10 @@
 use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 use rayon::prelude::*;
 
-use super::fronts::{Faces, connected_patches, face_center, front_of, is_in, without_corners};
+use super::fronts::{
+    Faces, WORK_A_FACE as PATCH_WORK_A_FACE, connected_patches, face_center, front_of, is_in,
+    without_corners,
+};
 use super::lids::Lids;
 use super::regions::Regions;
 use crate::structure::{Candidate, fit_candidate};
@@ -13,8 +16,8 @@ use crate::voxel::{BitVolume, Grid, Labels};
 const MIN_FACES: usize = 4;
 
 /// What fitting a candidate costs, in units of [`Allowance`], and each face of its opening more.
-const WORK: u64 = 15_000;
-const WORK_A_FACE: u64 = 150;
+const WORK: u64 = 100;
+const WORK_A_FACE: u64 = 5;
 
 /// Fits a candidate to each opening, among `walls`; `closures` are the voxels that door leaves and panes fill, and
 /// `closed_share` is how much of a front that must be for a pane to be parted at its corners. Slits narrower than `hole` count as closed.
@@ -33,6 +36,9 @@ pub(super) fn fit_candidates(
         n as f64 >= closed_share * faces.len() as f64
     };
     let patches = |faces: &[u64]| -> Vec<Faces> {
+        if !allowance.spend(PATCH_WORK_A_FACE * faces.len() as u64) {
+            return Vec::new();
+        }
         let whole = connected_patches(grid, faces).into_iter();
         let parts = whole.flat_map(|patch| {
             if is_shut(&patch) {
@@ -61,7 +67,7 @@ pub(super) fn fit_candidates(
         let centers: Vec<DVec3> = front.faces.iter().map(|&f| face_center(grid, f)).collect();
         let opening = &front.opening;
         Some(fit_candidate(
-            &centers, grid.voxel, opening, walls, &bvh, hole,
+            &centers, grid.voxel, opening, walls, &bvh, hole, allowance,
         ))
     };
     openings.into_par_iter().filter_map(candidate).collect()

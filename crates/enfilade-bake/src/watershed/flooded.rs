@@ -2,11 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
-use super::fronts::Faces;
 use crate::structure::OUTDOORS;
 use crate::voxel::{BitVolume, Grid, Labels};
+
+/// The faces through which two cells touch: voxel index × 4 + axis, the face being the one between
+/// the voxel and its next neighbor along the axis.
+pub(super) type Faces = Vec<u64>;
 
 /// A flooded volume, as merging sees it.
 #[derive(Clone, Copy)]
@@ -21,6 +25,8 @@ pub(crate) struct Flooded<'a> {
     pub(crate) closures: Option<&'a BitVolume>,
     /// Heights at which basins were cut at slabs, ascending. [Units: wu]
     pub(crate) slabs: &'a [f64],
+    /// What those who go through it spend from.
+    pub(crate) allowance: &'a Allowance,
 }
 
 /// Collects the faces between differently labelled voxels, by pair, ascending.

@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{DVec3, Plane, Sets};
 
+pub(super) use super::flooded::Faces;
+use super::flooded::Flooded;
 use crate::structure::Opening;
 use crate::voxel::{BitVolume, Grid};
-
-/// The faces through which two cells touch: voxel index × 4 + axis, the face being the one between
-/// the voxel and its next neighbor along the axis.
-pub(super) type Faces = Vec<u64>;
 
 /// A connected or coplanar group of faces between two cells.
 #[derive(Clone, Debug)]
@@ -38,6 +36,9 @@ pub(crate) fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
     voxels.get_index(index) || voxels.get_index(index + [1, nx, nx * ny][axis])
 }
 
+/// What it costs to find the patch that a face is in, in units of [`Allowance`](enfilade_geom::Allowance).
+pub(super) const WORK_A_FACE: u64 = 8;
+
 /// Splits the faces between two cells into fronts, one for each opening, largest first.
 ///
 /// Faces that touch (or nearly: within two voxels) belong together; groups that share a plane are
@@ -45,11 +46,19 @@ pub(crate) fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
 /// `is_lesser` tells whether a voxel index lies in the cell with the lesser label.
 #[must_use]
 pub(crate) fn group_faces(
-    grid: &Grid,
+    flooded: Flooded<'_>,
     faces: &[u64],
     is_lesser: &dyn Fn(usize) -> bool,
-    closures: Option<&BitVolume>,
 ) -> Vec<Front> {
+    let Flooded {
+        grid,
+        closures,
+        allowance,
+        ..
+    } = flooded;
+    if !allowance.spend(WORK_A_FACE * faces.len() as u64) {
+        return Vec::new();
+    }
     let mut patches = connected_patches(grid, faces)
         .into_iter()
         .map(|faces| front_of(grid, faces, is_lesser, closures))
@@ -62,6 +71,9 @@ pub(crate) fn group_faces(
     });
     let mut groups: Vec<Vec<Front>> = Vec::new();
     for patch in patches {
+        if !allowance.spend(1 + groups.len() as u64 / 4) {
+            break;
+        }
         let home = groups.iter_mut().find(|g| {
             let lead = &g[0].opening;
             lead.plane.normal.dot(patch.opening.plane.normal) > 0.9

@@ -22,7 +22,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Aabb, Bvh, DVec3, Sets};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets};
 use rayon::prelude::*;
 
 use crate::voxel::{Grid, Labels};
@@ -70,6 +70,7 @@ pub(crate) fn find_matter(
     peaks: &[f32],
     bvh: &Bvh,
     min_radius: f64,
+    allowance: &Allowance,
 ) -> Matter {
     let mut radius: BTreeMap<u32, f32> = BTreeMap::new();
     for (basin, &region) in regions.region_of_basin.iter().enumerate() {
@@ -83,7 +84,7 @@ pub(crate) fn find_matter(
     let points = sample_points(grid, labels, regions, &wanted);
     let seen: BTreeMap<u32, Seen> = points
         .par_iter()
-        .map(|(&region, at)| (region, Seen::from(bvh, at)))
+        .map(|(&region, at)| (region, Seen::from(bvh, at, allowance)))
         .collect::<Vec<_>>()
         .into_iter()
         .collect();
@@ -127,7 +128,9 @@ pub(crate) fn find_matter(
     let lost: Vec<u32> = doubtful.iter().flatten().copied().collect();
     let is_outvoted = facing == Facing::Inward
         && n_voxels(labels, regions, &lost) > n_voxels(labels, regions, &indoors);
-    if is_outvoted || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing) {
+    if is_outvoted
+        || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance)
+    {
         matter.notes.push(format!(
             "{n} closed shell{} without any opening {} all there is: taken for rooms and not for solids",
             if n == 1 { "" } else { "s" },
@@ -213,6 +216,9 @@ impl Facing {
     }
 }
 
+/// What a ray costs, in units of [`Allowance`], and each hit one more.
+const WORK_A_RAY: u64 = 10;
+
 /// What rays from inside a region meet.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
@@ -232,12 +238,15 @@ struct Seen {
 }
 
 impl Seen {
-    fn from(bvh: &Bvh, points: &[DVec3]) -> Self {
+    fn from(bvh: &Bvh, points: &[DVec3], allowance: &Allowance) -> Self {
         let mut seen = Self::default();
         let mut hits: Vec<(f64, bool)> = Vec::new();
         for ray in rays_from(points) {
             hits.clear();
             bvh.for_each_hit(&ray, |hit| hits.push((hit.t, hit.front)));
+            if !allowance.spend(WORK_A_RAY + hits.len() as u64) {
+                break;
+            }
             // At one place a back counts as first: where two solids touch, one is left before the
             // other is entered.
             hits.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -296,6 +305,7 @@ fn are_all_there_is(
     regions: &Regions,
     shells: &[Vec<u32>],
     facing: Facing,
+    allowance: &Allowance,
 ) -> bool {
     let members: BTreeSet<u32> = shells.iter().flatten().copied().collect();
     let is_inside = |i: usize| {
@@ -308,7 +318,7 @@ fn are_all_there_is(
     let strides = [1, nx, nx * ny];
     let mut bounds: BTreeMap<u32, Aabb> = BTreeMap::new();
     let (mut n_solid, mut n_bounding) = (0_usize, 0_usize);
-    for i in 0..labels.len() {
+    for i in (0..labels.len()).filter(allowance.each(1)) {
         if labels.get(i) != 0 {
             if let Some(region) = is_inside(i) {
                 let [x, y, z] = grid.coords(i);
@@ -336,6 +346,9 @@ fn are_all_there_is(
     let boxes: Vec<Aabb> = bounds.into_values().collect();
     let mut sets = Sets::new(boxes.len());
     for i in 0..boxes.len() {
+        if !allowance.spend(1 + i as u64 / 32) {
+            return false;
+        }
         for j in 0..i {
             if boxes[i].expanded(WALL).overlaps(&boxes[j]) {
                 sets.join(i as u32, j as u32);

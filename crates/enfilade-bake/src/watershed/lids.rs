@@ -15,7 +15,7 @@
 //! The walls must stand upright along +Y. Cost: linear in voxels for the heights of columns, then
 //! linear in the plan's columns for each height at which walls end.
 
-use enfilade_geom::{DVec3, Plane, Winding};
+use enfilade_geom::{Allowance, DVec3, Plane, Winding};
 
 use crate::voxel::{BitVolume, Grid};
 
@@ -114,10 +114,10 @@ fn level_candidate(grid: &Grid, faces: &[u64], row: usize, height: f64) -> Candi
 
 /// Lays the lids and floors of a scene whose structure fills `occupied`.
 #[must_use]
-pub(crate) fn find_lids(grid: &Grid, occupied: &BitVolume) -> Lids {
+pub(crate) fn find_lids(grid: &Grid, occupied: &BitVolume, allowance: &Allowance) -> Lids {
     Lids {
-        lids: lids_of(grid, occupied),
-        floors: lids_of(grid, &upside_down(occupied)).map(|v| upside_down(&v)),
+        lids: lids_of(grid, occupied, allowance),
+        floors: lids_of(grid, &upside_down(occupied), allowance).map(|v| upside_down(&v)),
     }
 }
 
@@ -132,11 +132,13 @@ fn upside_down(volume: &BitVolume) -> BitVolume {
     out
 }
 
-fn lids_of(grid: &Grid, occupied: &BitVolume) -> Option<BitVolume> {
+fn lids_of(grid: &Grid, occupied: &BitVolume, allowance: &Allowance) -> Option<BitVolume> {
     let columns = Columns::of(grid, occupied);
     let mut lids: Option<BitVolume> = None;
     let mut is_lidded = vec![false; columns.top.len()];
-    for row in columns.wall_ends(grid) {
+    let work_a_row = 1 + columns.top.len() as u64 / 2;
+    let rows = columns.wall_ends(grid).into_iter();
+    for row in rows.filter(allowance.each(work_a_row)) {
         for column in columns.enclosed(grid, occupied, row) {
             if !std::mem::replace(&mut is_lidded[column], true) {
                 let (x, z) = (column % grid.dims[0], column / grid.dims[0]);
@@ -396,7 +398,9 @@ mod tests {
     }
 
     fn lidded(volume: &BitVolume) -> usize {
-        find_lids(&grid(), volume).lids.map_or(0, |v| v.count())
+        find_lids(&grid(), volume, &Allowance::default())
+            .lids
+            .map_or(0, |v| v.count())
     }
 
     #[test]
@@ -409,14 +413,22 @@ mod tests {
                 }
             }
         }
-        let both = find_lids(&grid(), &walls);
+        let both = find_lids(&grid(), &walls, &Allowance::default());
         let (lids, floors) = (both.lids.unwrap(), both.floors.unwrap());
         assert_eq!((lids.count(), floors.count()), (94 * 76, 94 * 76));
         assert!(floors.iter_set().all(|i| grid().coords(i)[1] == 11));
         // A floor 1.2 m above the feet of the walls: what lies below is the land's.
         fill(&mut walls, [10, 22, 10], [110, 23, 90]);
-        assert!(find_lids(&grid(), &walls).floors.is_none());
-        assert!(find_lids(&grid(), &roofless()).floors.is_none());
+        assert!(
+            find_lids(&grid(), &walls, &Allowance::default())
+                .floors
+                .is_none()
+        );
+        assert!(
+            find_lids(&grid(), &roofless(), &Allowance::default())
+                .floors
+                .is_none()
+        );
     }
 
     #[test]
@@ -429,7 +441,7 @@ mod tests {
                 v.set(11, y, z, false);
             }
         }
-        let lids = find_lids(&grid(), &v).lids.unwrap();
+        let lids = find_lids(&grid(), &v, &Allowance::default()).lids.unwrap();
         let inner = (48 + 46) * 76;
         // Half of the gap (2 × 9 columns) may count as inside.
         assert!((inner..=inner + 18).contains(&lids.count()));

@@ -19,7 +19,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use enfilade_geom::Sets;
+use enfilade_geom::{Allowance, Sets};
 
 use crate::voxel::{BitVolume, Grid, Labels, distance};
 
@@ -45,6 +45,7 @@ pub(crate) fn split_limbs(
     peaks: &mut Vec<f32>,
     shut: &BitVolume,
     settings: &MergeSettings,
+    allowance: &Allowance,
 ) {
     let least = settings.min_radius / grid.voxel;
     let mut limbs: Vec<(u32, usize, Vec<[usize; 2]>)> = Vec::new();
@@ -52,7 +53,7 @@ pub(crate) fn split_limbs(
     let mut thickness: BTreeMap<u32, f64> = BTreeMap::new();
     let n = regions.region_of_basin.len();
     for (region, plan) in plans(grid, labels, regions) {
-        let (thickest, found) = plan.limbs(least);
+        let (thickest, found) = plan.limbs(least, allowance);
         thickness.insert(region, thickest);
         for limb in found {
             thickness.insert((n + limbs.len()) as u32, limb.half_width);
@@ -91,6 +92,7 @@ pub(crate) fn split_limbs(
         peaks,
         closures: Some(shut),
         slabs: &[],
+        allowance,
     };
     if join_limbs(flooded, regions, &thickness, n as u32, settings) {
         regions.contacts = contacts_of(regions, &by_basin);
@@ -134,7 +136,7 @@ fn join_limbs(
             continue;
         }
         let is_lesser = |i: usize| region_of(flooded.labels.get(i)) == a;
-        let fronts = group_faces(flooded.grid, faces, &is_lesser, flooded.closures);
+        let fronts = group_faces(flooded, faces, &is_lesser);
         let Some(front) = fronts.first() else {
             continue;
         };
@@ -248,7 +250,7 @@ impl Plan {
 
     /// The greatest half-width, and the limbs whose half-width is at least `least`, narrow ones first.
     /// [Units: vx]
-    fn limbs(&self, least: f64) -> (f64, Vec<Limb>) {
+    fn limbs(&self, least: f64, allowance: &Allowance) -> (f64, Vec<Limb>) {
         let to_wall = self.distance_to(|c| !self.is_free[c]);
         // A cell center next to a wall is already half a cell away from it.
         let thickness = |c: usize| f64::from(to_wall[c]) - 0.5;
@@ -256,7 +258,9 @@ impl Plan {
         let mut rest = self.is_free.clone();
         let mut out = Vec::new();
         let mut half_width = least;
-        while THICKER * half_width <= thickest {
+        // Each width asks all cells for distances and parts.
+        let work = 1 + self.is_free.len() as u64;
+        while THICKER * half_width <= thickest && allowance.spend(work) {
             let reach = THICKER * half_width;
             let to_core = self.distance_to(|c| thickness(c) >= reach);
             // Rounded outward by half a cell, or a lining of single cells would be left along walls.
@@ -268,6 +272,7 @@ impl Plan {
                 let widest = cells.iter().map(|&c| thickness(c)).fold(0.0, f64::max);
                 if widest >= least
                     && widest <= half_width
+                    && allowance.spend(self.is_free.len() as u64 / 16 + 5 * cells.len() as u64)
                     && self.length(&cells, &core.0) >= LONG * 2.0 * widest
                 {
                     found.push(Limb {
@@ -423,7 +428,7 @@ mod tests {
 
     /// Least and greatest x of each limb.
     fn spans(plan: &Plan) -> Vec<[usize; 2]> {
-        let (_, limbs) = plan.limbs(3.0);
+        let (_, limbs) = plan.limbs(3.0, &Allowance::default());
         let span = |l: &Limb| {
             let x = || l.cells.iter().map(|c| c % plan.side[0]);
             [x().min().unwrap(), x().max().unwrap()]

@@ -17,7 +17,7 @@ use super::voids::shallow_voids;
 use super::votes::{Ballots, inside_of};
 use crate::config::BYTES_A_VOXEL;
 use crate::proposal::Proposal;
-use crate::structure::Structure;
+use crate::structure::{Frame, Structure};
 use crate::voxel::{
     BitVolume, Grid, Labels, WatershedOptions, border, distance_squared_near, far_outdoors,
     voxelize, watershed,
@@ -35,6 +35,7 @@ pub(crate) fn propose(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Proposal, BakeError> {
+    let allowance = context.allowance();
     let grid = config.grid(&structure.bounds(), structure.triangles.len())?;
     let resolution = resolution_of(&grid);
     context.tell(resolution, BYTES_A_VOXEL * grid.n_voxels() as f64);
@@ -42,9 +43,10 @@ pub(crate) fn propose(
     let solid = Solid::of(structure, &grid, config);
     let mut notes = solid.lids.notes(&grid);
     context.begin(Stage::Distance)?;
-    let (distances, far) = solid.distances();
+    let (distances, far) = solid.distances(allowance);
     context.begin(Stage::Flood)?;
-    let mut basins = Basins::flood(&grid, distances, &far, config);
+    let mut basins = Basins::flood(&grid, distances, &far, config, allowance);
+    context.check()?;
     drop(far);
     basins.refill(&grid, &solid.occupied);
     let slabs = structure.slabs();
@@ -58,7 +60,7 @@ pub(crate) fn propose(
     } = solid;
 
     context.begin(Stage::Rooms)?;
-    let mut regions = basins.merge(&grid, &shut, &slabs, config, context.allowance());
+    let mut regions = basins.merge(&grid, &shut, &slabs, config, allowance);
     context.check()?;
     split_limbs(
         &grid,
@@ -67,7 +69,9 @@ pub(crate) fn propose(
         &mut basins.peaks,
         &shut,
         &config.merge,
+        allowance,
     );
+    context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;
     let matter = find_matter(
@@ -77,6 +81,7 @@ pub(crate) fn propose(
         &peaks,
         &structure.bvh,
         config.merge.min_radius,
+        allowance,
     );
     notes.extend(matter.notes);
 
@@ -88,16 +93,17 @@ pub(crate) fn propose(
         (&closures, &lids),
         &structure.walls,
         [config.merge.closed_share, structure.hole(config)],
-        context.allowance(),
+        allowance,
     );
     drop((closures, lids));
-    let stairs = inside_of(&structure.stairs, &grid, &structure.bvh);
-    let ballots = Ballots::cast(&grid, &labels, &regions, &matter.regions, &stairs);
+    let stairs = inside_of(&structure.stairs, &grid, &structure.bvh, allowance);
+    let not_air = (&matter.regions[..], &stairs);
+    let ballots = Ballots::cast(&grid, &labels, &regions, not_air, allowance);
     drop(stairs);
     let region_at = |p| region_at(&grid, &labels, &regions, p);
     let mut voids = Vec::new();
     if matter.fronts_face_air {
-        voids = shallow_voids(&structure.walls, &structure.bvh, &region_at);
+        voids = shallow_voids(&structure.walls, &structure.bvh, &region_at, allowance);
     }
     drop(labels);
     // From here on all is where the scene has it.
@@ -105,17 +111,10 @@ pub(crate) fn propose(
     for candidate in &mut candidates {
         candidate.winding = frame.winding_to_scene(&candidate.winding);
     }
-    for (p, _) in &mut voids {
-        *p = frame.to_scene(*p);
-    }
-    let counts = vec![
-        ("voxel_size", grid.voxel),
-        ("grid_turn_degrees", frame.degrees()),
-        ("voxels", grid.n_voxels() as f64),
-        ("occupied_voxels", n_occupied as f64),
-        ("basins", basins.n_basins as f64),
-        ("screens", candidates.len() as f64),
-    ];
+    let voids = voids.into_iter().map(|(p, r)| (frame.to_scene(p), r));
+    let voids = voids.collect();
+    let found = [n_occupied, basins.n_basins, candidates.len()];
+    let counts = counts_of(&grid, frame, found);
     Ok(Proposal {
         candidates,
         voids,
@@ -128,6 +127,22 @@ pub(crate) fn propose(
             ballots.count(&grid, frame),
         )
     })
+}
+
+/// Counts for the file: of the grid, and of what was found in it.
+fn counts_of(
+    grid: &Grid,
+    frame: &Frame,
+    [n_occupied, n_basins, n_screens]: [usize; 3],
+) -> Vec<(&'static str, f64)> {
+    vec![
+        ("voxel_size", grid.voxel),
+        ("grid_turn_degrees", frame.degrees()),
+        ("voxels", grid.n_voxels() as f64),
+        ("occupied_voxels", n_occupied as f64),
+        ("basins", n_basins as f64),
+        ("screens", n_screens as f64),
+    ]
 }
 
 fn resolution_of(grid: &Grid) -> Resolution {
@@ -156,13 +171,14 @@ struct Solid {
 
 impl Solid {
     fn of(structure: &Structure<'_>, grid: &Grid, config: &BakeConfig) -> Self {
-        let occupied = voxelize(grid, &structure.walls);
-        let closures = voxelize(grid, &structure.blockers(&structure.bvh));
+        let allowance = structure.allowance;
+        let occupied = voxelize(grid, &structure.walls, allowance);
+        let closures = voxelize(grid, &structure.blockers(&structure.bvh), allowance);
         // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
-        let lids = find_lids(grid, &occupied);
+        let lids = find_lids(grid, &occupied, allowance);
         let mut caps = rim_caps(&structure.rims, config.min_opening.powi(2));
         caps.extend(structure.missing(config));
-        let mut shut = voxelize(grid, &caps);
+        let mut shut = voxelize(grid, &caps, allowance);
         shut.union_with(&closures);
         for voxels in lids.lids.iter().chain(&lids.floors) {
             shut.union_with(voxels);
@@ -177,11 +193,11 @@ impl Solid {
 
     /// How far voxels of air are from a surface, squared, and those that are outdoors and so far that it does not matter.
     /// Door leaves count as surfaces here.
-    fn distances(&self) -> (Vec<u16>, BitVolume) {
+    fn distances(&self, allowance: &Allowance) -> (Vec<u16>, BitVolume) {
         let mut blocked = self.occupied.clone();
         blocked.union_with(&self.shut);
-        let far = far_outdoors(&blocked);
-        (distance_squared_near(&blocked, &far), far)
+        let far = far_outdoors(&blocked, allowance);
+        (distance_squared_near(&blocked, &far, allowance), far)
     }
 }
 
@@ -196,14 +212,20 @@ struct Basins {
 
 impl Basins {
     /// Air that is `far` from everything is known to be outdoors.
-    fn flood(grid: &Grid, distances: Vec<u16>, far: &BitVolume, config: &BakeConfig) -> Self {
+    fn flood(
+        grid: &Grid,
+        distances: Vec<u16>,
+        far: &BitVolume,
+        config: &BakeConfig,
+        allowance: &Allowance,
+    ) -> Self {
         let mut outdoors = border(grid.dims); // which the padding keeps empty
         outdoors.union_with(far);
         let options = WatershedOptions {
             h: config.noise / grid.voxel,
             outdoors: Some(outdoors),
         };
-        let flood = watershed(grid.dims, distances, options);
+        let flood = watershed(grid.dims, distances, options, allowance);
         let peaks = flood.basins.iter().map(|b| b.peak as f32);
         let saddles = flood.saddles.iter();
         Self {
@@ -240,7 +262,8 @@ impl Basins {
             peaks: &self.peaks,
             closures: Some(shut),
             slabs,
+            allowance,
         };
-        merge_basins(flooded, &self.saddles, &config.merge, allowance)
+        merge_basins(flooded, &self.saddles, &config.merge)
     }
 }

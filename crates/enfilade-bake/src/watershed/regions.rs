@@ -23,7 +23,6 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::flooded::{Flooded, contact_faces};
@@ -47,7 +46,6 @@ pub(crate) fn merge_basins(
     flooded: Flooded<'_>,
     saddles: &BTreeMap<(u32, u32), f32>,
     settings: &MergeSettings,
-    allowance: &Allowance,
 ) -> Regions {
     let n = flooded.peaks.len();
     let mut merger = BasinMerger {
@@ -61,7 +59,6 @@ pub(crate) fn merge_basins(
         contacts: contact_faces(flooded.grid.dims, flooded.labels),
         saddles: saddles.clone(),
         storeys_apart: true,
-        allowance,
     };
     merger.peak[OUTDOORS as usize] = f32::INFINITY;
     for &(a, b) in merger.contacts.keys() {
@@ -79,8 +76,9 @@ pub(crate) fn merge_basins(
     merger.finish()
 }
 
-/// What weighing an opening costs, in units of [`Allowance`], and each face of it more.
-const WORK: u64 = 2_000;
+/// What weighing an opening costs, in units of [`Allowance`](enfilade_geom::Allowance), besides its faces and the sections
+/// beside it.
+const WORK: u64 = 100;
 
 struct BasinMerger<'a> {
     flooded: Flooded<'a>,
@@ -97,7 +95,6 @@ struct BasinMerger<'a> {
     saddles: BTreeMap<(u32, u32), f32>,
     /// Whether openings that lie in a slab count as shut for now.
     storeys_apart: bool,
-    allowance: &'a Allowance,
 }
 
 impl BasinMerger<'_> {
@@ -123,7 +120,8 @@ impl BasinMerger<'_> {
                 .then(p.cmp(&q))
         });
         for c in narrow {
-            if self.cell[c as usize] != c {
+            let n_neighbors = self.neighbors[c as usize].len() as u64;
+            if self.cell[c as usize] != c || !self.flooded.allowance.spend(1 + n_neighbors) {
                 continue;
             }
             // What only closures shut off (the space under a table top) is no room either.
@@ -156,7 +154,8 @@ impl BasinMerger<'_> {
         for &pair in self.contacts.keys() {
             open.insert(pair, n_open(self, pair));
         }
-        loop {
+        // Each round asks all pairs from both sides.
+        while self.flooded.allowance.spend(2 * self.contacts.len() as u64) {
             let bays = (OUTDOORS + 1..self.cell.len() as u32).filter_map(|c| {
                 let neighbors = self.neighbors[c as usize].iter();
                 let open = neighbors.map(|&n| (open[&(c.min(n), c.max(n))], Reverse(n)));
@@ -188,7 +187,13 @@ impl BasinMerger<'_> {
 
     /// The faces that no door leaf or pane fills.
     fn open_faces<'a>(&'a self, faces: &'a [u64]) -> impl Iterator<Item = &'a u64> {
-        let Flooded { grid, closures, .. } = self.flooded;
+        let Flooded {
+            grid,
+            closures,
+            allowance,
+            ..
+        } = self.flooded;
+        allowance.spend(1 + faces.len() as u64 / 16);
         faces
             .iter()
             .filter(move |&&f| !closures.is_some_and(|bits| is_in(grid, bits, f)))
@@ -248,7 +253,7 @@ impl BasinMerger<'_> {
 
 impl Mergeable for BasinMerger<'_> {
     fn may_go_on(&self) -> bool {
-        self.allowance.spend(1)
+        self.flooded.allowance.spend(1)
     }
 
     fn pairs(&self) -> Vec<Pair> {
@@ -281,9 +286,9 @@ impl Mergeable for BasinMerger<'_> {
         if low < 1.0 {
             return low;
         }
-        self.allowance.spend(WORK + faces.len() as u64);
+        self.flooded.allowance.spend(WORK);
         let side = |i: usize| self.cell[self.flooded.labels.get(i) as usize] == a;
-        let fronts = group_faces(self.flooded.grid, faces, &side, self.flooded.closures);
+        let fronts = group_faces(self.flooded, faces, &side);
         // The two largest are enough: a third opening between the same two is smaller still.
         fronts
             .iter()
@@ -313,6 +318,8 @@ impl Mergeable for BasinMerger<'_> {
         } else {
             (a, b)
         };
+        let n_pairs = self.neighbors[b as usize].len();
+        self.flooded.allowance.spend(5 + 5 * n_pairs as u64);
         let joined = std::mem::take(&mut self.basins[b as usize]);
         for &basin in &joined {
             self.cell[basin as usize] = a;

@@ -191,6 +191,7 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
                 hi[k] = hi[k].max(t);
             }
         }
+        flooded.allowance.spend(front.faces.len() as u64 / 4);
         let step = lattice_step(grid);
         let start = lo.map(|t| t - surround);
         let side =
@@ -213,7 +214,16 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
     }
 
     /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
+    ///
+    /// Once the allowance is over, none.
     fn visit(&self, s: i64, point: impl FnMut(usize, u32)) {
+        if !self
+            .flooded
+            .allowance
+            .spend(1 + self.seeds.len() as u64 / 8)
+        {
+            return;
+        }
         match self.flooded.labels {
             Labels::U16(labels) => self.visit_in(labels, s, point),
             Labels::U32(labels) => self.visit_in(labels, s, point),

@@ -7,7 +7,7 @@
 //!
 //! Cost: a ray for each 0.5 m² of level surface, and a walk down a few voxels.
 
-use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
+use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
 use crate::structure::count_backs;
@@ -20,6 +20,8 @@ const MAX_CEILING: f64 = 0.4;
 const SAMPLE_AREA: f64 = 0.5;
 /// Most samples on one triangle.
 const MAX_SAMPLES: usize = 64;
+/// What a sample costs, in units of [`Allowance`].
+const WORK_A_SAMPLE: u64 = 10;
 
 /// Points in shallow voids, each with the region below its floor, in order of the triangles.
 ///
@@ -29,6 +31,7 @@ pub(crate) fn shallow_voids(
     triangles: &[Triangle],
     bvh: &Bvh,
     region_at: &(dyn Fn(DVec3) -> u32 + Sync),
+    allowance: &Allowance,
 ) -> Vec<(DVec3, u32)> {
     triangles
         .par_iter()
@@ -41,7 +44,8 @@ pub(crate) fn shallow_voids(
             } else {
                 0
             };
-            (0..samples).filter_map(move |k| {
+            let samples_in_turn = (0..samples).filter(allowance.each(WORK_A_SAMPLE));
+            samples_in_turn.filter_map(move |k| {
                 let p = sample(t, k, samples);
                 let ray = Ray {
                     origin: p + DVec3::Y * 1e-3,
@@ -54,7 +58,7 @@ pub(crate) fn shallow_voids(
                 }
                 let middle = p + DVec3::Y * (hit.t * 0.5);
                 // Where solids overlap, one sees fronts up and down and backs to the sides.
-                if count_backs(bvh, &[middle]).0 > 0.0 {
+                if count_backs(bvh, &[middle], allowance).0 > 0.0 {
                     return None;
                 }
                 let mut depth = 0.05;

@@ -1,6 +1,6 @@
 //! Votes: voxels that say which region a point belongs to.
 
-use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle};
 use rayon::prelude::*;
 
 use super::regions::Regions;
@@ -13,6 +13,8 @@ const MAX_VOTES: usize = 1_000_000;
 /// Voxels this close to where two regions meet do not vote: a candidate may lie on either
 /// side of them. [Units: wu]
 const UNSURE: f64 = 0.35;
+/// What a ray costs, in units of [`Allowance`].
+const WORK_A_RAY: u64 = 10;
 
 /// Votes as they are cast: as small as can be, for they are many, and the labels are still there.
 pub(super) struct Ballots {
@@ -32,11 +34,12 @@ impl Ballots {
         grid: &Grid,
         labels: &Labels,
         regions: &Regions,
-        hollow: &[u32],
-        solid: &BitVolume,
+        (hollow, solid): (&[u32], &BitVolume),
+        allowance: &Allowance,
     ) -> Self {
         let mut unsure = BitVolume::new(grid.dims);
         let reach = (UNSURE / grid.voxel).ceil() as usize;
+        let n_near = (2 * reach as u64 + 1).pow(3);
         for faces in regions.contacts.values() {
             let mut last = u64::MAX;
             for &face in faces {
@@ -44,6 +47,9 @@ impl Ballots {
                     continue;
                 }
                 last = face / 4;
+                if !allowance.spend(1 + n_near / 32) {
+                    break;
+                }
                 let at = grid.coords(last as usize);
                 let range =
                     |k: usize| at[k].saturating_sub(reach)..(at[k] + reach + 1).min(grid.dims[k]);
@@ -126,8 +132,13 @@ fn voter_at(of: [usize; 3], block: usize, k: usize) -> [usize; 3] {
 
 /// Voxels that stairs fill: those that they touch, and those between where rays up and down meet back
 /// faces.
-pub(super) fn inside_of(stairs: &[Triangle], grid: &Grid, bvh: &Bvh) -> BitVolume {
-    let mut filled = voxelize(grid, stairs);
+pub(super) fn inside_of(
+    stairs: &[Triangle],
+    grid: &Grid,
+    bvh: &Bvh,
+    allowance: &Allowance,
+) -> BitVolume {
+    let mut filled = voxelize(grid, stairs, allowance);
     let bounds = bounds_of(stairs);
     let (Some(lo), Some(hi)) = (grid.voxel_at(bounds.min), grid.voxel_at(bounds.max)) else {
         return filled;
@@ -143,6 +154,7 @@ pub(super) fn inside_of(stairs: &[Triangle], grid: &Grid, bvh: &Bvh) -> BitVolum
             (lo[1]..=hi[1]).flat_map(move |y| {
                 (lo[0]..=hi[0])
                     .filter(move |&x| !filled.get(x, y, z))
+                    .filter(allowance.each(WORK_A_RAY))
                     .filter_map(move |x| {
                         let origin = grid.center(x, y, z);
                         let meets_back = |direction: DVec3| {

@@ -2,10 +2,11 @@
 
 use std::io::{self, Write};
 
-use enfilade::bake::BakeConfig;
 use enfilade::bake::leak::{LeakTrail, NoTrail, find_leak_trail};
+use enfilade::bake::{BakeConfig, BakeContext, Silent};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::Scene;
+use enfilade_cli::memory::held_memory;
 
 use crate::progress::StageBar;
 use crate::screen::{Told, Warned};
@@ -62,7 +63,8 @@ fn look(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.map_or(0, usize::from))
         .build()?;
-    let found = pool.install(|| find_leak_trail(scene, config, from));
+    let context = BakeContext::new(&Silent, None).measured_by(held_memory);
+    let found = pool.install(|| find_leak_trail(scene, config, from, &context));
     bar.finish();
     Ok(found)
 }

@@ -399,6 +399,7 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     config.budget = enfilade::bake::Budget {
         memory: options.max_memory,
         time: options.max_time,
+        ..enfilade::bake::Budget::default()
     };
     config.costs = resolve_costs(options, &file.bsp)?;
     config.delaunay = options.delaunay.resolve()?;

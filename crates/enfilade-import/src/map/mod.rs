@@ -359,7 +359,7 @@ impl<'s, 't> Brushwork<'s, 't> {
         structural: &[&ConvexSolid],
         builder: &mut Builder<'_>,
     ) -> Result<Faces<'t>, ImportError> {
-        let exposed = exposed_faces(structural, WELD);
+        let exposed = exposed_faces(structural, WELD, enfilade_geom::Purse::endless());
         let mut exposed = exposed.iter();
         let mut faces = Faces::new();
         for s in self.shaped {

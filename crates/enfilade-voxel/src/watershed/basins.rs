@@ -130,3 +130,14 @@ pub struct Watershed {
     /// Touching pairs, by distance from great to small, then by labels.
     pub saddles: Vec<Saddle>,
 }
+
+impl Watershed {
+    /// So many voxels that no basin has.
+    pub(super) fn unflooded(n_voxels: usize) -> Self {
+        Self {
+            labels: Labels::U16(vec![0; n_voxels]),
+            basins: Vec::new(),
+            saddles: Vec::new(),
+        }
+    }
+}

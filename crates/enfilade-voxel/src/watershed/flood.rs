@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::Sets;
+use enfilade_geom::{Allowance, Sets};
 use rayon::prelude::*;
 
 use super::super::grid::{BitVolume, for_runs};
@@ -134,10 +134,10 @@ impl<W: Word> Flood<W> {
         self.pools[0].voxel = first.unwrap_or(0);
     }
 
-    /// Floods everything; returns `false` if numbers have run out.
-    pub(super) fn run(&mut self) -> bool {
-        while self.level > 0 {
-            self.drain();
+    /// Floods everything, or until the allowance is over; returns `false` if numbers have run out.
+    pub(super) fn run(&mut self, allowance: &Allowance) -> bool {
+        while self.level > 0 && allowance.spend(1) {
+            self.drain(allowance);
             while let Some(&voxel) = self.starts.get(self.next_start) {
                 // A voxel that is not reached still holds its level.
                 let word = self.words[voxel as usize].get();
@@ -158,7 +158,7 @@ impl<W: Word> Flood<W> {
                     });
                     self.words[voxel as usize] = W::of(W::REACHED | number);
                     self.queue.push(self.level, voxel);
-                    self.drain();
+                    self.drain(allowance);
                 }
                 self.next_start += 1;
             }
@@ -168,11 +168,12 @@ impl<W: Word> Flood<W> {
     }
 
     /// Floods from all voxels queued at the current level.
-    fn drain(&mut self) {
+    fn drain(&mut self, allowance: &Allowance) {
         let mut batch = [0; BATCH];
         loop {
             let n = self.queue.pop(self.level, &mut batch);
-            if n == 0 {
+            // A quarter of a unit a voxel.
+            if n == 0 || !allowance.spend(1 + n as u64 / 4) {
                 return;
             }
             self.fetch(&batch[..n]);

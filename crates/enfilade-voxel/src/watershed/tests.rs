@@ -63,6 +63,7 @@ fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>
             h,
             outdoors: outdoors.cloned(),
         },
+        &Allowance::default(),
     );
     let levels: Vec<u32> = squared.iter().map(|&d| level(d)).collect();
     let labels: Vec<u32> = w.labels.iter().collect();
@@ -240,7 +241,7 @@ proptest! {
     ) {
         let dims = [nx, ny, nz];
         let occupied: Vec<bool> = noise(nx * ny * nz, seed, 40).map(|v| v == 0).collect();
-        let squared = distance_squared(&BitVolume::from_fn(dims, |v| occupied[v]));
+        let squared = distance_squared(&BitVolume::from_fn(dims, |v| occupied[v]), &Allowance::default());
         check(dims, &squared, h, None);
     }
 }
@@ -298,8 +299,9 @@ fn the_number_of_threads_changes_nothing() {
         pool.install(|| {
             let w = watershed(
                 dims,
-                distance_squared(&occupied),
+                distance_squared(&occupied, &Allowance::default()),
                 WatershedOptions::default(),
+                &Allowance::default(),
             );
             let dams = mark_dams(dims, &w.labels);
             (w, dams)
@@ -324,7 +326,12 @@ fn two_rooms() -> ([usize; 3], BitVolume) {
 #[test]
 fn a_doorway_separates_two_rooms() {
     let (dims, occupied) = two_rooms();
-    let w = check(dims, &distance_squared(&occupied), 1.0, None);
+    let w = check(
+        dims,
+        &distance_squared(&occupied, &Allowance::default()),
+        1.0,
+        None,
+    );
     let peaks: Vec<f64> = w.basins.iter().map(|b| b.peak).collect();
     assert_eq!(peaks, [8.0, 6.0]);
     assert_eq!((w.saddles.len(), w.saddles[0].distance), (1, 3.0));
@@ -333,15 +340,25 @@ fn a_doorway_separates_two_rooms() {
     assert!((20..23).contains(&(w.saddles[0].voxel % 41)));
     // The shallow room's dynamics are 3: above that threshold both rooms are one.
     assert_eq!(
-        check(dims, &distance_squared(&occupied), 3.0, None)
-            .basins
-            .len(),
+        check(
+            dims,
+            &distance_squared(&occupied, &Allowance::default()),
+            3.0,
+            None
+        )
+        .basins
+        .len(),
         2
     );
     assert_eq!(
-        check(dims, &distance_squared(&occupied), 3.01, None)
-            .basins
-            .len(),
+        check(
+            dims,
+            &distance_squared(&occupied, &Allowance::default()),
+            3.01,
+            None
+        )
+        .basins
+        .len(),
         1
     );
 }
@@ -351,7 +368,12 @@ fn outdoors_takes_the_space_around_it() {
     let (dims, occupied) = two_rooms();
     let mut outdoors = BitVolume::new(dims);
     outdoors.set(31, 10, 6, true);
-    let w = check(dims, &distance_squared(&occupied), 1.0, Some(&outdoors));
+    let w = check(
+        dims,
+        &distance_squared(&occupied, &Allowance::default()),
+        1.0,
+        Some(&outdoors),
+    );
     assert_eq!(w.basins.len(), 2);
     assert_eq!(
         (w.basins[0].peak, w.basins[0].peak_voxel),
@@ -364,15 +386,25 @@ fn outdoors_takes_the_space_around_it() {
     let mut slope = BitVolume::new(dims);
     slope.set(38, 10, 6, true);
     assert_eq!(
-        check(dims, &distance_squared(&occupied), 1.0, Some(&slope))
-            .basins
-            .len(),
+        check(
+            dims,
+            &distance_squared(&occupied, &Allowance::default()),
+            1.0,
+            Some(&slope)
+        )
+        .basins
+        .len(),
         3
     );
     assert_eq!(
-        check(dims, &distance_squared(&occupied), 4.5, Some(&slope))
-            .basins
-            .len(),
+        check(
+            dims,
+            &distance_squared(&occupied, &Allowance::default()),
+            4.5,
+            Some(&slope)
+        )
+        .basins
+        .len(),
         2
     );
 }
@@ -396,7 +428,12 @@ fn many_basins(dims: [usize; 3], h: f64) -> Watershed {
             }
         })
         .collect();
-    watershed(dims, squared, WatershedOptions { h, outdoors: None })
+    watershed(
+        dims,
+        squared,
+        WatershedOptions { h, outdoors: None },
+        &Allowance::default(),
+    )
 }
 
 #[test]
@@ -432,6 +469,7 @@ fn renumbering_changes_nothing() {
             h: 0.5,
             outdoors: None,
         },
+        &Allowance::default(),
     );
     assert_eq!((w.basins.len(), w.basins[0].n_voxels), (1, 40_000));
     let w = watershed(
@@ -441,6 +479,7 @@ fn renumbering_changes_nothing() {
             h: 0.0,
             outdoors: None,
         },
+        &Allowance::default(),
     );
     assert_eq!((w.basins.len(), w.saddles.len()), (20_000, 19_999));
 }

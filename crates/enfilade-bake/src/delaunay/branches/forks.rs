@@ -106,7 +106,8 @@ impl TubeRegions<'_> {
                 let [p, q] = [fork.part, other.part].map(|t| self.centers[t as usize]);
                 p.distance(q) < fork.removed + other.removed
             };
-            if !forks.iter().any(is_near) {
+            let may_go_on = self.allowance.spend(1 + forks.len() as u64 / 16);
+            if may_go_on && !forks.iter().any(is_near) {
                 forks.push(fork);
             }
         }
@@ -140,6 +141,9 @@ impl TubeRegions<'_> {
         let mut next = 0;
         while let Some(&(distance, t)) = parts.get(next) {
             next += 1;
+            if !self.allowance.spend(2) {
+                return None;
+            }
             if distance < STRIDE * radius {
                 was_tested[t as usize] = true;
             }
@@ -175,6 +179,7 @@ impl TubeRegions<'_> {
             if around.wide < reach {
                 return None;
             }
+            self.allowance.spend(around.parts.len() as u64);
             let parts = &around.parts[..around.parts.partition_point(|a| a.0 <= reach)];
             let (middle, outer) = parts.split_at(parts.partition_point(|a| a.0 <= removed));
             let mut pieces = self.pieces(outer, radius, &mut search.places);

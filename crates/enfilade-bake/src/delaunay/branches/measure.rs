@@ -23,7 +23,8 @@ impl TubeRegions<'_> {
     /// The ways out of a region, widest first. Branches that leave the region itself, which are known by then, do not count.
     pub(super) fn mouths(&self, region: u32) -> Vec<Mouth> {
         let mut contacts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for &t in &self.regions[region as usize].parts {
+        let parts = self.regions[region as usize].parts.iter();
+        for &t in parts.filter(self.allowance.each(2)) {
             for &(other, l) in self.ways(t) {
                 let owner = self.owner[other as usize];
                 if owner == NONE || owner == region || self.regions[owner as usize].branch.is_some()

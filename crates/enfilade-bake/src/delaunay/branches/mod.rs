@@ -38,7 +38,7 @@ mod separate;
 
 use std::collections::BTreeSet;
 
-use enfilade_geom::{Bvh, Triangle};
+use enfilade_geom::{Allowance, Bvh, Triangle};
 
 use super::space::Space;
 use arms::Walls;
@@ -54,8 +54,9 @@ pub(super) fn find_branches(
     room_of_part: &[u32],
     walls: &[Triangle],
     bvh: &Bvh,
+    allowance: &Allowance,
 ) -> Branches {
-    let mut regions = TubeRegions::new(space, room_of_part);
+    let mut regions = TubeRegions::new(space, room_of_part, allowance);
     let limbs = open_rooms(&mut regions);
     // Narrow ones first: what is no branch is merged into a wider limb, which may be one.
     for limb in limbs.into_iter().rev() {

@@ -6,7 +6,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::super::balls::circumsphere;
 use super::super::cells::OUTDOOR_CELL;
@@ -45,10 +45,12 @@ pub(super) struct TubeRegions<'a> {
     ways: Vec<(u32, u32)>,
     /// What counts as the radius of infinite balls. [Units: wu]
     most: f64,
+    /// What growing spends from.
+    pub(super) allowance: &'a Allowance,
 }
 
 impl<'a> TubeRegions<'a> {
-    pub(super) fn new(space: &'a Space, room_of_part: &'a [u32]) -> Self {
+    pub(super) fn new(space: &'a Space, room_of_part: &'a [u32], allowance: &'a Allowance) -> Self {
         let n = space.radii.len();
         let mut radius_of_room: BTreeMap<u32, f64> = BTreeMap::new();
         for (t, &room) in room_of_part.iter().enumerate() {
@@ -85,6 +87,7 @@ impl<'a> TubeRegions<'a> {
             starts,
             ways,
             most: bounds.size().max_element(),
+            allowance,
         }
     }
 
@@ -159,6 +162,9 @@ impl<'a> TubeRegions<'a> {
     /// balls cover the middle of a part. `queue` holds parts, each with the part whose ball covers it.
     pub(super) fn reach(&mut self, region: u32, mut queue: VecDeque<(u32, u32)>, least: f64) {
         while let Some((t, witness)) = queue.pop_front() {
+            if !self.allowance.spend(2) {
+                return;
+            }
             for i in self.starts[t as usize]..self.starts[t as usize + 1] {
                 let (other, l) = self.ways[i as usize];
                 if self.owner[other as usize] != NONE {
@@ -219,6 +225,9 @@ impl<'a> TubeRegions<'a> {
             push(&mut heap, self, t);
         }
         while let Some((_, Reverse((t, owner)))) = heap.pop() {
+            if !self.allowance.spend(2) {
+                return;
+            }
             if self.owner[t as usize] == NONE {
                 self.give(t, owner);
                 push(&mut heap, self, t);

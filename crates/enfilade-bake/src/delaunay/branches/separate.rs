@@ -54,6 +54,9 @@ impl TubeRegions<'_> {
             push(&mut heap, &label, t);
         }
         while let Some((_, Reverse((t, l)))) = heap.pop() {
+            if !self.allowance.spend(5) {
+                return;
+            }
             if let Entry::Vacant(entry) = label.entry(t) {
                 entry.insert(l);
                 push(&mut heap, &label, t);
