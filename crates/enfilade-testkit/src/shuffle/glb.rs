@@ -85,7 +85,8 @@ impl Document {
 
     fn shuffle_meshes(&mut self) {
         let Self { root, rng, .. } = self;
-        for mesh in root["meshes"].as_array_mut().into_iter().flatten() {
+        let meshes = root.get_mut("meshes").and_then(Value::as_array_mut);
+        for mesh in meshes.into_iter().flatten() {
             if let Some(primitives) = mesh["primitives"].as_array_mut() {
                 rng.shuffle(primitives);
             }
