@@ -32,6 +32,7 @@ mod roof;
 mod site;
 pub mod solid;
 mod surface_net;
+pub mod tamper;
 mod tower;
 mod transform;
 mod truth;
