@@ -134,7 +134,7 @@ struct Plate {
 }
 
 impl Plate {
-    /// `None` for what has none: as much of its surface looks along its opening as through it.
+    /// `None` for what has none: it looks every way alike.
     fn of(leaf: &[Triangle]) -> Option<Self> {
         // Twice the angle, so that front and back are the same.
         let (mut cos, mut sin, mut all) = (0.0, 0.0, 0.0);
@@ -152,7 +152,7 @@ impl Plate {
                 heights.push(((t[0].z + t[1].z + t[2].z) / 3.0, area));
             }
         }
-        if cos.hypot(sin) < 0.5 * all || all == 0.0 {
+        if cos.hypot(sin) < 0.1 * all || all == 0.0 {
             return None;
         }
         let (s, c) = (0.5 * sin.atan2(cos)).sin_cos();
