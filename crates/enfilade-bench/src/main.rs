@@ -11,6 +11,7 @@ mod rows;
 mod sight;
 mod subject;
 mod table;
+mod tampered;
 mod walkthrough;
 
 use std::path::PathBuf;
@@ -25,6 +26,7 @@ use facade::bench_facade;
 use rows::bench_rows;
 use sight::{bench_los, bench_maze, bench_see, bench_tight};
 use table::Table;
+use tampered::bench_tampered;
 use walkthrough::Walkthrough;
 
 /// Measures, and prints the tables of the documentation.
@@ -57,6 +59,15 @@ enum What {
         /// Only scenes whose names begin so.
         #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
         scenes: Vec<String>,
+    },
+    /// Falsified worlds, those of a generated house among them: at how many of three places each kind is found by default. Lines
+    /// of JSON, which `bench trust` reads.
+    Tampered {
+        /// Folders with `scene.glb` and perhaps `detail.glb`.
+        scenes: Vec<PathBuf>,
+        /// Only kinds whose names begin so.
+        #[arg(long, value_delimiter = ',', value_name = "KIND,...")]
+        kinds: Vec<String>,
     },
     /// Binary space partition: tree, portals, separators, cells.
     Bsp {
@@ -153,6 +164,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
         What::Bring { rows, scenes } => return bench_rows(&bring::ROWS, args.json, rows, scenes),
+        What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),
         What::Living { rows, scenes } => return bench_rows(living::ROWS, args.json, rows, scenes),
         What::Bsp {
             scenes,

@@ -10,8 +10,8 @@ use enfilade::geom::scene::{Role, Scene, TriangleSource};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
-    SourceDetail, VerifyOptions, ViewOptions, ViewReport, compare_details, verify_evidence,
-    verify_views, verify_world_with_progress,
+    SourceDetail, VerifyOptions, ViewOptions, ViewReport, compare_details, compare_scene,
+    verify_evidence, verify_views, verify_world_with_progress,
 };
 
 use crate::bake::settings::{SceneOptions, bound_converter};
@@ -116,6 +116,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     bar.finish();
     if let Some(scene) = &source {
         report.problems.extend(detail_problems(&world, scene));
+        report.problems.extend(compare_scene(&world, scene));
     }
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
@@ -157,7 +158,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     }
     if !report.holds() {
         bail!(
-            "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} hidden cells seen, {} problems",
+            "{} breaks a promise: {} segments not sealed, {} triangles not listed, {} hidden things seen, {} problems",
             name_of(&args.world),
             report.unsealed,
             report.incomplete,
@@ -262,6 +263,7 @@ fn detail_problems(world: &World, scene: &Scene) -> Vec<String> {
     let ids: Vec<u32> = numbers.filter(|i| role(i) == Role::Detail).collect();
     compare_details(world, ids.len(), |i| SourceDetail {
         name: scene.objects[ids[i] as usize].name.clone(),
+        source: scene.objects[ids[i] as usize].node,
         triangles: triangles_of_object(scene, ids[i]).collect(),
     })
 }

@@ -25,7 +25,7 @@ pub struct Locator {
     pub outside: Option<CellId>,
     /// Distinct planes as `[nx, ny, nz, d]`.
     pub planes: Vec<[f64; 4]>,
-    /// Inner nodes; children always come after their parent, so that no walk can loop.
+    /// Inner nodes; children always come after their parent, so that no walk can loop, and each node has one parent.
     pub nodes: Vec<LocatorNode>,
     /// The tree: a node (`>= 0`) or a leaf (see [`Locator::leaf`]).
     pub root: i32,
@@ -54,6 +54,10 @@ impl Default for Locator {
 }
 
 impl Locator {
+    /// Nodes on a walk from the root to a leaf, at most. Trees of real buildings have some tens; what cuts space by a tree takes
+    /// time by its nodes times its depth, so that a file of a megabyte could ask for hours.
+    pub const MAX_DEPTH: u32 = 1024;
+
     /// The child value that stands for a leaf: `-1` for solid, `-2 - cell` for a cell.
     #[must_use]
     pub const fn leaf(cell: Option<CellId>) -> i32 {

@@ -3,7 +3,10 @@
 mod common;
 
 use common::two_rooms;
-use enfilade_cpg::{Cell, CellId, GraphError, LocatorNode, PortalId, PortalKind, World};
+use enfilade_cpg::{
+    Cell, CellId, FittingPart, GraphError, Locator, LocatorNode, MotionKind, PortalId, PortalKind,
+    World,
+};
 use enfilade_geom::{DVec3, Plane, Winding};
 use proptest::prelude::*;
 
@@ -13,6 +16,15 @@ fn first(change: impl FnOnce(&mut World)) -> GraphError {
     world.validate().unwrap();
     change(&mut world);
     world.validate().unwrap_err().remove(0)
+}
+
+/// The hinge of the door between the rooms.
+fn hinge(w: &mut World) -> &mut [f32; 3] {
+    let motion = w.graph.portals[0].fittings[0].motion.as_mut().unwrap();
+    match &mut motion.kind {
+        MotionKind::Turn { through, .. } => through,
+        MotionKind::Slide { along } => along,
+    }
 }
 
 macro_rules! breaks {
@@ -126,14 +138,36 @@ breaks! {
         => GraphError::CellList { cell: 0, .. },
     a_details_cells_exist: |w| w.details[1].cells[1] = CellId(3)
         => GraphError::CellList { cell: 3, .. },
-    what_fills_an_opening_exists: |w| w.graph.portals[0].fittings[0].detail = 2
+    what_fills_an_opening_exists: |w| w.graph.portals[0].fittings[0].detail = 3
         => GraphError::Fitting { .. },
-    what_fills_an_opening_is_named_once: |w| w.graph.portals[1].fittings[1].detail = 0
+    what_fills_an_opening_is_named_once: |w| w.graph.portals[1].fittings[1].detail = 1
         => GraphError::Fitting { .. },
     a_leaf_moves_by_a_number: |w| {
         let motion = w.graph.portals[0].fittings[0].motion.as_mut();
         motion.unwrap().open = f32::NAN;
     } => GraphError::Fitting { .. },
+    a_leaf_moves: |w| w.graph.portals[0].fittings[0].motion = None
+        => GraphError::Fitting { .. },
+    a_frame_stays: |w| w.graph.portals[0].fittings[0].part = FittingPart::Frame
+        => GraphError::Fitting { .. },
+    a_leaf_moves_in_one_way: |w| {
+        // A leaf of the window, too, but hung on its other side.
+        let mut leaf = w.graph.portals[0].fittings[0].clone();
+        leaf.motion.as_mut().unwrap().open = 1.5;
+        w.graph.portals[1].fittings.insert(0, leaf);
+    } => GraphError::Fitting { .. },
+    a_leaf_is_not_what_stays_elsewhere: |w| w.graph.portals[1].fittings[0].detail = 0
+        => GraphError::Fitting { .. },
+    a_hinge_is_at_the_model: |w| hinge(w)[0] = 1e6
+        => GraphError::Fitting { .. },
+    a_hinge_is_no_huge_number: |w| hinge(w)[1] = 1e38
+        => GraphError::Fitting { .. },
+    a_leaf_slides_within_the_model: |w| {
+        let motion = w.graph.portals[1].fittings[1].motion.as_mut();
+        motion.unwrap().open = 1000.0;
+    } => GraphError::Fitting { .. },
+    seals_have_no_sources: |w| w.batches[0].is_seal = true
+        => GraphError::Source { .. },
     a_part_is_of_another: |w| w.details[1].part_of = Some(1)
         => GraphError::Fitting { .. },
     a_part_is_of_a_whole: |w| w.details[0].part_of = Some(1)
@@ -182,21 +216,49 @@ fn a_world_broken_everywhere_reports_a_bounded_number() {
     );
 }
 
-#[test]
-fn a_locator_of_a_million_nodes_in_a_chain_is_walked() {
+/// Two rooms whose locator is a chain of so many nodes.
+fn chain(n: i32) -> World {
     let mut world = two_rooms();
-    let n = 1_000_000;
     let node = |i: i32| LocatorNode {
         plane: 0,
         children: [i + 1, -1],
     };
     world.graph.locator.nodes = (0..n).map(node).collect();
     world.graph.locator.nodes[n as usize - 1].children[0] = -3;
-    world.validate().unwrap();
+    world
+}
+
+#[test]
+fn a_locator_is_as_deep_as_it_may_be_and_no_deeper() {
+    let most = Locator::MAX_DEPTH as i32;
+    let deep = chain(most);
+    deep.validate().unwrap();
     assert_eq!(
-        world.graph.locator.locate(DVec3::new(5.0, 1.0, 1.0)),
+        deep.graph.locator.locate(DVec3::new(5.0, 1.0, 1.0)),
         Some(CellId(1))
     );
+    let said = chain(1_000_000).validate().unwrap_err();
+    let node = Locator::MAX_DEPTH;
+    assert_eq!(said, [GraphError::LocatorDepth { node }]);
+}
+
+/// ATTACKS F10: in 200 kilobytes, a locator with more leaves than atoms in the world.
+#[test]
+fn a_locator_whose_nodes_are_children_twice_is_refused() {
+    for n in [2, 10_000] {
+        let mut world = chain(n);
+        for (i, node) in (1..).zip(&mut world.graph.locator.nodes) {
+            node.children = [if i < n { i } else { -3 }; 2];
+        }
+        let said = world.validate().unwrap_err();
+        let node = 1;
+        assert_eq!(said[0], GraphError::LocatorShared { node }, "{n}");
+    }
+    // Nor may a node be the child of two others.
+    let mut world = chain(3);
+    world.graph.locator.nodes[0].children[1] = 2;
+    let said = world.validate().unwrap_err();
+    assert_eq!(said, [GraphError::LocatorShared { node: 2 }]);
 }
 
 fn f32s(points: &[DVec3]) -> Vec<[f32; 3]> {

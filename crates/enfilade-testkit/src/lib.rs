@@ -33,6 +33,7 @@ mod shuffle;
 mod site;
 pub mod solid;
 mod surface_net;
+pub mod tamper;
 mod tower;
 mod transform;
 mod truth;

@@ -18,7 +18,21 @@ pub(crate) fn check(world: &World) -> Vec<String> {
     check_names(world, &mut out);
     check_counts(world, &mut out);
     check_extents(world, &mut out);
+    check_mutual(world, &mut out);
     out
+}
+
+/// Checks that seeing is mutual.
+fn check_mutual(world: &World, out: &mut Vec<String>) {
+    let Some(pvs) = &world.pvs else { return };
+    let mut one_way = pvs.pairs().filter(|&(a, b)| !pvs.sees(b, a));
+    if let Some((a, b)) = one_way.next() {
+        let n = 1 + one_way.count();
+        let [a, b] = [a, b].map(|c| &world.graph[c].name);
+        out.push(format!(
+            "{a} is said to see {b}, but {b} not {a}; {n} pairs like these"
+        ));
+    }
 }
 
 /// A cell called by a number is called by its own.
@@ -100,12 +114,8 @@ fn check_extents(world: &World, out: &mut Vec<String>) {
     if bounds.is_empty() {
         return;
     }
-    let Some(extents) = measure(world) else {
-        out.push("the locator is no tree: parts of it are shared too often to be measured".into());
-        return;
-    };
     let side = SIDE + 1e-6 * bounds.extent();
-    for (cell, found) in world.graph.cells.iter().zip(extents) {
+    for (cell, found) in world.graph.cells.iter().zip(measure(world)) {
         let [min, max] = cell.aabb.map(to_dvec);
         let name = &cell.name;
         let mut skin = found.bounds.surface_area().max(0.0) * VOLUME_SKIN + VOLUME_SKIN;

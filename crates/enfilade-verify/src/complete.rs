@@ -6,20 +6,23 @@ use enfilade_geom::{DVec3, Ray};
 
 use crate::report::{Break, Failure, FailureKind, Tally};
 use crate::rng::Rng;
-use crate::sealed::follow;
+use crate::sealed::{Path, follow};
 use crate::subject::{Subject, point_of_triangle};
+
+/// The way of a ray, and the triangles that it ends at, numbered as the world's own: several where they lie on each other.
+pub(crate) type Seen = (Path, Vec<u32>);
 
 /// Casts ray number `i` from a random point of a random cell, or every other time towards a random triangle, and judges
 /// what it meets.
 ///
 /// A ray that crosses portals on its way judges the cell in which it arrives: from the last portal
 /// on it is a sight line of that cell.
-pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) {
+pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) -> Option<Seen> {
     let counts = &mut tally.complete;
     counts.drawn += 1;
     if subject.sampled.is_empty() {
         counts.on_surface += 1;
-        return;
+        return None;
     }
     let is_aimed = i % 2 == 1 && !subject.triangles.is_empty();
     let aimed = is_aimed.then(|| aim_at_triangle(subject, rng)).flatten();
@@ -29,7 +32,7 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     });
     if subject.is_close_to_surface(a) {
         counts.on_surface += 1;
-        return;
+        return None;
     }
     let ray = Ray {
         origin: a,
@@ -38,14 +41,14 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     };
     let Some(hit) = subject.blockers.closest_hit(&ray, |_| false) else {
         counts.escaped += 1;
-        return;
+        return None;
     };
     let at = ray.at(hit.t);
     // A little past the triangle, so that its own edges are among those that are passed.
     let b = ray.at(hit.t + 2.0 * subject.eps);
     if subject.is_grazing(a, b) || subject.nearest_portal(at).is_some() {
         counts.grazing += 1;
-        return;
+        return None;
     }
     // The end of the segment is on a boundary, so it is followed to a point short of the triangle
     // by more than the triangle may be misplaced.
@@ -57,36 +60,37 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     subject.crossings(a, end, &mut crossings);
     if hit.t <= slack || crossings.len() != n_crossings {
         counts.grazing += 1;
-        return;
+        return None;
     }
-    let cell = match follow(subject, rng, a, end, start, &mut crossings) {
-        Ok(cell) => cell,
+    let path = match follow(subject, rng, [a, end], start, &mut crossings) {
+        Ok(path) => path,
         Err(wrong) => {
             // The way there is a segment like any other, so it breaks the other promise.
             counts.unresolved += 1;
             if !subject.is_close_to_surface(end) {
                 tally.add_failure(subject, Failure::of_break(&wrong, i, [a, end], &crossings));
             }
-            return;
+            return None;
         }
     };
-    let (mut is_listed, mut is_present) = (false, false);
+    let cell = path.cells.last().map_or(start, |c| c.0);
+    let (mut listed, mut is_present) = (Vec::new(), false);
     let window = Ray {
         t_max: hit.t + 2.0 * slack,
         ..ray
     };
-    subject.for_each_own_at(&window, at, |batch| {
+    subject.for_each_own_at(&window, at, |triangle, batch| {
         is_present = true;
         let cells = &subject.world.batches[batch as usize].cells;
-        is_listed |= cells.binary_search(&cell).is_ok();
+        listed.extend(cells.binary_search(&cell).is_ok().then_some(triangle));
     });
-    if !is_listed && subject.is_grazing_own(a, b) {
+    if listed.is_empty() && subject.is_grazing_own(a, b) {
         counts.grazing += 1;
-        return;
+        return None;
     }
     counts.judged += 1;
-    if is_listed {
-        return;
+    if !listed.is_empty() {
+        return Some((path, listed));
     }
     let kind = if is_present {
         FailureKind::Unlisted
@@ -110,6 +114,7 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
             ..failure
         },
     );
+    None
 }
 
 /// Draws before a ray is no longer aimed: many triangles are inside walls.

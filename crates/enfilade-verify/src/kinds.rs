@@ -1,9 +1,8 @@
 //! Kinds of portals, as far as a file tells what they must be.
 //!
 //! A crack is narrow and a door stands upright, whoever made the world. What a bake of this version calls a window, a door or
-//! an opening follows from a sill and a height, too, unless the portals were cut since. Whether a leaf or a pane fills an
-//! opening is not judged: that depends on the scene's materials and on the bake's settings, so a door that is called an
-//! opening, or an opening a door, is not found.
+//! an opening follows from a sill and a height, too, unless the portals were cut since. What leaves tell is judged with them
+//! (`fittings`).
 //!
 //! Sills are found anew, by the triangles of the file; what is within a rounding of the other kind is left alone.
 
@@ -40,7 +39,7 @@ pub(crate) fn check(world: &World, own: &[Triangle]) -> Vec<String> {
 }
 
 /// Whether all portals are as a bake of this version made them.
-fn is_by_rule(world: &World) -> bool {
+pub(crate) fn is_by_rule(world: &World) -> bool {
     let counts = &world.graph.statistics.counts;
     let is_cut = ["edits", "cost_cuts"]
         .iter()

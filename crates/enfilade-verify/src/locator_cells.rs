@@ -1,6 +1,6 @@
 //! What the locator's cells are like: the convex leaves of its tree, cut out of its box one by one.
 
-use enfilade_cpg::{Locator, World};
+use enfilade_cpg::{CellId, Locator, World};
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
@@ -17,57 +17,53 @@ pub(crate) struct Extent {
 /// Leaves whose volume is less than this times their largest face are hairs. [Units: wu]
 const HAIR: f64 = 1e-3;
 
-/// A tree reaches each node once; by hand some parts may be shared.
-const SHARED: usize = 32;
-
 /// A convex body by its faces, corners counter-clockwise seen from outside.
-type Body = Vec<Poly>;
+pub(crate) type Body = Vec<Poly>;
 
 /// Volume and box of each cell within the locator's box.
 ///
-/// Time: leaves times faces of a leaf. `None` where nodes are reached so often that parts of the locator must be shared
-/// many times over: its leaves may be more than anyone can count.
-pub(crate) fn measure(world: &World) -> Option<Vec<Extent>> {
-    let locator = &world.graph.locator;
+/// Time: leaves times faces of a leaf.
+pub(crate) fn measure(world: &World) -> Vec<Extent> {
     let none = Extent {
         volume: 0.0,
         bounds: Aabb::EMPTY,
         thick: Aabb::EMPTY,
     };
     let mut out = vec![none; world.graph.cells.len()];
+    for_each_leaf(&world.graph.locator, |cell, body| {
+        let Some(extent) = cell.and_then(|c| out.get_mut(c.idx())) else {
+            return;
+        };
+        let volume = volume(body);
+        extent.volume += volume;
+        let around = Aabb::of_points(body.iter().flatten());
+        extent.bounds = extent.bounds.union(around);
+        let face = body.iter().map(|f| poly::area(f)).fold(0.0, f64::max);
+        if volume > HAIR * face {
+            extent.thick = extent.thick.union(around);
+        }
+    });
+    out
+}
+
+/// Calls `visit` with each leaf of a locator's tree, as a convex body, and its cell; `None` for solid. A valid locator is a tree,
+/// so that each is visited once.
+pub(crate) fn for_each_leaf(locator: &Locator, mut visit: impl FnMut(Option<CellId>, &Body)) {
     if locator.bounds.is_empty() {
-        return Some(out);
+        return;
     }
     let eps = 1e-10 * locator.bounds.extent().max(1.0);
-    let mut visits = 0;
     let mut stack = vec![(locator.root, box_body(&locator.bounds))];
     while let Some((at, body)) = stack.pop() {
         if at < 0 {
-            let cell = (-2 - i64::from(at)) as usize;
-            if at <= -2
-                && let Some(extent) = out.get_mut(cell)
-            {
-                let volume = volume(&body);
-                extent.volume += volume;
-                let around = Aabb::of_points(body.iter().flatten());
-                extent.bounds = extent.bounds.union(around);
-                let face = body.iter().map(|f| poly::area(f)).fold(0.0, f64::max);
-                if volume > HAIR * face {
-                    extent.thick = extent.thick.union(around);
-                }
-            }
+            visit((at <= -2).then(|| CellId((-2 - at) as u32)), &body);
             continue;
-        }
-        visits += 1;
-        if visits > SHARED * locator.nodes.len() {
-            return None;
         }
         let plane = plane_of(locator, at as usize);
         let (front, back) = split(body, &plane, eps);
         let parts = locator.nodes[at as usize].children.into_iter();
         stack.extend(parts.zip([front, back]).filter(|(_, body)| body.len() > 3));
     }
-    Some(out)
 }
 
 /// The plane of a node, of unit normal.

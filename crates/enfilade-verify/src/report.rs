@@ -63,6 +63,17 @@ pub struct CompleteCounts {
     pub unresolved: u64,
 }
 
+/// Outcome of the lines tried for *conservative*, where a world says which volumes and parts are seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct VisibleCounts {
+    /// Lines aimed at what is said not to be seen.
+    pub drawn: u64,
+    /// Lines that nothing blocks, of those tried for *sealed* and *complete* too: the volumes on their ways were asked.
+    pub lines: u64,
+    /// Triangles and objects at their ends and on their ways that were looked up.
+    pub parts: u64,
+}
+
 /// How a promise broke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -85,6 +96,10 @@ pub enum FailureKind {
     MissingTriangle,
     /// *Conservative*: a straight line leads to a cell that the world's own potentially visible set hides from its start.
     Hidden,
+    /// *Conservative*: a straight line leads to a point that the volume of what is seen of its cell does not hold.
+    OutsideVolume,
+    /// *Conservative*: a straight line leads to a triangle or object that is not among the parts that are said to be seen.
+    HiddenPart,
 }
 
 impl FailureKind {
@@ -93,7 +108,7 @@ impl FailureKind {
     pub fn promise(self) -> &'static str {
         match self {
             Self::Unlisted | Self::MissingTriangle => "complete",
-            Self::Hidden => "conservative",
+            Self::Hidden | Self::OutsideVolume | Self::HiddenPart => "conservative",
             _ => "sealed",
         }
     }
@@ -109,6 +124,8 @@ impl FailureKind {
             Self::Unlisted => "a triangle's batch lacks a cell that sees it",
             Self::MissingTriangle => "a triangle of the source is in no batch",
             Self::Hidden => "a cell is seen that the world's set of what is seen lacks",
+            Self::OutsideVolume => "a point is seen that the volume of what is seen lacks",
+            Self::HiddenPart => "a triangle or object is seen that the parts of what is seen lack",
         }
     }
 }
@@ -190,7 +207,10 @@ type FailureKey = (FailureKind, Option<u32>, Option<u32>, Option<u32>);
 #[derive(Default)]
 pub(crate) struct Tally {
     pub(crate) sealed: SealedCounts,
+    /// Counts of segments across faces.
+    pub(crate) across: SealedCounts,
     pub(crate) complete: CompleteCounts,
+    pub(crate) visible: VisibleCounts,
     failures: BTreeMap<FailureKey, Failure>,
 }
 
@@ -214,15 +234,19 @@ impl Tally {
     }
 
     pub(crate) fn merged(mut self, other: Self) -> Self {
-        let (s, o) = (&mut self.sealed, other.sealed);
-        s.drawn += o.drawn;
-        s.judged += o.judged;
-        s.blocked += o.blocked;
-        s.grazing += o.grazing;
-        s.solid += o.solid;
-        s.cell_to_solid += o.cell_to_solid;
-        s.on_surface += o.on_surface;
-        s.crossings += o.crossings;
+        for (s, o) in [
+            (&mut self.sealed, other.sealed),
+            (&mut self.across, other.across),
+        ] {
+            s.drawn += o.drawn;
+            s.judged += o.judged;
+            s.blocked += o.blocked;
+            s.grazing += o.grazing;
+            s.solid += o.solid;
+            s.cell_to_solid += o.cell_to_solid;
+            s.on_surface += o.on_surface;
+            s.crossings += o.crossings;
+        }
         let (c, o) = (&mut self.complete, other.complete);
         c.drawn += o.drawn;
         c.judged += o.judged;
@@ -230,6 +254,10 @@ impl Tally {
         c.grazing += o.grazing;
         c.on_surface += o.on_surface;
         c.unresolved += o.unresolved;
+        let (v, o) = (&mut self.visible, other.visible);
+        v.drawn += o.drawn;
+        v.lines += o.lines;
+        v.parts += o.parts;
         for failure in other.failures.into_values() {
             self.join(failure);
         }
@@ -258,15 +286,20 @@ pub struct VerifyReport {
     pub problems: Vec<String>,
     /// Segments for *sealed*.
     pub sealed: SealedCounts,
+    /// Short segments for *sealed*, across faces where the locator's answer changes.
+    pub across: SealedCounts,
     /// Rays for *complete*.
     pub complete: CompleteCounts,
+    /// Lines for *conservative*; none where the world says nothing of volumes and parts.
+    pub visible: VisibleCounts,
     /// Cells in which no point was found, so that nothing is known about them.
     pub unsampled_cells: Vec<u32>,
     /// Segments, and ways of rays to their triangles, that break *sealed*.
     pub unsealed: u64,
     /// Rays that break *complete*.
     pub incomplete: u64,
-    /// Segments that lead to a cell which the world's own potentially visible set hides from their start.
+    /// Lines that lead to what the world's own potentially visible set hides from their start: a cell, a point, a triangle or
+    /// an object.
     pub hidden: u64,
     /// Failures by likeness, the most frequent first; a list of limited length.
     pub failures: Vec<Failure>,
@@ -299,7 +332,9 @@ impl VerifyReport {
             seed: options.seed,
             problems,
             sealed: SealedCounts::default(),
+            across: SealedCounts::default(),
             complete: CompleteCounts::default(),
+            visible: VisibleCounts::default(),
             unsampled_cells: Vec::new(),
             unsealed: 0,
             incomplete: 0,
@@ -327,6 +362,12 @@ impl VerifyReport {
             FailureKind::Unlisted | FailureKind::MissingTriangle => {
                 write!(f, "; seen from {}", cell(failure.expected))?;
             }
+            FailureKind::Hidden | FailureKind::OutsideVolume | FailureKind::HiddenPart => write!(
+                f,
+                "; from {}, in {}",
+                cell(failure.expected),
+                cell(failure.found)
+            )?,
             _ => write!(
                 f,
                 "; in {}, found {}",
@@ -391,7 +432,9 @@ impl VerifyReport {
             has_source: subject.has_source,
             tolerance: subject.eps,
             sealed: tally.sealed,
+            across: tally.across,
             complete: tally.complete,
+            visible: tally.visible,
             unsampled_cells: (0..subject.cells.len() as u32)
                 .filter(|c| !is_sampled(c))
                 .collect(),
@@ -438,10 +481,26 @@ impl fmt::Display for VerifyReport {
         )?;
         writeln!(
             f,
-            "complete  {:>10} judged, {} broken\n          \
+            "  across  {:>10} judged, {} blocked, {} grazing\ncomplete  {:>10} judged, {} broken\n          \
              {:>10} met nothing, {} grazing, {} on a surface, {} unresolved",
-            c.judged, self.incomplete, c.escaped, c.grazing, c.on_surface, c.unresolved
+            self.across.judged,
+            self.across.blocked,
+            self.across.grazing,
+            c.judged,
+            self.incomplete,
+            c.escaped,
+            c.grazing,
+            c.on_surface,
+            c.unresolved
         )?;
+        let v = &self.visible;
+        if v.lines > 0 || self.hidden > 0 {
+            writeln!(
+                f,
+                "seen      {:>10} lines, {} parts judged, {} broken",
+                v.lines, v.parts, self.hidden
+            )?;
+        }
         writeln!(f, "outlines, numbers {:>3} problems", self.problems.len())?;
         for problem in &self.problems {
             writeln!(f, "  {}", shown(problem))?;

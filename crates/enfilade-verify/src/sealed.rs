@@ -11,32 +11,48 @@ use crate::subject::{Crossing, Subject};
 /// Draws before a segment is given up because its ends lie on surfaces.
 const DRAWS: usize = 4;
 
-/// Draws segment number `i` and judges it.
-pub(crate) fn try_segment(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) {
-    let counts = &mut tally.sealed;
-    counts.drawn += 1;
+/// Draws segment number `i` and judges it; returns its way if nothing blocks it and it is as it should be.
+pub(crate) fn try_segment(
+    subject: &Subject,
+    rng: &mut Rng,
+    i: u64,
+    tally: &mut Tally,
+) -> Option<Path> {
     let drawn = (0..DRAWS).find_map(|_| {
         let (a, b) = draw_segment(subject, rng, i);
         let is_usable =
             a != b && !subject.is_close_to_surface(a) && !subject.is_close_to_surface(b);
-        is_usable.then_some((a, b))
+        is_usable.then_some([a, b])
     });
-    let Some((a, b)) = drawn else {
-        counts.on_surface += 1;
-        return;
-    };
+    if drawn.is_none() {
+        tally.sealed.drawn += 1;
+        tally.sealed.on_surface += 1;
+    }
+    judge_segment(subject, rng, i, drawn?, tally)
+}
+
+/// Judges a segment whose ends are clear of all surfaces.
+pub(crate) fn judge_segment(
+    subject: &Subject,
+    rng: &mut Rng,
+    i: u64,
+    [a, b]: [DVec3; 2],
+    tally: &mut Tally,
+) -> Option<Path> {
+    let counts = &mut tally.sealed;
+    counts.drawn += 1;
     let ends = [subject.locator.locate(a), subject.locator.locate(b)];
     if subject.blockers.any_hit(a, b, |_| false) {
         counts.blocked += 1;
-        return;
+        return None;
     }
     if ends == [None, None] {
         counts.solid += 1;
-        return;
+        return None;
     }
     if subject.is_grazing(a, b) {
         counts.grazing += 1;
-        return;
+        return None;
     }
     let start = match ends {
         [Some(start), Some(_)] => start,
@@ -46,16 +62,18 @@ pub(crate) fn try_segment(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut 
             if let Some(cell) = one.or(other) {
                 tally.add_failure(subject, into_solid(subject, i, ends, cell));
             }
-            return;
+            return None;
         }
     };
     counts.judged += 1;
     let mut crossings = Vec::new();
     subject.crossings(a, b, &mut crossings);
     counts.crossings += crossings.len() as u64;
-    if let Err(wrong) = follow(subject, rng, a, b, start, &mut crossings) {
-        tally.add_failure(subject, Failure::of_break(&wrong, i, [a, b], &crossings));
+    let followed = follow(subject, rng, [a, b], start, &mut crossings);
+    if let Err(wrong) = &followed {
+        tally.add_failure(subject, Failure::of_break(wrong, i, [a, b], &crossings));
     }
+    followed.ok()
 }
 
 /// A segment from a cell into solid that nothing blocks.
@@ -69,19 +87,27 @@ fn into_solid(subject: &Subject, i: u64, [a, b]: [DVec3; 2], cell: CellId) -> Fa
     Failure::of_break(&wrong, i, [a, b], &crossings)
 }
 
+/// The way of a segment that was followed to its end.
+pub(crate) struct Path {
+    pub(crate) ends: [DVec3; 2],
+    /// The cells that it passes, and from where to where on it, 0 being its start and 1 its end. At least one.
+    pub(crate) cells: Vec<(CellId, [f64; 2])>,
+}
+
 /// Follows the segment through `crossings`; ends in the cell of `b`, or says where it does not.
 ///
 /// The order of crossings that may be swapped within the tolerance is settled on the way.
 pub(crate) fn follow(
     subject: &Subject,
     rng: &mut Rng,
-    a: DVec3,
-    b: DVec3,
+    ends: [DVec3; 2],
     start: CellId,
     crossings: &mut [Crossing],
-) -> Result<CellId, Break> {
+) -> Result<Path, Break> {
+    let [a, b] = ends;
     let mut cell = start;
     let mut t = 0.0;
+    let mut cells = Vec::with_capacity(crossings.len() + 1);
     for k in 0..crossings.len() {
         subject.settle_order(cell, &mut crossings[k..]);
         let crossing = crossings[k];
@@ -113,13 +139,15 @@ pub(crate) fn follow(
         {
             return Err(wrong(FailureKind::Hidden, start, to));
         }
+        cells.push((cell, [t, crossing.t]));
         cell = to;
         t = crossing.t;
     }
     check_between(subject, rng, a, b, [t, 1.0], cell)?;
     let end = subject.locator.locate(b);
     if end == Some(cell) {
-        return Ok(cell);
+        cells.push((cell, [t, 1.0]));
+        return Ok(Path { ends, cells });
     }
     Err(locate_change(subject, a, b, [t, 1.0], cell, end))
 }

@@ -35,9 +35,9 @@ pub(crate) fn problem(own: &[Triangle], source: &[Triangle], reach: f64) -> Opti
 }
 
 /// A triangle by the bits of its corners, whichever comes first.
-type Key = [[u32; 3]; 3];
+pub(crate) type Key = [[u32; 3]; 3];
 
-fn key(t: &Triangle) -> Key {
+pub(crate) fn key(t: &Triangle) -> Key {
     // Adding zero makes one of the two zeros.
     let mut key = t.map(|p| p.as_vec3().to_array().map(|v| (v + 0.0).to_bits()));
     key.sort_unstable();
@@ -60,6 +60,8 @@ fn percent_on(of: &[Triangle], within: &[Triangle], reach: f64) -> usize {
 pub struct SourceDetail {
     /// What it is called.
     pub name: String,
+    /// Where it comes from, as the world numbers its sources.
+    pub source: Option<u32>,
     /// Its triangles.
     pub triangles: Vec<Triangle>,
 }
@@ -69,6 +71,7 @@ struct Shape {
     /// Its number on its side.
     id: usize,
     name: String,
+    source: Option<u32>,
     n: usize,
     bounds: Aabb,
     is_met: bool,
@@ -76,10 +79,11 @@ struct Shape {
 
 impl Shape {
     /// `None` without triangles.
-    fn of(id: usize, name: &str, triangles: &[Triangle]) -> Option<Self> {
+    fn of(id: usize, name: &str, source: Option<u32>, triangles: &[Triangle]) -> Option<Self> {
         (!triangles.is_empty()).then(|| Self {
             id,
             name: name.to_owned(),
+            source,
             n: triangles.len(),
             bounds: Aabb::of_points(triangles.iter().flatten()),
             is_met: false,
@@ -129,12 +133,15 @@ pub fn compare_details(
     };
     let wholes = (0..world.details.len()).filter(|&i| world.details[i].part_of.is_none());
     let mut own: Vec<Shape> = wholes
-        .filter_map(|i| Shape::of(i, &world.details[i].name, &of_world(i).concat()))
+        .filter_map(|i| {
+            let detail = &world.details[i];
+            Shape::of(i, &detail.name, detail.source, &of_world(i).concat())
+        })
         .collect();
     let mut theirs: Vec<Shape> = (0..n)
         .filter_map(|i| {
             let detail = source(i);
-            Shape::of(i, &detail.name, &detail.triangles)
+            Shape::of(i, &detail.name, detail.source, &detail.triangles)
         })
         .collect();
     // By where they begin, so that only what is near is compared.
@@ -144,7 +151,7 @@ pub fn compare_details(
             a.n.cmp(&b.n).then(by_place).then(a.id.cmp(&b.id))
         });
     }
-    let mut first = 0;
+    let (mut first, mut renamed) = (0, Vec::new());
     for shape in &mut theirs {
         while own
             .get(first)
@@ -154,8 +161,8 @@ pub fn compare_details(
         }
         let triangles = source(shape.id).triangles;
         let near = own[first..].iter_mut();
-        let mut near = near.take_while(|o| !shape.is_before(o));
-        let met = near.find(|o| {
+        let near = near.take_while(|o| !shape.is_before(o));
+        let is_there = |o: &&mut Shape| {
             let bounds = [
                 o.bounds.min - shape.bounds.min,
                 o.bounds.max - shape.bounds.max,
@@ -164,13 +171,30 @@ pub fn compare_details(
                 .iter()
                 .all(|d| d.abs().max_element() <= shape.slack());
             !o.is_met && is_near && is_same(&of_world(o.id), &triangles, shape.slack())
-        });
-        if let Some(met) = met {
+        };
+        // Among several in one place, that of the same name if there is one.
+        let mut met: Vec<&mut Shape> = near.filter(is_there).collect();
+        met.sort_by_key(|o| (o.name != shape.name, o.source != shape.source));
+        if let Some(met) = met.into_iter().next() {
             met.is_met = true;
             shape.is_met = true;
+            if met.name != shape.name || met.source != shape.source {
+                renamed.push(format!(
+                    "detail {} ({}): the source calls it {:?}, or has it from elsewhere",
+                    met.id, met.name, shape.name
+                ));
+            }
         }
     }
-    unmet(&theirs, &own)
+    let mut out = unmet(&theirs, &own);
+    let more = renamed.len().saturating_sub(NAMED);
+    out.extend(renamed.into_iter().take(NAMED));
+    if more > 0 {
+        out.push(format!(
+            "{more} more details are called otherwise in the source"
+        ));
+    }
+    out
 }
 
 /// Whether triangles are those of parts that were taken out of them, each part in their order.

@@ -267,7 +267,12 @@ impl<'a> Subject<'a> {
 
     /// Whether `p` is nearer than `2 eps` to a structural triangle or a portal.
     pub(crate) fn is_close_to_surface(&self, p: DVec3) -> bool {
-        self.blockers.nearest(p, 2.0 * self.eps).is_some() || self.nearest_portal(p).is_some()
+        !self.is_clear(p, 2.0 * self.eps) || self.nearest_portal(p).is_some()
+    }
+
+    /// Returns true where `p` is at least `reach` from all structural triangles. [Units: wu]
+    pub(crate) fn is_clear(&self, p: DVec3, reach: f64) -> bool {
+        self.blockers.nearest(p, reach).is_none()
     }
 
     /// The portal nearest to `p`, if one is within `2 eps`.
@@ -351,15 +356,15 @@ impl<'a> Subject<'a> {
             .is_some_and(|bvh| nearest_edge(bvh, a, b, reach) < reach)
     }
 
-    /// Calls `visit` with the batch of each of the world's own triangles that the ray meets and
-    /// whose plane is within `2 eps` of `at`.
-    pub(crate) fn for_each_own_at(&self, ray: &Ray, at: DVec3, mut visit: impl FnMut(u32)) {
+    /// Calls `visit` with each of the world's own triangles that the ray meets and whose plane is within `2 eps` of `at`, and its
+    /// batch.
+    pub(crate) fn for_each_own_at(&self, ray: &Ray, at: DVec3, mut visit: impl FnMut(u32, u32)) {
         let bvh = self.own_bvh.as_ref().unwrap_or(&self.blockers);
         bvh.for_each_hit(ray, |hit| {
             let (triangle, batch) = &self.own[hit.triangle as usize];
             let distance = Plane::of_triangle(triangle).map(|p| p.signed_distance(at).abs());
             if distance.is_some_and(|d| d <= 2.0 * self.eps) {
-                visit(*batch);
+                visit(hit.triangle, *batch);
             }
         });
     }

@@ -13,6 +13,7 @@ mod mutated;
 mod order;
 mod random;
 mod scenes;
+mod tampered;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -50,6 +51,7 @@ const PARTS: &[(&str, Part)] = &[
     ("mutated", mutated::run),
     ("nasty", budgets::nasty),
     ("order", order::run),
+    ("tampered", tampered::run),
 ];
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;

@@ -1,5 +1,6 @@
 //! What can be broken, and the list of what is.
 
+use crate::Locator;
 use enfilade_geom::shown;
 
 /// Most problems that one call reports; a world with more is broken in the same way many times.
@@ -206,6 +207,21 @@ pub enum GraphError {
         node: Option<u32>,
         /// Where it leads.
         child: i32,
+    },
+    /// Two children in the locator, or the root and a child, are the same node: it is not a tree.
+    #[error("node {node} of the locator is a child twice; a tree reaches each node once")]
+    LocatorShared {
+        /// The node.
+        node: u32,
+    },
+    /// A walk down the locator takes too long.
+    #[error(
+        "node {node} of the locator is deeper than {} nodes; balance the tree",
+        Locator::MAX_DEPTH
+    )]
+    LocatorDepth {
+        /// The first such node.
+        node: u32,
     },
     /// The cell beyond the locator's box does not exist.
     #[error("the locator's outside is cell {cell} of {n_cells}")]

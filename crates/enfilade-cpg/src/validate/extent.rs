@@ -38,13 +38,7 @@ pub(super) fn check_cells_in_locator(graph: &CellPortalGraph, found: &mut Findin
 /// The locator's box and the outdoors' lie around the model. A world without triangles says nothing.
 pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
     let graph = &world.graph;
-    let corners = world.batches.iter().flat_map(|b| &b.primitive.positions);
-    let portals = graph.portals.iter().flat_map(|p| &p.outline);
-    let model = corners
-        .chain(portals)
-        .map(|&p| DVec3::from(p.map(f64::from)))
-        .filter(|p| p.is_finite())
-        .fold(Aabb::EMPTY, Aabb::including);
+    let model = geometry(world);
     if model.is_empty() {
         return;
     }
@@ -63,6 +57,17 @@ pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
     for (i, cell) in graph.cells.iter().enumerate() {
         check(format!("cell {i}"), box_of(cell.aabb));
     }
+}
+
+/// The box around structure and portals.
+pub(super) fn geometry(world: &World) -> Aabb {
+    let corners = world.batches.iter().flat_map(|b| &b.primitive.positions);
+    let portals = world.graph.portals.iter().flat_map(|p| &p.outline);
+    corners
+        .chain(portals)
+        .map(|&p| DVec3::from(p.map(f64::from)))
+        .filter(|p| p.is_finite())
+        .fold(Aabb::EMPTY, Aabb::including)
 }
 
 fn holds(outer: &Aabb, inner: &Aabb) -> bool {

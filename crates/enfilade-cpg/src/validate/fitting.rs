@@ -1,10 +1,22 @@
-//! Whether what fills openings is there and can move.
+//! Is what fills openings there, and can it move as it says?
 
-use crate::World;
+use std::collections::HashMap;
+
+use enfilade_geom::Aabb;
+
+use super::extent::geometry;
+use crate::fitting::vector;
+use crate::{Fitting, FittingPart, Motion, MotionKind, World};
+
+/// How far from the model a hinge may be, and by how much more than the model's size a leaf may slide. A leaf is not larger, and
+/// stands in an opening of the model. [Units: wu]
+const BESIDE: f64 = 10.0;
 
 /// Checks the fittings of all portals, and what details say they were taken out of.
 pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
     let n = world.details.len();
+    let model = geometry(world).expanded(BESIDE);
+    let mut known: HashMap<u32, (usize, &Fitting)> = HashMap::new();
     for (i, portal) in world.graph.portals.iter().enumerate() {
         let mut before = None;
         for f in &portal.fittings {
@@ -15,8 +27,15 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
                 report("its fittings do not ascend by detail".into());
             }
             before = Some(f.detail);
-            if let Some(problem) = f.motion.as_ref().and_then(crate::Motion::problem) {
+            if let Some(problem) = problem(f, &model) {
                 report(format!("detail {} in it: {problem}", f.detail));
+            }
+            let (first, other) = *known.entry(f.detail).or_insert((i, f));
+            if other.motion != f.motion {
+                let d = f.detail;
+                report(format!(
+                    "detail {d} moves otherwise in it than in portal {first}; it moves in one way, or not at all"
+                ));
             }
         }
     }
@@ -30,6 +49,31 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
                 format!("detail {i} ({})", detail.name),
                 format!("is part of detail {whole}, which is none, itself, or a part of another"),
             );
+        }
+    }
+}
+
+/// Returns what is wrong with a fitting by itself.
+fn problem(f: &Fitting, model: &Aabb) -> Option<&'static str> {
+    let motion = match (f.part, &f.motion) {
+        (FittingPart::Leaf, Some(motion)) => motion,
+        (FittingPart::Leaf, None) => return Some("a leaf that does not move"),
+        (_, None) => return None,
+        (_, Some(_)) => return Some("moves, though it is no leaf"),
+    };
+    motion.problem().or_else(|| far_problem(motion, model))
+}
+
+/// Returns how a motion leads out of the world.
+fn far_problem(motion: &Motion, model: &Aabb) -> Option<&'static str> {
+    match motion.kind {
+        MotionKind::Turn { through, .. } => {
+            (!model.contains(vector(through))).then_some("its hinge is far from the model")
+        }
+        MotionKind::Slide { .. } => {
+            let most = model.size().max_element();
+            let is_far = |x: f32| f64::from(x).abs() > most;
+            (is_far(motion.shut) || is_far(motion.open)).then_some("it slides out of the model")
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Does a walk down the locator always end, in a cell that exists?
+//! Is the locator a tree, not too deep, whose walks end in cells that exist?
 
 use super::error::{Findings, GraphError};
 use crate::{CellId, Locator};
@@ -54,6 +54,38 @@ pub(super) fn check_locator(locator: &Locator, n_cells: usize, found: &mut Findi
                     child,
                 });
             }
+        }
+    }
+    check_tree(locator, found);
+}
+
+/// Each node has one parent at most, and the way to it is not too long.
+///
+/// Readers that take the tree apart reach each node once; with shared nodes, a few kilobytes would have more leaves than anyone can
+/// count.
+fn check_tree(locator: &Locator, found: &mut Findings) {
+    // Number of nodes that lead to each, itself among them; 0 as long as none does. A parent comes before its children.
+    let mut depth = vec![0_u32; locator.nodes.len()];
+    let mut is_deep = false;
+    let mut lead_to = |depth: &mut [u32], child: i32, above: u32| {
+        let Some(own) = usize::try_from(child).ok().and_then(|c| depth.get_mut(c)) else {
+            return;
+        };
+        let node = child as u32;
+        if *own > 0 {
+            found.push(GraphError::LocatorShared { node });
+        }
+        *own = above + 1;
+        if *own > Locator::MAX_DEPTH && !is_deep {
+            is_deep = true;
+            found.push(GraphError::LocatorDepth { node });
+        }
+    };
+    lead_to(&mut depth, locator.root, 0);
+    for (i, node) in locator.nodes.iter().enumerate() {
+        let above = depth[i];
+        for child in node.children {
+            lead_to(&mut depth, child, above);
         }
     }
 }

@@ -39,6 +39,10 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
         if let Some(problem) = batch.sources.problem(n_triangles, n) {
             broken(format!("batch {i}"), problem);
         }
+        if batch.is_seal && !batch.sources.is_empty() {
+            let problem = "has sources, but is of seals, which no input has";
+            broken(format!("batch {i}"), problem.into());
+        }
     }
     for (i, detail) in world.details.iter().enumerate() {
         if let Some(source) = detail.source.filter(|&s| s as usize >= n) {

@@ -99,8 +99,8 @@ pub(crate) fn two_rooms() -> World {
     let mut door = doorway(4.0, 2.0, 3.0, 2.1, [0, 1]);
     door.fittings = vec![fitting(0, FittingPart::Leaf, turn, [-0.25, 1.25])];
     window.fittings = vec![
-        fitting(0, FittingPart::Pane, turn, [0.0; 2]),
-        fitting(1, FittingPart::Leaf, slide, [0.0, 1.5]),
+        fitting(1, FittingPart::Pane, turn, [0.0; 2]),
+        fitting(2, FittingPart::Leaf, slide, [0.0, 1.5]),
     ];
     let locator = Locator {
         bounds: Aabb::new(DVec3::new(0.0, 0.0, 0.0), DVec3::new(8.0, 3.0, 5.0)),
@@ -206,6 +206,7 @@ pub(crate) fn two_rooms() -> World {
                 part_of: Some(0),
                 ..chair("chair", turned, &[0, 1])
             },
+            chair("stool", identity, &[1]),
         ],
         sources: vec![
             source("house", None, r#"{"site": [1, {"a": null}]}"#),

@@ -1,0 +1,128 @@
+//! Falsified worlds: each kind of tampering at three places of each scene, and whether `verify` finds it by default.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
+use enfilade::cpg::wire::{decode_glb, encode_glb};
+use enfilade::cpg::{SightGraph, World};
+use enfilade::geom::Triangle;
+use enfilade::geom::scene::{Role, Scene};
+use enfilade::import::{ImportOptions, import};
+use enfilade::vis::{VisConfig, VisContext, see_all, see_parts};
+use enfilade_testkit::furnished_house;
+use enfilade_testkit::tamper::{ShownBy, tamperings};
+use enfilade_verify::{
+    SourceDetail, VerifyOptions, compare_details, compare_scene, structural_triangles, verify_world,
+};
+use serde_json::json;
+
+use crate::measure::files_of;
+
+/// Rays tried one after the other until something is found; the last is the default of `verify`.
+const RAYS: [u64; 4] = [0, 20_000, 200_000, 1_000_000];
+
+/// Prints a line of JSON for each kind and scene: at how many places it was found, of how many. `kinds` are beginnings of names.
+pub(crate) fn bench_tampered(scenes: &[PathBuf], kinds: &[String]) -> anyhow::Result<()> {
+    bench_scene("house", &named(furnished_house().scene), kinds)?;
+    for dir in scenes {
+        let (files, detail) = files_of(dir);
+        let imported = import(&files, &detail, &ImportOptions::default())?;
+        let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        bench_scene(&name, &imported.scene, kinds)?;
+    }
+    Ok(())
+}
+
+fn bench_scene(name: &str, scene: &Scene, kinds: &[String]) -> anyhow::Result<()> {
+    let context = BakeContext::new(&Silent, None);
+    let world = bake(scene, &BakeConfig::default(), &context)?.world;
+    let world = seen(world).with_context(|| name.to_owned())?;
+    let is_asked =
+        |kind: &str| kinds.is_empty() || kinds.iter().any(|k| kind.starts_with(k.as_str()));
+    anyhow::ensure!(
+        !is_found(&world, scene, ShownBy::Source),
+        "{name}: found, though nobody changed it"
+    );
+    for tampering in tamperings().filter(|t| is_asked(t.name)) {
+        let (mut n, mut n_found) = (0, 0);
+        for place in 0..3 {
+            let Some(changed) = tampering.apply(&world, place) else {
+                continue;
+            };
+            n += 1;
+            n_found += u32::from(is_found(&changed, scene, tampering.shown_by));
+        }
+        let by = match tampering.shown_by {
+            ShownBy::File => "file",
+            ShownBy::Source => "source",
+        };
+        println!(
+            "{}",
+            json!({"kind": tampering.name, "scene": name, "by": by, "found": n_found, "places": n})
+        );
+    }
+    Ok(())
+}
+
+/// Returns true where a world is refused or found false: by itself, or also by its source.
+fn is_found(world: &World, scene: &Scene, by: ShownBy) -> bool {
+    let Ok(Ok(read)) = encode_glb(world).map(|bytes| decode_glb(&bytes)) else {
+        return true;
+    };
+    if by == ShownBy::Source {
+        let said = [compare_scene(&read, scene), detail_problems(&read, scene)].concat();
+        return !said.is_empty();
+    }
+    RAYS.iter().any(|&rays| {
+        let options = VerifyOptions {
+            rays,
+            ..VerifyOptions::default()
+        };
+        !verify_world(&read, None, &options).holds()
+    })
+}
+
+fn detail_problems(world: &World, scene: &Scene) -> Vec<String> {
+    let mut triangles: Vec<Vec<Triangle>> = vec![Vec::new(); scene.objects.len()];
+    for t in scene.triangle_sources(Role::Detail) {
+        triangles[t.object as usize].push(scene.world_triangle(t));
+    }
+    let ids: Vec<usize> = (0..scene.objects.len())
+        .filter(|&i| scene.objects[i].role == Role::Detail)
+        .collect();
+    compare_details(world, ids.len(), |i| SourceDetail {
+        name: scene.objects[ids[i]].name.clone(),
+        source: scene.objects[ids[i]].node,
+        triangles: triangles[ids[i]].clone(),
+    })
+}
+
+/// The generated house as an input has it: its objects with names of their own.
+fn named(mut scene: Scene) -> Scene {
+    for (i, object) in (0..).zip(&mut scene.objects) {
+        object.name = format!("{} {i}", object.name);
+        object.node = Some(i);
+        scene.nodes.push(enfilade::geom::scene::SourceNode {
+            name: object.name.clone(),
+            ..Default::default()
+        });
+    }
+    scene
+}
+
+/// With what is seen from each cell, as volumes and parts.
+fn seen(mut world: World) -> anyhow::Result<World> {
+    let walls: Vec<Triangle> = structural_triangles(&world).iter().map(|t| t.0).collect();
+    let mut context = VisContext {
+        on_round: &mut |_, _| true,
+        walls: Some(&walls),
+        checkpoint: None,
+    };
+    let graph = SightGraph::of_graph(&world.graph);
+    let mut pvs = see_all(&graph, &VisConfig::default(), &mut context)?.cells;
+    let (volumes, parts) = see_parts(&world, &pvs)?;
+    (pvs.volumes, pvs.parts) = (Some(volumes), Some(parts));
+    world.pvs = Some(pvs);
+    Ok(world)
+}

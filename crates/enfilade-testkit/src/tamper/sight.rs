@@ -1,0 +1,199 @@
+//! Claims about sight: cells, volumes and parts.
+
+use enfilade_cpg::{Batch, CellId, CellSet, PartNumbers, Pvs, VisibleParts, VisibleVolumes, World};
+use enfilade_geom::{Bvh, DVec3, Plane, Triangle};
+
+use super::{Tampering, pick};
+
+pub(super) const ALL: &[Tampering] = &[
+    Tampering::new(
+        "two cells that do not see each other through their portal",
+        |w, at| hidden(w, at, true),
+    ),
+    Tampering::new(
+        "a cell that does not see another, which sees it",
+        |w, at| hidden(w, at, false),
+    ),
+    Tampering::new("a visible volume emptied", |w, at| {
+        volumes(w, at, |_, pieces| pieces.clear())
+    }),
+    Tampering::new("a visible volume half a meter inwards", |w, at| {
+        volumes(w, at, |_, pieces| {
+            pieces.iter_mut().flatten().for_each(|p| p[3] -= 0.5);
+        })
+    }),
+    Tampering::new("a plane of a visible volume two meters inwards", |w, at| {
+        volumes(w, at, |portal, pieces| {
+            for piece in pieces {
+                if let Some(plane) = facing(portal, piece) {
+                    piece[plane][3] -= 2.0;
+                }
+            }
+        })
+    }),
+    Tampering::new("a visible volume turned about", |w, at| {
+        volumes(w, at, |_, pieces| {
+            let flat = pieces.iter_mut().flatten();
+            flat.for_each(|p| *p = p.map(|x| -x));
+        })
+    }),
+    Tampering::new("a cell that does not see all of itself", |w, at| {
+        let pvs = w.pvs.as_ref()?;
+        let own = |i: usize| pvs.pairs().nth(i).is_some_and(|(a, b)| a == b);
+        let pair = pick(pvs.n_pairs(), at, own)?;
+        volumes_of_pair(w, pair, |pieces| {
+            pieces.clear();
+            pieces.push(vec![[1.0, 0.0, 0.0, -1e4]]);
+        })
+    }),
+    Tampering::new("the parts of a pair emptied", |w, at| {
+        parts(w, at, Vec::clear)
+    }),
+    Tampering::new("a run of parts halved", |w, at| {
+        parts(w, at, |row| {
+            let half = row.len() / 2;
+            row.truncate(half);
+        })
+    }),
+    Tampering::new("the largest triangle that a pair sees left out", |w, at| {
+        let p = portal(w, at)?;
+        let largest = largest_seen(w, p)?;
+        parts(w, at, |row| row.retain(|t| *t != largest))
+    }),
+    Tampering::new("a part that its own cell does not see", |w, at| {
+        let pvs = w.pvs.as_ref()?;
+        let own = |i: usize| pvs.pairs().nth(i).is_some_and(|(a, b)| a == b);
+        let pair = pick(pvs.n_pairs(), at, own)?;
+        parts_of_pair(w, pair, |row| {
+            row.pop();
+        })
+    }),
+];
+
+/// A portal between two cells, the larger ones of its kind.
+fn portal(w: &World, place: usize) -> Option<usize> {
+    pick(w.graph.portals.len(), place, |i| {
+        w.graph.portals[i].area > 0.2
+    })
+}
+
+fn hidden(w: &mut World, at: usize, is_mutual: bool) -> Option<()> {
+    let n = w.graph.cells.len();
+    let [a, b] = w.graph.portals[portal(w, at)?].cells;
+    let mut rows = match &w.pvs {
+        None => vec![CellSet::all(n); n],
+        Some(pvs) => {
+            let row = |c: usize| {
+                let mut set = CellSet::new(n);
+                pvs.visible_from(CellId(c as u32)).for_each(|to| {
+                    set.insert(to);
+                });
+                set
+            };
+            (0..n).map(row).collect()
+        }
+    };
+    rows[a.idx()].remove(b);
+    if is_mutual {
+        rows[b.idx()].remove(a);
+    }
+    w.pvs = Some(Pvs::of_rows(&rows));
+    Some(())
+}
+
+/// The pair of cells that a portal joins, one way.
+fn pair_through(w: &World, portal: usize) -> Option<usize> {
+    let [a, b] = w.graph.portals[portal].cells;
+    w.pvs.as_ref()?.pairs().position(|pair| pair == (a, b))
+}
+
+type Pieces = Vec<Vec<[f64; 4]>>;
+
+fn volumes(w: &mut World, at: usize, change: impl Fn(&Plane, &mut Pieces)) -> Option<()> {
+    let volumes = w.pvs.as_ref()?.volumes.as_ref()?;
+    // A piece without planes is all of the cell, whatever the others are.
+    let is_bounded = |p: usize| {
+        let pair = pair_through(w, p);
+        pair.is_some_and(|pair| volumes.pieces_of(pair).all(|piece| !piece.is_empty()))
+    };
+    let p = pick(w.graph.portals.len(), at, |p| {
+        w.graph.portals[p].area > 0.2 && is_bounded(p)
+    })?;
+    let pair = pair_through(w, p)?;
+    let portal = &w.graph.portals[p];
+    let v = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+    let plane = Plane::through(v(portal.outline[0]), v(portal.normal));
+    volumes_of_pair(w, pair, |pieces| change(&plane, pieces))
+}
+
+fn volumes_of_pair(w: &mut World, pair: usize, change: impl Fn(&mut Pieces)) -> Option<()> {
+    let pvs = w.pvs.as_mut()?;
+    let known = pvs.volumes.as_ref()?;
+    let mut all: Vec<Pieces> = (0..known.n_pairs())
+        .map(|i| known.pieces_of(i).map(<[_]>::to_vec).collect())
+        .collect();
+    let before = all[pair].clone();
+    change(&mut all[pair]);
+    let is_other = all[pair] != before;
+    pvs.volumes = Some(VisibleVolumes::of_pairs(all));
+    is_other.then_some(())
+}
+
+/// The plane of a piece that is most that of a portal.
+fn facing(portal: &Plane, piece: &[[f64; 4]]) -> Option<usize> {
+    let along = |p: &[f64; 4]| DVec3::new(p[0], p[1], p[2]).dot(portal.normal);
+    (0..piece.len()).max_by(|&a, &b| along(&piece[a]).total_cmp(&along(&piece[b])))
+}
+
+fn parts(w: &mut World, at: usize, change: impl Fn(&mut Vec<u32>)) -> Option<()> {
+    let pair = pair_through(w, portal(w, at)?)?;
+    parts_of_pair(w, pair, change)
+}
+
+fn parts_of_pair(w: &mut World, pair: usize, change: impl Fn(&mut Vec<u32>)) -> Option<()> {
+    let pvs = w.pvs.as_mut()?;
+    let known = pvs.parts.as_ref()?;
+    let row = |i| {
+        let runs = known.runs_of(i).iter();
+        runs.flat_map(|&[a, b]| a..b).collect()
+    };
+    let mut all: Vec<Vec<u32>> = (0..known.n_pairs()).map(row).collect();
+    let before = all[pair].len();
+    change(&mut all[pair]);
+    let is_other = all[pair].len() != before;
+    pvs.parts = Some(VisibleParts::of_ascending(all));
+    is_other.then_some(())
+}
+
+/// The largest triangle of the second cell of a portal whose middle is seen from the middle of the portal: leaving out what
+/// is not seen is not a lie.
+fn largest_seen(w: &World, portal: usize) -> Option<u32> {
+    let of_batch = |b: &Batch| -> Vec<Triangle> {
+        let p = &b.primitive;
+        let corner = |i: u32| DVec3::from(p.positions[i as usize].map(f64::from));
+        let triangles = p.indices.chunks_exact(3);
+        triangles.map(|t| [t[0], t[1], t[2]].map(corner)).collect()
+    };
+    let all: Vec<Triangle> = w.batches.iter().flat_map(of_batch).collect();
+    let walls = Bvh::build(&all);
+    let portal = &w.graph.portals[portal];
+    let piece: Vec<DVec3> = (portal.pieces[0].iter())
+        .map(|c| DVec3::from(c.map(f64::from)))
+        .collect();
+    let normal = DVec3::from(portal.normal.map(f64::from));
+    let eye = piece.iter().sum::<DVec3>() / piece.len() as f64 - normal * 0.01;
+    let numbers = PartNumbers::new(w);
+    // A batch of several cells may be seen by way of another of them.
+    let of_one = (0..w.batches.len()).filter(|&b| w.batches[b].cells == [portal.cells[1]]);
+    let seen = of_one.flat_map(|b| numbers.of_batch(b)).filter(|&n| {
+        let [x, y, z] = all[n as usize];
+        let middle = (x + y + z) / 3.0;
+        let is_ahead = (middle - eye).dot(normal) > 0.2;
+        is_ahead && !walls.any_hit(eye, eye.lerp(middle, 0.999), |_| false)
+    });
+    let size = |n: u32| {
+        let [x, y, z] = all[n as usize];
+        (y - x).cross(z - x).length()
+    };
+    seen.max_by(|&a, &b| size(a).total_cmp(&size(b)))
+}
