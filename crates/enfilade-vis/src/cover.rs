@@ -1,12 +1,13 @@
-//! Walls in one plane, taken together: whether they cross all lines of a beam.
+//! Occlusion by all walls in one plane together: whether they cross all lines of a beam.
 //!
-//! A sheet (`sheets`) ends where two walls meet that share no edges: two boxes side by side, a long wall beside two short ones. Here whatever
-//! lies in one plane counts as one occluder, after the fused occluders of Schaufler, Dorsey, Decoret and Sillion, *Conservative Volumetric
-//! Visibility with Occluder Fusion* (SIGGRAPH 2000), but exact: the beam's section by the plane, a convex polygon, less the triangles in it, is
-//! empty. Doorways in the plane are what is left.
+//! A sheet (`sheets`) ends where two walls meet that share no edges: two boxes side by side, a long wall beside two
+//! short ones. Here whatever lies in one plane counts as one occluder, after the fused occluders of Schaufler,
+//! Dorsey, Decoret and Sillion, *Conservative Volumetric Visibility with Occluder Fusion* (SIGGRAPH 2000), but exact:
+//! the beam's section by the plane, a convex polygon, less the triangles in it, is empty. Doorways in the plane are
+//! what is left.
 //!
-//! Errs to visible, but for lines that pass nearer to a wall's edge than the world's tolerance, which are judged neither way: corners so near to
-//! a plane lie in it, and gaps so narrow are none.
+//! Errs to visible, but for lines that pass nearer to a wall's edge than the world's tolerance, which are judged
+//! neither way: vertices so near to a plane lie in it, and gaps so narrow are none.
 
 use enfilade_geom::poly::{Poly, cut_out, is_larger};
 use enfilade_geom::{Aabb, DVec2, DVec3, Plane, Triangle};
@@ -17,7 +18,7 @@ use crate::sheets::{Sheets, cut};
 const MAX_TRIANGLES: usize = 256;
 const MAX_LEFT: usize = 32;
 
-/// What the walls in a plane do to a beam.
+/// The effect of the walls in a plane on a beam.
 pub(crate) enum Cover {
     /// All lines cross them.
     Closed,
@@ -26,19 +27,19 @@ pub(crate) enum Cover {
     Open,
 }
 
-/// How near is near. [Units: wu]
+/// Distances that count as none, each for its purpose. [Units: wu]
 #[derive(Clone, Copy)]
 pub(crate) struct Near {
     /// Distances that count as apart.
     pub(crate) apart: f64,
     /// An end of a beam that lies no farther before a plane, and else behind it, lies behind it.
     pub(crate) strip: f64,
-    /// What a world's planes and corners may be moved.
+    /// The world's tolerance: how far planes and vertices may be moved.
     pub(crate) slack: f64,
 }
 
 impl Sheets<'_> {
-    /// Holds the lines from one polygon to another against all walls in the plane of a triangle.
+    /// Tests the lines from one polygon to another against all walls in the plane of a triangle.
     pub(crate) fn cover(&self, seed: u32, ends: &[Vec<DVec3>; 2], near: Near) -> Cover {
         let Some(plane) = Plane::of_triangle(self.triangle(seed)) else {
             return Cover::Open;
@@ -144,7 +145,8 @@ impl Sheets<'_> {
         Cover::Open
     }
 
-    /// Whether a triangle's plane passes nowhere farther from a polygon than the world's tolerance: it does not hide it, as both may be moved.
+    /// Returns whether a polygon lies in a triangle's plane, within the world's tolerance: the triangle does not hide
+    /// it then, as both may be moved.
     pub(crate) fn is_in_plane(&self, triangle: u32, polygon: &[DVec3], slack: f64) -> bool {
         let Some(plane) = Plane::of_triangle(self.triangle(triangle)) else {
             return true;
@@ -159,7 +161,7 @@ impl Sheets<'_> {
     }
 }
 
-/// The corners of the hull, counter-clockwise (Andrew 1979).
+/// Vertices of the hull, counter-clockwise (Andrew 1979).
 fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();

@@ -1,11 +1,13 @@
-//! What walls hide from a portal on the way to it.
+//! Occlusion by walls of what lies behind a portal.
 //!
-//! Behind a portal the visible volume is all that is in front of it, which in a street is the whole facade that the window is in. Here the lines
-//! from the portal to a triangle are held against the walls, as `occlude` does between two portals: by sheets, and by all walls in one plane (`cover`).
-//! Of an object they are held against each face of its box by which they may come in, and if that is not enough, against its triangles. Lines that a
-//! wall's plane tells apart are cut there rather than in halves.
+//! Behind a portal the visible volume is all that is in front of it, which in a street is the whole facade that the
+//! window is in. Here the lines from the portal to a triangle are held against the walls, as `occlude` does between
+//! two portals: by sheets, and by all walls in one plane (`cover`). Of an object they are held against each face of
+//! its box by which they may come in, and if that is not enough, against its triangles. Lines that a wall's plane
+//! tells apart are cut there rather than in halves.
 //!
-//! Most of what is seen is found by a few random lines. Errs to visible: what [`MAX_BEAMS`] pieces do not settle counts as seen.
+//! Most of what is seen is found by a few random lines. Errs to visible: what [`MAX_BEAMS`] pieces do not settle
+//! counts as seen.
 
 use enfilade_geom::{Aabb, DVec3, Ray, Triangle};
 
@@ -40,12 +42,12 @@ pub(crate) struct Shade<'a> {
     pub(crate) inset: f64,
     /// Rounding of `normal · point`. [Units: wu]
     pub(crate) rounding: f64,
-    /// What a world's planes and corners may be moved. [Units: wu]
+    /// The world's tolerance: how far planes and vertices may be moved. [Units: wu]
     pub(crate) slack: f64,
 }
 
 impl Shade<'_> {
-    /// Whether no line through an opening reaches a triangle, or the triangles of an object, behind it.
+    /// Returns whether no line through an opening reaches a triangle, or the triangles of an object, behind it.
     pub(crate) fn hides(&self, dir: usize, triangles: &[Triangle], bounds: &Aabb) -> bool {
         let opening = &self.dirs.all[dir];
         let height = (opening.low + opening.high) * 0.5;
@@ -78,7 +80,7 @@ impl Shade<'_> {
             && both().all(|ends| self.closes(ends.map(Clone::clone), near, true))
     }
 
-    /// Whether no line through an opening reaches a box behind it.
+    /// Returns whether no line through an opening reaches a box behind it.
     fn hides_box(&self, dir: usize, bounds: &Aabb) -> bool {
         let opening = &self.dirs.all[dir];
         let height = (opening.low + opening.high) * 0.5;
@@ -122,7 +124,7 @@ impl Shade<'_> {
         }
     }
 
-    /// Whether one of so many lines from a polygon to another is free; the second may be in a wall itself.
+    /// Returns whether one of so many lines from a polygon to another is free; the second may be in a wall itself.
     fn has_line(&self, ends: [&Vec<DVec3>; 2], n: usize, may_be_wall: bool) -> bool {
         let mut rng = Rng::new(0);
         (0..n).any(|_| {
@@ -132,7 +134,7 @@ impl Shade<'_> {
         })
     }
 
-    /// Whether walls close all lines from one polygon to the other, which may be in a wall itself.
+    /// Returns whether walls close all lines from one polygon to the other, which may be in a wall itself.
     fn closes(&self, ends: [Vec<DVec3>; 2], near: Near, may_be_wall: bool) -> bool {
         let mut beams = vec![ends];
         let mut n_done = 0;
@@ -191,7 +193,7 @@ impl Shade<'_> {
         beams.push(ends);
     }
 
-    /// What the walls that one line of a beam meets do to all of it.
+    /// Returns the effect on a beam of the walls that one of its lines meets.
     fn close(
         &self,
         ends: &[Vec<DVec3>; 2],

@@ -9,6 +9,7 @@ mod inputs;
 mod mutate;
 mod mutated;
 mod random;
+mod tight;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -37,6 +38,7 @@ const PARTS: &[(&str, Part)] = &[
     ("large", budgets::large),
     ("mutated", mutated::run),
     ("nasty", budgets::nasty),
+    ("tight", tight::run),
 ];
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;
