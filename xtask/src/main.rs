@@ -41,7 +41,8 @@ usage: cargo xtask test
           messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
           choose by how names begin;
-          trust: hostile and huge input, a row a figure; --rows (case, gate, large, mutated, nasty) chooses;
+          trust: hostile and huge input, a row a figure; --rows (case, gate, large, mutated, nasty,
+          tight) chooses;
           --count and --from choose the damaged files of `mutated`;
           any other NAME (bring, bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
