@@ -23,6 +23,7 @@ mod bits;
 mod checkpoint;
 mod clip;
 mod config;
+mod cover;
 mod dirs;
 mod evidence;
 mod flow;

@@ -46,18 +46,19 @@ pub fn see_parts(
     let walls = walls(world);
     let bvh = Bvh::build(&walls);
     let sheets = Sheets::new(&walls, &bvh);
+    let slack = world_tolerance(glasses.dirs().scale);
     let shade = Shade {
         sheets: &sheets,
         dirs: glasses.dirs(),
         inset: glasses.clearance(),
         rounding: glasses.tolerance().rounding,
+        slack,
     };
-    let slack = world_tolerance(glasses.dirs().scale);
     let is_hidden: Vec<bool> = (asked.par_iter())
         .with_min_len(64)
         .map(|&(portal, part)| {
-            let bounds = all[part as usize].bounds.expanded(slack);
-            shade.hides(glasses.place(portal), &bounds)
+            let shape = &all[part as usize];
+            shade.hides(glasses.place(portal), &shape.triangles, &shape.bounds)
         })
         .collect();
     let is_open = |pair: (u32, u32)| asked.binary_search(&pair).is_ok_and(|at| !is_hidden[at]);

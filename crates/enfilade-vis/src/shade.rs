@@ -1,17 +1,28 @@
-//! What walls hide from a portal on the way to it.
+//! Occlusion by walls of what lies behind a portal.
 //!
-//! Behind a portal the visible volume is all that is in front of it, which in a street is the whole facade that the window is in. Here the lines
-//! from the portal to a box are held against the triangles, as `occlude` does between two portals: each face of the box by which they may come in
-//! is one end of a beam. Errs to visible: what [`MAX_BEAMS`] pieces do not settle counts as seen.
+//! Behind a portal the visible volume is all that is in front of it, which in a street is the whole facade that the
+//! window is in. Here the lines from the portal to a triangle are held against the walls, as `occlude` does between
+//! two portals: by sheets, and by all walls in one plane (`cover`). Of an object they are held against each face of
+//! its box by which they may come in, and if that is not enough, against its triangles. Lines that a wall's plane
+//! tells apart are cut there rather than in halves.
+//!
+//! Most of what is seen is found by a few random lines. Errs to visible: what [`MAX_BEAMS`] pieces do not settle
+//! counts as seen.
 
-use enfilade_geom::{Aabb, DVec3, Ray};
+use enfilade_geom::{Aabb, DVec3, Ray, Triangle};
 
+use crate::cover::{Cover, Near};
 use crate::dirs::Dirs;
 use crate::occlude::{APART, spread};
+use crate::rng::Rng;
 use crate::sheets::{Beam, Hull, Part, Sheets, cut, halves, inner_point, size};
 
-/// Pieces that the lines to one face of a box may be cut into.
+/// Pieces that the lines to one face of a box, or to one triangle, may be cut into.
 const MAX_BEAMS: usize = 24;
+/// Lines tried before.
+const LINES: usize = 16;
+/// Objects of more triangles are told by their boxes alone.
+const MAX_TRIANGLES: usize = 64;
 
 /// Which way the faces of a box look, in the order of [`Aabb::faces`].
 const OUTWARD: [DVec3; 6] = [
@@ -31,11 +42,46 @@ pub(crate) struct Shade<'a> {
     pub(crate) inset: f64,
     /// Rounding of `normal · point`. [Units: wu]
     pub(crate) rounding: f64,
+    /// The world's tolerance: how far planes and vertices may be moved. [Units: wu]
+    pub(crate) slack: f64,
 }
 
 impl Shade<'_> {
-    /// Whether no line through an opening reaches a box behind it.
-    pub(crate) fn hides(&self, dir: usize, bounds: &Aabb) -> bool {
+    /// Returns whether no line through an opening reaches a triangle, or the triangles of an object, behind it.
+    pub(crate) fn hides(&self, dir: usize, triangles: &[Triangle], bounds: &Aabb) -> bool {
+        let opening = &self.dirs.all[dir];
+        let height = (opening.low + opening.high) * 0.5;
+        let parts = self.dirs.open_parts(dir, self.inset);
+        let parts: Vec<_> = parts.into_iter().filter(|part| part.len() > 2).collect();
+        if triangles.len() > 1 && self.hides_box(dir, &bounds.expanded(self.slack)) {
+            return true;
+        }
+        if triangles.len() > MAX_TRIANGLES {
+            return false;
+        }
+        let near = Near {
+            strip: self.inset,
+            ..self.near()
+        };
+        // What lies in the opening's plane is seen along it at most.
+        let behind = |t: &Triangle| cut(t, opening.normal, height + self.inset);
+        let to: Vec<_> = triangles
+            .iter()
+            .map(behind)
+            .filter(|t| !t.is_empty())
+            .collect();
+        let both = || {
+            parts
+                .iter()
+                .flat_map(|part| to.iter().map(move |to| [part, to]))
+        };
+        // What is seen is mostly found by a line.
+        !both().any(|ends| self.has_line(ends, LINES.div_ceil(to.len()), true))
+            && both().all(|ends| self.closes(ends.map(Clone::clone), near, true))
+    }
+
+    /// Returns whether no line through an opening reaches a box behind it.
+    fn hides_box(&self, dir: usize, bounds: &Aabb) -> bool {
         let opening = &self.dirs.all[dir];
         let height = (opening.low + opening.high) * 0.5;
         let parts = self.dirs.open_parts(dir, self.inset);
@@ -44,6 +90,11 @@ impl Shade<'_> {
         if Aabb::of_points(parts.clone().flatten()).overlaps(bounds) {
             return false;
         }
+        // What of an object lies this far before a wall may as well be in it.
+        let near = Near {
+            strip: self.slack,
+            ..self.near()
+        };
         let faces = bounds.faces();
         let center = bounds.center();
         for part in parts {
@@ -55,7 +106,9 @@ impl Shade<'_> {
                 if from.is_empty() || to.is_empty() {
                     continue;
                 }
-                if !self.closes([from, to]) {
+                if self.has_line([&from, &to], LINES, false)
+                    || !self.closes([from, to], near, false)
+                {
                     return false;
                 }
             }
@@ -63,9 +116,26 @@ impl Shade<'_> {
         true
     }
 
-    /// Whether sheets close all lines from one polygon to the other.
-    fn closes(&self, ends: [Vec<DVec3>; 2]) -> bool {
-        let apart = APART * self.rounding;
+    fn near(&self) -> Near {
+        Near {
+            apart: APART * self.rounding,
+            strip: self.inset,
+            slack: self.slack,
+        }
+    }
+
+    /// Returns whether one of so many lines from a polygon to another is free; the second may be in a wall itself.
+    fn has_line(&self, ends: [&Vec<DVec3>; 2], n: usize, may_be_wall: bool) -> bool {
+        let mut rng = Rng::new(0);
+        (0..n).any(|_| {
+            let [a, b] = ends.map(|end| point_in(end, &mut rng));
+            let is_same = |i| may_be_wall && self.sheets.is_in_plane(i, ends[1], self.slack);
+            !self.sheets.bvh.any_hit(a, b, is_same)
+        })
+    }
+
+    /// Returns whether walls close all lines from one polygon to the other, which may be in a wall itself.
+    fn closes(&self, ends: [Vec<DVec3>; 2], near: Near, may_be_wall: bool) -> bool {
         let mut beams = vec![ends];
         let mut n_done = 0;
         while let Some(ends) = beams.pop() {
@@ -79,33 +149,202 @@ impl Shade<'_> {
             self.sheets.bvh.for_each_hit(&ray, |hit| {
                 hits.push((hit.t, hit.triangle));
             });
+            if may_be_wall {
+                hits.retain(|hit| !self.sheets.is_in_plane(hit.1, &ends[1], self.slack));
+            }
             if hits.is_empty() {
                 return false;
             }
             hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let beam = Beam {
-                ends,
-                what: Part::Open,
-            };
-            let hull = Hull::new(&beam, apart);
-            let is_closed = spread(hits.len())
-                .any(|i| self.sheets.grown(hits[i].1, &beam, &hull, line).is_some());
-            if is_closed {
-                continue;
-            }
-            let end = usize::from(size(&beam.ends[1]) > size(&beam.ends[0]));
-            for half in halves(&beam.ends[end]) {
-                if half.is_empty() {
-                    continue;
+            match self.close(&ends, &hits, line, near) {
+                Cover::Closed => {}
+                Cover::Cuts(end, plane) => {
+                    for (normal, least) in [(plane.normal, -plane.d), (-plane.normal, plane.d)] {
+                        let part = cut(&ends[end], normal, least + 4.0 * near.apart);
+                        self.go_on(&mut beams, &ends, end, part);
+                    }
                 }
-                if size(&half) < 1e3 * apart {
-                    return false;
+                Cover::Open => {
+                    let end = usize::from(size(&ends[1]) > size(&ends[0]));
+                    for half in halves(&ends[end]) {
+                        if !half.is_empty() && size(&half) < 1e3 * near.apart {
+                            return false;
+                        }
+                        self.go_on(&mut beams, &ends, end, half);
+                    }
                 }
-                let mut ends = beam.ends.clone();
-                ends[end] = half;
-                beams.push(ends);
             }
         }
         true
+    }
+
+    fn go_on(
+        &self,
+        beams: &mut Vec<[Vec<DVec3>; 2]>,
+        ends: &[Vec<DVec3>; 2],
+        end: usize,
+        part: Vec<DVec3>,
+    ) {
+        if part.is_empty() {
+            return;
+        }
+        let mut ends = ends.clone();
+        ends[end] = part;
+        beams.push(ends);
+    }
+
+    /// Returns the effect on a beam of the walls that one of its lines meets.
+    fn close(
+        &self,
+        ends: &[Vec<DVec3>; 2],
+        hits: &[(f64, u32)],
+        line: [DVec3; 2],
+        near: Near,
+    ) -> Cover {
+        let mut cuts = Cover::Open;
+        for i in spread(hits.len()) {
+            match self.sheets.cover(hits[i].1, ends, near) {
+                Cover::Closed => return Cover::Closed,
+                Cover::Cuts(end, plane) => {
+                    if matches!(cuts, Cover::Open) {
+                        cuts = Cover::Cuts(end, plane);
+                    }
+                }
+                Cover::Open => {}
+            }
+        }
+        let beam = Beam {
+            ends: ends.clone(),
+            what: Part::Open,
+        };
+        let hull = Hull::new(&beam, near.apart);
+        let is_closed =
+            spread(hits.len()).any(|i| self.sheets.grown(hits[i].1, &beam, &hull, line).is_some());
+        if is_closed { Cover::Closed } else { cuts }
+    }
+}
+
+/// A random point of a convex polygon, not evenly spread.
+fn point_in(points: &[DVec3], rng: &mut Rng) -> DVec3 {
+    let k = 1 + rng.below(points.len() - 2);
+    let [mut u, mut v] = [rng.unit(), rng.unit()];
+    if u + v > 1.0 {
+        [u, v] = [1.0 - u, 1.0 - v];
+    }
+    points[0] + (points[k] - points[0]) * u + (points[k + 1] - points[0]) * v
+}
+
+#[cfg(test)]
+mod tests {
+    use enfilade_cpg::SightGraph;
+    use enfilade_geom::Bvh;
+
+    use super::*;
+    use crate::hourglass::Hourglasses;
+
+    /// A square opening between two cells, one unit wide around the z axis; lines pass it upwards.
+    const OPENING: [[f64; 3]; 4] = [
+        [-0.5, -0.5, 0.0],
+        [0.5, -0.5, 0.0],
+        [0.5, 0.5, 0.0],
+        [-0.5, 0.5, 0.0],
+    ];
+
+    fn rectangle([x0, y0]: [f64; 2], [x1, y1]: [f64; 2], z: f64) -> [Triangle; 2] {
+        let p = |x, y| DVec3::new(x, y, z);
+        [
+            [p(x0, y0), p(x1, y0), p(x1, y1)],
+            [p(x0, y0), p(x1, y1), p(x0, y1)],
+        ]
+    }
+
+    fn hides(walls: &[Triangle], target: &[Triangle]) -> bool {
+        let winding = OPENING.map(DVec3::from_array).to_vec();
+        let graph = SightGraph::of_windings(2, [([0, 1], winding)]);
+        let glasses = Hourglasses::new(&graph).unwrap();
+        let bvh = Bvh::build(walls);
+        let shade = Shade {
+            sheets: &Sheets::new(walls, &bvh),
+            dirs: glasses.dirs(),
+            inset: glasses.clearance(),
+            rounding: glasses.tolerance().rounding,
+            slack: 2e-5,
+        };
+        let bounds = Aabb::of_points(target.iter().flatten());
+        shade.hides(glasses.place(0), target, &bounds)
+    }
+
+    /// Three walls side by side in one plane, which share no edge.
+    fn row(z: f64) -> Vec<Triangle> {
+        let walls = [
+            rectangle([-9.0, -9.0], [-0.1, 9.0], z),
+            rectangle([-0.1, -9.5], [0.2, 9.5], z),
+            rectangle([0.2, -9.0], [9.0, 9.0], z),
+        ];
+        walls.concat()
+    }
+
+    #[test]
+    fn walls_side_by_side_hide_what_is_behind_them() {
+        let target = rectangle([-1.0, -1.0], [1.0, 1.0], 4.0);
+        let walls = row(1.0);
+        assert!(hides(&walls, &target[..1]) && hides(&walls, &target));
+        // Without the one in the middle there is a way through, and in front of them nothing is hidden.
+        let gap = [&walls[..2], &walls[4..]].concat();
+        assert!(!hides(&gap, &target[..1]) && !hides(&gap, &target));
+        let before = rectangle([-1.0, -1.0], [1.0, 1.0], 0.9);
+        assert!(!hides(&walls, &before[..1]) && !hides(&walls, &before));
+    }
+
+    #[test]
+    fn what_sticks_out_of_a_wall_is_seen_and_what_stands_behind_it_is_not() {
+        let upright = |low: f64, high: f64| {
+            let p = |y, z| DVec3::new(0.3, y, z);
+            [p(-0.2, low), p(0.3, low), p(0.1, high)]
+        };
+        let walls = row(1.0);
+        assert!(!hides(&walls, &[upright(0.5, 2.0)]));
+        assert!(!hides(&walls, &[upright(0.999, 2.0)]));
+        // It begins in the wall, as a wall does that two rooms share.
+        assert!(hides(&walls, &[upright(1.0, 2.0)]));
+        // What is in the wall itself is seen.
+        assert!(!hides(&walls, &walls[..1]));
+    }
+
+    #[test]
+    fn no_line_reaches_what_counts_as_hidden() {
+        let mut n_hidden = 0;
+        for seed in 0..600 {
+            let mut rng = Rng::new(seed);
+            let mut range = |low: f64, high: f64| low + (high - low) * rng.unit();
+            let mut walls = Vec::new();
+            for _ in 0..6 {
+                let z = f64::round(range(1.0, 4.0)) * 0.5;
+                let [x, y] =
+                    [range(-2.0, 0.5), range(-2.0, 0.5)].map(|x| f64::round(x * 4.0) / 4.0);
+                let size = [range(0.5, 4.0), range(0.5, 4.0)];
+                walls.extend(rectangle([x, y], [x + size[0], y + size[1]], z));
+            }
+            let at = [range(-1.0, 1.0), range(-1.0, 1.0), range(0.4, 3.0)];
+            let mut corner = || DVec3::from_array(at.map(|x| x + range(-0.5, 0.5)));
+            let target = [corner(), corner(), corner()];
+            if !hides(&walls, &[target]) {
+                continue;
+            }
+            n_hidden += 1;
+            for _ in 0..2000 {
+                let opening = OPENING.map(DVec3::from_array);
+                let [a, b] = [&opening[..], &target].map(|end| point_in(end, &mut rng));
+                let blocks = |t: &Triangle| {
+                    let ray = Ray::segment(a, b);
+                    enfilade_geom::ray::hit_triangle(&ray, t).is_some()
+                };
+                assert!(
+                    b.z < 0.0 || walls.iter().any(blocks),
+                    "seed {seed}: {a} sees {b}"
+                );
+            }
+        }
+        assert!(n_hidden > 60, "{n_hidden}");
     }
 }

@@ -21,7 +21,7 @@ mod symbol {
 
 /// Triangles and their edges.
 pub(crate) struct Sheets<'a> {
-    triangles: &'a [Triangle],
+    pub(crate) triangles: &'a [Triangle],
     pub(crate) bvh: &'a Bvh,
     /// By triangle.
     edges: Vec<[u32; 3]>,

@@ -14,6 +14,7 @@ mod order;
 mod random;
 mod scenes;
 mod tampered;
+mod tight;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -52,6 +53,7 @@ const PARTS: &[(&str, Part)] = &[
     ("nasty", budgets::nasty),
     ("order", order::run),
     ("tampered", tampered::run),
+    ("tight", tight::run),
 ];
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;
