@@ -86,11 +86,11 @@ fn bounded(rows: &Figures, line: &str) -> anyhow::Result<Ran> {
 }
 
 /// A name, the scene as OBJ, and files that it refers to.
-type Input = (String, String, Vec<(&'static str, Vec<u8>)>);
+type NastyInput = (String, String, Vec<(&'static str, Vec<u8>)>);
 
 /// The scenes that bakes are tried with, and rooms with what is nasty to those who read worlds: long names, large pictures.
-fn inputs() -> Vec<Input> {
-    let mut all: Vec<Input> = scenes()
+fn inputs() -> Vec<NastyInput> {
+    let mut all: Vec<NastyInput> = scenes()
         .into_iter()
         .map(|(name, text)| (name.to_owned(), text, Vec::new()))
         .collect();
