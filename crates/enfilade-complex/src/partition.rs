@@ -238,7 +238,11 @@ fn without_holes(
     seals: Vec<Seal>,
     complex: &Complex,
 ) -> (Vec<Seal>, Vec<PartitionPortal>, Vec<DVec3>) {
-    let is_wide = wide::wide(&seals, &complex.bvh, complex.graph.hole);
+    let outlines = seals
+        .iter()
+        .map(|s| (&s.outline.points[..], s.plane.normal));
+    let outlines: Vec<_> = outlines.collect();
+    let is_wide = wide::wide(&outlines, &complex.bvh, complex.graph.hole);
     let (mut kept, mut holes, mut before_matter) = (Vec::new(), Vec::new(), Vec::new());
     for (seal, is_wide) in seals.into_iter().zip(is_wide) {
         if is_wide && seal.cells[1] != SOLID {

@@ -11,8 +11,6 @@
 use enfilade_geom::{Bvh, DVec3, Triangle};
 use rayon::prelude::*;
 
-use super::partition::Seal;
-
 /// A hole is told where the ball has this much room around it: seals overlap what they join by about as much. [Units: wu]
 const ROOM: f64 = 5e-4;
 /// Smaller parts are not cut. [Units: wu]
@@ -20,10 +18,12 @@ const FINEST: f64 = 5e-4;
 /// Points on the rim of a disk.
 const AROUND: usize = 16;
 
+/// A seal: its vertices and the normal of its plane.
+type Polygon<'a> = (&'a [DVec3], DVec3);
+
 /// Tells of each seal whether it closes a hole through which a ball of this diameter passes.
-pub(super) fn wide(seals: &[Seal], model: &Bvh, hole: f64) -> Vec<bool> {
-    let parts = |seal: &Seal| -> Vec<Triangle> {
-        let p = &seal.outline.points;
+pub(super) fn wide(seals: &[Polygon<'_>], model: &Bvh, hole: f64) -> Vec<bool> {
+    let parts = |(p, _): &Polygon<'_>| -> Vec<Triangle> {
         (2..p.len()).map(|k| [p[0], p[k - 1], p[k]]).collect()
     };
     let closed: Vec<Triangle> = seals.iter().flat_map(parts).collect();
@@ -32,7 +32,7 @@ pub(super) fn wide(seals: &[Seal], model: &Bvh, hole: f64) -> Vec<bool> {
         closed: Bvh::build(&closed),
         radius: 0.5 * hole + ROOM,
     };
-    let is_wide = |seal: &Seal| holes.has_one(parts(seal), seal.plane.normal);
+    let is_wide = |seal: &Polygon<'_>| holes.has_one(parts(seal), seal.1);
     seals.par_iter().map(is_wide).collect()
 }
 
@@ -87,8 +87,6 @@ impl Holes<'_> {
 
 #[cfg(test)]
 mod tests {
-    use enfilade_geom::{Plane, Winding};
-
     use super::*;
 
     fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> Vec<DVec3> {
@@ -97,19 +95,15 @@ mod tests {
             .to_vec()
     }
 
+    /// A seal: its vertices and the normal of its plane.
+    type Polygon<'a> = (&'a [DVec3], DVec3);
+
     /// Tells of each seal whether it is too wide for a hole of 10 mm.
     fn judged(walls: &[[f64; 4]], seals: &[[f64; 4]]) -> Vec<bool> {
         let corners = walls.iter().map(|&w| rectangle(w));
         let fans = corners.flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);
-        let seal = |&at: &[f64; 4]| Seal {
-            cells: [0, 1],
-            plane: Plane {
-                normal: DVec3::Z,
-                d: 0.0,
-            },
-            outline: Winding::new(rectangle(at)),
-        };
-        let seals: Vec<Seal> = seals.iter().map(seal).collect();
+        let seals: Vec<Vec<DVec3>> = seals.iter().map(|&at| rectangle(at)).collect();
+        let seals: Vec<Polygon<'_>> = seals.iter().map(|s| (&s[..], DVec3::Z)).collect();
         wide(&seals, &Bvh::build(&fans.collect::<Vec<_>>()), 0.01)
     }
 
