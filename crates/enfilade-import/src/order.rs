@@ -11,7 +11,7 @@ use std::mem::take;
 use enfilade_geom::scene::{
     Entity, Fixture, Image, Material, Mesh, Object, Primitive, Scene, SourceNode, Texture,
 };
-use enfilade_geom::{ConvexSolid, DMat4};
+use enfilade_geom::{ConvexSolid, DMat4, DVec3};
 use serde_json::Value;
 
 use crate::gltf::map_textures;
@@ -375,7 +375,7 @@ fn solids(a: &ConvexSolid, b: &ConvexSolid) -> Ordering {
         let planes = s.planes.iter();
         let planes = planes.flat_map(|p| p.normal.to_array().into_iter().chain([p.d]));
         let points = s.faces.iter().flat_map(|f| &f.points);
-        planes.chain(points.flat_map(|p| p.to_array())).collect()
+        planes.chain(points.flat_map(DVec3::to_array)).collect()
     };
     all(&numbers(a), &numbers(b), f64::total_cmp)
 }

@@ -67,11 +67,11 @@ impl Document {
     fn shuffle_looks(&mut self) {
         let images = self.shuffle_list("images");
         self.each("textures", |texture| {
-            renumber_at(texture, "source", &images)
+            renumber_at(texture, "source", &images);
         });
         let textures = self.shuffle_list("textures");
         self.each("materials", |material| {
-            renumber_textures(material, &textures)
+            renumber_textures(material, &textures);
         });
         let materials = self.shuffle_list("materials");
         self.each("meshes", |mesh| {
