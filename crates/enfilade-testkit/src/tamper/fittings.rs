@@ -55,7 +55,7 @@ pub(super) const ALL: &[Tampering] = &[
     }),
     Tampering::new("a leaf that hardly opens", |w, at| {
         moved(w, at, |m| {
-            m.open = m.shut + 0.02_f32.copysign(m.open - m.shut)
+            m.open = m.shut + 0.02_f32.copysign(m.open - m.shut);
         })
     }),
     Tampering::new("a leaf that is open where it is shut", |w, at| {
@@ -162,9 +162,11 @@ pub(super) const ALL: &[Tampering] = &[
         let [p, f] = leaf(w, at, |_| true)?;
         let detail = w.graph.portals[p].fittings[f].detail as usize;
         let normal = w.graph.portals[p].normal;
-        for k in 0..3 {
-            w.details[detail].transform[12 + k] += normal[k] * 0.8;
-        }
+        let place = &mut w.details[detail].transform[12..15];
+        place
+            .iter_mut()
+            .zip(normal)
+            .for_each(|(x, n)| *x += n * 0.8);
         Some(())
     }),
 ];
