@@ -1,5 +1,6 @@
 //! Falsified worlds: each kind of tampering at three places of each scene, and whether `verify` finds it by default.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -57,10 +58,10 @@ fn bench_scene(name: &str, scene: &Scene, kinds: &[String]) -> anyhow::Result<()
             ShownBy::File => "file",
             ShownBy::Source => "source",
         };
-        println!(
-            "{}",
-            json!({"kind": tampering.name, "scene": name, "by": by, "found": n_found, "places": n})
-        );
+        let row = json!({
+            "kind": tampering.name, "scene": name, "by": by, "found": n_found, "places": n,
+        });
+        writeln!(std::io::stdout().lock(), "{row}")?;
     }
     Ok(())
 }

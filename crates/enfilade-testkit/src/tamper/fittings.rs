@@ -162,10 +162,11 @@ pub(super) const ALL: &[Tampering] = &[
         let [p, f] = leaf(w, at, |_| true)?;
         let detail = w.graph.portals[p].fittings[f].detail as usize;
         let normal = w.graph.portals[p].normal;
-        let moved = &mut w.details[detail].transform[12..15];
-        for (at, along) in moved.iter_mut().zip(normal) {
-            *at += along * 0.8;
-        }
+        let place = &mut w.details[detail].transform[12..15];
+        place
+            .iter_mut()
+            .zip(normal)
+            .for_each(|(x, n)| *x += n * 0.8);
         Some(())
     }),
 ];

@@ -21,19 +21,15 @@ pub(crate) const DOOR_X: f64 = 4.125;
 
 pub(crate) type Quad = [[f64; 3]; 4];
 
-/// A chain of box tests: the first box that holds a point gives its cell.
+/// A chain of box tests: the first box that holds a point gives its cell. Box `k` has planes `6 k` to `6 k + 5`; a point may fail
+/// at each of them, and what is asked then is a tree of its own.
 pub(crate) fn locator_of_boxes(
     boxes: &[([f64; 3], [f64; 3], Option<CellId>)],
     bounds: Aabb,
     outside: Option<CellId>,
 ) -> Locator {
-    let (mut planes, mut nodes) = (Vec::new(), Vec::new());
-    for (k, (min, max, cell)) in boxes.iter().enumerate() {
-        let next = if k + 1 == boxes.len() {
-            Locator::leaf(outside)
-        } else {
-            (k as i32 + 1) * 6
-        };
+    let mut planes = Vec::new();
+    for (min, max, _) in boxes {
         for i in 0..6_usize {
             let axis = i / 2;
             let mut plane = [0.0; 4];
@@ -43,24 +39,47 @@ pub(crate) fn locator_of_boxes(
                 (-1.0, max[axis])
             };
             planes.push(plane);
-            let inside = if i == 5 {
-                Locator::leaf(*cell)
-            } else {
-                nodes.len() as i32 + 1
-            };
-            nodes.push(LocatorNode {
-                plane: planes.len() as u32 - 1,
-                children: [inside, next],
-            });
         }
     }
+    let cells: Vec<Option<CellId>> = boxes.iter().map(|b| b.2).collect();
+    let mut nodes = Vec::new();
+    let root = tree_of_boxes(&cells, 0, outside, &mut nodes);
     Locator {
         bounds,
         outside,
         planes,
         nodes,
-        root: 0,
+        root,
     }
+}
+
+/// Adds the tests of box `k` and of those after it; returns the first.
+fn tree_of_boxes(
+    cells: &[Option<CellId>],
+    k: usize,
+    outside: Option<CellId>,
+    nodes: &mut Vec<LocatorNode>,
+) -> i32 {
+    if k == cells.len() {
+        return Locator::leaf(outside);
+    }
+    let first = nodes.len();
+    for i in 0..6 {
+        let inside = if i == 5 {
+            Locator::leaf(cells[k])
+        } else {
+            (first + i + 1) as i32
+        };
+        nodes.push(LocatorNode {
+            plane: (6 * k + i) as u32,
+            children: [inside, 0],
+        });
+    }
+    for i in 0..6 {
+        let next = tree_of_boxes(cells, k + 1, outside, nodes);
+        nodes[first + i].children[1] = next;
+    }
+    first as i32
 }
 
 /// The rectangle `a` to `b` in the plane where they share a coordinate, with rectangular holes.
