@@ -18,8 +18,8 @@ use crate::screen::{print_json, printed, write_lines};
 /// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
 #[derive(clap::Args)]
 pub(crate) struct Demo {
-    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to; files of these names that are not the demo's stay as they are, and
-    /// the demo says so and ends.
+    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to; files of these names that are not the demo's stay as they
+    /// are, and the demo says so and ends.
     #[arg(short, long, default_value = ".", value_name = "DIR")]
     output: PathBuf,
     /// Print JSON for machines.

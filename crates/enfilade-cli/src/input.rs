@@ -26,8 +26,8 @@ pub fn name_of(path: &Path) -> String {
 /// Reads a world, a portal file or evidence, from a file or standard input, of at most as many bytes as a scene may have
 /// ([`Limits::max_file_bytes`]).
 ///
-/// A GLB says in its head how long it is: of what does not end there, no more than a byte is read. Of what is none of the three, only the
-/// beginning.
+/// A GLB says in its head how long it is: of what does not end there, no more than a byte is read. Of what is none of the
+/// three, only the beginning.
 ///
 /// # Errors
 ///

@@ -118,8 +118,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Ends with what is wrong, or with the help that was asked for. The message repeats arguments, and a shell makes arguments of the names
-/// of files: of those that hold hidden characters, it is told by names that can be shown.
+/// Ends with what is wrong, or with the help that was asked for. The message repeats arguments, and a shell makes arguments
+/// of the names of files: of those that hold hidden characters, it is told by names that can be shown.
 fn wrong_usage(error: &clap::Error) -> ! {
     let args = || std::env::args_os().map(|a| a.to_string_lossy().into_owned());
     if args().any(|a| a.contains(is_hidden)) {

@@ -136,8 +136,9 @@ impl Outputs {
         Ok(())
     }
 
-    /// Takes down that `option` names a file to write. Refused where that is an input or what another option writes, says by its
-    /// extension that it is something else, or cannot be written: asked before minutes of work are spent on what goes there.
+    /// Takes down that `option` names a file to write. Refused where that is an input or what another option writes, says by
+    /// its extension that it is something else, or cannot be written: asked before minutes of work are spent on what goes
+    /// there.
     pub(crate) fn write(
         &mut self,
         option: &'static str,
@@ -201,8 +202,9 @@ impl Outputs {
     }
 }
 
-/// Writes files into the folder that `option` names. Nobody named the files, so none is written over that may be somebody's: what
-/// is there already stays if it is the same, and is refused, before any is written, if it is a link or not an earlier one of ours.
+/// Writes files into the folder that `option` names. Nobody named the files, so none is written over that may be somebody's:
+/// what is there already stays if it is the same, and is refused, before any is written, if it is a link or not an earlier
+/// one of ours.
 pub(crate) fn write_unnamed(
     option: &str,
     files: &[(PathBuf, Vec<u8>)],

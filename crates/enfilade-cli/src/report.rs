@@ -56,8 +56,8 @@ struct PageReport<'a> {
 }
 
 const SIZE: [u32; 2] = [960, 540];
-/// Openings looked at from openings to find out what can be seen; after that, what is not decided counts as visible. Twice what a clinic of
-/// 660 rooms takes. A count and no time, so that the page of a world is the same every time.
+/// Openings looked at from openings to find out what can be seen; after that, what is not decided counts as visible. Twice
+/// what a clinic of 660 rooms takes. A count and no time, so that the page of a world is the same every time.
 const BUDGET: u64 = 2_000_000;
 /// Worlds that are made to take long take no longer, and then the page may differ.
 const LONGEST: Duration = Duration::from_secs(300);
@@ -110,7 +110,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
 
 fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
     let start = Instant::now();
-    let mut on_round = |done, _| done < BUDGET && start.elapsed() < LONGEST;
+    let mut on_round = |done: u64, _: u64| done < BUDGET && start.elapsed() < LONGEST;
     let walls: Vec<Triangle> = structural_triangles(world)
         .into_iter()
         .map(|(triangle, _)| triangle)

@@ -1,9 +1,9 @@
 //! What is said, on standard output and standard error: nothing gets there but text.
 //!
-//! Names of objects, cells and files are strangers' text, and on a terminal text can be a command, or look like a line of ours. So all
-//! that is printed goes through the writers here, and `cargo xtask tidy` knows it: a call of `writeln!` writes one line, whatever is in
-//! it, with [hidden characters escaped](shown). Text of several lines is [written as such](write_lines) by who has escaped the names
-//! in it.
+//! Names of objects, cells and files are strangers' text, and on a terminal text can be a command, or look like a line of
+//! ours. So all that is printed goes through the writers here, and `cargo xtask tidy` knows it: a call of `writeln!` writes
+//! one line, whatever is in it, with [hidden characters escaped](shown). Text of several lines is [written as
+//! such](write_lines) by who has escaped the names in it.
 
 use std::fmt;
 use std::io::{self, BufWriter, IsTerminal as _, StdoutLock, Write};
@@ -134,8 +134,8 @@ fn escaped_lines(bytes: &[u8]) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Writes text of several lines, the last of which need not end. Names in it are escaped already, or a line break in one of them would
-/// begin a line of its own.
+/// Writes text of several lines, the last of which need not end. Names in it are escaped already, or a line break in one of
+/// them would begin a line of its own.
 pub(crate) fn write_lines(out: &mut impl Write, text: &impl fmt::Display) -> io::Result<()> {
     let mut text = text.to_string();
     if !text.is_empty() && !text.ends_with('\n') {

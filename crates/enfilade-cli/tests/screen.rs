@@ -1,5 +1,5 @@
-//! What is printed is data: names with commands to the terminal, line breaks and turned text, in everything that has a name, through
-//! every command.
+//! What is printed is data: names with commands to the terminal, line breaks and turned text, in everything that has a name,
+//! through every command.
 
 #![cfg(unix)]
 

@@ -1,8 +1,9 @@
 //! Text of strangers, made fit to be shown.
 //!
-//! Names come from files, and files from anybody. On a terminal a name can be a command (move the cursor, set the title, answer as if
-//! typed), a line of its own, or letters that are read in another order than they stand. So whatever goes to a terminal, log, report
-//! or error message goes through [`shown`]; what cannot be seen is written as Rust writes it in a literal, `\n` or `\u{202e}`.
+//! Names come from files, and files from anybody. On a terminal a name can be a command (move the cursor, set the title,
+//! answer as if typed), a line of its own, or letters that are read in another order than they stand. So whatever goes to a
+//! terminal, log, report or error message goes through [`shown`]; what cannot be seen is written as Rust writes it in a
+//! literal, `\n` or `\u{202e}`.
 
 use std::fmt::{self, Write};
 
@@ -51,11 +52,11 @@ impl<W: Write> Write for Escaper<W> {
     }
 }
 
-/// Tells characters that do something else than to be seen: control characters (C0, DEL, C1), line and paragraph separators, marks and
-/// overrides of direction, and all that Unicode lets a font ignore, such as zero-width spaces and tags.
+/// Tells characters that do something else than to be seen: control characters (C0, DEL, C1), line and paragraph separators,
+/// marks and overrides of direction, and all that Unicode lets a font ignore, such as zero-width spaces and tags.
 ///
-/// Selectors of a look (U+FE00 to U+FE0F) are none: they stand behind many a visible emoji and change nothing but its look. Joiners are
-/// hidden, though some scripts use them: two names that differ by one look the same.
+/// Selectors of a look (U+FE00 to U+FE0F) are none: they stand behind many a visible emoji and change nothing but its look.
+/// Joiners are hidden, though some scripts use them: two names that differ by one look the same.
 #[must_use]
 pub const fn is_hidden(c: char) -> bool {
     matches!(c,

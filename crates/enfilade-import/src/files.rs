@@ -30,8 +30,8 @@ pub(crate) fn open_file(path: &Path, limit: u64) -> Result<File, ImportError> {
 /// Bytes that tell what something is.
 const HEAD: u64 = 1 << 16;
 
-/// Reads all of what has at most `limit` bytes, if its head is worth it: `length` says of that, and whether it is all there is, how many
-/// bytes there can be. Of what has more, one more is read.
+/// Reads all of what has at most `limit` bytes, if its head is worth it: `length` says of that, and whether it is all there
+/// is, how many bytes there can be. Of what has more, one more is read.
 pub(crate) fn read_headed(
     mut from: impl Read,
     path: &Path,

@@ -98,8 +98,8 @@ pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
 /// Links in a row that lead somewhere; systems follow about as many.
 const MOST_LINKS: usize = 40;
 
-/// The file that a path means once links are followed, also of a link to what is not there yet. Links that lead in a circle mean none:
-/// the path itself is returned.
+/// The file that a path means once links are followed, also of a link to what is not there yet. Links that lead in a circle
+/// mean none: the path itself is returned.
 pub fn followed(path: impl AsRef<Path>) -> PathBuf {
     let path = path.as_ref();
     let mut at = path.to_owned();

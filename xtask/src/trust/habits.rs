@@ -1,5 +1,5 @@
-//! What a user relies on without asking: names are data, nobody's files are lost, an extension says what is in a file, half a file is a
-//! failure, and the same input gives the same bytes.
+//! What a user relies on without asking: names are data, nobody's files are lost, an extension says what is in a file, half a
+//! file is a failure, and the same input gives the same bytes.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
