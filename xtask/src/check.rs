@@ -227,7 +227,29 @@ fn check_scene(scene: &Path, name: &str) -> anyhow::Result<()> {
         output_of(&mut GATE.bake_command(scene, &world), None)?
     );
     validate(&world)?;
-    verify(&world, Some(scene))
+    verify(&world, Some(scene))?;
+    check_order(scene, name, &world)
+}
+
+/// Bakes the scene once more, with its triangles, vertices, nodes and all other lists shuffled: not a byte may differ.
+fn check_order(scene: &Path, name: &str, world: &Path) -> anyhow::Result<()> {
+    let folder = target_dir().join("scenes").join(format!("{name}-shuffled"));
+    let mut generate = Command::new(GATE.binary("examples/generate"));
+    generate
+        .arg(scene)
+        .args(["--shuffle", "1", "-o"])
+        .arg(&folder);
+    output_of(&mut generate, None)?;
+    let other = folder.join("world.glb");
+    output_of(&mut GATE.bake_command(&folder, &other), None)?;
+    if std::fs::read(world)? != std::fs::read(&other)? {
+        bail!(
+            "{} and {}, of the same scene in another order, differ",
+            world.display(),
+            other.display()
+        );
+    }
+    Ok(())
 }
 
 /// Scores the worlds that were just baked; fails where a figure lies below its floor.

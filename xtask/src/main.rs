@@ -29,7 +29,7 @@ usage: cargo xtask test
        cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
-       cargo xtask bench trust [--json] [--rows ROW,...] [--count N] [--from I]
+       cargo xtask bench trust [--json] [--rows ROW,...] [--scenes SCENE,...] [--count N] [--from I]
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
@@ -41,8 +41,8 @@ usage: cargo xtask test
           messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
           choose by how names begin;
-          trust: hostile and huge input, a row a figure; --rows (case, gate, large, mutated, nasty) chooses;
-          --count and --from choose the damaged files of `mutated`;
+          trust: hostile and huge input, a row a figure; --rows (case, gate, large, mutated, nasty, order) chooses;
+          --count and --from choose the damaged files of `mutated` and the shuffles of `order`, --scenes its scenes;
           any other NAME (bring, bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 
@@ -150,12 +150,14 @@ impl Task {
             match arg.as_str() {
                 "--json" => options.is_json = true,
                 "--rows" => options.rows = args.next()?.split(',').map(str::to_owned).collect(),
+                "--scenes" => options.scenes = args.next()?.split(',').map(str::to_owned).collect(),
                 "--count" => n = Some(args.next()?.parse().ok()?),
                 "--from" => from = args.next()?.parse().ok()?,
                 _ => return None,
             }
         }
         options.runs = trust::runs(from, n);
+        options.shuffles = trust::shuffles(from, n);
         Some(Self::Trust(options))
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
 use enfilade::cpg::wire::encode_glb;
-use enfilade::import::export_glb;
+use enfilade::import::{export_glb, sort_scene};
 use enfilade_report::{PlanOptions, plan_svg};
 use enfilade_testkit::furnished_house;
 
@@ -34,7 +34,9 @@ struct DemoReport {
 }
 
 pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
-    let scene = furnished_house().scene;
+    let mut scene = furnished_house().scene;
+    // As it is when the file is read, by `verify` for one.
+    sort_scene(&mut scene);
     make_folder("-o", &args.output)?;
     let path = |name: &str| args.output.join(name);
     let mut outputs = Outputs::default();

@@ -3,6 +3,7 @@
 mod naming;
 
 use crate::mesh::{bytes_of, mirror};
+use crate::order::sort;
 use crate::origins::Origins;
 use crate::repair::{GridSteps, weld_quantized};
 use crate::roles::{Facts, Verdict};
@@ -553,7 +554,7 @@ impl<'a> Builder<'a> {
         Ok(made)
     }
 
-    /// Ends the import: drops meshes that nothing places, and makes one what quantization parted.
+    /// Ends the import: drops meshes that nothing places, puts everything in order, and makes one what quantization parted.
     pub(crate) fn finish(mut self) -> (Scene, ImportReport) {
         let mut remap = vec![u32::MAX; self.scene.meshes.len()];
         let mut kept = Vec::new();
@@ -568,14 +569,16 @@ impl<'a> Builder<'a> {
         self.scene.meshes = kept;
         let steps = std::mem::take(&mut self.steps).into_iter();
         let steps = steps.map(|(mesh, steps)| (remap[mesh as usize], steps));
-        let n_welded = weld_quantized(&mut self.scene, &steps.collect());
+        let mut steps = steps.collect();
+        self.origins.move_into(&mut self.scene);
+        sort(&mut self.scene, &mut steps);
+        let n_welded = weld_quantized(&mut self.scene, &steps);
         if n_welded > 0 {
             let text = format!(
                 "quantized positions: {n_welded} corners that were less than half a step of their grids apart made one"
             );
-            self.note("meshes", text);
+            self.report.note(&self.path, "meshes", text);
         }
-        self.origins.move_into(&mut self.scene);
         (self.scene, self.report)
     }
 }

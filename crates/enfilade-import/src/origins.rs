@@ -3,7 +3,7 @@
 use enfilade_geom::scene::{About, Entity, Fixture, FixtureKind, Scene, SourceNode};
 use enfilade_geom::{DMat3, DMat4, DVec3};
 use serde_json::{Map, Value};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// Most levels of brackets in what is carried along for applications: worlds nest it a few levels deeper, and readers of JSON
 /// stop at 128.
@@ -14,7 +14,10 @@ const MAX_NESTING: usize = 100;
 pub(crate) struct Origins {
     nodes: Vec<SourceNode>,
     fixtures: Vec<Fixture>,
-    about: About,
+    /// Of each file that has one, each once.
+    copyrights: BTreeSet<String>,
+    /// Of the scene as a whole.
+    extras: String,
 }
 
 impl Origins {
@@ -35,21 +38,20 @@ impl Origins {
         self.fixtures.push(fixture);
     }
 
-    /// Adds the copyright of one more file, as a line unless it is there already, and the extras of its scene if no file before it had
-    /// any. Returns whether extras were left out.
+    /// Adds the copyright of one more file and the extras of its scene. Of extras the least text stays, whichever file came first; returns
+    /// whether others were left out.
     pub(crate) fn add_about(&mut self, copyright: &str, extras: &str) -> bool {
-        let known = &mut self.about.copyright;
-        if !copyright.is_empty() && !known.lines().any(|l| l == copyright) {
-            if !known.is_empty() {
-                known.push('\n');
-            }
-            known.push_str(copyright);
+        if !copyright.is_empty() {
+            self.copyrights.insert(copyright.to_owned());
         }
-        let is_first = self.about.extras.is_empty();
-        if is_first {
-            extras.clone_into(&mut self.about.extras);
+        if extras.is_empty() {
+            return false;
         }
-        !is_first && !extras.is_empty()
+        let is_first = self.extras.is_empty();
+        if is_first || *extras < *self.extras {
+            extras.clone_into(&mut self.extras);
+        }
+        !is_first
     }
 
     /// Hands everything to the scene. Objects without a node get one of their own name, and nodes with no object at or below them
@@ -101,7 +103,10 @@ impl Origins {
             object.node = object.node.map(|n| number[n as usize]);
         }
         scene.fixtures = self.fixtures;
-        scene.about = self.about;
+        scene.about = About {
+            copyright: Vec::from_iter(self.copyrights).join("\n"),
+            extras: self.extras,
+        };
     }
 }
 

@@ -132,8 +132,9 @@ fn obj_materials_and_pictures_come_from_beside_it() {
         ),
         (1, 1, 2)
     );
+    assert_eq!(scene.materials[0].name, "glassy");
     assert!(
-        scene.materials[0]
+        scene.materials[1]
             .gltf
             .contains(r#""baseColorTexture":{"index":0}"#)
     );

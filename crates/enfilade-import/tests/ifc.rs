@@ -65,14 +65,14 @@ fn products_have_their_class_and_global_id_as_name() {
         told[..2],
         [
             (
-                "IfcWallStandardCase/0iEHWY1$XA8eQeeULq4jE6",
-                Role::Structural,
-                "IFC class IfcWallStandardCase"
-            ),
-            (
                 "IfcDoor/1iEHWY1$XA8eQeeULq4jE6",
                 Role::Detail,
                 "IFC class IfcDoor"
+            ),
+            (
+                "IfcWallStandardCase/0iEHWY1$XA8eQeeULq4jE6",
+                Role::Structural,
+                "IFC class IfcWallStandardCase"
             ),
         ]
     );

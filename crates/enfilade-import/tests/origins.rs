@@ -43,10 +43,10 @@ fn load(document: &Value, options: &ImportOptions) -> (Scene, ImportReport) {
 fn objects_know_their_nodes_and_all_above_them() {
     let (scene, _) = load(&house(), &ImportOptions::default());
     let names: Vec<_> = scene.nodes.iter().map(|n| n.name.as_str()).collect();
-    assert_eq!(names, ["house", "storey", "wall", "panel"]);
+    assert_eq!(names, ["house", "storey", "panel", "wall"]);
     let parents: Vec<_> = scene.nodes.iter().map(|n| n.parent).collect();
     assert_eq!(parents, [None, Some(0), Some(1), Some(1)]);
-    assert_eq!(scene.nodes[2].extras, r#"{"fire":[60]}"#);
+    assert_eq!(scene.nodes[3].extras, r#"{"fire":[60]}"#);
     let of_objects: Vec<_> = scene.objects.iter().map(|o| o.node).collect();
     assert_eq!(of_objects, [Some(2), Some(3)]);
     assert_eq!(scene.about.copyright, "2026 A. Mason");
@@ -120,7 +120,7 @@ fn entities_of_a_map_are_names_and_places() {
     };
     assert_eq!(start.name, "info_player_start");
     assert_eq!(
-        scene.entities[1].position,
+        scene.entities[0].position,
         Some(start.transform.transform_point3(DVec3::ZERO))
     );
     assert!(start.extras.contains(r#""angle":"90""#));

@@ -1,7 +1,8 @@
 //! Reads the real scenes where they are at hand; passes, and says so, where they are not.
 
-use enfilade_geom::scene::Role;
-use enfilade_import::{ImportOptions, import};
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_import::{ImportOptions, decode_gltf, decode_map, decode_obj, export_glb, import};
+use enfilade_testkit::{shuffled_glb, shuffled_map, shuffled_obj};
 use std::path::{Path, PathBuf};
 
 fn scenes_folder() -> PathBuf {
@@ -53,5 +54,47 @@ fn every_real_scene_loads() {
         }
         assert!(n_structural > 0, "{}", scene.display());
         assert!(details.is_empty() || n_detail > 0, "{}", scene.display());
+    }
+}
+
+/// The scene that a file of this ending holds, plain and shuffled.
+fn plain_and_shuffled(ending: &str, bytes: &[u8], seed: u64) -> Option<[Scene; 2]> {
+    let options = ImportOptions::default();
+    let text = String::from_utf8_lossy(bytes);
+    let read = match ending {
+        "glb" => [bytes.to_vec(), shuffled_glb(bytes, seed)].map(|b| decode_gltf(&b, &options)),
+        "obj" => [text.clone().into_owned(), shuffled_obj(&text, seed)]
+            .map(|t| decode_obj(t.as_bytes(), &options)),
+        "map" => [text.clone().into_owned(), shuffled_map(&text, seed)]
+            .map(|t| decode_map(t.as_bytes(), &options)),
+        _ => return None,
+    };
+    Some(read.map(|r| r.unwrap_or_else(|e| panic!("{e}")).scene))
+}
+
+#[test]
+fn every_real_scene_is_the_same_in_another_order() {
+    /// Larger files take minutes as the gate is built, and are left to `cargo xtask bench trust --rows order`. [Units: bytes]
+    const LARGEST: u64 = 1 << 20;
+    let folders = std::fs::read_dir(scenes_folder()).into_iter().flatten();
+    let files = folders.flatten().filter_map(|f| f.path().read_dir().ok());
+    for file in files.flatten().flatten().map(|f| f.path()) {
+        let ending = file.extension().unwrap_or_default().to_string_lossy();
+        if file.metadata().is_ok_and(|m| m.len() > LARGEST) {
+            continue;
+        }
+        let bytes = std::fs::read(&file).unwrap();
+        let Some([plain, shuffled]) = plain_and_shuffled(&ending, &bytes, 1) else {
+            continue;
+        };
+        let told = |s: &Scene| {
+            let named = format!("{:?} {:?} {:?}", s.objects, s.nodes, s.fixtures);
+            (
+                named,
+                format!("{:?} {:?}", s.solids, s.entities),
+                export_glb(s),
+            )
+        };
+        assert!(told(&plain) == told(&shuffled), "{}", file.display());
     }
 }

@@ -12,6 +12,7 @@ use enfilade_import::{ImportOptions, RoleRules, export_glb, import};
 use enfilade_testkit::{
     Disturbance, Fault, Generated, TowerParams, Variant, cave, dirkse_maze, disturb, disturbed,
     furnished_house, gjorup_cavern, gjorup_rooms, mixed, office_tower, rotated, scaled, shuffled,
+    shuffled_glb, shuffled_map, shuffled_obj,
 };
 
 const USAGE: &str = "\
@@ -22,11 +23,13 @@ SCENE    house, tower, maze, cave, gjorup-optimised, gjorup-tessellated, gjorup-
          double-door-corridor, glass-facade-office, pitched-roof-attic;
          or one with a fault: {FAULTS};
          faults: all of these, each in a folder of its own below DIR;
-         or a folder with a scene.glb, to be spoilt
+         or a folder with a scene.glb, to be spoilt or shuffled;
+         or a file (GLB, OBJ, Quake map), to be shuffled
 OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave, spoiling (1)
          --cracks, --double-walls, --leaves        of the tower
          --turn DEG    about +Y                    --scale F     about the origin
-         --shuffle N   triangles in another order, by seed
+         --shuffle N   triangles in another order, by seed; of files also nodes, vertices
+                       and all other lists, each file by itself
 SPOILT   --jitter M    each corner of each triangle moved, standard deviation M meters
          --drop SHARE  that share of the triangles is missing
          --snap M      corners rounded to a grid of M meters per object
@@ -142,6 +145,43 @@ impl Options {
         Ok(())
     }
 
+    /// Writes a file in another order, under its name.
+    fn shuffle(&self, from: &Path) -> Result<(), Box<dyn Error>> {
+        let seed = self.shuffle.ok_or("a file can only be shuffled")?;
+        let bytes = std::fs::read(from)?;
+        let text = || String::from_utf8_lossy(&bytes);
+        let ending = from.extension().unwrap_or_default().to_string_lossy();
+        let shuffled = match &*ending {
+            "glb" => shuffled_glb(&bytes, seed),
+            "obj" => shuffled_obj(&text(), seed).into(),
+            "map" => shuffled_map(&text(), seed).into(),
+            _ => return Err(format!("no way to shuffle a file that ends in .{ending}").into()),
+        };
+        std::fs::create_dir_all(&self.folder)?;
+        let name = from.file_name().ok_or("a file without a name")?;
+        Ok(std::fs::write(self.folder.join(name), shuffled)?)
+    }
+
+    /// Spoils or shuffles the files of a folder, each by itself, and copies the truth.
+    fn change(&self, from: &Path) -> Result<(), Box<dyn Error>> {
+        let spoils = self.is_spoilt() || self.shuffle.is_none();
+        if spoils {
+            self.spoil(from)?;
+        }
+        let from = if spoils { &self.folder } else { from };
+        for name in ["scene.glb", "detail.glb"] {
+            let file = from.join(name);
+            if self.shuffle.is_some() && file.is_file() {
+                self.shuffle(&file)?;
+            }
+        }
+        let truth = from.join("truth.json");
+        if !spoils && truth.is_file() {
+            std::fs::copy(truth, self.folder.join("truth.json"))?;
+        }
+        Ok(())
+    }
+
     /// Spoils the files of a folder, each by itself, and copies the truth.
     fn spoil(&self, from: &Path) -> Result<(), Box<dyn Error>> {
         // What is detail is judged when the result is read; here no object may be left out.
@@ -238,8 +278,9 @@ fn run() -> Result<(), Box<dyn Error>> {
             return Ok(());
         }
         name if Path::new(name).join("scene.glb").is_file() => {
-            return options.spoil(Path::new(name));
+            return options.change(Path::new(name));
         }
+        name if Path::new(name).is_file() => return options.shuffle(Path::new(name)),
         name => {
             let fault = Fault::ALL.into_iter().find(|f| f.name() == name);
             let small = || mixed::all().into_iter().find(|g| g.truth.scene == name);

@@ -29,6 +29,7 @@ pub mod oracle;
 mod picture;
 mod rng;
 mod roof;
+mod shuffle;
 mod site;
 pub mod solid;
 mod surface_net;
@@ -47,6 +48,7 @@ pub use graphs::{GridParams, courtyard, room_grid, scaled_world, window_tower, w
 pub use house::furnished_house;
 pub use maze::dirkse_maze;
 pub use rng::Rng;
+pub use shuffle::{shuffled_glb, shuffled_map, shuffled_obj};
 pub use site::{Generated, Site};
 pub use tower::{TowerParams, office_tower};
 pub use transform::{reordered, rotated, scaled, shuffled, transformed};

@@ -8,6 +8,7 @@ mod gate;
 mod inputs;
 mod mutate;
 mod mutated;
+mod order;
 mod random;
 
 use std::ops::Range;
@@ -28,6 +29,10 @@ pub(crate) struct TrustOptions {
     pub(crate) rows: Vec<String>,
     /// Which damaged files are tried, by number.
     pub(crate) runs: Range<usize>,
+    /// Which shuffles are tried, by number.
+    pub(crate) shuffles: Range<usize>,
+    /// Beginnings of the names of scenes that are shuffled; all where empty.
+    pub(crate) scenes: Vec<String>,
 }
 
 /// The parts by the first word of their rows: a module and a line here for each.
@@ -37,6 +42,7 @@ const PARTS: &[(&str, Part)] = &[
     ("large", budgets::large),
     ("mutated", mutated::run),
     ("nasty", budgets::nasty),
+    ("order", order::run),
 ];
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;
@@ -44,6 +50,11 @@ type Part = fn(&mut Figures) -> anyhow::Result<()>;
 /// The `n` damaged files from number `from` on; as many as there are by default if `n` is not given.
 pub(crate) fn runs(from: usize, n: Option<usize>) -> Range<usize> {
     from..from.saturating_add(n.unwrap_or(mutated::COUNT))
+}
+
+/// As [`runs`], of shuffles.
+pub(crate) fn shuffles(from: usize, n: Option<usize>) -> Range<usize> {
+    from..from.saturating_add(n.unwrap_or(order::COUNT))
 }
 
 /// Measures and prints; fails where a bar is not met.
@@ -55,6 +66,8 @@ pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
         is_json: options.is_json,
         folder,
         runs: options.runs.clone(),
+        shuffles: options.shuffles.clone(),
+        scenes: options.scenes.clone(),
         n: [0; 3],
     };
     for (name, part) in PARTS.iter().copied() {
@@ -76,6 +89,10 @@ struct Figures {
     folder: PathBuf,
     /// Damaged files that are tried.
     runs: Range<usize>,
+    /// Shuffles that are tried.
+    shuffles: Range<usize>,
+    /// Beginnings of the names of scenes that are shuffled.
+    scenes: Vec<String>,
     /// Bars not met, met and unknown.
     n: [usize; 3],
 }

@@ -47,7 +47,7 @@ impl Builder<'_> {
         if self.origins.add_about(copyright, extras) {
             self.note(
                 "scene",
-                "extras of the scene; a file before it has some, and these are left out",
+                "extras of several scenes; those are kept that come first as text",
             );
         }
     }

@@ -59,7 +59,12 @@ pub(super) fn read_materials(
         if !value.is_object() {
             return Err(builder.malformed(format!("material {i}"), "is no object"));
         }
-        remap_textures(&mut value, first_texture, root.textures.len() as u64)
+        let mut number = |key: &str, index: &Value| {
+            let known = index.as_u64().filter(|&t| t < root.textures.len() as u64);
+            let known = known.ok_or_else(|| format!("{key}: no texture {index}"))?;
+            Ok((known + u64::from(first_texture)).into())
+        };
+        map_textures(&mut value, &mut number)
             .map_err(|problem| builder.malformed(format!("material {i}"), problem))?;
         let pbr = &value["pbrMetallicRoughness"];
         let mut base_color = [1.0; 4];
@@ -110,24 +115,25 @@ fn source_of(def: &TextureDef) -> Option<u32> {
     def.source.or_else(extended)
 }
 
-/// Adds `first` to the index of every texture reference: an object under a key that ends in
-/// `Texture`, anywhere in the material but its `extras`.
-fn remap_textures(value: &mut Value, first: u32, n: u64) -> Result<(), String> {
+/// Changes the index of every texture reference: an object under a key that ends in `Texture`, anywhere in the material but its
+/// `extras`. `number` gives the new one by key and old one.
+pub(crate) fn map_textures(
+    value: &mut Value,
+    number: &mut dyn FnMut(&str, &Value) -> Result<Value, String>,
+) -> Result<(), String> {
     // serde_json bounds the nesting of what it reads, and so this recursion.
     match value {
         Value::Array(items) => items
             .iter_mut()
-            .try_for_each(|item| remap_textures(item, first, n)),
+            .try_for_each(|item| map_textures(item, number)),
         Value::Object(fields) => {
             for (key, inner) in fields.iter_mut().filter(|(key, _)| *key != "extras") {
                 if key.ends_with("Texture")
                     && let Some(index) = inner.get_mut("index")
                 {
-                    let number = index.as_u64().filter(|&i| i < n);
-                    let number = number.ok_or_else(|| format!("{key}: no texture {index}"))?;
-                    *index = (number + u64::from(first)).into();
+                    *index = number(key, index)?;
                 }
-                remap_textures(inner, first, n)?;
+                map_textures(inner, number)?;
             }
             Ok(())
         }

@@ -12,6 +12,7 @@
 //! exact. Up is z. Sizes of textures are in WAD files, which are not read, so no texture coordinates
 //! come out of a map.
 
+mod order;
 mod parse;
 mod patch;
 
@@ -139,7 +140,8 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     let text = String::from_utf8_lossy(bytes);
     let failed =
         |builder: &Builder<'_>, p: parse::Problem| builder.malformed(p.place.to_string(), p.text);
-    let entities = parse::parse(&text).map_err(|p| failed(builder, p))?;
+    let mut entities = parse::parse(&text).map_err(|p| failed(builder, p))?;
+    order::sort(&mut entities);
     if !entities
         .iter()
         .any(|e| e.get("classname") == Some("worldspawn"))

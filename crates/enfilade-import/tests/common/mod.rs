@@ -58,6 +58,20 @@ pub(crate) fn world(scene: &Scene) -> Vec<Triangle> {
         .collect()
 }
 
+/// Triangles in an order of their own, each from its least corner on.
+pub(crate) fn sorted(triangles: impl IntoIterator<Item = Triangle>) -> Vec<Triangle> {
+    let by = |a: &Triangle, b: &Triangle| {
+        let numbers = |t: &Triangle| t.map(|p| p.to_array());
+        numbers(a).partial_cmp(&numbers(b)).expect("finite corners")
+    };
+    let starts = |[a, b, c]: Triangle| [[a, b, c], [b, c, a], [c, a, b]];
+    let mut out: Vec<Triangle> = (triangles.into_iter())
+        .filter_map(|t| starts(t).into_iter().min_by(by))
+        .collect();
+    out.sort_by(by);
+    out
+}
+
 /// A closed box from 0 to `size`, front faces outwards, 8 vertices and 12 triangles.
 pub(crate) fn box_primitive(size: [f32; 3]) -> Primitive {
     let corner = |i: usize| [0, 1, 2].map(|k| if i >> k & 1 == 1 { size[k] } else { 0.0 });

@@ -1,0 +1,394 @@
+//! One order for one scene, whatever order its files, nodes, triangles and vertices came in.
+//!
+//! Everything after it may then choose by number, add up and break ties as it likes: what is the same scene is the same list. The
+//! order is one of content alone: names, bits of coordinates, bits of transforms. What is equal in all of that is interchangeable.
+//! Vertices, pictures, textures, materials and meshes that are equal become one, as two of a kind would have to be told apart by
+//! who refers to which.
+
+use std::cmp::Ordering;
+use std::mem::take;
+
+use enfilade_geom::scene::{
+    Entity, Fixture, Image, Material, Mesh, Object, Primitive, Scene, SourceNode, Texture,
+};
+use enfilade_geom::{ConvexSolid, DMat4};
+use serde_json::Value;
+
+use crate::gltf::map_textures;
+use crate::repair::GridSteps;
+
+/// Puts a scene in an order of its own.
+///
+/// Scenes that hold the same objects, of the same triangles, under the same names, become the same scene to the bit, in whatever
+/// order they list files, nodes, meshes, primitives, triangles and vertices, and at whichever vertex a triangle begins.
+/// [`import`](crate::import) does it with all that it reads; a scene put together otherwise needs it for the same world to come
+/// out. Vertices that no triangle uses are left out. `n log n` in all that it lists.
+///
+/// # Panics
+///
+/// When the scene breaks its own promises: an index out of range, or attributes of unequal lengths.
+pub fn sort_scene(scene: &mut Scene) {
+    sort(scene, &mut GridSteps::new());
+}
+
+/// [`sort_scene`], of meshes that have been rounded to a grid.
+pub(crate) fn sort(scene: &mut Scene, steps: &mut GridSteps) {
+    sort_looks(scene);
+    sort_meshes(scene, steps);
+    sort_objects(scene);
+    scene.solids.sort_by(solids);
+    scene.entities.sort_by(entities);
+    scene.fixtures.sort_by(fixtures);
+}
+
+/// Pictures, textures, materials, each once.
+fn sort_looks(scene: &mut Scene) {
+    let image_of = make_unique(&mut scene.images, images);
+    for texture in &mut scene.textures {
+        texture.image = texture.image.map(|i| image_of[i as usize]);
+    }
+    let texture_of = make_unique(&mut scene.textures, textures);
+    for material in &mut scene.materials {
+        renumber_textures(material, &texture_of);
+    }
+    let material_of = make_unique(&mut scene.materials, materials);
+    let meshes = scene.meshes.iter_mut();
+    for primitive in meshes.flat_map(|m| &mut m.primitives) {
+        primitive.material = primitive.material.map(|m| material_of[m as usize]);
+    }
+}
+
+fn renumber_textures(material: &mut Material, texture_of: &[u32]) {
+    if !material.gltf.contains("Texture\"") {
+        return;
+    }
+    let Ok(mut value) = serde_json::from_str::<Value>(&material.gltf) else {
+        return;
+    };
+    let mut number = |_: &str, index: &Value| {
+        let texture = index.as_u64().and_then(|i| usize::try_from(i).ok());
+        let new = texture.and_then(|i| texture_of.get(i));
+        Ok(new.map_or_else(|| index.clone(), |&n| n.into()))
+    };
+    if map_textures(&mut value, &mut number).is_ok() {
+        material.gltf = value.to_string();
+    }
+}
+
+/// Meshes, each once, and what is in them.
+fn sort_meshes(scene: &mut Scene, steps: &mut GridSteps) {
+    /// A mesh with the width of each primitive's grid, 0 for none.
+    type Stepped = (Mesh, Vec<f32>);
+    let stepped = |(i, mut mesh): (usize, Mesh)| -> Stepped {
+        let of = steps.get(&(i as u32)).map_or(&[][..], Vec::as_slice);
+        let width = |k: usize| of.get(k).copied().unwrap_or(0.0);
+        let primitives = take(&mut mesh.primitives).into_iter().enumerate();
+        let mut primitives: Vec<(Primitive, f32)> = primitives
+            .map(|(k, mut primitive)| {
+                sort_primitive(&mut primitive);
+                (primitive, width(k))
+            })
+            .collect();
+        primitives.sort_by(|(p, a), (q, b)| a.total_cmp(b).then_with(|| self::primitives(p, q)));
+        let (primitives, steps) = primitives.into_iter().unzip();
+        (Mesh { primitives, ..mesh }, steps)
+    };
+    let mut meshes: Vec<Stepped> = take(&mut scene.meshes)
+        .into_iter()
+        .enumerate()
+        .map(stepped)
+        .collect();
+    let mesh_of = make_unique(&mut meshes, |(m, a), (n, b)| {
+        let by_steps = || floats(a, b);
+        let by_primitives = || all(&m.primitives, &n.primitives, primitives);
+        (m.name.cmp(&n.name))
+            .then_with(by_steps)
+            .then_with(by_primitives)
+    });
+    steps.clear();
+    for (i, (mesh, widths)) in meshes.into_iter().enumerate() {
+        scene.meshes.push(mesh);
+        if widths.iter().any(|&w| w > 0.0) {
+            steps.insert(i as u32, widths);
+        }
+    }
+    for object in &mut scene.objects {
+        object.mesh = mesh_of[object.mesh as usize];
+    }
+}
+
+/// Vertices that are equal become one, each triangle begins at its least vertex, triangles are sorted by their vertices, and
+/// vertices numbered as triangles come to them.
+fn sort_primitive(p: &mut Primitive) {
+    let mut is_used = vec![false; p.positions.len()];
+    p.indices.iter().for_each(|&i| is_used[i as usize] = true);
+    let mut vertices: Vec<([u32; 3], u32)> = (0..p.positions.len() as u32)
+        .filter(|&v| is_used[v as usize])
+        .map(|v| (p.positions[v as usize].map(ordered), v))
+        .collect();
+    let order = |(a, v): &([u32; 3], u32), (b, w): &([u32; 3], u32)| {
+        a.cmp(b).then_with(|| looks(p, *v as usize, *w as usize))
+    };
+    vertices.sort_unstable_by(order);
+    // By vertex its place among those that differ, and by place one of the vertices there.
+    let mut place = vec![0; p.positions.len()];
+    let mut first: Vec<u32> = Vec::new();
+    for equal in vertices.chunk_by(|a, b| order(a, b).is_eq()) {
+        for (_, v) in equal {
+            place[*v as usize] = first.len() as u32;
+        }
+        first.push(equal[0].1);
+    }
+    let mut triangles: Vec<[u32; 3]> = (p.indices.chunks_exact(3))
+        .map(|t| {
+            let [a, b, c] = [0, 1, 2].map(|k| place[t[k] as usize]);
+            [a, b, c].min([b, c, a]).min([c, a, b])
+        })
+        .collect();
+    triangles.sort_unstable();
+    let mut number = vec![u32::MAX; first.len()];
+    let mut kept: Vec<usize> = Vec::with_capacity(first.len());
+    p.indices = (triangles.into_iter().flatten())
+        .map(|v| {
+            let slot = &mut number[v as usize];
+            if *slot == u32::MAX {
+                *slot = kept.len() as u32;
+                kept.push(first[v as usize] as usize);
+            }
+            *slot
+        })
+        .collect();
+    fn pick<T: Copy>(values: &mut Vec<T>, kept: &[usize]) {
+        if !values.is_empty() {
+            *values = kept.iter().map(|&i| values[i]).collect();
+        }
+    }
+    pick(&mut p.positions, &kept);
+    pick(&mut p.normals, &kept);
+    pick(&mut p.tangents, &kept);
+    pick(&mut p.colors, &kept);
+    p.uvs.iter_mut().for_each(|set| pick(set, &kept));
+}
+
+/// Nodes, as a tree is listed from its top, those beside each other by name; and objects by node.
+fn sort_objects(scene: &mut Scene) {
+    let rank = ranks(scene.objects.len(), |i, j| {
+        objects(&scene.objects[i], &scene.objects[j])
+    });
+    let number = node_numbers(&scene.nodes, &scene.objects, &rank);
+    let mut nodes = vec![SourceNode::default(); number.len()];
+    for (node, &n) in take(&mut scene.nodes).into_iter().zip(&number) {
+        let parent = node.parent.map(|p| number[p as usize]);
+        nodes[n as usize] = SourceNode { parent, ..node };
+    }
+    scene.nodes = nodes;
+    for object in &mut scene.objects {
+        object.node = object.node.map(|n| number[n as usize]);
+    }
+    let mut order: Vec<usize> = (0..rank.len()).collect();
+    order.sort_by_key(|&i| (scene.objects[i].node, rank[i]));
+    let mut place = vec![0; order.len()];
+    for (new, &old) in order.iter().enumerate() {
+        place[old] = new as u32;
+    }
+    let mut old: Vec<Option<Object>> = take(&mut scene.objects).into_iter().map(Some).collect();
+    scene.objects = order.iter().filter_map(|&i| old[i].take()).collect();
+    for entity in &mut scene.entities {
+        entity.object = entity.object.map(|o| place[o as usize]);
+    }
+}
+
+/// By node its new number; `rank` is that of each object.
+///
+/// From the leaves up, nodes are told apart by what is at and below them, as trees without order are (Aho, Hopcroft & Ullman, "The
+/// Design and Analysis of Computer Algorithms", 1974, example 3.2).
+fn node_numbers(nodes: &[SourceNode], objects: &[Object], rank: &[u32]) -> Vec<u32> {
+    let n = nodes.len();
+    let mut height = vec![0_u32; n];
+    let mut below: Vec<Vec<u32>> = vec![Vec::new(); n];
+    // A node comes after the one above it.
+    for i in (0..n).rev() {
+        if let Some(parent) = nodes[i].parent {
+            let parent = parent as usize;
+            height[parent] = height[parent].max(height[i] + 1);
+            below[parent].push(i as u32);
+        }
+    }
+    let mut own: Vec<Vec<u32>> = vec![Vec::new(); n];
+    for (object, &rank) in objects.iter().zip(rank) {
+        if let Some(node) = object.node {
+            own[node as usize].push(rank);
+        }
+    }
+    own.iter_mut().for_each(|ranks| ranks.sort_unstable());
+    let mut by_height: Vec<u32> = (0..n as u32).collect();
+    by_height.sort_by_key(|&i| height[i as usize]);
+    let mut kind = vec![0_u32; n];
+    let mut kinds_below: Vec<Vec<u32>> = vec![Vec::new(); n];
+    let mut n_kinds = 0;
+    for level in by_height.chunk_by(|&i, &j| height[i as usize] == height[j as usize]) {
+        for &i in level {
+            let mut kinds: Vec<u32> = below[i as usize]
+                .iter()
+                .map(|&b| kind[b as usize])
+                .collect();
+            kinds.sort_unstable();
+            kinds_below[i as usize] = kinds;
+        }
+        let told = |k: usize| {
+            let i = level[k] as usize;
+            let SourceNode { name, extras, .. } = &nodes[i];
+            (name, extras, &own[i], &kinds_below[i])
+        };
+        let ranks = ranks(level.len(), |a, b| told(a).cmp(&told(b)));
+        for (&i, rank) in level.iter().zip(&ranks) {
+            kind[i as usize] = n_kinds + rank;
+        }
+        n_kinds += level.len() as u32;
+    }
+    // Reversed, as the last of a stack comes first.
+    let reversed = |list: &mut Vec<u32>| {
+        list.sort_by_key(|&i| std::cmp::Reverse((&nodes[i as usize].name, kind[i as usize])));
+    };
+    below.iter_mut().for_each(reversed);
+    let mut stack: Vec<u32> = (0..n as u32)
+        .filter(|&i| nodes[i as usize].parent.is_none())
+        .collect();
+    reversed(&mut stack);
+    let mut number = vec![0; n];
+    let mut next = 0;
+    while let Some(i) = stack.pop() {
+        number[i as usize] = next;
+        next += 1;
+        stack.extend(&below[i as usize]);
+    }
+    number
+}
+
+/// Sorts a list, keeps one of those that are equal, and returns by old number the new one.
+fn make_unique<T>(list: &mut Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Vec<u32> {
+    let mut items: Vec<(u32, T)> = (0..).zip(take(list)).collect();
+    items.sort_by(|a, b| order(&a.1, &b.1));
+    let mut number = vec![0; items.len()];
+    for (old, item) in items {
+        if list.last().is_none_or(|last| order(last, &item).is_ne()) {
+            list.push(item);
+        }
+        number[old as usize] = list.len() as u32 - 1;
+    }
+    number
+}
+
+/// By item its rank, the same for equal ones.
+fn ranks(n: usize, order: impl Fn(usize, usize) -> Ordering) -> Vec<u32> {
+    let mut items: Vec<usize> = (0..n).collect();
+    items.sort_by(|&a, &b| order(a, b));
+    let mut rank = vec![0; n];
+    for (k, equal) in items.chunk_by(|&a, &b| order(a, b).is_eq()).enumerate() {
+        equal.iter().for_each(|&i| rank[i] = k as u32);
+    }
+    rank
+}
+
+/// A number that is ordered as [`f32::total_cmp`] orders.
+fn ordered(x: f32) -> u32 {
+    let bits = x.to_bits();
+    let sign = 1 << 31;
+    if bits & sign == 0 { bits | sign } else { !bits }
+}
+
+/// Shorter lists first, then by the first that differ.
+pub(crate) fn all<T>(a: &[T], b: &[T], order: impl Fn(&T, &T) -> Ordering) -> Ordering {
+    let unequal = || {
+        let mut pairs = a.iter().zip(b).map(|(a, b)| order(a, b));
+        pairs.find(|o| o.is_ne()).unwrap_or(Ordering::Equal)
+    };
+    a.len().cmp(&b.len()).then_with(unequal)
+}
+
+fn floats(a: &[f32], b: &[f32]) -> Ordering {
+    all(a, b, f32::total_cmp)
+}
+
+fn vectors<const N: usize>(a: &[[f32; N]], b: &[[f32; N]]) -> Ordering {
+    all(a, b, |a, b| floats(a, b))
+}
+
+fn transforms(a: &DMat4, b: &DMat4) -> Ordering {
+    let (a, b) = (a.to_cols_array(), b.to_cols_array());
+    all(&a, &b, f64::total_cmp)
+}
+
+fn images(a: &Image, b: &Image) -> Ordering {
+    (&a.name, &a.mime, &a.bytes).cmp(&(&b.name, &b.mime, &b.bytes))
+}
+
+fn textures(a: &Texture, b: &Texture) -> Ordering {
+    (a.image, &a.sampler).cmp(&(b.image, &b.sampler))
+}
+
+fn materials(a: &Material, b: &Material) -> Ordering {
+    let told = |m: &Material| (m.double_sided, m.transparent);
+    (&a.name, &a.gltf)
+        .cmp(&(&b.name, &b.gltf))
+        .then_with(|| told(a).cmp(&told(b)))
+        .then_with(|| floats(&a.base_color, &b.base_color))
+}
+
+fn primitives(a: &Primitive, b: &Primitive) -> Ordering {
+    (a.material, &a.indices)
+        .cmp(&(b.material, &b.indices))
+        .then_with(|| vectors(&a.positions, &b.positions))
+        .then_with(|| vectors(&a.normals, &b.normals))
+        .then_with(|| vectors(&a.tangents, &b.tangents))
+        .then_with(|| all(&a.uvs, &b.uvs, |a, b| vectors(a, b)))
+        .then_with(|| vectors(&a.colors, &b.colors))
+}
+
+/// Two vertices of a primitive by all but their positions.
+fn looks(p: &Primitive, v: usize, w: usize) -> Ordering {
+    fn by<const N: usize>(list: &[[f32; N]], v: usize, w: usize) -> Ordering {
+        if list.is_empty() {
+            return Ordering::Equal;
+        }
+        floats(&list[v], &list[w])
+    }
+    by(&p.normals, v, w)
+        .then_with(|| by(&p.tangents, v, w))
+        .then_with(|| {
+            let mut sets = p.uvs.iter().map(|set| by(set, v, w));
+            sets.find(|o| o.is_ne()).unwrap_or(Ordering::Equal)
+        })
+        .then_with(|| by(&p.colors, v, w))
+}
+
+/// By all but their nodes.
+fn objects(a: &Object, b: &Object) -> Ordering {
+    (&a.name, a.mesh)
+        .cmp(&(&b.name, b.mesh))
+        .then_with(|| transforms(&a.transform, &b.transform))
+        .then_with(|| (a.role, &a.reason).cmp(&(b.role, &b.reason)))
+}
+
+fn solids(a: &ConvexSolid, b: &ConvexSolid) -> Ordering {
+    let numbers = |s: &ConvexSolid| -> Vec<f64> {
+        let planes = s.planes.iter();
+        let planes = planes.flat_map(|p| p.normal.to_array().into_iter().chain([p.d]));
+        let points = s.faces.iter().flat_map(|f| &f.points);
+        planes.chain(points.flat_map(|p| p.to_array())).collect()
+    };
+    all(&numbers(a), &numbers(b), f64::total_cmp)
+}
+
+fn entities(a: &Entity, b: &Entity) -> Ordering {
+    let place = |e: &Entity| e.position.map_or(Vec::new(), |p| p.to_array().to_vec());
+    (&a.class, &a.properties, a.object)
+        .cmp(&(&b.class, &b.properties, b.object))
+        .then_with(|| all(&place(a), &place(b), f64::total_cmp))
+}
+
+fn fixtures(a: &Fixture, b: &Fixture) -> Ordering {
+    (a.kind, &a.name, &a.gltf, &a.extras)
+        .cmp(&(b.kind, &b.name, &b.gltf, &b.extras))
+        .then_with(|| transforms(&a.transform, &b.transform))
+}
