@@ -32,7 +32,7 @@ mod verify;
 #[cfg(feature = "view")]
 mod view;
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};

@@ -184,7 +184,8 @@ mod tests {
         writeln!(out).unwrap();
         write_lines(&mut out, &"a\u{9b}\nb").unwrap();
         let boxed: &mut dyn Write = &mut out;
-        writeln!(boxed, "{}", "c\n").unwrap();
+        let name = "c\n";
+        writeln!(boxed, "{name}").unwrap();
         let text = String::from_utf8(out.0).unwrap();
         let shown = r"wall\u{1b}[2J\u{202e}\nwrote x";
         assert_eq!(

@@ -17,8 +17,11 @@ fn names(glb: &[u8], list: &str) -> Vec<String> {
     items.map(|item| item["name"].to_string()).collect()
 }
 
+/// An object: its name, its material, and its triangles by the bits of their vertices.
+type Content = (String, String, Vec<[[u64; 3]; 3]>);
+
 /// Each object's triangles by their bits, from the least vertex on, sorted, under its name and material.
-fn content(scene: &Scene) -> Vec<(String, String, Vec<[[u64; 3]; 3]>)> {
+fn content(scene: &Scene) -> Vec<Content> {
     let mut out = Vec::new();
     for object in &scene.objects {
         let mut only = scene.clone();

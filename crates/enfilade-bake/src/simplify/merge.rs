@@ -444,9 +444,9 @@ pub(super) mod tests {
                 prop_assert!(n == 1 || cost <= bounds.max_cost, "group {g} costs {cost}");
             }
             // The outdoors stays apart unless asked for.
-            for c in 0..n {
-                let is_alike = graph.aloof[c] == graph.aloof[into[c] as usize];
-                prop_assert!(joins_outdoors || is_alike, "{c} and {}", into[c]);
+            for (c, &host) in into.iter().enumerate() {
+                let is_alike = graph.aloof[c] == graph.aloof[host as usize];
+                prop_assert!(joins_outdoors || is_alike, "{c} and {host}");
             }
             // Groups are joined by portals: each member reaches its host within the group.
             for c in 0..n {
