@@ -41,9 +41,9 @@ usage: cargo xtask test
           messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
           choose by how names begin;
-          trust: hostile and huge input, a row a figure; --rows (case, commands, gate, habits, large, mutated, nasty, order,
-          tampered, tight) chooses; --count and --from choose the damaged files of `mutated` and the shuffles of `order`,
-          --scenes its scenes;
+          trust: hostile and huge input, a row a figure; --rows (bound, case, commands, estimate, gate, habits, large,
+          mutated, nasty, order, tampered, tight) chooses; --count and --from choose the damaged files of `mutated` and
+          the shuffles of `order`, --scenes its scenes;
           any other NAME (bring, bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 

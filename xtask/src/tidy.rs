@@ -53,7 +53,8 @@ const FENCES: [Fence; 17] = [
         name: "enfilade-import",
         siblings: &["enfilade-geom"],
         not: &["rayon", "anyhow"],
-        words: &["std::thread"],
+        // It waits for a converter, and so may sleep.
+        words: &["thread::spawn", "thread::scope", "thread::Builder"],
     },
     Fence {
         name: "enfilade-voxel",

@@ -3,8 +3,7 @@
 use enfilade_cpg::{Motion, MotionKind};
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
-use super::opening::Opening;
-use super::{BESIDE, DEEP};
+use super::opening::{BESIDE, DEEP, FittedOpening};
 use crate::subject::to_dvec;
 
 /// A hinge this near to the edge of its leaf is at it: it may be that of the glass, within rails. [Units: wu]
@@ -33,14 +32,14 @@ pub(super) struct Leaf<'a> {
 
 impl Leaf<'_> {
     /// Its triangles at a share of its way, in the opening's directions.
-    fn at(&self, share: f32, opening: &Opening) -> Vec<Triangle> {
+    fn at(&self, share: f32, opening: &FittedOpening) -> Vec<Triangle> {
         let by = self.motion.at(share);
         let place = |p| opening.place(by.transform_point3(p));
         self.triangles.iter().map(|t| t.map(place)).collect()
     }
 
     /// Returns what is wrong with how it moves in an opening.
-    pub(super) fn problem(&self, opening: &Opening) -> Option<String> {
+    pub(super) fn problem(&self, opening: &FittedOpening) -> Option<String> {
         let [from, to] = [self.motion.shut, self.motion.open].map(f64::from);
         if from.min(to) > ROUNDING || from.max(to) < -ROUNDING {
             return Some("the file has it neither shut, nor open, nor between".into());
@@ -90,7 +89,7 @@ impl Leaf<'_> {
 }
 
 /// Returns what is wrong with where a leaf turns or slides, `around` being the box of the shut leaf.
-fn way_problem(motion: &Motion, opening: &Opening, around: &Aabb) -> Option<String> {
+fn way_problem(motion: &Motion, opening: &FittedOpening, around: &Aabb) -> Option<String> {
     match motion.kind {
         MotionKind::Slide { along } => {
             let off = opening.turn(to_dvec(along)).z.abs();

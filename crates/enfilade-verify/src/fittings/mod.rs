@@ -16,12 +16,8 @@ use rayon::prelude::*;
 use crate::details::triangles_of;
 use crate::kinds::is_by_rule;
 use leaf::Leaf;
-use opening::Opening;
+use opening::{BESIDE, DEEP, FittedOpening};
 
-/// How far beside its opening a fitting may end: over the wall, or short of the jamb. [Units: wu]
-const BESIDE: f64 = 0.3;
-/// How far from the opening's plane a fitting may lie, within a wall. [Units: wu]
-const DEEP: f64 = 0.6;
 /// Least share of a window that a pane covers.
 const PANE: f64 = 0.25;
 /// A frame leaves as much of a door or window free.
@@ -47,7 +43,7 @@ pub(crate) fn check(world: &World) -> Vec<String> {
     let found = found.flat_map_iter(|(i, portal)| {
         let mut out = Vec::new();
         let of_portal = OfPortal { world, portal };
-        if let Some(opening) = Opening::of(portal) {
+        if let Some(opening) = FittedOpening::of(portal) {
             of_portal.check_fitted(&opening, &mut out);
             if is_by_rule {
                 of_portal.check_rest(&opening, &others, &mut out);
@@ -80,7 +76,7 @@ impl OfPortal<'_> {
     }
 
     /// Checks the fittings of the opening against what they are called.
-    fn check_fitted(&self, opening: &Opening, out: &mut Vec<String>) {
+    fn check_fitted(&self, opening: &FittedOpening, out: &mut Vec<String>) {
         let of_part = |part| {
             let fittings = self.portal.fittings.iter();
             fittings.filter(move |f: &&Fitting| f.part == part)
@@ -115,7 +111,7 @@ impl OfPortal<'_> {
     }
 
     /// Returns what is wrong with a frame or pane.
-    fn still_problem(&self, f: &Fitting, opening: &Opening) -> Option<String> {
+    fn still_problem(&self, f: &Fitting, opening: &FittedOpening) -> Option<String> {
         let near = self.within(f.detail, opening);
         let covered = opening.covered(&near);
         let percent = 100.0 * covered;
@@ -144,7 +140,7 @@ impl OfPortal<'_> {
     }
 
     /// Checks that what shuts a door is a leaf of it, and that something does.
-    fn check_rest(&self, opening: &Opening, others: &Others, out: &mut Vec<String>) {
+    fn check_rest(&self, opening: &FittedOpening, others: &Others, out: &mut Vec<String>) {
         if self.portal.kind != PortalKind::Door {
             return;
         }
@@ -173,7 +169,7 @@ impl OfPortal<'_> {
     }
 
     /// The triangles of a detail that lie about the opening, in its directions.
-    fn within(&self, detail: u32, opening: &Opening) -> Vec<Triangle> {
+    fn within(&self, detail: u32, opening: &FittedOpening) -> Vec<Triangle> {
         let b = opening.bounds;
         let is_in = |t: &Triangle| {
             let low = t[0].min(t[1]).min(t[2]);

@@ -8,8 +8,13 @@ use crate::subject::to_dvec;
 /// Squares across and up the raster of an opening.
 const SQUARES: usize = 32;
 
+/// How far beside its opening a fitting may end: over the wall, or short of the jamb. [Units: wu]
+pub(super) const BESIDE: f64 = 0.3;
+/// How far from the opening's plane a fitting may lie, within a wall. [Units: wu]
+pub(super) const DEEP: f64 = 0.6;
+
 /// The opening of a portal. Its own directions are across, up, and along its normal; its plane lies at 0.
-pub(super) struct Opening {
+pub(super) struct FittedOpening {
     origin: DVec3,
     directions: [DVec3; 3],
     /// Around what is open.
@@ -18,7 +23,7 @@ pub(super) struct Opening {
     n_open: usize,
 }
 
-impl Opening {
+impl FittedOpening {
     /// `None` where nothing is open.
     pub(super) fn of(portal: &Portal) -> Option<Self> {
         let normal = to_dvec(portal.normal).try_normalize()?;
