@@ -2,6 +2,7 @@
 //!
 //! A comment line begins with a noun phrase or a verb, says "is not" rather than "is no", and calls the points of a
 //! polygon vertices (`docs/glossary.md`).
+//! Files below [`STILL`] are exempt until they are rewritten; a file leaves the list with the commit that rewrites it.
 
 use std::collections::BTreeMap;
 

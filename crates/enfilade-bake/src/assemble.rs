@@ -126,37 +126,6 @@ fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
     })
 }
 
-fn to_f32(w: &Winding) -> Vec<[f32; 3]> {
-    let corners = w.points.iter().map(|p| p.as_vec3().to_array());
-    corners.collect()
-}
-
-fn rounded(piece: &[[f32; 3]]) -> Winding {
-    let corners = piece.iter().map(|&p| DVec3::from(p.map(f64::from)));
-    Winding::new(corners.collect())
-}
-
-/// Tells whether a rounded piece still has a width.
-fn is_there(piece: &[[f32; 3]], plane: &Plane) -> bool {
-    let w = rounded(piece);
-    let n = w.points.len();
-    let rim: f64 = (0..n)
-        .map(|i| w.points[i].distance(w.points[(i + 1) % n]))
-        .sum();
-    w.area_normal().dot(plane.normal) > HAIR * rim
-}
-
-/// The outline of what a file holds of an opening.
-fn held(p: &PartitionPortal) -> Winding {
-    let is_held = |piece: &&Winding| is_there(&to_f32(piece), &p.plane);
-    let held: Vec<&Winding> = p.pieces.iter().filter(is_held).collect();
-    if held.len() == p.pieces.len() {
-        return p.outline.clone();
-    }
-    let corners: Vec<DVec3> = held.iter().flat_map(|w| &w.points).copied().collect();
-    Winding::hull_in_plane(&p.plane, &corners)
-}
-
 /// An open portal as a file holds it, its outline grown by `outward`; cells are for the caller to set.
 ///
 /// `None` when nothing of it is wider than a rounding.
@@ -166,11 +135,29 @@ pub(crate) fn rounded_portal(
     pieces: &[Winding],
     outward: f64,
 ) -> Option<Portal> {
-    let pieces: Vec<Vec<[f32; 3]>> = pieces
-        .iter()
-        .map(to_f32)
-        .filter(|piece| is_there(piece, plane))
-        .collect();
+    let to_f32 = |w: &Winding| {
+        w.points
+            .iter()
+            .map(|p| p.as_vec3().to_array())
+            .collect::<Vec<_>>()
+    };
+    let rounded = |piece: &Vec<[f32; 3]>| {
+        Winding::new(
+            piece
+                .iter()
+                .map(|&p| DVec3::from(p.map(f64::from)))
+                .collect(),
+        )
+    };
+    let is_there = |piece: &Vec<[f32; 3]>| {
+        let w = rounded(piece);
+        let n = w.points.len();
+        let rim: f64 = (0..n)
+            .map(|i| w.points[i].distance(w.points[(i + 1) % n]))
+            .sum();
+        w.area_normal().dot(plane.normal) > HAIR * rim
+    };
+    let pieces: Vec<Vec<[f32; 3]>> = pieces.iter().map(to_f32).filter(is_there).collect();
     if pieces.is_empty() {
         return None;
     }
@@ -289,11 +276,10 @@ fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
         .map_or(0.0, |s| cut.candidates[s as usize].closed);
     let is_closed = closed >= cut.closed_share;
     let is_upright = p.plane.normal.y.abs() < 0.5;
-    let outline = held(p);
-    let up = outline.points.iter().map(|q| q.y);
+    let up = p.outline.points.iter().map(|q| q.y);
     let bottom = up.clone().fold(f64::MAX, f64::min);
     let height = up.fold(f64::MIN, f64::max) - bottom;
-    let has_sill = is_upright && sill(cut, p, outline.centroid().with_y(bottom)) > PARAPET;
+    let has_sill = is_upright && sill(cut, p, bottom) > PARAPET;
     let kind = match (is_closed, is_upright) {
         (_, true) if has_sill => PortalKind::Window,
         (true, true) if height >= LEAST_DOOR => PortalKind::Door,
@@ -303,11 +289,12 @@ fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     (kind, is_upright && !has_sill)
 }
 
-/// Height of an upright opening's `foot` over the ground half a meter away, on the higher side. [Units: wu]
-fn sill(cut: &Cut<'_>, p: &PartitionPortal, foot: DVec3) -> f64 {
+/// Height of an upright opening's lower edge over the ground half a meter away, on the higher side. [Units: wu]
+fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
     let n = p.plane.normal;
+    let center = p.outline.centroid();
     let drop = |side: f64| {
-        let foot = foot.with_y(foot.y + 0.05)
+        let foot = DVec3::new(center.x, bottom + 0.05, center.z)
             + DVec3::new(n.x, 0.0, n.z).normalize_or_zero() * (0.5 * side);
         let ray = Ray {
             origin: foot,

@@ -27,7 +27,7 @@ const MEMORY: u64 = 8 << 30;
 
 /// Work that any scene is worth, and each triangle of it more, in units of [`Allowance`]. Of real scenes those that take most
 /// of it, a house by tetrahedra and a vessel by the partition, take a quarter; by the watershed none takes more than a tenth.
-const WORK: u64 = 80_000_000;
+const WORK: u64 = 400_000_000;
 const WORK_A_TRIANGLE: u64 = 200_000;
 
 /// Work that each voxel is worth besides.

@@ -35,7 +35,13 @@ pub(crate) fn realize(
         .collect();
     let structure = structure.into_scene();
     let hole = config.smallest_hole.resolved(structure.misfit);
-    proposal.notes.extend(note_of_misfit(config, &structure));
+    if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
+        proposal.notes.push(format!(
+            "triangles that should meet miss each other: gaps up to {:.0} mm are closed instead of {:.0} (--smallest-hole)",
+            hole.gap() * 1e3,
+            SmallestHole::LEAST * 1e3
+        ));
+    }
     let settings = &mut proposal.settings;
     settings.insert("smallest_hole".to_owned(), hole.to_string());
     let windings: Vec<_> = proposal
@@ -60,7 +66,6 @@ pub(crate) fn realize(
     drop(complex);
 
     context.begin(Stage::Geometry)?;
-    proposal.notes.extend(note_of_wide_seals(&partition, hole));
     let leaks = partition.leaks.clone();
     let cut = Cut {
         scene: structure.scene,
@@ -85,35 +90,6 @@ pub(crate) fn realize(
         leaks,
         notes: proposal.notes,
     })
-}
-
-/// The note about a model whose triangles miss each other.
-fn note_of_misfit(config: &BakeConfig, structure: &Structure<'_>) -> Option<String> {
-    let misfit = structure.misfit;
-    let width = SmallestHole::Auto.resolved(misfit).gap();
-    match config.smallest_hole {
-        SmallestHole::Auto if width > SmallestHole::LEAST => Some(format!(
-            "triangles that should meet miss each other: gaps up to {:.0} mm are closed instead of {:.0} (--smallest-hole)",
-            width * 1e3,
-            SmallestHole::LEAST * 1e3
-        )),
-        SmallestHole::Open(_) if misfit > 0.0 => Some(format!(
-            "triangles that should meet miss each other, by up to {:.2} mm: each gap between two of them stays open, as a crack; \
-             --smallest-hole {width:.3} closes them",
-            misfit * 1e3
-        )),
-        _ => None,
-    }
-}
-
-/// The note about seals that close more than the smallest hole, if any do.
-fn note_of_wide_seals(partition: &Partition, hole: SmallestHole) -> Option<String> {
-    let [x, y, z] = partition.wide_seals.first()?.to_array();
-    Some(format!(
-        "seals close more than the smallest hole of {:.0} mm before matter at {} places, the first at {x:.2} {y:.2} {z:.2}",
-        hole.gap() * 1e3,
-        partition.wide_seals.len()
-    ))
 }
 
 /// Divides the leaves of the complex among cells.

@@ -6,7 +6,7 @@ use anyhow::Context;
 use enfilade::bake::BakeConfig;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::shown;
-use enfilade::import::{export_glb, sort_scene};
+use enfilade::import::{ImportOptions, decode_gltf, export_glb};
 use enfilade_report::{PlanOptions, plan_svg};
 use enfilade_testkit::furnished_house;
 
@@ -37,9 +37,9 @@ struct DemoReport {
 }
 
 pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
-    let mut scene = furnished_house().scene;
-    // As it is when the file is read, by `verify` for one.
-    sort_scene(&mut scene);
+    let house = export_glb(&furnished_house().scene);
+    // As `bake` reads it: in the file's order, with its names.
+    let scene = decode_gltf(&house, &ImportOptions::default())?.scene;
     make_folder("-o", &args.output)?;
     let path = |name: &str| args.output.join(name);
     let mut outputs = Outputs::default();
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     let plan = plan_svg(&baked.world, &PlanOptions::default());
     let files = [
-        (path("house.glb"), export_glb(&scene)),
+        (path("house.glb"), house),
         (path("world.glb"), bytes),
         (path("plan.svg"), plan.into_bytes()),
     ];

@@ -64,7 +64,7 @@ fn inspect_prints_the_agreed_json() {
     assert_eq!(
         report["portals"][0],
         json!({"id": 0, "cells": [0, 1], "kind": "open", "area": 2.1, "width": 1.0, "height": 2.1,
-            "pieces": 1, "visible_volume": seen, "balance": 4.0, "score": 4.0 * seen, "normal": [1.0, 0.0, 0.0],
+            "pieces": 1, "visible_volume": seen, "balance": 2.0, "score": 2.0 * seen, "normal": [1.0, 0.0, 0.0],
             "outline": [[4.0, 0.0, 2.0], [4.0, 2.1, 2.0], [4.0, 2.1, 3.0], [4.0, 0.0, 3.0]],
             "fittings": [{"detail": 0, "part": "leaf", "turns": {"through": [4.0, 0.0, 1.0], "axis": [0.0, 1.0, 0.0],
                 "shut_degrees": -14.323_945, "open_degrees": 71.619_73}}]})

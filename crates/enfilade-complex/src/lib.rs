@@ -51,11 +51,10 @@ mod surface;
 mod tagged;
 mod thin;
 mod tree;
-mod wide;
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Triangle, Winding, world_tolerance};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Triangle, Winding};
 
 use facet::Visitor;
 use graph::{Clearance, LeafGraph};
@@ -214,8 +213,7 @@ fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'
         purse,
     };
     let tree = tree::build(&set, bounds, &tolerance, purse);
-    let finest = (!input.has_seals).then(|| least_unsealed(&bounds));
-    let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap, finest);
+    let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap);
     let bvh = Bvh::build(input.triangles);
     let hole = input.gap;
     let clearance = Clearance {
@@ -234,14 +232,6 @@ fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'
         bvh,
         has_seals: input.has_seals,
     }
-}
-
-/// Width of the narrowest openings that are told where no seals close them. [Units: wu]
-///
-/// Each point of a narrower one is nearer to its rim than builders and files may move it ([`world_tolerance`]), so nobody
-/// can say that it is open; and where vertices miss each other by as little, there is one at every edge.
-fn least_unsealed(bounds: &Aabb) -> f64 {
-    2.0 * world_tolerance(bounds.extent())
 }
 
 impl Complex<'_> {
@@ -275,15 +265,6 @@ impl Complex<'_> {
     #[must_use]
     pub fn opening_tolerance(&self) -> f64 {
         self.tolerance.width
-    }
-
-    /// Openings that are narrower all along are left out. [Units: wu]
-    fn least_opening(&self) -> f64 {
-        if self.has_seals {
-            self.tolerance.width
-        } else {
-            least_unsealed(&self.tree.bounds)
-        }
     }
 
     /// Divides the leaves among cells by votes.

@@ -13,7 +13,7 @@ use super::pieces::{self, Opening, Piece, Rules};
 use super::seen::{self, TriangleCells};
 use super::surface::{NO_PLANE, Source, Surface};
 use super::tagged::{MIXED, TaggedTree};
-use super::{CRACK_WIDTH, Complex, wide};
+use super::{CRACK_WIDTH, Complex};
 
 /// Cells and portals, exactly.
 #[derive(Clone, Debug)]
@@ -33,8 +33,6 @@ pub struct Partition {
     pub hairlines: Vec<PartitionPortal>,
     /// Gaps that are closed: what a bake adds to the model's own surfaces.
     pub seals: Vec<Seal>,
-    /// Places of seals before matter that close more than a gap.
-    pub wide_seals: Vec<DVec3>,
     /// The portals that lie on no candidate: where cells leak into each other.
     pub leaks: Vec<Leak>,
     /// The cells that see each triangle.
@@ -196,16 +194,14 @@ pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
     let (gaps, openings): (Vec<Opening>, Vec<Opening>) = pieces::group(pieces, &rules)
         .into_iter()
         .partition(|o| o.is_seal);
-    let least_width = complex.least_opening();
+    let least_width = complex.tolerance.width;
     let is_wide = |s: &Seal| poly::width(&s.outline.points) >= least_width;
     let seals = gaps.into_iter().flat_map(seals_of).filter(is_wide);
-    let seals: Vec<Seal> = seals.collect();
-    let (mut portals, hairlines): (Vec<_>, Vec<_>) = openings
+    let seals = seals.collect();
+    let (portals, hairlines): (Vec<_>, Vec<_>) = openings
         .into_iter()
         .map(portal_of)
         .partition(|p| p.width >= least_width);
-    let (seals, holes, wide_seals) = without_holes(seals, complex);
-    portals.extend(holes);
     let aabbs = (0..cells.volumes.len() as u32)
         .map(|c| boxes.get(&c).copied().unwrap_or(Aabb::EMPTY))
         .collect();
@@ -226,44 +222,9 @@ pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
         portals,
         hairlines,
         seals,
-        wide_seals,
         triangle_cells,
         locator,
     }
-}
-
-/// The seals that close gaps; as portals, those between two cells that would close more; and the places of those before
-/// matter that do, as nothing else could close them.
-fn without_holes(
-    seals: Vec<Seal>,
-    complex: &Complex,
-) -> (Vec<Seal>, Vec<PartitionPortal>, Vec<DVec3>) {
-    let outlines = seals
-        .iter()
-        .map(|s| (&s.outline.points[..], s.plane.normal));
-    let outlines: Vec<_> = outlines.collect();
-    let is_wide = wide::wide(&outlines, &complex.bvh, complex.graph.hole);
-    let (mut kept, mut holes, mut before_matter) = (Vec::new(), Vec::new(), Vec::new());
-    for (seal, is_wide) in seals.into_iter().zip(is_wide) {
-        if is_wide && seal.cells[1] != SOLID {
-            holes.push(portal_of(Opening {
-                cells: seal.cells,
-                plane: seal.plane,
-                area: seal.outline.area(),
-                width: poly::width(&seal.outline.points),
-                pieces: vec![seal.outline.clone()],
-                outline: seal.outline,
-                candidate: None,
-                is_seal: false,
-            }));
-            continue;
-        }
-        if is_wide {
-            before_matter.push(seal.outline.centroid());
-        }
-        kept.push(seal);
-    }
-    (kept, holes, before_matter)
 }
 
 /// The open pieces between leaves of different cells, and the box of each cell.

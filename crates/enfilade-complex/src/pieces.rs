@@ -22,10 +22,6 @@ const TOGETHER: f64 = 0.01;
 /// Corners this near to a line lie on it; the tree's own cuts are good to 1e-9. [Units: wu]
 const STRAIGHT: f64 = 1e-7;
 
-/// Two pieces with a notch this deep between them are not one: what is there may be open to another cell. Rounding to `f32`
-/// moves vertices as far. [Units: wu]
-const NOTCH: f64 = 1e-6;
-
 /// A convex opening between two leaves of different cells.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
@@ -197,18 +193,13 @@ fn hull(points: impl Iterator<Item = DVec2>) -> Flat {
 }
 
 /// The union of two disjoint convex polygons where it is convex too.
-///
-/// Little area is filled then, and no notch: a short one may be a thousand times wider than a long slit of its area.
 fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
     if !a.touches(b, STRAIGHT) {
         return None;
     }
-    let corners = || a.points.iter().chain(&b.points).copied();
-    let union = hull(corners());
+    let union = hull(a.points.iter().chain(&b.points).copied());
     let size = (union.max - union.min).max_element();
-    let is_convex = union.area - a.area - b.area <= STRAIGHT * size
-        && corners().all(|p| !union.is_within(p, -NOTCH));
-    is_convex.then_some(union)
+    (union.area - a.area - b.area <= STRAIGHT * size).then_some(union)
 }
 
 /// Merges until no two neighbors have a convex union. Candidates come from a sweep, each piece
@@ -505,28 +496,5 @@ mod tests {
             .map(|o| ((o.area * 1e3).round() / 1e3, o.candidate))
             .collect();
         assert_eq!(found, [(3.6, Some(0)), (6.0, None)]);
-    }
-
-    #[test]
-    fn a_notch_of_little_area_is_not_filled() {
-        // Two pieces side by side, 2.4 m in all, the one short of a triangle of 0.15 mm by 2 mm: less area than a slit of 0.1 um.
-        let left = hull(
-            [[0.0, 0.0], [1.2, 0.0], [1.2, 1.0], [0.0, 1.0]]
-                .map(DVec2::from)
-                .into_iter(),
-        );
-        let right = |notch: [f64; 2]| {
-            let [w, h] = notch;
-            let ring = [
-                [1.2, 0.0],
-                [2.4, 0.0],
-                [2.4, 1.0],
-                [1.2 + w, 1.0],
-                [1.2, 1.0 - h],
-            ];
-            hull(ring.map(DVec2::from).into_iter())
-        };
-        assert!(convex_union(&left, &right([0.0, 0.0])).is_some());
-        assert!(convex_union(&left, &right([1.5e-4, 2e-3])).is_none());
     }
 }

@@ -45,19 +45,14 @@ struct Edge {
 /// A strip across a leaf.
 struct Strip {
     plane: u32,
-    /// Strips this near to it are not cut again. [Units: wu]
-    alike: f64,
     points: Poly,
 }
 
 /// The tree with its thin leaves cut. The order of the surfaces has no say.
-///
-/// `finest` is given where what is left beside an edge is not sealed but open: shorter edges are not cut, and what is left is no
-/// wider than that or than the leaf is thick there. [Units: wu]
-pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64, finest: Option<f64>) -> Tree {
+pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     let mut sink = Edges {
         visitor,
-        shortest: finest.unwrap_or(gap),
+        gap,
         found: Vec::new(),
     };
     visitor.visit(&mut sink);
@@ -69,7 +64,6 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64, finest: Option<f6
         tree,
         edges: &edges,
         gap,
-        finest,
         tolerance: visitor.tolerance,
         purse: visitor.purse,
         planes: tree.planes.clone(),
@@ -99,7 +93,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64, finest: Option<f6
 struct Edges<'a> {
     visitor: &'a Visitor<'a>,
     /// Shorter edges do not count. [Units: wu]
-    shortest: f64,
+    gap: f64,
     found: Vec<Edge>,
 }
 
@@ -120,7 +114,7 @@ impl FacetSink for Edges<'_> {
             for (k, &a) in piece.iter().enumerate() {
                 let b = piece[(k + 1) % piece.len()];
                 // Shorter ones leave nothing uncut that is wider than a gap.
-                if (b - a).length() <= self.shortest {
+                if (b - a).length() <= self.gap {
                     continue;
                 }
                 let Some(outward) = (b - a).cross(normal).try_normalize() else {
@@ -148,7 +142,7 @@ impl FacetSink for Edges<'_> {
     fn fork(&self, _: Range<u32>) -> Self {
         Self {
             visitor: self.visitor,
-            shortest: self.shortest,
+            gap: self.gap,
             found: Vec::new(),
         }
     }
@@ -175,8 +169,6 @@ struct LeafCutter<'a> {
     edges: &'a [Edge],
     /// Leaves are cut where they are thinner. [Units: wu]
     gap: f64,
-    /// See [`cut_thin_leaves`].
-    finest: Option<f64>,
     tolerance: Tolerance,
     purse: Purse<'a>,
     planes: Vec<Plane>,
@@ -227,9 +219,7 @@ impl LeafCutter<'_> {
 
     /// The strips that are to cut a leaf.
     fn strips(&mut self, leaf: u32, region: &CutBox) -> Vec<Strip> {
-        let most = ALIKE * self.gap;
-        let alike = |thickness: f64| self.finest.map_or(most, |f| thickness.min(most).max(f));
-        let mut found: Vec<(f64, f64, Plane, Poly)> = self
+        let mut found: Vec<(f64, Plane, Poly)> = self
             .edges_of(leaf..leaf + 1)
             .iter()
             .filter_map(|e| {
@@ -246,10 +236,8 @@ impl LeafCutter<'_> {
                 let beside = normal * (2.0 * self.tolerance.width);
                 let is_across =
                     region.contains(middle + beside) && region.contains(middle - beside);
-                (is_thin && is_there && is_across).then(|| {
-                    let alike = alike(poly::area(&points) / length);
-                    (length, alike, Plane::through(e.from, normal), points)
-                })
+                (is_thin && is_there && is_across)
+                    .then(|| (length, Plane::through(e.from, normal), points))
             })
             .collect();
         // Longest first; what is alike comes from both sides of one edge.
@@ -257,11 +245,10 @@ impl LeafCutter<'_> {
         found.truncate(MAX_CUTS);
         found
             .into_iter()
-            .map(|(_, alike, plane, points)| {
+            .map(|(_, plane, points)| {
                 self.planes.push(plane);
                 Strip {
                     plane: self.planes.len() as u32 - 1,
-                    alike,
                     points,
                 }
             })
@@ -279,13 +266,14 @@ impl LeafCutter<'_> {
         let at = self.push(first.plane);
         let mut sides = [Vec::new(), Vec::new()];
         for s in strips {
-            match poly::split(&s.points, &plane, first.alike) {
+            match poly::split(&s.points, &plane, ALIKE * self.gap) {
                 Sides::On => {}
                 Sides::Front => sides[0].push(s),
                 Sides::Back => sides[1].push(s),
                 Sides::Both(front, back) => {
                     for (side, points) in sides.iter_mut().zip([front, back]) {
-                        side.push(Strip { points, ..s });
+                        let plane = s.plane;
+                        side.push(Strip { plane, points });
                     }
                 }
             }

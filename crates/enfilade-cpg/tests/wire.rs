@@ -57,7 +57,7 @@ fn viewers_find_details_below_the_names_they_had_and_lights_once() {
             .map(|c| &nodes[c.as_u64().unwrap() as usize])
             .collect()
     };
-    assert_eq!(below("details").len(), 2);
+    assert_eq!(below("details").len(), 3);
     let storey = below("house")[0];
     assert_eq!(storey["extras"]["storey"], 0);
     let chair = &nodes[storey["children"][0].as_u64().unwrap() as usize];

@@ -457,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn the_box_tree_finds_what_a_loop_finds() {
+    fn the_box_tree_equals_a_loop() {
         let boxes: Vec<Aabb> = (0..300_u32)
             .map(|i| {
                 let at = |k: u32| f64::from((i * 7919 + k * 104_729) % 97);

@@ -55,7 +55,7 @@ impl Doors {
     ///
     /// # Errors
     ///
-    /// When a fitting of a portal names an object that does not exist.
+    /// If a fitting of a portal names an object that does not exist.
     pub(crate) fn of(world: &World) -> Result<Self, SightError> {
         let mut out = Self {
             first: vec![0],

@@ -50,7 +50,6 @@ struct Runs {
 ///
 /// # Panics
 /// If there are 2³² runs or more.
-/// When there are 2³² runs or more.
 #[must_use]
 pub fn components(set: &BitVolume, connectivity: Connectivity) -> Components {
     let [nx, ..] = set.dims();
@@ -98,7 +97,6 @@ pub fn components(set: &BitVolume, connectivity: Connectivity) -> Components {
 ///
 /// # Panics
 /// If the boxes differ in size, or there are 2³² runs or more.
-/// When the boxes differ in size, or there are 2³² runs or more.
 #[must_use]
 pub fn flood(set: &BitVolume, seeds: &BitVolume, connectivity: Connectivity) -> BitVolume {
     assert_eq!(set.dims(), seeds.dims(), "boxes of one size");

@@ -34,7 +34,6 @@ const SLAB: usize = 8;
 ///
 /// # Panics
 /// If there are 2³² triangles or more.
-/// When there are 2³² triangles or more.
 #[must_use]
 pub fn voxelize(grid: &Grid, triangles: &[Triangle], allowance: &Allowance) -> BitVolume {
     let mut out = BitVolume::new(grid.dims);

@@ -53,7 +53,6 @@ pub struct WatershedOptions {
 /// # Panics
 /// If `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is negative or
 /// NaN.
-/// negative or NaN.
 #[must_use]
 pub fn watershed(
     dims: [usize; 3],

@@ -6,7 +6,6 @@
 //! not been seen for a while. Beyond him, a plan spans many cells, so that the cells on it need no updates; and plans change
 //! only by events with a time, whose random numbers depend on actor and event alone. So positions do not depend on views,
 //! queries, or the steps in which time advances.
-//! looked, how often, or in which steps time went by.
 //!
 //! | file | holds |
 //! | --- | --- |

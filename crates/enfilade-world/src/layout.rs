@@ -194,9 +194,8 @@ impl Layout {
         &self.exits[first[0] as usize..first[1] as usize]
     }
 
-    /// Returns the distance of a point from the nearest box around an opening of a cell; infinite if the cell has none. O(its
-    /// openings).
-    /// [Units: wu]
+    /// Returns the distance of a point from the nearest box around an opening of a cell; infinite if the cell has none.
+    /// O(its openings). [Units: wu]
     ///
     /// # Panics
     ///

@@ -481,7 +481,7 @@ mod tests {
 
     /// W11: Maekawa's chart.
     #[test]
-    fn edges_take_what_maekawas_chart_says() {
+    fn edge_losses_equal_maekawas_chart() {
         for (fresnel, decibels) in [
             (0.0, 5.0),
             (1.0, 13.0),

@@ -1,4 +1,4 @@
-//! Shortest ways over floors, square by square, and straight lines over them.
+//! Shortest paths over floors, square by square, and straight lines over them.
 //!
 //! Dijkstra's algorithm, or A* (Hart, Nilsson & Raphael, "A formal basis for the heuristic determination of minimum cost paths",
 //! 1968) for a single goal, over 16 directions: along the squares, the diagonals, and the knight's moves between. So paths are at

@@ -35,7 +35,7 @@ fn root(cell: CellId) -> Place {
 }
 
 #[test]
-fn a_point_that_a_lamp_reaches_is_lit_and_the_lamp_matters_to_who_sees_it() {
+fn a_point_in_reach_of_a_lamp_is_lit_and_the_lamp_matters_to_its_viewers() {
     let world = offices(1);
     let mut space = Space::new(&world).unwrap();
     for portal in world.graph.portal_ids().step_by(3) {
@@ -86,7 +86,7 @@ fn a_point_that_a_lamp_reaches_is_lit_and_the_lamp_matters_to_who_sees_it() {
 }
 
 #[test]
-fn a_door_that_closes_and_a_room_that_comes_change_what_is_lit() {
+fn closing_doors_and_arriving_rooms_change_the_lit_cells() {
     let world = room_grid(&GridParams::two_rooms());
     let mut space = Space::new(&world).unwrap();
     let mut lights = Lights::new(&space);

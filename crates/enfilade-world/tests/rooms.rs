@@ -174,7 +174,7 @@ fn nested(depth: usize) -> Vec<World> {
 }
 
 #[test]
-fn what_rays_hit_is_seen_sixteen_rooms_deep() {
+fn ray_hits_are_seen_through_sixteen_nested_rooms() {
     let worlds = nested(16);
     let refs: Vec<&World> = worlds.iter().collect();
     let mut space = Space::new(&worlds[0]).unwrap();
@@ -209,7 +209,7 @@ fn what_rays_hit_is_seen_sixteen_rooms_deep() {
 }
 
 #[test]
-fn what_rays_hit_is_seen_where_rooms_stand_side_by_side() {
+fn ray_hits_are_seen_between_adjacent_rooms() {
     let root = offices(3);
     let cabins: Vec<World> = (0..4).map(|k| cabin(k, 1.0)).collect();
     let mut worlds = vec![&root];
@@ -313,7 +313,7 @@ fn a_room_far_away_is_as_exact_as_a_near_one() {
 }
 
 #[test]
-fn doors_lead_to_what_is_around_them_and_meet_when_they_touch() {
+fn doors_lead_to_their_surroundings_and_meet_on_contact() {
     let root = offices(3);
     let [a, b] = [cabin(1, 1.0), cabin(1, 1.0)];
     let mut space = Space::new(&root).unwrap();
@@ -348,7 +348,7 @@ fn doors_lead_to_what_is_around_them_and_meet_when_they_touch() {
 }
 
 #[test]
-fn what_is_no_motion_is_refused_and_changes_nothing() {
+fn invalid_motions_are_refused_and_change_nothing() {
     let root = offices(3);
     let mut space = Space::new(&root).unwrap();
     let part = space
@@ -401,7 +401,7 @@ fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
 }
 
 #[test]
-fn what_stands_beside_a_room_that_moves_is_found_where_it_comes_to() {
+fn things_beside_a_moving_room_are_found_in_their_new_cells() {
     let root = furnished_cabin(2, 30.0, 0);
     let mut space = Space::new(&root).unwrap();
     let away = Pose::from_translation(DVec3::X * -500.0);

@@ -209,7 +209,7 @@ fn things_that_move_are_where_the_locator_and_a_new_flood_say() {
 }
 
 #[test]
-fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
+fn carried_things_move_with_the_room_and_free_ones_do_not() {
     let root = offices(4);
     let mut space = Space::new(&root).unwrap();
     let away = Pose::from_translation(DVec3::X * -60.0);
@@ -270,7 +270,7 @@ fn who_is_carried_moves_with_the_room_and_who_is_free_does_not() {
 }
 
 #[test]
-fn who_stands_in_a_door_between_rooms_is_in_both_until_they_part() {
+fn a_thing_in_a_door_between_rooms_is_in_both_until_they_separate() {
     let root = room_grid(&GridParams::two_rooms());
     let mut space = Space::new(&root).unwrap();
     let far = Pose::from_translation(DVec3::X * 100.0);
@@ -334,7 +334,7 @@ fn a_thing_that_can_be_seen_is_in_the_answer() {
         let view = View::perspective(eye.to_array(), toward_f32, up, 1.2, 1.0).unwrap();
         let seen = viewer.see(&space, PartId::ROOT, &view);
         let seen = things.see(&space, &seen).to_vec();
-        assert!(seen.contains(&balls[0].0), "what is global is always there");
+        assert!(seen.contains(&balls[0].0), "global things are always seen");
         n_seen += seen.len();
         for &(id, center, radius) in &balls[1..] {
             // A point of the ball in reach of its cell's air that the eye sees.
@@ -361,7 +361,7 @@ fn a_thing_that_can_be_seen_is_in_the_answer() {
 }
 
 #[test]
-fn what_is_no_motion_and_what_is_gone_is_refused() {
+fn invalid_motions_and_removed_things_are_refused() {
     let space = Space::new(&offices(6)).unwrap();
     let mut things = Things::new();
     let ball = || Shape::sphere(0.2).unwrap();

@@ -42,8 +42,8 @@
 //! }
 //! ```
 //!
-//! Each frame: build a [`Sight`] once, and query a [`Viewer`] (one per camera) for everything that a [`View`] sees; a
-//! [`DrawList`] turns the answer into few ranges of triangles.
+//! To draw frames, build a [`Sight`] once. Every frame, query a [`Viewer`] (one per camera) for everything that a [`View`]
+//! sees; a [`DrawList`] turns the answer into few ranges of triangles.
 //!
 //! ```
 //! use enfilade::{DrawList, Sight, SightState, View, Viewer};

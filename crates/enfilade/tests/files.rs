@@ -13,7 +13,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 #[test]
-fn what_is_saved_is_opened_again_and_nothing_else_is_left() {
+fn saved_worlds_open_again_and_leave_no_other_file() {
     let folder = folder("saved");
     let path = folder.join("world.glb");
     let mut world = room_grid(&GridParams::offices(12, 1));

@@ -153,8 +153,12 @@ impl OfPortal<'_> {
         let mut is_shut = false;
         for d in (0..others.bounds.len() as u32).filter(is_near) {
             let covered = opening.covered(&self.within(d, opening));
-            if covered > SHUTS {
-                is_shut = true;
+            if covered <= SHUTS {
+                continue;
+            }
+            is_shut = true;
+            // Where an opening holds a door and a window, the window's pane is a leaf of neither.
+            if !self.is_see_through(d) {
                 let (d, percent) = (self.called(d), 100.0 * covered);
                 out.push(format!(
                     "{d} covers {percent:.0} % of it, but is none of its fittings"
@@ -166,6 +170,18 @@ impl OfPortal<'_> {
         if !has_leaf && !is_shut {
             out.push("is called a door, but has no leaf".into());
         }
+    }
+
+    /// True if all of a detail is see-through.
+    fn is_see_through(&self, detail: u32) -> bool {
+        let mesh = self.world.details[detail as usize].mesh as usize;
+        let mut primitives = self.world.detail_meshes[mesh].primitives.iter();
+        primitives.all(|p| {
+            let material = p
+                .material
+                .and_then(|m| self.world.materials.get(m as usize));
+            material.is_some_and(|m| m.transparent)
+        })
     }
 
     /// The triangles of a detail that lie about the opening, in its directions.

@@ -163,7 +163,7 @@ fn the_state_at_a_time_is_the_same_however_a_camera_walked() {
     }
     let mut other = town.populate(400);
     town.advance(&mut other, end);
-    assert_ne!(hash(&other), expected, "what they are told matters");
+    assert_ne!(hash(&other), expected, "messages change the state");
 }
 
 /// An actor that is stepped from frame to frame.
