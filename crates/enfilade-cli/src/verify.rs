@@ -48,6 +48,10 @@ pub(crate) struct Verify {
     /// Segments for `sealed`, and as many rays for `complete`.
     #[arg(long, default_value_t = 1_000_000, value_name = "N")]
     rays: u64,
+    /// Try short segments for `sealed` across every face of the locator's leaves, too. Finds slits however small, and openings of micrometers
+    /// that a bake leaves where triangles miss each other.
+    #[arg(long)]
+    faces: bool,
     /// Views tried for *conservative per frame*, with 100 rays in each: what they hit must be in the
     /// run-time's answer. 0: none.
     #[arg(long, default_value_t = 10_000, value_name = "N")]
@@ -103,6 +107,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let structure = source.as_ref().map(structure_of);
     let options = VerifyOptions {
         rays: args.rays,
+        faces: args.faces,
         seed: args.seed,
         tolerance: args.tolerance,
         max_listed: args.list,

@@ -152,7 +152,11 @@ pub fn verify_world_with_progress(
             tally
         })
         .reduce(Tally::default, Tally::merged);
-    let tally = tally.merged(faces::try_all(&subject, options.seed));
+    let tally = if options.faces {
+        tally.merged(faces::try_all(&subject, options.seed))
+    } else {
+        tally
+    };
     VerifyReport::new(&subject, options, problems, tally)
 }
 

@@ -22,8 +22,9 @@ use opening::{BESIDE, DEEP, FittedOpening};
 const PANE: f64 = 0.25;
 /// A frame leaves as much of a door or window free.
 const FREE: f64 = 0.4;
-/// An object that covers more of a door, and is not a leaf of another, is a leaf of it.
-const SHUTS: f64 = 0.25;
+/// An object that covers more of a door, and is not a leaf of another, is a leaf of it. One that covers less leaves the larger part open:
+/// a pane beside a door that is one opening with it, say.
+const SHUTS: f64 = 0.5;
 
 /// Problems, a line each.
 pub(crate) fn check(world: &World) -> Vec<String> {
@@ -153,12 +154,8 @@ impl OfPortal<'_> {
         let mut is_shut = false;
         for d in (0..others.bounds.len() as u32).filter(is_near) {
             let covered = opening.covered(&self.within(d, opening));
-            if covered <= SHUTS {
-                continue;
-            }
-            is_shut = true;
-            // Where an opening holds a door and a window, the window's pane is a leaf of neither.
-            if !self.is_see_through(d) {
+            if covered > SHUTS {
+                is_shut = true;
                 let (d, percent) = (self.called(d), 100.0 * covered);
                 out.push(format!(
                     "{d} covers {percent:.0} % of it, but is none of its fittings"
@@ -170,18 +167,6 @@ impl OfPortal<'_> {
         if !has_leaf && !is_shut {
             out.push("is called a door, but has no leaf".into());
         }
-    }
-
-    /// True if all of a detail is see-through.
-    fn is_see_through(&self, detail: u32) -> bool {
-        let mesh = self.world.details[detail as usize].mesh as usize;
-        let mut primitives = self.world.detail_meshes[mesh].primitives.iter();
-        primitives.all(|p| {
-            let material = p
-                .material
-                .and_then(|m| self.world.materials.get(m as usize));
-            material.is_some_and(|m| m.transparent)
-        })
     }
 
     /// The triangles of a detail that lie about the opening, in its directions.
