@@ -35,6 +35,7 @@ pub fn bake(data: &[u8]) {
         budget: Budget {
             memory: Some(256 << 20),
             time: Some(Duration::from_secs(4)),
+            ..Budget::default()
         },
         ..BakeConfig::of(METHODS[usize::from(kind & 3)])
     };

@@ -190,7 +190,7 @@ mod tests {
     fn a_scene_of_many_voxels_may_do_more() {
         let context = BakeContext::default().within(&Budget::default(), 12);
         let of_triangles = Budget::default().allowance(12, None);
-        let work = 100_000_000;
+        let work = 500_000_000;
         assert!(!of_triangles.spend(work) && of_triangles.is_over());
         let dims = [700, 240, 880];
         context.tell(Resolution::Voxels { edge: 0.1, dims }, 0.0);
