@@ -71,8 +71,8 @@ fn inspect_prints_the_agreed_json() {
     );
     assert_eq!(
         report["portals"][1]["fittings"],
-        json!([{"detail": 0, "part": "pane"},
-            {"detail": 1, "part": "leaf", "slides": {"along": [0.0, 0.0, -1.0], "shut": 0.0, "open": 1.5}}])
+        json!([{"detail": 1, "part": "pane"},
+            {"detail": 2, "part": "leaf", "slides": {"along": [0.0, 0.0, -1.0], "shut": 0.0, "open": 1.5}}])
     );
     assert_eq!(report["portals"][1]["kind"], json!("window"));
     assert_eq!(report["stats"]["input_triangles"], json!(8));
