@@ -2,8 +2,8 @@
 
 use enfilade_geom::DVec2;
 
-/// The part of the line from `a` to `b` within the rectangle from `low` to `high`; `None` where it misses it. Ends that lie
-/// within stay as they are.
+/// The part of the line from `a` to `b` inside the rectangle from `low` to `high`; `None` if there is none. Ends that
+/// lie inside stay as they are.
 pub(crate) fn clipped(a: DVec2, b: DVec2, [low, high]: [DVec2; 2]) -> Option<(DVec2, DVec2)> {
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     let way = b - a;
@@ -18,7 +18,7 @@ pub(crate) fn clipped(a: DVec2, b: DVec2, [low, high]: [DVec2; 2]) -> Option<(DV
         enter = enter.max(s.min(t));
         leave = leave.min(s.max(t));
     }
-    // Of ends far away next to nothing is left but rounding: it must not lead out of the rectangle.
+    // Far ends leave little but rounding error, which must not lead out of the rectangle.
     let at = |t: f64| (a + way * t).clamp(low, high);
     let start = if enter > 0.0 { at(enter) } else { a };
     let end = if leave < 1.0 { at(leave) } else { b };
@@ -38,10 +38,10 @@ mod tests {
         for far in [3.0, 1e6, 1e20, 1e38] {
             let (a, b) = (DVec2::new(-far, 0.5), DVec2::new(far, 0.5));
             let (a, b) = clipped(a, b, page).unwrap();
-            // As exact as numbers of that size are.
+            // As exact as numbers of that size allow.
             let off = (a.x - low.x).abs().max((b.x - high.x).abs());
             assert!(off <= 1e-15 * far, "{far}: {a} {b}");
-            // Of a slanting one the places are rounding, in the rectangle all the same.
+            // The ends of a slanting line are rounded, but still in the rectangle.
             let slanting = clipped(DVec2::splat(-far), DVec2::splat(far), page);
             for p in slanting.map(|(a, b)| [a, b]).into_iter().flatten() {
                 assert!(p.cmpge(low).all() && p.cmple(high).all(), "{p}");

@@ -1,4 +1,4 @@
-//! What is drawn, whatever it is written as: paths of a class, words, and where they stand.
+//! Drawings independent of the format they are written as: paths of a class, words, and their places.
 
 use enfilade_cpg::CellId;
 use enfilade_geom::DVec2;
@@ -7,7 +7,7 @@ use enfilade_geom::DVec2;
 pub(crate) type Rgb = [u8; 3];
 
 const BLACK: Rgb = [0, 0, 0];
-/// Color of words.
+/// Color of text.
 pub(crate) const INK: Rgb = [0x22, 0x22, 0x22];
 
 /// A drawing, ready to be written as SVG, PNG or PDF: one plan or several on a sheet.
@@ -16,7 +16,7 @@ pub struct Drawing {
     pub(crate) title: String,
     /// [Units: wu]
     pub(crate) size: DVec2,
-    /// How much wider than usual lines are, for drawings of large buildings.
+    /// Factor on the usual line width, for drawings of large buildings.
     pub(crate) zoom: f64,
     pub(crate) items: Vec<Item>,
 }
@@ -31,7 +31,7 @@ impl Drawing {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Item {
-    /// What follows until the next stands at `at`, and is a storey of that name or no storey.
+    /// Sets the origin to `at` for the items up to the next `Place`. `storey` is the storey they show, if any.
     Place {
         at: DVec2,
         storey: Option<String>,
@@ -43,30 +43,30 @@ pub(crate) enum Item {
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
     pub(crate) class: Class,
-    /// Instead of the color of the class.
+    /// Replaces the color of the class.
     pub(crate) fill: Option<Rgb>,
-    /// Lines; closed ones end where they begin without saying so. [Units: wu]
+    /// Lines. Closed ones do not repeat their first point. [Units: wu]
     pub(crate) lines: Vec<Vec<DVec2>>,
     pub(crate) is_closed: bool,
     pub(crate) cell: Option<CellId>,
-    /// What is shown where a pointer rests on it.
+    /// Text shown when a pointer rests on the path.
     pub(crate) hint: Option<String>,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Words {
-    /// Where the base line starts, or has its middle. [Units: wu]
+    /// Start of the base line, or its middle. [Units: wu]
     pub(crate) at: DVec2,
-    /// Height of the letters, from base line to base line where there are several. [Units: wu]
+    /// Height of the letters; for several lines, the distance between base lines. [Units: wu]
     pub(crate) size: f64,
     pub(crate) is_centered: bool,
-    /// Read from below upwards.
+    /// Read from bottom to top.
     pub(crate) is_turned: bool,
     pub(crate) text: String,
     pub(crate) cell: Option<CellId>,
 }
 
-/// What a path stands for, which decides how it looks.
+/// The meaning of a path, which decides how it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
     Cell,
@@ -102,14 +102,14 @@ pub(crate) const CLASSES: [Class; 14] = [
     Class::Gap,
 ];
 
-/// How a class looks.
+/// The look of a class.
 pub(crate) struct Look {
     pub(crate) name: &'static str,
     /// Color and opacity.
     pub(crate) fill: Option<(Rgb, f32)>,
     /// Color and width. [Units: cm]
     pub(crate) stroke: Option<(Rgb, f64)>,
-    /// Lengths of dashes and gaps in turn. [Units: cm]
+    /// Alternating lengths of dashes and gaps. [Units: cm]
     pub(crate) dashes: &'static [f64],
 }
 
@@ -154,10 +154,10 @@ impl Class {
     }
 }
 
-/// A light color of its own for each number; neighbors in number are far apart in hue.
+/// Returns a light color for each number; consecutive numbers are far apart in hue.
 pub(crate) fn color(id: u32) -> Rgb {
-    // The golden angle spreads any run of hues evenly; lightness alternates over three steps so
-    // that hues that come round again still differ.
+    // The golden angle spreads any run of hues evenly. Lightness alternates over three steps, so that hues that recur
+    // still differ.
     let hue = (f64::from(id) * 137.507_764 + 40.0) % 360.0;
     let lightness = [0.82, 0.75, 0.87][(id % 3) as usize];
     let saturation = 0.62;

@@ -1,7 +1,8 @@
 //! Finds the heights at which the cells have floors.
 //!
-//! Points spread over the level triangles ask which cell stands on them. The heights of a cell's points, weighted by area, are a
-//! histogram; its heaviest windows are the cell's levels. A cell on sloping ground has several, and so has one that holds a stair.
+//! Points spread over the level triangles are located in a cell. The heights of a cell's points, weighted by area,
+//! form a histogram; its heaviest windows are the cell's levels. A cell on sloping ground has several, as does one
+//! that contains a stair.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,24 +11,26 @@ use enfilade_geom::{DVec2, DVec3, Triangle};
 
 /// Half the height of the window in which floor areas add up to one level. [Units: wu]
 const WINDOW: f64 = 0.1;
-/// Floors of one cell nearer than this in height are one level: a cut at the usual height still passes above all of them. [Units: wu]
+/// Floors of one cell closer in height than this are one level: a cut at the usual height still passes above all of
+/// them. [Units: wu]
 const APART: f64 = 1.0;
-/// The least area of a second level in a cell: a landing, but no tread and no sill. [Units: wu²]
+/// The least area of a second level in a cell: admits a landing, excludes treads and sills. [Units: wu²]
 const LEAST_LEVEL: f64 = 1.0;
-/// Spacing of the points at which a floor is asked whether a room stands on it. [Units: wu]
+/// Spacing of the sample points on a floor. [Units: wu]
 const SPACING: f64 = 0.5;
-/// Most rows of points on one triangle: with those, a floor 64 m long is still asked every half meter.
+/// Most rows of points on one triangle: enough to sample a floor 64 m long every half meter.
 const MAX_ROWS: usize = 128;
 /// Most tiles along a side of the world.
 const MAX_TILES: f64 = 1000.0;
-/// How far above a floor its cell must still be, so that a person can stand on it: the usual height of a cut. [Units: wu]
+/// Height above a floor that must be in the same cell for a person to stand there: the usual height of a cut.
+/// [Units: wu]
 const HEADROOM: f64 = 1.2;
-/// How far above a floor the cell that stands on it is looked for. [Units: wu]
+/// Height above a floor at which its cell is looked up. [Units: wu]
 const JUST_ABOVE: f64 = 0.1;
-/// A cell stands on slopes where less than this share of its ground is level: terrain.
+/// A cell with a smaller share of level ground stands on slopes: it is terrain.
 const LEAST_LEVEL_SHARE: f64 = 0.25;
 
-/// Squares of the plane (x, z), by whole numbers.
+/// Squares of the plane (x, z), by integer coordinates.
 pub(crate) type Tiles = BTreeSet<(i32, i32)>;
 
 /// A floor of a cell, near one height.
@@ -38,7 +41,7 @@ pub(crate) struct Level {
     pub(crate) height: f64,
     /// [Units: wu²]
     pub(crate) area: f64,
-    /// Where it is.
+    /// Tiles that the level covers.
     pub(crate) tiles: Tiles,
 }
 
@@ -46,7 +49,7 @@ pub(crate) struct Level {
 pub(crate) struct Floors {
     /// Floors to stand on, cells ascending, the largest of a cell first.
     pub(crate) levels: Vec<Level>,
-    /// Cells that nobody can stand in, ascending: shafts, spaces above ceilings, cavities.
+    /// Cells without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
     pub(crate) unfloored: Vec<CellId>,
     /// Side of a tile. [Units: wu]
     pub(crate) tile: f64,
@@ -59,7 +62,7 @@ struct Sample {
     is_level: bool,
 }
 
-/// Finds them. O(floor area + triangles).
+/// Finds the floors of a world. O(floor area + triangles).
 pub(crate) fn find_floors(world: &World) -> Floors {
     let tile = tile_of(world);
     let samples = floor_samples(world);
@@ -77,12 +80,13 @@ pub(crate) fn find_floors(world: &World) -> Floors {
     out
 }
 
-/// Which tile a point is in.
+/// The tile of a point.
 pub(crate) fn tile_at(x: f64, z: f64, tile: f64) -> (i32, i32) {
     ((x / tile).floor() as i32, (z / tile).floor() as i32)
 }
 
-/// A tile as wide as samples are apart on the largest triangle that there can be, and of a world not more than a million.
+/// The side of a tile: at least the sample spacing on the largest possible triangle, and large enough for a million
+/// tiles at most.
 fn tile_of(world: &World) -> f64 {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let mut reach = 0.0_f64;
@@ -95,7 +99,7 @@ fn tile_of(world: &World) -> f64 {
     SPACING.max(reach / MAX_ROWS as f64).max(whole / MAX_TILES)
 }
 
-/// Points of the surfaces that an indoor cell stands on, by cell.
+/// Sample points on the surfaces that an indoor cell stands on, by cell.
 fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
     let mut out = BTreeMap::new();
     for batch in &world.batches {
@@ -108,9 +112,9 @@ fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
             let t: Triangle =
                 [0, 1, 2].map(|k| DVec3::from_array(p.positions[t[k] as usize].map(f64::from)));
             let n = (t[1] - t[0]).cross(t[2] - t[0]);
-            // Within 45° of level one can walk, whichever way it faces: models turn floors upside down.
+            // Surfaces within 45° of level are walkable, whichever way they face: models turn floors upside down.
             if n.y.abs() > 0.7 * n.length() && n.y != 0.0 {
-                // Within 8° it is level.
+                // Slopes within 8° count as level.
                 let is_level = n.y.abs() > 0.99 * n.length();
                 ask(world, &t, 0.5 * n.length(), is_level, &mut out);
             }
@@ -119,7 +123,7 @@ fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
     out
 }
 
-/// Asks points spread over the triangle; those with headroom are a sample of the cell above them.
+/// Samples points spread over the triangle; those with headroom are assigned to the cell above them.
 fn ask(
     world: &World,
     t: &Triangle,
@@ -131,14 +135,14 @@ fn ask(
         .distance(t[1])
         .max(t[1].distance(t[2]))
         .max(t[2].distance(t[0]));
-    // A sliver needs no more points than its area holds.
+    // A sliver needs only as many points as its area holds.
     let side = longest.min(4.0 * area.sqrt());
     let n = ((side / SPACING).ceil() as usize).clamp(1, MAX_ROWS);
     let each = area / (n * n) as f64;
     let locator = &world.graph.locator;
     for i in 0..n {
         for j in 0..2 * (n - i) - 1 {
-            // Centroids of the n² small triangles, upright and inverted in turn.
+            // Centroids of the n² small triangles, upright and inverted alternately.
             let (row, column, third) =
                 (i as f64, (j / 2) as f64, if j % 2 == 0 { 1.0 } else { 2.0 });
             let (u, v) = (
@@ -150,7 +154,7 @@ fn ask(
             let Some(cell) = above(JUST_ABOVE).filter(|&c| !world.graph[c].outdoor) else {
                 continue;
             };
-            // The top of a suspended ceiling, or of a wall under the roof, is no floor; neither is it one of the room above.
+            // The top of a suspended ceiling, or of a wall under the roof, is not a floor of either cell.
             if above(HEADROOM) == Some(cell) && above(0.5 * HEADROOM).is_some() {
                 out.entry(cell).or_default().push(Sample {
                     p,
@@ -206,7 +210,7 @@ fn levels_of(cell: CellId, samples: &[Sample], tile: f64, out: &mut Vec<Level>) 
     }
 }
 
-/// The run of votes (sorted by height, none taken) within one window with the greatest sum.
+/// The run of votes (sorted by height, none taken) within one window that has the largest sum.
 fn heaviest_window(votes: &[&Sample], is_taken: &[bool]) -> Option<(usize, usize)> {
     let mut best: Option<(f64, usize, usize)> = None;
     let (mut first, mut sum) = (0, 0.0);

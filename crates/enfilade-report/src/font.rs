@@ -1,13 +1,14 @@
-//! Words as outlines, for formats whose readers may not have a font of ours.
+//! Text as outlines, for formats whose readers may lack our fonts.
 //!
-//! The fonts are those that egui shows its text in: they are on board for the window of `view` anyway, and their licenses are open.
+//! The fonts are the ones egui shows its text in: the window of `view` includes them anyway, and their licenses are
+//! open.
 
 use skrifa::instance::{LocationRef, Size};
 use skrifa::outline::{DrawSettings, OutlinePen};
 use skrifa::{FontRef, GlyphId, MetadataProvider};
 use vello_cpu::kurbo::{Affine, BezPath};
 
-/// The fonts that are asked for a letter, in turn.
+/// The fonts searched for a letter, in order.
 pub(crate) struct Fonts {
     fonts: Vec<FontRef<'static>>,
 }
@@ -24,7 +25,7 @@ impl Fonts {
         }
     }
 
-    /// Outlines of a line of words whose base line starts at the origin, y down, and how long it is; letters are 1 high.
+    /// Outlines of a line of text (base line from the origin, y down, letters 1 high), and its length.
     pub(crate) fn outlines(&self, words: &str) -> (BezPath, f64) {
         let mut path = BezPath::new();
         let mut x = 0.0;
@@ -36,7 +37,7 @@ impl Fonts {
             let mut pen = Tracer(BezPath::new());
             if let Some(outline) = font.outline_glyphs().get(glyph) {
                 let settings = DrawSettings::unhinted(Size::new(1.0), location);
-                // A glyph that its font describes wrongly stays a gap.
+                // A glyph with an invalid outline stays a gap.
                 if outline.draw(settings, &mut pen).is_ok() {
                     path.extend(Affine::translate((x, 0.0)) * pen.0);
                 }
@@ -47,7 +48,7 @@ impl Fonts {
         (path, x)
     }
 
-    /// The glyph of a letter in the first font that has one; a question mark where none has.
+    /// The glyph of a letter in the first font that has one; otherwise that of a question mark.
     fn glyph(&self, letter: char) -> Option<(&FontRef<'static>, GlyphId)> {
         let find = |c: char| {
             self.fonts
@@ -58,7 +59,7 @@ impl Fonts {
     }
 }
 
-/// Takes an outline with y up.
+/// Receives an outline with y up.
 struct Tracer(BezPath);
 
 fn at(x: f32, y: f32) -> (f64, f64) {

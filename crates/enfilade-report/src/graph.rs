@@ -1,7 +1,8 @@
-//! The graph of rooms as a drawing: laid out by forces, starting from where the rooms are.
+//! The graph of rooms as a drawing: laid out by forces, starting from the places of the rooms.
 //!
-//! Doorways pull their rooms together and rooms push each other away (library `force_graph`); the start decides which of the many
-//! arrangements comes out, so that it looks like the plan as far as it can. At the end disks that still touch are pushed apart.
+//! Doorways pull their rooms together, and rooms push each other away (library `force_graph`). The start selects one
+//! of the many possible arrangements, so that the graph resembles the plan as far as possible. At the end, disks that
+//! still touch are pushed apart.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -17,15 +18,15 @@ use crate::svg::{escaped, hex};
 
 /// Distance at which the pull of a doorway and the push of its two rooms are equal. [Units: pixels]
 const DISTANCE: f64 = 70.0;
-/// Middles of disks are no nearer than this: numbers of three digits stay apart. [Units: pixels]
+/// Least distance between centers of disks: numbers of three digits stay apart. [Units: pixels]
 const LEAST_DISTANCE: f64 = 40.0;
-/// Width of a page without a scroll bar, but for the margins. [Units: pixels]
+/// Width of a page without a scroll bar, minus the margins. [Units: pixels]
 const PAGE: f64 = 980.0;
 /// Radius of the smallest and of the largest disk. [Units: pixels]
 const RADII: [f64; 2] = [11.0, 19.0];
 /// Steps of the layout: three times as many as a tower of 100 rooms takes to come to rest.
 const STEPS: usize = 400;
-/// Directions of length 1 without a pattern.
+/// Unit directions without a pattern.
 const WAYS: [DVec2; 5] = [
     DVec2::new(1.0, 0.0),
     DVec2::new(-0.6, 0.8),
@@ -33,10 +34,11 @@ const WAYS: [DVec2; 5] = [
     DVec2::new(0.8, 0.6),
     DVec2::new(-0.96, -0.28),
 ];
-/// More rooms than this stay where they are: each step takes the square of their number.
+/// With more rooms than this, rooms stay where they are: a step takes time quadratic in their number.
 const MAX_ROOMS: usize = 2000;
 
-/// Draws the graph as an element `svg`, rooms as disks with the number of the cell. A sentence where there is no room.
+/// Draws the graph as an `svg` element, rooms as disks with the number of the cell. Returns a sentence if there are
+/// no rooms.
 pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
     let rooms: Vec<CellId> = world.graph.indoor_cells().map(|c| c.0).collect();
     if rooms.is_empty() {
@@ -82,7 +84,7 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
     let most = rooms.iter().map(|c| volume(world, *c)).fold(1.0, f64::max);
     for (cell, p) in &at {
         let radius = RADII[0] + (RADII[1] - RADII[0]) * (volume(world, *cell) / most).sqrt();
-        // A ring for rooms with a way or a view out.
+        // Thick rings mark rooms with an opening to the outdoors.
         let ring = openings.get(cell).map_or("#444", |kind| stroke(*kind));
         let width = if openings.contains_key(cell) { 3 } else { 1 };
         let _ = writeln!(
@@ -116,7 +118,7 @@ fn stroke(kind: PortalKind) -> &'static str {
     }
 }
 
-/// The pairs of rooms that portals join, each with the kind of portal that says most: a way rather than a view.
+/// The pairs of rooms that portals join, each with its most important kind of portal: passages before windows.
 fn edges(world: &World) -> BTreeMap<(CellId, CellId), PortalKind> {
     let mut out: BTreeMap<(CellId, CellId), PortalKind> = BTreeMap::new();
     for portal in &world.graph.portals {
@@ -129,7 +131,7 @@ fn edges(world: &World) -> BTreeMap<(CellId, CellId), PortalKind> {
     out
 }
 
-/// The rooms that portals join to the outdoors, with the kind that says most.
+/// The rooms that portals join to the outdoors, each with its most important kind of portal.
 fn openings(world: &World) -> BTreeMap<CellId, PortalKind> {
     let mut out: BTreeMap<CellId, PortalKind> = BTreeMap::new();
     for portal in &world.graph.portals {
@@ -145,7 +147,7 @@ fn openings(world: &World) -> BTreeMap<CellId, PortalKind> {
     out
 }
 
-/// Where the rooms are on the plan, storeys below each other, so large that a room has about its share of room.
+/// Places of the rooms on the plan, upper storeys at the top, scaled to the space that so many rooms need.
 fn start(world: &World, storeys: &[&Storey], rooms: &[CellId]) -> Vec<DVec2> {
     let middle = |c: CellId| {
         let [low, high] = world.graph[c].aabb;
@@ -159,7 +161,7 @@ fn start(world: &World, storeys: &[&Storey], rooms: &[CellId]) -> Vec<DVec2> {
         (low, high) = (low.min(middle(c)), high.max(middle(c)));
     }
     let size = (high - low).max(DVec2::ONE);
-    // The upper storeys above, as one draws them.
+    // Upper storeys at the top, as is usual in drawings.
     let main = || storeys.iter().filter(|s| !s.is_between);
     let n = main().count().max(1);
     let row = |c: CellId| main().position(|s| s.cells.contains(&c)).unwrap_or(0);
@@ -171,14 +173,14 @@ fn start(world: &World, storeys: &[&Storey], rooms: &[CellId]) -> Vec<DVec2> {
     rooms.iter().map(|&c| place(c)).collect()
 }
 
-/// Moves the rooms until pull and push are about equal.
+/// Moves the rooms until pull and push are roughly equal.
 fn lay_out(rooms: &[CellId], edges: &BTreeMap<(CellId, CellId), PortalKind>, places: &mut [DVec2]) {
     let mut graph = <ForceGraph>::new(SimulationParameters {
-        // Of two rooms with a doorway, the pull 0.5 · spring · d equals the push charge / d² at the distance above.
+        // For two rooms with a doorway, the pull 0.5 · spring · d equals the push charge / d² at the distance above.
         force_spring: 1.0,
         force_charge: (0.5 * DISTANCE.powi(3)) as f32,
         force_max: 2000.0,
-        // With the step below: a fiftieth of the force a step, which is stable up to a hundred doorways of a room.
+        // With the step below, a fiftieth of the force per step: stable for up to a hundred doorways per room.
         node_speed: 20.0,
         damping_factor: 0.85,
     });
@@ -187,7 +189,7 @@ fn lay_out(rooms: &[CellId], edges: &BTreeMap<(CellId, CellId), PortalKind>, pla
         .enumerate()
         .map(|(i, p)| {
             graph.add_node(NodeData {
-                // Two rooms above each other would push in no direction.
+                // Two rooms exactly above each other would have no direction to push in.
                 x: (p.x + (i % 7) as f64) as f32,
                 y: (p.y + (i % 11) as f64) as f32,
                 mass: 1.0,
@@ -213,7 +215,8 @@ fn lay_out(rooms: &[CellId], edges: &BTreeMap<(CellId, CellId), PortalKind>, pla
     }
 }
 
-/// Edges that are not drawn: each part that no doorway joins to the first is tied to its nearest room, or it would drift away.
+/// Edges that are not drawn: ties each part without a doorway to the first part to its nearest room, so that it does
+/// not drift away.
 fn bonds(joined: &[[usize; 2]], places: &[DVec2]) -> Vec<[usize; 2]> {
     let mut part: Vec<usize> = (0..places.len()).collect();
     fn root(part: &mut [usize], mut i: usize) -> usize {
@@ -247,7 +250,7 @@ fn bounds(places: &[DVec2]) -> (DVec2, DVec2) {
         .fold(start, |(low, high), p| (low.min(*p), high.max(*p)))
 }
 
-/// Makes the whole as small as the number of disks allows, and no wider than the page if it can be.
+/// Shrinks the drawing as far as the number of disks allows, and to the width of the page if possible.
 fn tighten(places: &mut [DVec2]) {
     let (low, high) = bounds(places);
     let size = (high - low).max(DVec2::ONE);
@@ -261,7 +264,7 @@ fn tighten(places: &mut [DVec2]) {
     }
 }
 
-/// Pushes apart what is nearer than a disk is wide.
+/// Pushes apart disks that overlap.
 fn spread(places: &mut [DVec2]) {
     for _ in 0..500 {
         let mut is_moved = false;
@@ -276,13 +279,13 @@ fn spread(places: &mut [DVec2]) {
                 }
                 let distance = apart.length();
                 if distance < LEAST_DISTANCE {
-                    // Two on one spot part in a direction of their own, or a heap of them would become a row.
+                    // Coinciding disks part in directions of their own, or a heap of them would become a row.
                     let way = if distance > 1e-6 {
                         apart / distance
                     } else {
                         WAYS[(a + b) % WAYS.len()]
                     };
-                    // A little more than needed, so that this comes to an end.
+                    // Slightly more than needed, so that the loop ends.
                     let push = way * (0.5 * (LEAST_DISTANCE - distance) + 0.05);
                     places[a] -= push;
                     places[b] += push;

@@ -1,4 +1,4 @@
-//! One page about a world: plans, graph, visibility, tables, pictures. Self-contained, printable.
+//! A page about one world: plans, graph, visibility, tables, pictures. Self-contained, printable.
 
 use std::fmt::Write;
 
@@ -13,13 +13,13 @@ use crate::plan::{PlanOptions, Plans};
 use crate::storeys::Storey;
 use crate::svg::escaped;
 
-/// Rows of the table of rooms at most.
+/// Most rows in the table of rooms.
 const MAX_ROWS: usize = 1000;
 
 /// A picture of the page.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// What is below it.
+    /// Text below it.
     pub caption: String,
     /// A PNG file.
     pub png: Vec<u8>,
@@ -28,32 +28,33 @@ pub struct Figure {
 /// A table of the page; the first row is its head.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// What is above it.
+    /// Text above it.
     pub title: String,
-    /// A sentence that says what it means.
+    /// A sentence that explains it.
     pub note: String,
-    /// Cells by row, the first of each left-aligned, numbers right-aligned.
+    /// Cells by row. The first of each row is left-aligned; numbers are right-aligned.
     pub rows: Vec<Vec<String>>,
 }
 
-/// What goes on the page beside what the world itself tells.
+/// Content of the page that the world itself does not contain.
 #[derive(Clone, Debug, Default)]
 pub struct ReportParts {
     /// The title, e.g. the file's name.
     pub title: String,
-    /// By cell: what can be seen from it, as `enfilade pvs` finds it.
+    /// The cells visible from each cell, as computed by `enfilade pvs`.
     pub visible: Pvs,
     /// Tables of measurements.
     pub tables: Vec<Table>,
     /// Pictures.
     pub figures: Vec<Figure>,
-    /// Sentences on what is missing, and why.
+    /// Sentences that name missing parts, with reasons.
     pub notes: Vec<String>,
 }
 
-/// Writes the page. The world must be valid; the same parts give the same bytes.
+/// Writes the page. The world must be valid. The same parts give the same bytes.
 ///
-/// All that shows a cell carries its number as `data-cell`; a script of the page's own marks the others where a pointer rests on one.
+/// Every element that shows a cell carries its number as `data-cell`. When a pointer rests on one, a script in the
+/// page highlights the others.
 #[must_use]
 pub fn report_html(world: &World, parts: &ReportParts) -> String {
     let plans = Plans::new(world, &PlanOptions::default());
@@ -129,7 +130,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     out
 }
 
-/// Marks what belongs to a cell wherever it is shown, and hides voids. The page is whole without it.
+/// Highlights the elements of a cell, and hides voids. The page is complete without it.
 const SCRIPT: &str = include_str!("report.js");
 
 const STYLE: &str = "\
@@ -183,7 +184,7 @@ fn figures(out: &mut String, figures: &[Figure]) {
     out.push_str("</div>\n");
 }
 
-/// `cells` are those of the rows after the head, where the rows are about cells.
+/// `cells` are the cells of the rows after the head, if the rows describe cells.
 fn table(out: &mut String, t: &Table, cells: &[CellId]) {
     let _ = write!(
         out,
@@ -254,7 +255,7 @@ fn rooms(world: &World, storeys: &[&Storey]) -> (Table, Vec<CellId>) {
     (table, cells.iter().map(|c| CellId(c.0)).collect())
 }
 
-/// Which room can be seen from which; twice where there are voids, with and without them.
+/// Writes the matrix of visible pairs of rooms; if there are voids, twice: with and without them.
 fn matrix(out: &mut String, world: &World, plans: &Plans, visible: &Pvs) {
     let storeys: Vec<&Storey> = plans.storeys().collect();
     let all = Order::new(world, &storeys, visible, |_| true);
@@ -314,7 +315,7 @@ mod tests {
         };
         let page = report_html(&world, &parts);
         assert!(!page.contains("<script>x"), "{page}");
-        // Names of name spaces are no addresses to load from.
+        // Namespace names are not addresses to load from.
         let outside = page.replace("http://www.w3.org/2000/svg", "");
         assert!(
             !outside.contains("http") && !outside.contains("src=\"/"),

@@ -1,4 +1,4 @@
-//! Finds a place and a size for the name of a cell, inside the cell.
+//! Fits the name of a cell into the cell: finds a place and a size.
 
 use std::borrow::Cow;
 
@@ -6,21 +6,22 @@ use enfilade_geom::DVec2;
 
 use crate::section::{Label, Region, Section};
 
-/// The width of a letter, as part of its height: an upper estimate over the usual fonts, since every viewer has its own.
+/// The width of a letter as a fraction of its height: an upper estimate over common fonts, since each viewer has its
+/// own.
 const LETTER: f64 = 0.62;
-/// The height of a line, as part of the letters' height.
+/// The height of a line as a fraction of the letters' height.
 const LINE: f64 = 1.15;
-/// What a size is multiplied by until the words fit.
+/// Factor on the size until the text fits.
 const SMALLER: f64 = 0.88;
-/// Height of the area below a name, as part of the name's.
+/// Height of the area below a name as a fraction of the name's.
 const AREA: f64 = 0.7;
-/// A number may be this much smaller than what is readable without a magnifying glass, rather than not be there.
+/// A number may shrink to this fraction of the least readable size rather than be left out.
 const TINY: f64 = 0.5;
 
-/// Letters of a name in drawings and pages, at most.
+/// Most letters of a name in drawings and pages.
 const LONGEST: usize = 64;
 
-/// A name as it is drawn: of more than 64 letters the first 63, and an ellipsis.
+/// A name as drawn: the first 63 letters and an ellipsis if it has more than 64.
 pub(crate) fn shortened(name: &str) -> Cow<'_, str> {
     let mut ends = name.char_indices().map(|(at, _)| at);
     let (last, beyond) = (ends.nth(LONGEST - 1), ends.next());
@@ -37,23 +38,24 @@ pub(crate) struct Sizes {
     pub(crate) most: f64,
 }
 
-/// Lines of words and where they stand.
+/// Lines of text and their place.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Fitted {
     /// Top line first.
     pub(crate) lines: Vec<String>,
-    /// The last line is the area, and smaller.
+    /// The last line is the area, in smaller letters.
     pub(crate) has_area: bool,
-    /// The middle of all. [Units: wu]
+    /// The center of all lines. [Units: wu]
     pub(crate) at: DVec2,
     /// [Units: wu]
     pub(crate) size: f64,
     pub(crate) is_turned: bool,
-    /// The name did not fit; its number stands for it.
+    /// The name did not fit; the cell's number replaces it.
     pub(crate) is_number: bool,
 }
 
-/// Fits the name, and the area if there is room: in one line, else turned, else in several lines, else the number alone.
+/// Fits the name, with the area if there is space: on one line, else turned, else on several lines, else the number
+/// alone.
 pub(crate) fn fit(
     section: &Section,
     (label, region): (Label, &Region),
@@ -88,14 +90,15 @@ pub(crate) fn fit(
     })
 }
 
-/// About how wide words are, in heights of their letters.
+/// The estimated width of text, in heights of its letters.
 pub(crate) fn width(words: &str) -> f64 {
-    // Letters of East Asian scripts are as wide as high.
+    // East Asian letters are as wide as they are high.
     let letter = |c: char| if c < '\u{1100}' { LETTER } else { 1.0 };
     words.chars().map(letter).sum()
 }
 
-/// The parts of a name that may stand below each other: broken after spaces, hyphens, underscores and dots.
+/// The parts of a name that may go on separate lines: broken after spaces, hyphens, underscores, dots, colons and
+/// slashes.
 fn wrapped(name: &str) -> Vec<String> {
     let parts = name.split_inclusive([' ', '-', '_', '.', ':', '/']);
     parts
@@ -150,7 +153,7 @@ impl Try {
         }
     }
 
-    /// The largest size, and a place for it.
+    /// The largest size that fits, with its place.
     fn largest(&self, mask: &Mask, sizes: Sizes) -> Option<Fitted> {
         let extent = self.extent();
         let mut size = sizes.most;
@@ -170,13 +173,13 @@ impl Try {
     }
 }
 
-/// Where one label is, with sums over rectangles: whether words fit somewhere is four look-ups.
+/// The points of one label, with sums over rectangles: a test of whether a text fits takes four look-ups.
 struct Mask {
     origin: DVec2,
     step: f64,
     width: usize,
     height: usize,
-    /// Points of the label above and left of each corner; rows of `width + 1`.
+    /// Number of the label's points above and left of each grid vertex; rows of `width + 1`.
     sums: Vec<u32>,
     /// A point well inside.
     inner: DVec2,
@@ -208,7 +211,8 @@ impl Mask {
         self.inner
     }
 
-    /// The middle of a rectangle of this size in the label, the nearest to its inner point.
+    /// The center of a rectangle of this size inside the label, the one nearest to its inner point; `None` if it does
+    /// not fit.
     fn place(&self, size: DVec2) -> Option<DVec2> {
         let points = (size / self.step).ceil();
         if points.x > self.width as f64 || points.y > self.height as f64 {
@@ -224,7 +228,7 @@ impl Mask {
             self.origin + (DVec2::new(x as f64, y as f64) + 0.5 * points) * self.step
         };
         let mut best: Option<(f64, DVec2)> = None;
-        // An eighth of a letter more or less is not seen.
+        // An error of an eighth of a letter is invisible.
         let stride = (h.min(w) / 8).max(1);
         for y in (0..=self.height - h).step_by(stride) {
             for x in (0..=self.width - w).step_by(stride) {
@@ -240,13 +244,13 @@ impl Mask {
     }
 }
 
-/// Height of the area's letters, as part of the name's.
+/// Height of the letters of a line: smaller for the area.
 pub(crate) fn line_size(fitted: &Fitted, line: usize) -> f64 {
     let is_area = fitted.has_area && line + 1 == fitted.lines.len();
     fitted.size * if is_area { AREA } else { 1.0 }
 }
 
-/// Height from one line's top to the next one's, as part of the letters' height.
+/// Distance from one line's top to the next, as a fraction of the letters' height.
 pub(crate) const fn line_height() -> f64 {
     LINE
 }

@@ -1,5 +1,4 @@
-//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, and a page with all there
-//! is to see.
+//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, and an HTML page about a world.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -9,8 +8,8 @@
 //! assert!(svg.starts_with("<?xml"));
 //! ```
 //!
-//! Everything here reads a valid world (`World::validate`) and gives the same bytes every time. A
-//! plan is a drawing: shapes are accurate to about a pixel of its sampling grid, not evidence.
+//! All functions take a valid world (`World::validate`) and return the same bytes every time. A plan is a drawing:
+//! shapes are accurate to about a pixel of its sampling grid, not evidence.
 
 mod clip;
 mod drawing;

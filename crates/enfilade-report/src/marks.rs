@@ -1,4 +1,4 @@
-//! What a plan shows beside the cells: walls, doorways, and the objects that stand there.
+//! Marks of a plan beside the cells: walls, doorways, and objects.
 
 use enfilade_cpg::{CellId, Portal, PortalId, PortalKind, World};
 use enfilade_geom::{Aabb, DVec2, DVec3, Plane, Winding};
@@ -9,7 +9,7 @@ use crate::label::shortened;
 use crate::section::{Section, cell_of};
 use crate::storeys::Page;
 
-/// A hole in a floor belongs to the storeys on both sides of that floor, if it is no farther from them. [Units: wu]
+/// A hole in a floor belongs to the storeys on both sides if it is at most this far from them. [Units: wu]
 const FLOOR: f64 = 0.5;
 
 /// A page with its section.
@@ -17,7 +17,7 @@ pub(crate) struct View<'a> {
     pub(crate) world: &'a World,
     pub(crate) page: &'a Page,
     pub(crate) section: &'a Section,
-    /// By cut.
+    /// Height of each cut. [Units: wu]
     pub(crate) heights: &'a [f64],
 }
 
@@ -37,9 +37,9 @@ fn point(p: [f32; 3]) -> DVec3 {
 }
 
 impl View<'_> {
-    /// Structural triangles cut by the plane of the place, as one path.
+    /// Structural triangles cut at the heights of the page, as one path.
     pub(crate) fn walls(&self) -> Item {
-        // In tenths of millimeters, so that the two sides of a sheet are one line.
+        // In tenths of millimeters, so that the two sides of a thin sheet become one line.
         let mut lines: Vec<[[i64; 2]; 2]> = Vec::new();
         let rounded = |p: DVec2| [p.x, p.y].map(|x| (x * 1e3).round() as i64);
         for batch in &self.world.batches {
@@ -66,9 +66,9 @@ impl View<'_> {
         path(Class::Wall, lines, false, None)
     }
 
-    /// The parts of a line of cut `k` that lie where that cut is shown.
+    /// The parts of a line of cut `k` that lie where the page shows that cut.
     fn shown_parts(&self, k: usize, a: DVec2, b: DVec2) -> Vec<(DVec2, DVec2)> {
-        // What reaches far beyond the page would take as many steps.
+        // The part far beyond the page would only cost steps.
         let Some((a, b)) = clipped(a, b, self.section.surroundings()) else {
             return Vec::new();
         };
@@ -93,7 +93,7 @@ impl View<'_> {
         out
     }
 
-    /// A line for an upright portal, at its true width; an outline for a level one; nothing for one of another storey.
+    /// A line of true width for an upright portal; an outline for a level one; nothing for one of another storey.
     pub(crate) fn portal(&self, id: PortalId) -> Option<Item> {
         let portal = &self.world.graph[id];
         let outline: Vec<DVec3> = portal.outline.iter().map(|&p| point(p)).collect();
@@ -126,8 +126,8 @@ impl View<'_> {
         let mut segments = self.segments(portal, &flat);
         let mut class = class;
         if segments.is_empty() {
-            // Not cut: what is in the storey all the same, by half of its height at least (a lintel
-            // may hang through a ceiling, and a sill stand in the floor), is drawn as wide as it is.
+            // Not cut: a portal that is in the storey by at least half of its height (a lintel may hang through a
+            // ceiling, a sill stand in the floor) is still drawn at its true width.
             let is_inside =
                 |(floor, top): (f64, f64)| high.min(top) - low.max(floor) > 0.5 * (high - low);
             if !self.spans(portal).any(is_inside) {
@@ -145,7 +145,7 @@ impl View<'_> {
         Some(path(class, lines, false, hint))
     }
 
-    /// From which to which height the portal's cells are on this page.
+    /// Lowest and highest height of the portal's cells on this page, for each cut. [Units: wu]
     fn spans(&self, portal: &Portal) -> impl Iterator<Item = (f64, f64)> {
         let cuts = self.page.cuts.iter();
         let cells = portal.cells;
@@ -155,7 +155,8 @@ impl View<'_> {
         })
     }
 
-    /// Where the cuts that show one of its cells cross the portal; or the main cut, where it shows one of another storey.
+    /// Segments where the cuts that show one of its cells cross the portal; those of the main cut if the page shows a
+    /// cell of another storey beside it.
     fn segments(&self, portal: &Portal, flat: &[DVec2]) -> Vec<(DVec2, DVec2)> {
         let pieces = |y: f64| -> Vec<(DVec2, DVec2)> {
             let cut = |piece: &Vec<[f32; 3]>| {
@@ -172,7 +173,7 @@ impl View<'_> {
                 }
             }
         }
-        // Beside it one sees the cell of another storey.
+        // A cell of another storey is visible beside the portal.
         let middle = flat.iter().sum::<DVec2>() / flat.len().max(1) as f64;
         let normal = DVec2::new(portal.normal[0].into(), portal.normal[2].into());
         let is_seen = [-2.0, 2.0].into_iter().any(|side| {
@@ -220,7 +221,8 @@ impl View<'_> {
             .iter()
             .map(|p| p.y)
             .fold(f64::NEG_INFINITY, f64::max);
-        // What hangs above the cut is not seen from it. What touches outdoors only stands on the ground around the storey.
+        // Objects above the cut are not visible from it. Objects that touch only the outdoors stand on the ground
+        // around the storey.
         let is_indoor = |c: &CellId| !self.world.graph[*c].outdoor;
         let cuts = || self.page.cuts.iter().zip(self.heights).enumerate();
         let is_here = cuts().any(|(k, (cut, &y))| {
@@ -253,8 +255,9 @@ impl View<'_> {
         ))
     }
 
-    /// Area of the boxes of some cells: no object stands in a room that is smaller than itself, but the box around parts of it that
-    /// lie far apart may be. [Units: wu²]
+    /// Area of the boxes of some cells. [Units: wu²]
+    ///
+    /// An object cannot stand in a room smaller than itself, but the box around its scattered parts may be larger.
     fn room_of(&self, cells: &[CellId]) -> f64 {
         let side = |c: &CellId, axis: usize| {
             let [low, high] = self.world.graph[*c].aabb;
@@ -271,7 +274,7 @@ fn footprint(corners: &[DVec2]) -> f64 {
     0.5 * twice.sum::<f64>().abs()
 }
 
-/// Where a convex polygon crosses the height `y`, seen from above.
+/// The segment where a convex polygon crosses the height `y`, seen from above.
 fn cut(corners: &[DVec3], y: f64) -> Option<(DVec2, DVec2)> {
     let mut ends = [DVec2::ZERO; 2];
     let mut n = 0;
@@ -311,7 +314,7 @@ fn joined(segments: &[(DVec2, DVec2)]) -> Vec<(DVec2, DVec2)> {
     let mut out: Vec<(DVec2, DVec2)> = Vec::new();
     for (a, b) in sorted {
         match out.last_mut() {
-            // A millimeter: as far as is drawn.
+            // A millimeter: the precision of the drawing.
             Some(last) if along.dot(a) <= along.dot(last.1) + 1e-3 => {
                 if along.dot(b) > along.dot(last.1) {
                     last.1 = b;

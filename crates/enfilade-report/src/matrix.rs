@@ -1,4 +1,4 @@
-//! Which room can be seen from which, as a square with a row and a column for each room.
+//! Visibility between rooms, as a square with a row and a column for each room.
 
 use std::fmt::Write;
 
@@ -8,23 +8,23 @@ use crate::label::shortened;
 use crate::storeys::Storey;
 use crate::svg::escaped;
 
-/// Rooms of a matrix at most; larger worlds show the largest rooms.
+/// Most rooms of a matrix; larger worlds show the largest rooms.
 const MAX_ROOMS: usize = 200;
 /// Side of a square. [Units: pixels]
 const SIDE: usize = 11;
-/// Room for the numbers beside and above the squares. [Units: pixels]
+/// Space for the numbers beside and above the squares. [Units: pixels]
 const HEAD: usize = 30;
 
-/// The rooms of a matrix, storey by storey, each only once.
+/// The rooms of a matrix, grouped by storey, each only once.
 pub(crate) struct Order {
     /// Ascending within a storey.
     pub(crate) cells: Vec<CellId>,
-    /// Before which rows another storey begins.
+    /// Rows at which another storey begins.
     pub(crate) starts: Vec<usize>,
 }
 
 impl Order {
-    /// Of all cells that the answer knows and `is_shown` wants, the outdoors last.
+    /// Lists all cells that `visible` covers and `is_shown` accepts, the outdoors last.
     pub(crate) fn new(
         world: &World,
         storeys: &[&Storey],
@@ -50,7 +50,7 @@ impl Order {
     }
 }
 
-/// Draws the matrix as an element `svg`.
+/// Draws the matrix as an `svg` element.
 pub(crate) fn matrix_svg(world: &World, visible: &Pvs, order: &Order) -> String {
     let n = order.cells.len();
     let (side, size) = (SIDE, n * SIDE);

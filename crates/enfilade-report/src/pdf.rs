@@ -1,4 +1,4 @@
-//! Writes drawings as PDF, each on a page of paper, at a scale that architects use.
+//! Writes drawings as PDF, each on a page of paper, at a scale in architectural use.
 
 use std::fmt;
 use std::io::Write as _;
@@ -14,12 +14,12 @@ use crate::drawing::{Class, Drawing, INK, Item, Path, Rgb, Words};
 use crate::font::Fonts;
 use crate::raster::laid;
 
-/// Points a millimeter.
+/// Points per millimeter.
 const POINT: f64 = 72.0 / 25.4;
-/// Paper that printers leave white, and room for the scale below the drawing. [Units: mm]
+/// Paper that printers leave white, and space for the scale below the drawing. [Units: mm]
 const MARGIN: f64 = 10.0;
 const FOOT: f64 = 8.0;
-/// Scales in use, times powers of ten.
+/// Common scales, times powers of ten.
 const SCALES: [f64; 7] = [1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 7.5];
 
 /// A size of paper.
@@ -31,7 +31,7 @@ pub struct Paper {
     pub sides: [f64; 2],
 }
 
-/// The sizes that there are, the smallest first.
+/// The supported sizes, smallest first.
 pub const PAPERS: [Paper; 8] = [
     Paper {
         name: "A5",
@@ -70,13 +70,13 @@ pub const PAPERS: [Paper; 8] = [
 /// A drawing that does not fit its paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperError {
-    /// The scale that was asked for is 1 to this.
+    /// The requested scale is 1 to this.
     pub scale: f64,
     /// Width and height of the drawing at that scale. [Units: mm]
     pub size: [f64; 2],
     /// The paper's name.
     pub paper: &'static str,
-    /// The scale that fits is 1 to this.
+    /// The largest common scale that fits is 1 to this.
     pub fits: f64,
 }
 
@@ -85,7 +85,7 @@ impl fmt::Display for PaperError {
         let [w, h] = self.size;
         write!(
             f,
-            "at 1:{} the drawing is {w:.0} × {h:.0} mm and does not fit {} with its margins; 1:{} does, or larger paper",
+            "at 1:{} the drawing is {w:.0} × {h:.0} mm and does not fit {} with its margins; use 1:{} or larger paper",
             self.scale, self.paper, self.fits
         )
     }
@@ -93,12 +93,12 @@ impl fmt::Display for PaperError {
 
 impl std::error::Error for PaperError {}
 
-/// Writes each drawing as a page. `scale` is 1 to that many; where it is not given, each page gets the largest in use that fits.
-/// Words can be searched for. The same drawings give the same bytes.
+/// Writes each drawing as a page. `scale` is 1 to that number; without it, each page gets the largest common scale
+/// that fits. The text can be searched. The same drawings give the same bytes.
 ///
 /// # Errors
 ///
-/// [`PaperError`] when a drawing does not fit the paper at the given scale.
+/// [`PaperError`] if a drawing does not fit the paper at the given scale.
 pub fn to_pdf(
     drawings: &[Drawing],
     paper: Paper,
@@ -144,7 +144,7 @@ pub fn to_pdf(
     Ok(pdf.finish())
 }
 
-/// Where a drawing is on its paper.
+/// Placement of a drawing on its paper.
 struct OnPaper {
     /// Width and height. [Units: mm]
     paper: [f64; 2],
@@ -184,7 +184,7 @@ impl OnPaper {
 
     /// The page's commands, compressed.
     fn content(&self, drawing: &Drawing, fonts: &Fonts) -> Vec<u8> {
-        // Points a world unit.
+        // Points per world unit.
         let unit = 1e3 / self.scale * POINT;
         let top = (self.paper[1] - MARGIN) * POINT;
         let base = Affine::new([unit, 0.0, 0.0, -unit, MARGIN * POINT, top]);
@@ -214,13 +214,13 @@ impl OnPaper {
         });
         let commands = pen.content.finish();
         let mut out = ZlibEncoder::new(Vec::new(), Compression::default());
-        // Into memory, where writing cannot fail.
+        // Writing to memory cannot fail.
         let written = out.write_all(&commands).and_then(|()| out.finish());
         written.unwrap_or_default()
     }
 }
 
-/// The largest scale in use (1 to the smallest number) that is no larger than 1 to `least`.
+/// The largest common scale (1 to the smallest number) that is at most 1 to `least`.
 fn usual_scale(least: f64) -> f64 {
     let power = 10.0_f64.powi(least.max(1.0).log10().floor() as i32);
     let usual = SCALES.iter().map(|s| s * power);
@@ -236,7 +236,7 @@ struct Pen<'a> {
     /// From the drawing to points.
     base: Affine,
     place: DVec2,
-    /// Width of a line of 1. [Units: points]
+    /// Width of a line of width 1. [Units: points]
     line: f64,
 }
 
@@ -286,7 +286,7 @@ impl Pen<'_> {
         self.content.restore_state();
     }
 
-    /// Outlines to look at, and the same words unseen to search for, as far as a standard font has them.
+    /// Draws visible outlines, and the same text invisibly for searching, as far as a standard font covers it.
     fn words(&mut self, words: &Words) {
         let (outline, length) = self.fonts.outlines(&words.text);
         let at = self.place + words.at;
@@ -300,7 +300,7 @@ impl Pen<'_> {
             .chars()
             .map(|c| u8::try_from(u32::from(c)).unwrap_or(b'?'))
             .collect();
-        // The text's own y goes up.
+        // In text space, y points up.
         let matrix = (laid * Affine::scale_non_uniform(1.0, -1.0)).as_coeffs();
         self.content
             .begin_text()
@@ -322,7 +322,7 @@ impl Pen<'_> {
                     self.content.line_to(p.x as f32, p.y as f32);
                 }
                 PathEl::QuadTo(c, p) => {
-                    // The cubic curve that is the same.
+                    // The equivalent cubic curve.
                     let [a, b] = [last.lerp(c, 2.0 / 3.0), p.lerp(c, 2.0 / 3.0)];
                     self.cubic([a, b, p]);
                 }

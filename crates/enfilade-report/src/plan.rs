@@ -1,4 +1,4 @@
-//! Floor plans: a section of each storey, with names, and sheets of them.
+//! Floor plans: a section of each storey with names, and sheets of several plans.
 
 use std::collections::BTreeSet;
 
@@ -12,16 +12,16 @@ use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
 use crate::storeys::{Page, Storey, find_pages};
 
-/// Air around each plan, for its title. [Units: wu]
+/// Space around each plan, for its title. [Units: wu]
 const MARGIN: f64 = 1.2;
-/// Letters of names are no higher than this in a small house. [Units: wu]
+/// Largest height of the letters of names, in a small house. [Units: wu]
 const NAME: f64 = 0.32;
-/// Letters of the legend, in a small house. [Units: wu]
+/// Height of the legend's letters, in a small house. [Units: wu]
 const SMALL: f64 = 0.16;
-/// The smallest letters, as part of the longer side of a sheet: 1.2 mm on A4, 6.5 pixels of 1600.
+/// The smallest letters as a fraction of the longer side of a sheet: 1.2 mm on A4, 6.5 pixels of 1600.
 const LEGIBLE: f64 = 0.004;
 
-/// How to draw plans.
+/// Settings for plans.
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
     /// Height of the cut above each floor. [Units: wu] [Limit: above 0]
@@ -30,27 +30,27 @@ pub struct PlanOptions {
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        // The usual height of architects' plans: above sills, below lintels.
+        // The usual height in architectural plans: above sills, below lintels.
         Self { cut_height: 1.2 }
     }
 }
 
 /// The plans of all storeys of a world.
 ///
-/// Every indoor cell is drawn and named on one of them at least: where its floor is; a space without a floor beside the rooms that
-/// it lies beside, or on a plan of such spaces; and a cell that is thinner than a drawing shows as the outline of its box.
+/// At least one plan shows and names each indoor cell: where its floor is; for a space without a floor, beside its
+/// neighbors or on a plan of such spaces; for a cell thinner than the drawing resolves, as the outline of its box.
 pub struct Plans<'a> {
     world: &'a World,
     cut_height: f64,
     pages: Vec<Drawn>,
-    /// Cells of which no plan shows anything but a box.
+    /// Cells that plans show only as a box.
     thin: BTreeSet<CellId>,
     voids: Vec<CellId>,
     min: DVec2,
     max: DVec2,
 }
 
-/// A storey, cut.
+/// A storey with its section.
 struct Drawn {
     page: Page,
     heights: Vec<f64>,
@@ -84,7 +84,7 @@ impl Drawn {
     }
 }
 
-/// The indoor cells that no plan shows.
+/// The indoor cells that are on no plan.
 fn hidden_cells(world: &World, pages: &[Drawn]) -> BTreeSet<CellId> {
     let regions = pages.iter().flat_map(|p| &p.regions);
     let shown = regions.filter_map(|r| cell_of(r.0)).filter(|c| c.1);
@@ -93,8 +93,8 @@ fn hidden_cells(world: &World, pages: &[Drawn]) -> BTreeSet<CellId> {
     indoor.filter(|c| !shown.contains(c)).collect()
 }
 
-/// Draws the floor plans of all storeys as one SVG document; x runs right and z down, as seen from
-/// above. One drawing unit is a centimeter.
+/// Draws the floor plans of all storeys as one SVG document; x points right and z down, as seen from above. One
+/// drawing unit is a centimeter.
 ///
 /// The world must be valid (`World::validate`). Time grows with the area drawn and the triangles.
 #[must_use]
@@ -112,7 +112,7 @@ impl<'a> Plans<'a> {
         let (pages, voids) = find_pages(world);
         let draw = |page: Page| Drawn::new(world, page, options.cut_height, (min, max));
         let mut pages: Vec<Drawn> = pages.into_iter().map(draw).collect();
-        // What the cut of its neighbors misses, or what lies under one of them, is cut at a height of its own.
+        // A cell missed by its neighbors' cut, or hidden under one of them, is cut at a height of its own.
         let hidden: Vec<CellId> = hidden_cells(world, &pages).into_iter().collect();
         for drawn in &mut pages {
             let mut of_page = hidden.clone();
@@ -136,7 +136,7 @@ impl<'a> Plans<'a> {
         }
     }
 
-    /// The cells in which nobody can stand, ascending: shafts, spaces above ceilings, cavities.
+    /// The cells without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
     pub fn voids(&self) -> impl ExactSizeIterator<Item = CellId> {
         self.voids.iter().copied()
     }
@@ -146,7 +146,8 @@ impl<'a> Plans<'a> {
         self.pages.iter().map(|p| &p.page.storey)
     }
 
-    /// The plans that are meant by the name of a storey, `1`, or by that of a cell, `cell-3`. Ascending; empty where there is none.
+    /// Returns the plans of a storey's name (`1`) or of a cell's name (`cell-3`), ascending; empty if the name is
+    /// unknown.
     #[must_use]
     pub fn find(&self, name: &str) -> Vec<usize> {
         let by_name = self.storeys().position(|s| s.name == name);
@@ -162,13 +163,13 @@ impl<'a> Plans<'a> {
     ///
     /// # Panics
     ///
-    /// When an index is not less than the number of storeys.
+    /// If an index is not less than the number of storeys.
     #[must_use]
     pub fn sheet(&self, which: &[usize]) -> Drawing {
         let zoom = lettering(self.max - self.min, which.len());
         let margin = MARGIN * zoom;
         let size = self.max - self.min + 2.0 * margin;
-        // Rows and columns that make the sheet about three wide by two high.
+        // Rows and columns for a sheet about three wide by two high.
         let n = which.len().max(1);
         let columns = ((n as f64 * 1.5 * size.y / size.x).sqrt().round() as usize).clamp(1, n);
         let rows = n.div_ceil(columns);
@@ -183,7 +184,7 @@ impl<'a> Plans<'a> {
             },
         };
         sheet.sizes.most = sheet.sizes.most.max(2.6 * sheet.sizes.least);
-        // No title may reach the next plan, and all are of one size.
+        // All titles have one size, and none reaches the next plan.
         let room = self.max.x - self.min.x + margin;
         for &index in which {
             let title = self.title(&self.pages[index]);
@@ -234,10 +235,10 @@ impl<'a> Plans<'a> {
             let n = fitted.lines.len();
             let sizes: Vec<f64> = (0..n).map(|i| line_size(&fitted, i)).collect();
             let height: f64 = sizes.iter().sum::<f64>() * line_height();
-            // Along the lines' own down.
+            // Along the downward direction of the lines.
             let mut down = -0.5 * height;
             for (line, size) in fitted.lines.iter().zip(sizes) {
-                // The base line is a quarter of the letters' height above the line's end.
+                // The base line lies above the line's end by about a quarter of the letters' height.
                 down += size * line_height();
                 let base = down - 0.28 * size;
                 let offset = if fitted.is_turned {
@@ -280,7 +281,7 @@ impl<'a> Plans<'a> {
         })
     }
 
-    /// A cell that is thinner than the grid is fine: the box around it, and its number.
+    /// Draws a cell thinner than the grid: the box around it, and its number.
     fn draw_thin(&self, cell: CellId, sheet: &mut Sheet) {
         let [low, high] = self.world.graph[cell]
             .aabb
@@ -311,7 +312,7 @@ impl<'a> Plans<'a> {
     }
 
     fn title(&self, drawn: &Drawn) -> String {
-        // No "-0.00".
+        // Avoids "-0.00".
         let height = |h: f64| {
             let h = (h * 100.0).round() / 100.0;
             format!("{:+.2}", if h == 0.0 { 0.0 } else { h })
@@ -358,14 +359,14 @@ impl<'a> Plans<'a> {
     }
 }
 
-/// What is drawn so far.
+/// The part of the sheet drawn so far.
 struct Sheet {
     items: Vec<Item>,
     zoom: f64,
     sizes: Sizes,
     /// Height of the letters of titles. [Units: wu]
     title: f64,
-    /// Cells that have only a number somewhere on the sheet.
+    /// Cells that are labeled only by a number somewhere on the sheet.
     numbered: BTreeSet<CellId>,
 }
 
@@ -392,12 +393,12 @@ impl Sheet {
         }));
     }
 
-    /// How much larger than usual the legend is: its letters are legible, too.
+    /// Factor on the usual size of the legend, so that its letters are legible, too.
     fn legend(&self) -> f64 {
         self.zoom.max(self.sizes.least / SMALL)
     }
 
-    /// Scale bar, legend, and the names of numbered cells. Returns where they end. [Units: wu]
+    /// Draws the scale bar, the legend, and the names of numbered cells. Returns the y of their end. [Units: wu]
     fn foot(&mut self, world: &World, at: DVec2, width: f64) -> f64 {
         let (zoom, grown) = (self.zoom, self.legend());
         let is_there = |class: Class| {
@@ -439,7 +440,7 @@ impl Sheet {
                 let up = DVec2::new(0.0, -0.12) * grown;
                 let [a, b] = [line[0], line[1]];
                 self.shape(*class, vec![vec![a, b, b + up, a + up]], true);
-                // A color, as the cells have.
+                // Any color of a cell.
                 if let Some(Item::Path(path)) = self.items.last_mut() {
                     path.fill = Some(color(0));
                 }
@@ -454,7 +455,7 @@ impl Sheet {
         at.y + below
     }
 
-    /// The names that numbers stand for, in columns.
+    /// Draws the names that numbers stand for, in columns.
     fn numbers(&mut self, world: &World, below: f64, room: f64) -> f64 {
         let size = SMALL * self.legend();
         let mut rows: Vec<String> = Vec::new();
@@ -464,7 +465,7 @@ impl Sheet {
                 rows.push(format!("{}  {}", cell.0, shown(shortened(name))));
             }
         }
-        // The usual names hold their numbers.
+        // Default names contain their numbers.
         if let Some(cell) = self
             .numbered
             .iter()
@@ -485,8 +486,8 @@ impl Sheet {
     }
 }
 
-/// How much larger than usual letters and margins are: sheets are looked at as a whole, whatever
-/// the size of the building. Whole numbers keep the scale bar round.
+/// Factor on the usual size of letters and margins: a sheet is viewed as a whole, whatever the size of the building.
+/// Whole numbers keep the scale bar round.
 fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
     let side = (plan.x * plan.y * n_storeys.max(1) as f64).sqrt();
     [40.0, 20.0, 10.0, 4.0, 2.0]
@@ -495,7 +496,7 @@ fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// The rectangle (x and z) around all indoor cells; around the triangles where there is none.
+/// The rectangle (x and z) around all indoor cells; around the triangles if there are none.
 fn extent(world: &World) -> (DVec2, DVec2) {
     let indoor = world.graph.indoor_cells().flat_map(|(_, c)| c.aabb);
     let mut corners: Vec<[f32; 3]> = indoor.collect();
@@ -515,6 +516,6 @@ fn extent(world: &World) -> (DVec2, DVec2) {
         let p = DVec2::new(c[0].into(), c[2].into());
         bounds = (bounds.0.min(p), bounds.1.max(p));
     }
-    // Room for the thickness of outer walls.
+    // Leaves space for the thickness of outer walls.
     (bounds.0 - 0.5, bounds.1 + 0.5)
 }

@@ -13,7 +13,7 @@ use vello_cpu::{
 use crate::drawing::{Class, Drawing, INK, Item, Path, Rgb, Words};
 use crate::font::Fonts;
 
-/// Most pixels along a side.
+/// Largest number of pixels along a side.
 pub const MAX_PIXELS: u32 = 16_384;
 
 /// A picture that cannot be made.
@@ -21,10 +21,10 @@ pub const MAX_PIXELS: u32 = 16_384;
 pub enum RasterError {
     /// A side is 0, or longer than [`MAX_PIXELS`]. [Units: pixels]
     Size {
-        /// Width and height that were asked for.
+        /// The requested width and height.
         size: [u32; 2],
     },
-    /// The encoder's words.
+    /// The encoder's message.
     Encoding(String),
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for RasterError {
         match self {
             Self::Size { size: [w, h] } => write!(
                 f,
-                "the picture would be {w} × {h} pixels; between 1 and {MAX_PIXELS} a side can be drawn: choose another width"
+                "the picture would be {w} × {h} pixels; each side must have between 1 and {MAX_PIXELS}: choose another width"
             ),
             Self::Encoding(why) => write!(f, "the picture cannot be encoded as PNG: {why}"),
         }
@@ -43,11 +43,11 @@ impl fmt::Display for RasterError {
 impl std::error::Error for RasterError {}
 
 impl Drawing {
-    /// Draws the drawing and encodes it as PNG, `width` pixels wide. The same bytes on every run.
+    /// Draws the drawing and encodes it as PNG, `width` pixels wide. Returns the same bytes on every run.
     ///
     /// # Errors
     ///
-    /// [`RasterError::Size`] when a side is 0 or longer than [`MAX_PIXELS`].
+    /// [`RasterError::Size`] if a side is 0 or longer than [`MAX_PIXELS`].
     pub fn to_png(&self, width: u32) -> Result<Vec<u8>, RasterError> {
         let scale = f64::from(width) / self.size.x;
         let height = (self.size.y * scale).ceil() as u32;
@@ -57,7 +57,7 @@ impl Drawing {
                 size: [width, height],
             });
         }
-        // The instructions that every processor of the kind has: the same pixels on all of them.
+        // Instructions that every processor of the architecture has, so that all give the same pixels.
         let settings = RenderSettings {
             level: Level::baseline(),
             num_threads: 0,
@@ -69,7 +69,7 @@ impl Drawing {
             scale,
             place: DVec2::ZERO,
         };
-        // The last row of pixels may be only partly of the drawing.
+        // The drawing may cover the last row of pixels only in part.
         brush.paper(self.size + 1.0 / scale);
         for item in &self.items {
             match item {
@@ -91,7 +91,7 @@ impl Drawing {
     }
 }
 
-/// Nothing shines through the paper: three bytes a pixel.
+/// Encodes three bytes per pixel: the paper is opaque.
 fn encoded(pixels: &Pixmap, width: u32, height: u32) -> Result<Vec<u8>, RasterError> {
     let rgb: Vec<u8> = pixels.data().iter().flat_map(|p| [p.r, p.g, p.b]).collect();
     let mut out = Vec::new();
@@ -110,7 +110,7 @@ struct Brush {
     context: RenderContext,
     fonts: Fonts,
     zoom: f64,
-    /// Pixels a world unit.
+    /// Pixels per world unit.
     scale: f64,
     place: DVec2,
 }
@@ -146,7 +146,7 @@ impl Brush {
             } else {
                 Cap::Butt
             };
-            // Styles are in centimeters; what is thinner than half a pixel would fade away.
+            // Styles are in centimeters; lines thinner than half a pixel would fade away.
             let width = (width * self.zoom / 100.0).max(0.5 / self.scale);
             let mut stroke = Stroke::new(width).with_caps(cap);
             if !look.dashes.is_empty() {
@@ -170,7 +170,7 @@ impl Brush {
     }
 }
 
-/// From a line of words that begins at the origin to where it stands around its own place.
+/// The transform from a line of text that begins at the origin to its place and direction.
 pub(crate) fn laid(words: &Words, length: f64) -> Affine {
     let turn = if words.is_turned {
         -std::f64::consts::FRAC_PI_2

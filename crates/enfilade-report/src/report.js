@@ -1,5 +1,5 @@
 "use strict";
-// Marks what belongs to a cell wherever the page shows it, and hides spaces in which nobody can stand.
+// Highlights the elements of a cell wherever the page shows it, and hides spaces without a floor to stand on.
 (() => {
   const body = document.body;
   const of = (cell) => [

@@ -1,9 +1,8 @@
-//! A section of a world: which cell is where, as outlines.
+//! A section of a world: the cells on a plane, as outlines.
 //!
-//! The locator is asked on a grid, each point at the height of the cut that belongs there, and the borders between answers are
-//! traced and simplified.
-//! Borders are cut at the points where three answers meet and simplified piece by piece, each the
-//! same way from both sides, so that neighbors still share them.
+//! The locator is queried on a grid, each point at the height of its cut; the borders between the resulting labels
+//! are traced and simplified. Borders are cut at the points where three labels meet and simplified piece by piece,
+//! each the same way from both sides, so that neighbors still share them.
 
 use std::collections::BTreeMap;
 
@@ -12,29 +11,30 @@ use enfilade_geom::{DVec2, DVec3};
 
 use crate::storeys::Page;
 
-/// Cuts are raised by this, so that a plane of the model at just that height does not matter. [Units: wu]
+/// Cuts are raised by this, so that they avoid model planes at exactly their height.
 const OFF_PLANES: f64 = 1.37e-4;
-/// Matter is drawn as far as this from a room: walls and floors, but not the rock that a level of a game is dug into. [Units: wu]
+/// Solid matter is drawn up to this far from a room: walls and floors, but not the rock around the level of a game.
+/// [Units: wu]
 const WALL: f64 = 1.0;
 /// Most grid points along the longer side.
 const MAX_SIDE: f64 = 1200.0;
 /// Finest grid. [Units: wu]
 const FINEST: f64 = 0.02;
 
-/// The cut of a point at which nothing is drawn.
+/// Marks a point at which nothing is drawn.
 const NO_CUT: u16 = u16::MAX;
 
-/// What a grid point is in.
+/// The label of a grid point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Label {
     Outdoor,
     Solid,
-    /// A cell that is on another storey, seen from this one: the upper part of a hall.
+    /// A cell of another storey, seen from this one: the upper part of a hall.
     Beyond(u32),
     Cell(u32),
 }
 
-/// Which cuts may show something where, the likeliest first.
+/// The cuts that may apply at each place, the most likely first.
 struct Candidates {
     min: DVec2,
     tile: f64,
@@ -54,7 +54,7 @@ impl Candidates {
             let is_inside = x >= 0.0 && z >= 0.0 && x < size.x && z < size.y;
             is_inside.then(|| z as usize * width + x as usize)
         };
-        // What is small comes first: it would be lost under what is large.
+        // Small cuts first: they would be lost under large ones.
         let mut order: Vec<u16> = (0..page.cuts.len().min(usize::from(NO_CUT)) as u16).collect();
         let cut = |k: u16| &page.cuts[usize::from(k)];
         order.sort_by_key(|&k| (cut(k).tiles.len(), k));
@@ -102,7 +102,7 @@ pub(crate) fn heights(page: &Page, cut_height: f64) -> Vec<f64> {
     page.cuts.iter().map(|c| height(c.at, c.floor)).collect()
 }
 
-/// The cell of a label, and whether it belongs to the storey.
+/// The cell of a label, and `true` if it belongs to the storey.
 pub(crate) fn cell_of(label: Label) -> Option<(CellId, bool)> {
     match label {
         Label::Cell(id) => Some((CellId(id), true)),
@@ -111,21 +111,21 @@ pub(crate) fn cell_of(label: Label) -> Option<(CellId, bool)> {
     }
 }
 
-/// Border edges by the corner that they start from.
+/// Border edges by their start vertex.
 type Edges = BTreeMap<(i64, i64), Vec<(i64, i64)>>;
 
-/// The answers on a grid; rows along z, columns along x.
+/// The labels of a grid; rows along z, columns along x.
 pub(crate) struct Section {
     origin: DVec2,
     step: f64,
     width: usize,
     height: usize,
     labels: Vec<Label>,
-    /// By which cut each point was decided.
+    /// The cut that decided each point.
     cuts: Vec<u16>,
 }
 
-/// Where a cell is on the section.
+/// The area that a cell covers on the section.
 pub(crate) struct Region {
     /// Closed borders, outer and inner alike, to be filled by the even-odd rule. [Units: wu, x and z]
     pub(crate) borders: Vec<Vec<DVec2>>,
@@ -133,13 +133,13 @@ pub(crate) struct Region {
     pub(crate) area: f64,
     /// A point well inside.
     pub(crate) inner: DVec2,
-    /// The first column and row of the grid that it reaches, and how many of them.
+    /// The first column and row that it reaches; then the number of columns and rows.
     pub(crate) first: [usize; 2],
     pub(crate) size: [usize; 2],
 }
 
 impl Section {
-    /// Samples a page over the rectangle `min` to `max` (x and z), `heights` being those of its cuts.
+    /// Samples a page over the rectangle `min` to `max` (x and z); `heights` are those of its cuts.
     pub(crate) fn sample(
         world: &World,
         page: &Page,
@@ -191,7 +191,7 @@ impl Section {
         out
     }
 
-    /// Turns matter that is far from every room to paper.
+    /// Turns solid matter far from every room into paper.
     fn drop_rock(&mut self) {
         let is_room = |l: &Label| matches!(l, Label::Cell(_) | Label::Beyond(_));
         let mut is_near: Vec<bool> = self.labels.iter().map(is_room).collect();
@@ -227,17 +227,17 @@ impl Section {
         self.step
     }
 
-    /// Whether a point of the grid has this label.
+    /// Returns `true` if a point of the grid has this label.
     pub(crate) fn is(&self, label: Label, column: usize, row: usize) -> bool {
         self.labels[row * self.width + column] == label
     }
 
-    /// Where a column and a row begin. [Units: wu]
+    /// The start of a column and a row. [Units: wu]
     pub(crate) fn corner(&self, column: usize, row: usize) -> DVec2 {
         self.origin + DVec2::new(column as f64, row as f64) * self.step
     }
 
-    /// The grid point that `p` is in, if it is in the rectangle.
+    /// The index of the grid point that contains `p`, if it is in the rectangle.
     fn index(&self, p: DVec2) -> Option<usize> {
         let at = ((p - self.origin) / self.step).floor();
         let is_inside =
@@ -245,21 +245,21 @@ impl Section {
         is_inside.then(|| at.y as usize * self.width + at.x as usize)
     }
 
-    /// What is at `p`.
+    /// The label at `p`.
     pub(crate) fn label_at(&self, p: DVec2) -> Label {
         self.index(p).map_or(Label::Outdoor, |i| self.labels[i])
     }
 
-    /// The page, and eight times its size around it: beyond, nothing is cut.
+    /// The page, and eight times its size around it: nothing beyond is cut.
     pub(crate) fn surroundings(&self) -> [DVec2; 2] {
         let size = DVec2::new(self.width as f64, self.height as f64) * self.step;
         let around = 8.0 * size.max_element();
         [self.origin - around, self.origin + size + around]
     }
 
-    /// Whether something near `p` is cut by cut `k`: `p` is a border point of its part of the page.
+    /// Returns `true` if a point near `p`, a border point of its part of the page, is cut by cut `k`.
     pub(crate) fn is_cut_by(&self, k: usize, p: DVec2) -> bool {
-        // A wall that is thinner than the grid is seen from its sides only.
+        // A wall thinner than the grid is visible from its sides only.
         let reach = 1.5 * self.step;
         let around = [
             DVec2::ZERO,
@@ -288,7 +288,7 @@ impl Section {
         self.origin + DVec2::new(corner.0 as f64, corner.1 as f64) * self.step
     }
 
-    /// Every label but the outdoors with its region.
+    /// Every label except the outdoors, with its region.
     pub(crate) fn regions(&self) -> BTreeMap<Label, Region> {
         let mut edges = self.border_edges();
         let depth = self.depths();
@@ -333,7 +333,7 @@ impl Section {
         regions
     }
 
-    /// Border edges of each label, from corner to corner, the label on the right hand as drawn.
+    /// Border edges of each label, from vertex to vertex, with the label on the right as drawn.
     fn border_edges(&self) -> BTreeMap<Label, Edges> {
         let mut out: BTreeMap<Label, Edges> = BTreeMap::new();
         for row in 0..self.height as i64 {
@@ -363,7 +363,7 @@ impl Section {
         out
     }
 
-    /// Whether borders of more than two regions, or two borders, meet in a corner.
+    /// Returns `true` if borders of more than two regions, or two borders, meet at a vertex.
     fn is_junction(&self, (x, z): (i64, i64)) -> bool {
         let around = [
             self.label(x - 1, z - 1),
@@ -374,14 +374,14 @@ impl Section {
         (0..4).filter(|&k| around[k] != around[(k + 1) % 4]).count() > 2
     }
 
-    /// Links edges to closed borders and simplifies them.
+    /// Links edges into closed borders and simplifies them.
     fn trace(&self, mut edges: Edges) -> Vec<Vec<DVec2>> {
         let mut borders = Vec::new();
         while let Some((&start, _)) = edges.first_key_value() {
             let (mut path, mut at, mut heading) = (Vec::new(), start, (0, 0));
             while let Some(nexts) = edges.get_mut(&at) {
-                // Two ways out where the label touches itself at a corner: turn right, which keeps
-                // to the same square.
+                // There are two continuations where the label touches itself at a vertex: turn right, which stays at
+                // the same square.
                 let right = (at.0 - heading.1, at.1 + heading.0);
                 let k = nexts
                     .iter()
@@ -405,7 +405,7 @@ impl Section {
 
     /// Simplifies a closed border between its junctions.
     fn simplified(&self, mut path: Vec<(i64, i64)>) -> Vec<DVec2> {
-        // Without junctions, the least corner and the one farthest from it stay.
+        // Without junctions, the smallest vertex and the one farthest from it stay.
         let mut fixed: Vec<usize> = (0..path.len())
             .filter(|&i| self.is_junction(path[i]))
             .collect();
@@ -432,7 +432,7 @@ impl Section {
             if is_reversed {
                 arc.reverse();
             }
-            // The corners of a slanted line's steps lie up to √2 steps apart across it.
+            // The vertices of a slanted line's steps lie up to √2 steps apart across it.
             let mut kept = simplify(&arc, 1.5 * self.step);
             if is_reversed {
                 kept.reverse();
@@ -443,8 +443,7 @@ impl Section {
         out
     }
 
-    /// Steps from each grid point to the nearest of another label, in rounds over the four
-    /// neighbors.
+    /// Steps from each grid point to the nearest one of another label, in rounds over the four neighbors.
     fn depths(&self) -> Vec<u32> {
         let (w, h) = (self.width as i64, self.height as i64);
         let mut depth = vec![0_u32; self.labels.len()];
@@ -453,7 +452,7 @@ impl Section {
         for row in 0..h {
             for column in 0..w {
                 let label = self.label(column, row);
-                // Beyond the grid is another label too, even for what reaches its rim.
+                // Points beyond the grid count as another label, even for a region that reaches its rim.
                 let is_border = sides.iter().any(|s| {
                     let (c, r) = (column + s.0, row + s.1);
                     !(0..w).contains(&c) || !(0..h).contains(&r) || self.label(c, r) != label
@@ -497,7 +496,7 @@ fn simplify(points: &[DVec2], tolerance: f64) -> Vec<DVec2> {
         let along = b - a;
         let length = along.length();
         let distance = |p: DVec2| {
-            // A closed arc has no line; the distance from its end serves.
+            // A closed arc has no line; use the distance from its end.
             if length > 0.0 {
                 along.perp_dot(p - a).abs() / length
             } else {
@@ -532,8 +531,8 @@ mod tests {
     fn neighbors_share_every_point_of_a_jagged_border() {
         let (width, height) = (120, 90);
         let label = |i: usize| {
-            // Uneven teeth: many corners are equally far from a line, and which of them is
-            // kept depends on the direction of walking.
+            // Uneven teeth: many vertices are equally far from a line, so that the direction of walking decides which
+            // is kept.
             let (x, z) = (i % width, i / width);
             Label::Cell(u32::from(x > 50 + z * z % 7 % 4))
         };

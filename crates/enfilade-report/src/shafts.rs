@@ -1,18 +1,18 @@
-//! Where to cut the cells that have no floor to stand on: shafts, spaces above ceilings, cavities.
+//! Cuts through cells that have no floor to stand on: shafts, spaces above ceilings, cavities.
 
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::DVec3;
 
 use crate::floors::{Tiles, tile_at};
 
-/// Heights that are tried, as parts of the cell's own: the middle first.
+/// Heights to try, as fractions of the cell's height: the middle first.
 const HEIGHTS: [f64; 5] = [0.5, 0.25, 0.75, 0.1, 0.9];
-/// Points asked along each side of a cell's box: few at first, and more where these find nothing.
+/// Sample points along each side of a cell's box: few at first, more if these find nothing.
 const SIDES: [usize; 2] = [32, 128];
-/// The part of the best cut's points that another height must find to serve as well.
+/// A height serves as well as the best cut if it has at least this fraction of its points.
 const AS_GOOD: f64 = 0.5;
 
-/// A cell that nobody can stand in, and the height that shows most of it.
+/// A cell without a floor to stand on, with the height that shows most of it.
 pub(crate) struct Shaft {
     pub(crate) cell: CellId,
     /// Bottom and top of the cell. [Units: wu]
@@ -20,16 +20,16 @@ pub(crate) struct Shaft {
     pub(crate) top: f64,
     /// Height of the cut. [Units: wu]
     pub(crate) at: f64,
-    /// About how much of it is cut. [Units: wu²]
+    /// Approximate area of the cut. [Units: wu²]
     pub(crate) area: f64,
-    /// Where that is. Empty for a cell that is thinner than its points are apart.
+    /// Tiles of the cut. Empty for a cell thinner than the spacing of its points.
     pub(crate) tiles: Tiles,
-    /// The heights tried that show about as much.
+    /// The heights tried that show nearly as much.
     heights: [Option<f64>; HEIGHTS.len()],
 }
 
 impl Shaft {
-    /// Whether a cut at this height shows about as much as its own: it lies between two that do.
+    /// Returns `true` if a cut at this height shows nearly as much as its own: it lies between two that do.
     pub(crate) fn is_shown_at(&self, height: f64) -> bool {
         let known = || self.heights.iter().flatten().copied();
         let low = known().fold(self.at, f64::min);
@@ -78,7 +78,7 @@ fn shaft(world: &World, cell: CellId, tile: f64) -> Shaft {
     out
 }
 
-/// The points of a grid over the cell's box, `n` to a side, that lie in it at this height.
+/// The points of an `n` × `n` grid over the cell's box that lie in the cell at this height.
 fn points(world: &World, cell: CellId, y: f64, n: usize) -> Vec<DVec3> {
     let [low, high] = world.graph[cell].aabb.map(|p| p.map(f64::from));
     let mut out = Vec::new();

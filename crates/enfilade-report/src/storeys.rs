@@ -1,9 +1,10 @@
-//! Finds the storeys of a world: floors that meet, none of which lies above another.
+//! Finds the storeys of a world: connected floors, none of which lies above another.
 //!
-//! Levels of cells are joined where a doorway leads from one to the other without a step; then those of one height, as the wings of
-//! a building are; then, from the smallest step to the largest, those that a stair, a ramp or a drop connects. What would come to
-//! lie above or below what is joined already is not joined: so the storeys of a building stay apart, whatever stairs connect them,
-//! and a level of a game, whose floors rise and fall beside each other, is one or two plans instead of one for each height.
+//! Levels of cells are joined in three rounds: where a doorway leads from one to the other without a step; then
+//! levels of equal height, such as the wings of a building; then, from the smallest step to the largest, levels
+//! connected by a stair, a ramp or a drop. A level is not joined to a group that it would lie above or below. So the
+//! storeys of a building stay apart, whatever stairs connect them, and the level of a game, whose floors rise and
+//! fall beside each other, becomes one or two plans instead of one for each height.
 
 use std::collections::BTreeMap;
 
@@ -12,31 +13,33 @@ use enfilade_cpg::{CellId, PortalKind, World};
 use crate::floors::{Floors, Level, Tiles, find_floors};
 use crate::shafts::{Shaft, find_shafts};
 
-/// Floors that differ by no more meet without a stair: a threshold, a ramp's end, a tall step of a game. [Units: wu]
+/// Largest difference of floors that meet without a stair: a threshold, a ramp's end, a tall step of a game.
+/// [Units: wu]
 const STEP: f64 = 0.6;
-/// Floors this far apart in height may be on one plan even where nothing connects them: split levels. [Units: wu]
+/// Floors this close in height may share a plan even if nothing connects them: split levels. [Units: wu]
 const SPLIT: f64 = 1.5;
-/// The part of the smaller of two groups that may lie above or below the other; tiles at a common border do, for they are coarse.
+/// Largest fraction of the smaller of two groups that may lie above or below the other; tiles at a common border do,
+/// because they are coarse.
 const MOST_HIDDEN: f64 = 0.3;
-/// Floors of one place must differ by this to lie above each other: less is a border of two floors in one tile. [Units: wu]
+/// Floors in one tile that differ by less lie beside each other, not above. [Units: wu]
 const ABOVE: f64 = 1.5;
-/// What has less than this share of the largest storey's area is no storey of its own, if its cells are on another.
+/// A group with a smaller share of the largest storey's area is not a storey of its own if its cells are on another.
 const LEAST_SHARE: f64 = 0.05;
-/// A space without a floor may cover this part of a room on the room's plan, as that under a stair does.
+/// Largest fraction of a room that a space without a floor, such as one under a stair, may cover on the room's plan.
 const INSET: f64 = 0.2;
-/// Where this share of a page's floor is at one height, the page has one height to speak of.
+/// If at least this fraction of a page's floor is at one height, the page reports that height alone.
 const NEARLY_ALL: f64 = 0.75;
 /// Floors that differ by less are cut at one height. [Units: wu]
 const SAME_CUT: f64 = 0.5;
 
-/// A storey: floors that meet, and what stands on them; or the cells without a floor above such a storey.
+/// A storey: connected floors and the cells above them; or the cells without a floor above such a storey.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Storey {
     /// `1`, `2`, … from below; `2a`, `2b`, … for spaces without a floor, such as those above the ceilings of storey 2.
     pub name: String,
     /// Height of most of its floor. [Units: wu]
     pub floor: f64,
-    /// Height of its lowest and of its highest floor; both are `floor` where most of the area is at that height. [Units: wu]
+    /// Heights of its lowest and highest floor; both are `floor` if most of the area is at that height. [Units: wu]
     pub range: [f64; 2],
     /// Height of the next storey's floor, or the top of the highest indoor cell. [Units: wu]
     pub top: f64,
@@ -44,36 +47,36 @@ pub struct Storey {
     pub area: f64,
     /// The cells that stand on it, ascending. A cell of several levels may be in several storeys.
     pub cells: Vec<CellId>,
-    /// Whether these are spaces in which nobody can stand.
+    /// `true` for spaces without a floor to stand on.
     pub is_between: bool,
 }
 
-/// What is cut at one height.
+/// The cells cut at one height.
 #[derive(Clone, Debug)]
 pub(crate) struct Cut {
     /// Height of the floor. [Units: wu]
     pub(crate) floor: f64,
-    /// The height of the cut itself, where it does not follow from the floor. [Units: wu]
+    /// The height of the cut itself, if the floor does not determine it. [Units: wu]
     pub(crate) at: Option<f64>,
-    /// The cells that are shown by this cut, and up to which height they belong to it. [Units: wu]
+    /// The cells shown by this cut, each with the height up to which it belongs to the cut. [Units: wu]
     pub(crate) tops: BTreeMap<CellId, f64>,
-    /// Where their floors are.
+    /// Tiles of their floors.
     pub(crate) tiles: Tiles,
 }
 
-/// A storey with all that is needed to draw it.
+/// A storey with everything needed to draw it.
 #[derive(Clone, Debug)]
 pub(crate) struct Page {
     pub(crate) storey: Storey,
-    /// The one of most area first; one at least.
+    /// The cut with the largest area first; never empty.
     pub(crate) cuts: Vec<Cut>,
     /// Side of a tile. [Units: wu]
     pub(crate) tile: f64,
-    /// Which cell is shown where.
+    /// The cell shown at each tile.
     ground: BTreeMap<(i32, i32), CellId>,
 }
 
-/// The storeys, lowest first; one at least where there is an indoor cell. Every indoor cell is in one of them.
+/// Returns the storeys, lowest first; at least one if there is an indoor cell. Every indoor cell is in one of them.
 ///
 /// O(floor area + triangles + levels²) where nothing connects the levels, much less where doorways do.
 #[must_use]
@@ -81,7 +84,7 @@ pub fn find_storeys(world: &World) -> Vec<Storey> {
     find_pages(world).0.into_iter().map(|p| p.storey).collect()
 }
 
-/// The same with their cuts; and the cells in which nobody can stand, ascending.
+/// Like [`find_storeys`], with the cuts; and the cells without a floor to stand on, ascending.
 pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
     let floors = find_floors(world);
     let groups = grouped(world, &floors);
@@ -102,15 +105,15 @@ pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
     )
 }
 
-/// Levels that are drawn on one plan.
+/// Levels drawn on one plan.
 #[derive(Clone, Default)]
 struct Group {
-    /// By index, ascending after [`grouped`].
+    /// Indices of levels; ascending after [`grouped`].
     levels: Vec<usize>,
-    /// Where floors are, and how high.
+    /// Height of the floor at each tile.
     ground: BTreeMap<(i32, i32), f64>,
     area: f64,
-    /// Height of its largest level, and the area of that.
+    /// Height and area of its largest level.
     main: (f64, f64),
 }
 
@@ -124,7 +127,7 @@ impl Group {
         }
     }
 
-    /// Whether too much of one lies above or below the other.
+    /// Returns `true` if too much of one lies above or below the other.
     fn hides(&self, other: &Self) -> bool {
         let (small, large) = if self.ground.len() <= other.ground.len() {
             (self, other)
@@ -151,13 +154,13 @@ impl Group {
     }
 }
 
-/// Two levels that somebody can get between.
+/// Two levels with a way between them.
 struct Link {
     ends: [usize; 2],
     step: f64,
 }
 
-/// Joins the levels to groups, as the head of this file says.
+/// Joins the levels to groups, as described at the head of this file.
 fn grouped(world: &World, floors: &Floors) -> Vec<Group> {
     let levels = &floors.levels;
     let mut slots: Vec<Option<Group>> = levels
@@ -172,7 +175,7 @@ fn grouped(world: &World, floors: &Floors) -> Vec<Group> {
     join_alike(STEP, &mut slots, &mut slot_of);
     join_linked(&links[n_flat..], &mut slots, &mut slot_of);
     join_alike(SPLIT, &mut slots, &mut slot_of);
-    // What is small is better off beside another storey of any height than alone.
+    // A small group is better placed beside a storey of any height than alone.
     let largest = slots.iter().flatten().map(|g| g.area).fold(0.0, f64::max);
     let (small, mut out): (Vec<Group>, Vec<Group>) = slots
         .into_iter()
@@ -193,7 +196,7 @@ fn grouped(world: &World, floors: &Floors) -> Vec<Group> {
     out
 }
 
-/// Joins the groups at the ends of links, in their order, where neither hides the other.
+/// Joins the groups at the ends of each link, in order, if neither hides the other.
 fn join_linked(links: &[Link], slots: &mut [Option<Group>], slot_of: &mut [usize]) {
     for link in links {
         let [a, b] = link.ends.map(|level| slot_of[level]);
@@ -206,10 +209,10 @@ fn join_linked(links: &[Link], slots: &mut [Option<Group>], slot_of: &mut [usize
     }
 }
 
-/// Joins groups whose main heights differ by `most` at most, from below, where neither hides the other.
+/// Joins groups whose main heights differ by at most `most`, largest first, if neither hides the other.
 fn join_alike(most: f64, slots: &mut [Option<Group>], slot_of: &mut [usize]) {
     let mut order: Vec<usize> = (0..slots.len()).filter(|&k| slots[k].is_some()).collect();
-    // The largest first: what is joined keeps its height.
+    // The largest first: it keeps its height.
     let area = |k: usize| slots[k].as_ref().map_or(0.0, |g| g.area);
     order.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
     let mut hosts: Vec<usize> = Vec::new();
@@ -236,7 +239,7 @@ fn join_slots(into: usize, from: usize, slots: &mut [Option<Group>], slot_of: &m
     }
 }
 
-/// All links: from level to level of a cell, and through doorways. Those with the smallest step first.
+/// All links: from level to level within a cell, and through doorways. The smallest step first.
 fn links(world: &World, levels: &[Level]) -> Vec<Link> {
     let mut of_cell: BTreeMap<CellId, Vec<usize>> = BTreeMap::new();
     for (i, level) in levels.iter().enumerate() {
@@ -264,7 +267,8 @@ fn links(world: &World, levels: &[Level]) -> Vec<Link> {
         let high = heights().fold(f64::NEG_INFINITY, f64::max);
         for &a in one {
             for &b in other {
-                // One stands in the opening on the higher of the two floors; another pair of floors has its own doorway.
+                // A person stands in the opening on the higher of the two floors; another pair of floors has its own
+                // doorway.
                 let stand = levels[a].height.max(levels[b].height);
                 if low < stand + STEP && high > stand + STEP {
                     link(a, b);
@@ -276,7 +280,7 @@ fn links(world: &World, levels: &[Level]) -> Vec<Link> {
     out
 }
 
-/// A group as a page, without its name and top.
+/// Makes a page from a group, without its name and top.
 fn page(world: &World, floors: &Floors, group: &Group) -> Page {
     let mut order = group.levels.clone();
     let level = |k: usize| &floors.levels[k];
@@ -284,7 +288,7 @@ fn page(world: &World, floors: &Floors, group: &Group) -> Page {
     let mut cuts: Vec<(Cut, f64)> = Vec::new();
     for k in order {
         let Level { cell, height, .. } = *level(k);
-        // Up to the cell's next floor it is shown here.
+        // The cell is shown here up to its next floor.
         let own = floors.levels.iter().filter(|l| l.cell == cell);
         let next = own.map(|l| l.height).filter(|&h| h > height + SAME_CUT);
         let top = next.fold(f64::from(world.graph[cell].aabb[1][1]), f64::min);
@@ -348,7 +352,7 @@ impl Cut {
     }
 }
 
-/// Drops what is small and shows no cell that another page does not show: landings of stairs, mostly.
+/// Drops small pages whose cells are all on other pages: landings of stairs, mostly.
 fn drop_landings(pages: &mut Vec<Page>) {
     let largest = pages.iter().map(|p| p.storey.area).fold(0.0, f64::max);
     let mut shown: BTreeMap<CellId, usize> = BTreeMap::new();
@@ -368,9 +372,9 @@ fn drop_landings(pages: &mut Vec<Page>) {
     });
 }
 
-/// Puts the cells without a floor on the storeys that they stand beside, or on pages of their own.
+/// Puts the cells without a floor on the storeys beside them, or on pages of their own.
 fn place(shafts: &[Shaft], mut pages: Vec<Page>, tile: f64, highest: f64) -> Vec<Page> {
-    // By the page below: those between, in the order of their making.
+    // Keyed by the page below: the pages between, in order of creation.
     let mut between: BTreeMap<usize, Vec<Page>> = BTreeMap::new();
     for shaft in shafts {
         let below = pages.iter().rposition(|p| p.storey.floor <= shaft.at);
@@ -403,7 +407,7 @@ fn place(shafts: &[Shaft], mut pages: Vec<Page>, tile: f64, highest: f64) -> Vec
         }
     }
     if pages.is_empty() {
-        // No floor anywhere: these are the storeys.
+        // No floor anywhere: these become the storeys.
         let mut out: Vec<Page> = between.into_values().flatten().collect();
         out.sort_by(|a, b| a.storey.floor.total_cmp(&b.storey.floor));
         for (k, page) in out.iter_mut().enumerate() {
@@ -437,7 +441,8 @@ fn letters(mut index: usize) -> String {
 }
 
 impl Page {
-    /// Whether a shaft can be shown here: most of its place is free, or it is a small part of the rooms that it covers.
+    /// Returns `true` if a shaft can be shown here: most of its place is free, or it is a small part of the rooms
+    /// that it covers.
     fn has_room_for(&self, shaft: &Shaft) -> bool {
         let mut covered: BTreeMap<CellId, usize> = BTreeMap::new();
         for cell in shaft.tiles.iter().filter_map(|t| self.ground.get(t)) {
@@ -463,7 +468,7 @@ impl Page {
         self.cuts.push(cut);
     }
 
-    /// Shows a shaft, at the height of a cut that is there if that serves.
+    /// Shows a shaft, at the height of an existing cut if that serves.
     fn add(&mut self, shaft: &Shaft) {
         let storey = &mut self.storey;
         if let Err(at) = storey.cells.binary_search(&shaft.cell) {

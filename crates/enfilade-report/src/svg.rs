@@ -7,17 +7,17 @@ use enfilade_geom::{DVec2, shown};
 
 use crate::drawing::{CLASSES, Class, Drawing, INK, Item, Path, Rgb, Words};
 
-/// Drawing units a meter: centimeters, so that one decimal is a millimeter.
+/// Drawing units per meter: centimeters, so that one decimal is a millimeter.
 pub(crate) const SCALE: f64 = 100.0;
 
-/// A number with at most one decimal and without a useless one.
+/// Formats a number with at most one decimal, omitted if zero.
 pub(crate) fn number(x: f64) -> String {
     let tenths = (x * 10.0).round() as i64;
     if tenths % 10 == 0 {
         return (tenths / 10).to_string();
     }
     let sign = if tenths < 0 { "-" } else { "" };
-    // The smallest number of all has no absolute value of its own type.
+    // The smallest number of the type has no absolute value in it.
     let tenths = tenths.unsigned_abs();
     format!("{sign}{}.{}", tenths / 10, tenths % 10)
 }
@@ -27,7 +27,8 @@ pub(crate) fn point(p: DVec2) -> String {
     format!("{} {}", number(p.x * SCALE), number(p.y * SCALE))
 }
 
-/// Text safe between tags and in attributes: [shown], and so free of what XML cannot hold at all.
+/// Text safe between tags and in attributes: passed through [`shown`], and so free of characters that XML cannot
+/// hold.
 pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in shown(text).to_string().chars() {
@@ -91,14 +92,14 @@ impl Drawing {
     }
 }
 
-/// How the classes look, as CSS. Classes of this sheet only: of several drawings on one page each brings its own widths.
+/// The look of the classes, as CSS. Scoped to this sheet: several drawings on one page have different line widths.
 fn style(zoom: f64) -> String {
     let mut out = String::new();
     for class in CLASSES {
         let look = class.look();
         let _ = write!(out, ".{}{{", look.name);
         match look.fill {
-            // The color of a cell is its own.
+            // Each cell has its own color.
             Some(_) if matches!(class, Class::Cell) => {}
             Some((_, opacity)) if matches!(class, Class::Beyond) => {
                 let _ = write!(out, "fill-opacity:{opacity};");

@@ -1,4 +1,4 @@
-//! Plans of houses by hand: valid XML, every room named, portals as wide as they are.
+//! Plans of hand-made houses: valid XML, every room named, portals at their true width.
 
 #[path = "../../enfilade-verify/tests/common/mod.rs"]
 mod common;
@@ -15,7 +15,7 @@ fn plan(world: &World) -> String {
     plan_svg(world, &PlanOptions::default())
 }
 
-/// Path data `Mx yLx y…` of all elements of a class, as points, one list for each `M`.
+/// Path data `Mx yLx y…` of all elements of a class: a list of points for each `M`.
 fn paths(svg: &str, class: &str) -> Vec<Vec<[f64; 2]>> {
     let document = roxmltree::Document::parse(svg).unwrap();
     let storeys = document
@@ -123,15 +123,15 @@ fn every_room_is_named_with_its_area() {
         );
     }
     assert!(svg.contains("<title>portal-0, cell-0 and cell-1</title>"));
-    // 16 m² and half of the doorway in the wall, 0.125 m²; the grid is 2 cm fine, so that each
-    // border of 4 m may be off by 0.04 m².
+    // 16 m² and half of the doorway in the wall, 0.125 m². The grid spacing is 2 cm, so that each border of 4 m may
+    // be off by 0.04 m².
     let areas: Vec<f64> = texts
         .iter()
         .filter_map(|t| t.strip_suffix(" m²")?.parse().ok())
         .collect();
     assert_eq!(areas.len(), 2);
     assert!(areas.iter().all(|a| (a - 16.1).abs() < 0.25), "{areas:?}");
-    // The outdoors is the paper.
+    // The outdoors is left as paper.
     assert_eq!(svg.matches("class=\"cell\"").count(), 2);
     assert_eq!(paths(&svg, "solid").len(), 2, "the wall beside the doorway");
 }
@@ -144,7 +144,7 @@ fn portals_are_drawn_as_wide_as_they_are() {
         for (class, width) in [("open", 100.0), ("window", 100.0)] {
             let lines = paths(&svg, class);
             assert_eq!(lines.len(), 1, "{class}");
-            // Coordinates are written to a millimeter.
+            // Coordinates are written in millimeters.
             assert!(
                 (length(&lines[0]) - width).abs() < 0.15,
                 "{class} {lines:?}"
@@ -212,7 +212,7 @@ fn storeys_are_found_by_their_floors_and_share_the_stair_hole() {
     assert_eq!(floors.len(), 2, "{storeys:?}");
     assert!(floors[0].abs() < 1e-6 && (floors[1] - 3.25).abs() < 1e-6);
     assert!((storeys[0].area - 30.0).abs() < 0.01, "{storeys:?}");
-    // Two square meters less; the triangles around the hole are sampled half a meter apart.
+    // Two square meters less; the triangles around the hole are sampled every half meter.
     assert!((storeys[1].area - 28.0).abs() < 0.01, "{storeys:?}");
     let svg = plan(&world);
     let holes = paths(&svg, "stair");
@@ -226,10 +226,10 @@ fn storeys_are_found_by_their_floors_and_share_the_stair_hole() {
 fn neighbors_share_their_borders_point_by_point() {
     let turned = moved(house(), &DMat4::from_rotation_y(0.37));
     let cells = paths(&plan(&turned), "cell");
-    // The door's portal is where the two cells touch: some points are in both borders.
+    // The door's portal lies where the two cells touch: some points are in both borders.
     let shared = cells[0].iter().filter(|p| cells[1].contains(p)).count();
     assert!(shared >= 2, "{shared}");
-    // Straight walls do not come out as stairs of a thousand steps.
+    // Straight walls do not become stairs of a thousand steps.
     assert!(
         cells.iter().all(|c| c.len() < 20),
         "{:?}",
@@ -272,7 +272,7 @@ fn the_same_world_gives_the_same_bytes() {
     assert_eq!(plan(&two_storeys()), plan(&two_storeys()));
 }
 
-/// Writes them for people to look at, too, when `PLAN_DIR` says where.
+/// Also writes the plans to `PLAN_DIR`, if set, for people to look at.
 #[test]
 fn plans_of_houses_that_are_turned_or_high_are_valid_xml() {
     let turned = moved(house(), &DMat4::from_rotation_y(0.37));
@@ -300,7 +300,7 @@ fn names_that_are_too_long_are_cut() {
         [plan(world).len(), pdf.len(), page.len()]
     };
     let usual = sizes(&world);
-    // Letters of several bytes, and one more than are drawn.
+    // Letters of several bytes, one more than the limit.
     world.graph.cells[0].name = "ä".repeat(65);
     assert!(plan(&world).contains(&format!("{}…", "ä".repeat(63))));
     assert!(!plan(&world).contains(&"ä".repeat(64)));

@@ -1,4 +1,4 @@
-//! Which floors are on one plan, and that every room is on one, in worlds made of boxes.
+//! Storeys of worlds made of boxes: which floors share a plan, and that every room is on one.
 
 #[path = "../../enfilade-verify/tests/common/mod.rs"]
 mod common;
@@ -10,7 +10,7 @@ use enfilade_report::{PlanOptions, Plans, RasterError, find_storeys, plan_svg};
 
 type Corner = [f64; 3];
 
-/// A room, and whether it has a floor.
+/// A room, with or without a floor.
 struct Hall {
     low: Corner,
     high: Corner,
@@ -32,7 +32,7 @@ fn shaft(low: Corner, high: Corner) -> Hall {
     }
 }
 
-/// A door of 2 m in a wall across x, from `y` up, between two halls.
+/// A door 2 m wide in a wall across x, from `y` up, between two halls.
 type Door = (u32, u32, [f64; 3]);
 
 fn world(halls: &[Hall], doors: &[Door]) -> World {
@@ -87,7 +87,7 @@ fn world(halls: &[Hall], doors: &[Door]) -> World {
     }
 }
 
-/// Storeys by name, each with its cells.
+/// Storeys by name, with their cells.
 fn storeys(world: &World) -> Vec<(String, Vec<u32>)> {
     let found = find_storeys(world).into_iter();
     found
@@ -133,7 +133,7 @@ fn rooms_that_step_down_beside_each_other_are_one_storey() {
 #[test]
 fn what_lies_above_is_another_storey_whatever_stairs_lead_there() {
     let mut halls = cascade();
-    // Back over the first room, from the last one by a door with a drop.
+    // Back over the first room, reached from the last one by a door with a drop.
     halls.push(room([0.0, -12.0, 0.0], [30.0, -9.0, 5.0]));
     let mut doors = cascade_doors();
     doors.push((5, 6, [30.0, -11.0, 2.0]));
@@ -149,7 +149,7 @@ fn wings_of_one_height_are_one_storey_without_a_doorway() {
     let halls = [
         room([0.0, 0.0, 0.0], [5.0, 3.0, 5.0]),
         room([20.0, 0.3, 0.0], [25.0, 3.0, 5.0]),
-        // Far below, and nothing leads there; but it is no storey of its own beside these two if it is small.
+        // Far below, and unconnected; but too small for a storey of its own beside these two.
         room([0.0, -30.0, 20.0], [1.2, -27.0, 21.2]),
         room([0.0, 9.0, 20.0], [5.0, 12.0, 25.0]),
     ];
@@ -177,14 +177,14 @@ fn a_hall_with_a_gallery_is_on_both_storeys() {
 fn spaces_without_a_floor_stand_beside_rooms_or_on_plans_of_their_own() {
     let halls = [
         room([0.0, 0.0, 0.0], [8.0, 2.5, 5.0]),
-        // Above the ceiling of that room, and above this space another.
+        // Above the ceiling of that room, and another space above this one.
         shaft([0.0, 2.5, 0.0], [8.0, 3.0, 5.0]),
         shaft([0.0, 3.0, 0.0], [8.0, 3.4, 5.0]),
-        // A shaft beside it, and one that a stair covers.
+        // A shaft beside it, and one under a stair.
         shaft([8.5, 0.0, 0.0], [9.5, 3.0, 1.0]),
         shaft([3.0, 2.0, 1.0], [4.0, 2.4, 2.0]),
     ];
-    // Boxes that come first win: the cavity is cut out of its room.
+    // The first box wins: the cavity is cut out of its room.
     let halls = [4, 0, 1, 2, 3].map(|i: usize| Hall {
         low: halls[i].low,
         high: halls[i].high,
@@ -212,7 +212,7 @@ fn spaces_without_a_floor_stand_beside_rooms_or_on_plans_of_their_own() {
 
 #[test]
 fn a_low_room_is_cut_below_its_ceiling() {
-    // Of two floors that are cut together, the lower room ends below that cut.
+    // The lower one of two rooms cut together ends below that cut.
     let halls = [
         room([0.0, 0.4, 0.0], [20.0, 4.0, 20.0]),
         room([20.0, 0.0, 0.0], [22.0, 1.3, 20.0]),
@@ -251,7 +251,7 @@ fn a_cell_that_is_too_thin_to_draw_is_a_box_with_its_number() {
     assert!(svg.contains("A number alone stands for a cell: 1 is cell-1."));
 }
 
-/// Words of a cell on the sheet: where, how high, whether turned, and what.
+/// Text of a cell on the sheet: place, height, `true` if turned, and content.
 fn words_of(svg: &str, cell: u32) -> Vec<([f64; 2], f64, bool, String)> {
     let document = roxmltree::Document::parse(svg).unwrap();
     let id = cell.to_string();
@@ -304,7 +304,7 @@ fn names_stay_in_their_rooms_shrunk_turned_wrapped_or_numbered() {
             } else {
                 [half, *size]
             };
-            // Letters stand on their base line, and reach a quarter below it.
+            // Letters stand on their base line, and reach a quarter of their height below it.
             for (k, axis) in [0, 2].into_iter().enumerate() {
                 let (low, high) = (hall.low[axis] * 100.0, hall.high[axis] * 100.0);
                 let is_down = (k == 1) != *is_turned;
@@ -313,7 +313,7 @@ fn names_stay_in_their_rooms_shrunk_turned_wrapped_or_numbered() {
                 } else {
                     (reach[k], reach[k])
                 };
-                // Two centimeters: the grid of the section.
+                // Twice the grid of the section, 2 cm.
                 assert!(
                     at[k] - before > low - 4.0 && at[k] + after < high + 4.0,
                     "{text} at {at:?} in {low}..{high} of {axis}"
@@ -332,7 +332,7 @@ fn names_stay_in_their_rooms_shrunk_turned_wrapped_or_numbered() {
 
 #[test]
 fn a_name_stays_in_the_arms_of_a_room_with_a_corner_in_it() {
-    // Boxes that come first win: the second room is an L around the first, 2 m wide on one side and 1 m on the other.
+    // The first box wins: the second room is an L around the first, 2 m wide on one side and 1 m on the other.
     let halls = [
         room([2.0, 0.0, 1.0], [12.0, 3.0, 12.0]),
         room([0.0, 0.0, 0.0], [12.0, 3.0, 12.0]),
@@ -392,7 +392,7 @@ fn a_pdf_has_a_page_for_each_drawing_at_a_scale_that_fits() {
     assert_eq!(pdf, enfilade_report::to_pdf(&pages, a4, None).unwrap());
     let text = String::from_utf8_lossy(&pdf);
     assert!(text.starts_with("%PDF-") && text.contains("/Count 2"));
-    // A4 across, in points.
+    // A4 landscape, in points.
     assert_eq!(text.matches("/MediaBox [0 0 841.88").count(), 2, "{text}");
     let error = enfilade_report::to_pdf(&pages, a4, Some(50.0)).unwrap_err();
     assert_eq!((error.scale, error.paper, error.fits), (50.0, "A4", 200.0));

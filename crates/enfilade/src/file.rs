@@ -9,7 +9,7 @@ use enfilade_geom::shown;
 
 use crate::whole;
 
-/// Why a world could not be read or written. Messages say which file and what to do.
+/// The reason why a world could not be read or written. Messages name the file and say what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
@@ -18,7 +18,7 @@ pub enum FileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// The file cannot be written.
@@ -26,26 +26,27 @@ pub enum FileError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
-    /// The file is no world, or the world breaks an invariant.
+    /// The file is not a world, or the world breaks an invariant.
     #[error("{}: {source}", shown(path.display()))]
     World {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         source: WireError,
     },
 }
 
-/// Reads a world that `enfilade bake` or [`save`] wrote. Linear in the file, which is held in memory while it is decoded.
+/// Reads a world written by `enfilade bake` or [`save`]. Linear in the size of the file, which is held in memory
+/// while it is decoded.
 ///
-/// A world that is returned satisfies every invariant ([`World::validate`]), so that what is asked of it later cannot fail.
+/// A returned world satisfies every invariant ([`World::validate`]), so that later queries cannot fail.
 ///
 /// # Errors
 ///
-/// When the file cannot be read, or is no world or a damaged one.
+/// If the file cannot be read, is not a world, or is damaged.
 pub fn open(path: impl AsRef<Path>) -> Result<World, FileError> {
     let path = path.as_ref();
     let bytes = fs::read(path).map_err(|source| FileError::Read {
@@ -58,11 +59,13 @@ pub fn open(path: impl AsRef<Path>) -> Result<World, FileError> {
     })
 }
 
-/// Writes a world as one GLB, [whole or not at all](crate::whole), and removes what killed runs left beside it. Linear in the world.
+/// Writes a world as one GLB, [whole or not at all](crate::whole), and removes files that killed runs left beside it.
+/// Linear in the size of the world.
 ///
 /// # Errors
 ///
-/// When the file cannot be written, or the world breaks an invariant. An earlier file of that name is left as it was then.
+/// If the file cannot be written, or the world breaks an invariant. An earlier file of that name then stays as it
+/// was.
 pub fn save(path: impl AsRef<Path>, world: &World) -> Result<(), FileError> {
     let path = path.as_ref();
     let bytes = encode_glb(world).map_err(|source| FileError::World {

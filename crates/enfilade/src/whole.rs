@@ -1,8 +1,8 @@
-//! Files that are written whole or not at all.
+//! Writing of files, whole or not at all.
 //!
-//! What is written goes to a file beside the target first, `.NAME.PROCESS-TIME.tmp`, which is locked while it is written and
-//! renamed when it is done. A run that is killed leaves such a file behind, unlocked; [`remove_left`] knows it by that.
-//! [`save`](crate::save) and the command `enfilade` write by this rule, and so may what lies beside a world.
+//! Data goes first to a file beside the target, `.NAME.PROCESS-TIME.tmp`, which is locked while it is written and
+//! then renamed. A killed run leaves such a file behind, unlocked; [`remove_left`] recognizes it by the missing lock.
+//! [`save`](crate::save) and the command `enfilade` follow this rule; files beside a world may do so, too.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions};
@@ -10,27 +10,29 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Names tried beside a target. All differ; a few may be taken for left between being made and being locked.
+/// Most names tried beside a target. All differ; another process may remove a few, taken for leftovers between
+/// creation and locking.
 const MOST_TRIES: usize = 100;
 
-/// Writes `bytes` to `path`: aside first, then renamed, so that a reader sees the old file or the new one and never half of
-/// one, whatever happens in between.
+/// Writes `bytes` to a file beside `path` and renames it, so that a reader sees the old file or the new one and never
+/// a part, whatever happens in between.
 ///
-/// [Follows](followed) symbolic links. What exists and is no regular file (`/dev/stdout`, a named pipe) is written to directly, because
-/// nothing can be renamed over it. Several threads and processes may write to one path: the last one's file is left.
+/// [Follows](followed) symbolic links. An existing target that is not a regular file (`/dev/stdout`, a named pipe) is
+/// written directly, because nothing can be renamed over it. Several threads and processes may write to one path: the
+/// last one's file stays.
 ///
 /// # Errors
 ///
-/// When the file cannot be written; what was there is left as it was.
+/// If the file cannot be written; the earlier file then stays as it was.
 pub fn write(path: impl AsRef<Path>, bytes: &[u8]) -> io::Result<()> {
     write_with(path, |out| out.write_all(bytes))
 }
 
-/// The same for what is made while it is written; `fill` had best write many bytes at a time.
+/// Like [`write()`], for data made while it is written; `fill` should write many bytes at a time.
 ///
 /// # Errors
 ///
-/// As [`write()`], and those of `fill`; what was there is left as it was.
+/// Those of [`write()`] and of `fill`; the earlier file then stays as it was.
 pub fn write_with<E: From<io::Error>>(
     path: impl AsRef<Path>,
     fill: impl FnOnce(&mut dyn Write) -> Result<(), E>,
@@ -41,7 +43,7 @@ pub fn write_with<E: From<io::Error>>(
     }
     let (aside, mut file) = open_aside(&path)?;
     let filled = fill(&mut file).and_then(|()| Ok(file.sync_all()?));
-    // The lock is held until the name is the target's: nobody takes the file for one that was left.
+    // Holds the lock until the file has the target's name, so that no process takes it for a leftover.
     let written = filled.and_then(|()| Ok(fs::rename(&aside, &path)?));
     if written.is_err() {
         // The first error is the one to report.
@@ -50,15 +52,16 @@ pub fn write_with<E: From<io::Error>>(
     written
 }
 
-/// Whether [`write()`] to `path` would find a place: makes the file aside and removes it again. Leaves `path` alone.
+/// Tests if [`write()`] to `path` could create its file: makes the file beside it and removes it again. Leaves `path`
+/// alone.
 ///
 /// # Errors
 ///
-/// Why not: a folder that is missing, is read-only or is `path` itself.
+/// The obstacle: a folder that is missing or read-only, or a `path` that is a folder.
 pub fn try_write(path: impl AsRef<Path>) -> io::Result<()> {
     let path = followed(path);
     match fs::metadata(&path) {
-        // What is left of a link is one that leads in a circle.
+        // A link that remains after following leads in a circle.
         Err(_) if path.is_symlink() => {
             Err(io::Error::other("it is a link that leads back to itself"))
         }
@@ -72,10 +75,10 @@ pub fn try_write(path: impl AsRef<Path>) -> io::Result<()> {
     }
 }
 
-/// Removes what killed runs left beside the files of these paths, which lie in one folder. What a run is writing now is
-/// locked and stays. Linear in the folder.
+/// Removes files that killed runs left beside the files of these paths, which lie in one folder. A file that a run is
+/// writing now is locked and stays. Linear in the size of the folder.
 ///
-/// What cannot be removed is passed over: it does no harm but to take room.
+/// Skips files that it cannot remove: they only take disk space.
 pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
     let paths: Vec<PathBuf> = paths.iter().map(followed).collect();
     let Some(entries) = paths.first().and_then(|p| fs::read_dir(folder_of(p)).ok()) else {
@@ -95,11 +98,11 @@ pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
     }
 }
 
-/// Links in a row that lead somewhere; systems follow about as many.
+/// Longest chain of links; systems follow about as many.
 const MOST_LINKS: usize = 40;
 
-/// The file that a path means once links are followed, also of a link to what is not there yet. Links that lead in a circle
-/// mean none: the path itself is returned.
+/// Returns the file that a path denotes after following links, including a link to a file that does not exist yet.
+/// For links in a circle, returns the path itself.
 pub fn followed(path: impl AsRef<Path>) -> PathBuf {
     let path = path.as_ref();
     let mut at = path.to_owned();
@@ -108,9 +111,9 @@ pub fn followed(path: impl AsRef<Path>) -> PathBuf {
             return found;
         }
         match fs::read_link(&at) {
-            // Relative to where the link lies.
+            // Relative to the folder of the link.
             Ok(target) => at = folder_of(&at).join(target),
-            // Nothing is there. Its folder may be reached by links, too.
+            // The file does not exist. Links may lead to its folder, too.
             Err(_) => {
                 let name = at.file_name().map(OsStr::to_owned);
                 let folder = fs::canonicalize(folder_of(&at)).ok();
@@ -130,7 +133,7 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Makes a file in the same folder (a rename must not cross file systems), of this call alone, and locks it.
+/// Makes a file in the same folder (a rename must not cross file systems), for this call alone, and locks it.
 fn open_aside(path: &Path) -> io::Result<(PathBuf, File)> {
     for _ in 0..MOST_TRIES {
         let aside = aside(path)?;
@@ -140,9 +143,9 @@ fn open_aside(path: &Path) -> io::Result<(PathBuf, File)> {
             Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
             Err(e) => return Err(e),
         };
-        // A disk that has no locks does without; there, nothing is taken for left either.
+        // On a file system without locks, work on without; leftovers are not recognized there either.
         let is_taken = matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock));
-        // Before it was locked, someone may have taken it for one that was left.
+        // Another process may have removed it as a leftover before it was locked.
         if !is_taken && aside.exists() {
             return Ok((aside, file));
         }
@@ -153,11 +156,11 @@ fn open_aside(path: &Path) -> io::Result<(PathBuf, File)> {
     ))
 }
 
-/// A name that was never taken before: whoever looks at a file of a name long after it was gone must not find another one.
+/// Returns a fresh name: a process that looks up a name long after its file is gone must not find another file.
 fn aside(path: &Path) -> io::Result<PathBuf> {
     let name = path
         .file_name()
-        .ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "it is no file name"))?;
+        .ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "it is not a file name"))?;
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     let time = since.unwrap_or_default().as_nanos();
     let mut hidden = OsString::from(".");
@@ -166,7 +169,7 @@ fn aside(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(hidden))
 }
 
-/// The name of the file beside which a file of this name is written.
+/// Returns the name of the target from the name of the file written beside it.
 fn target_of(name: &str) -> Option<&str> {
     let (target, process) = name
         .strip_prefix('.')?
@@ -207,7 +210,7 @@ mod tests {
         let path = folder.join("taken");
         fs::create_dir_all(path.join("full")).unwrap();
         assert!(write(&path, b"new").is_err() && try_write(&path).is_err());
-        // Nor what ends in the middle.
+        // Nor is a partial file left.
         let half = |out: &mut dyn Write| {
             out.write_all(b"half")?;
             Err(io::Error::other("no more"))
@@ -255,7 +258,7 @@ mod tests {
         write(&link, b"new").unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&target).unwrap(), b"new");
-        // One to a file that is not there yet, through another; and two that lead to each other.
+        // A link to a file that does not exist yet, through another link; and two links that lead to each other.
         fs::remove_file(&target).unwrap();
         let other = folder.join("other");
         std::os::unix::fs::symlink("./link", &other).unwrap();
