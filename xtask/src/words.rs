@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 const STILL: &[&str] = &[
     "crates/enfilade-bake/",
     "crates/enfilade-bench/",
-    "crates/enfilade-cli/",
     "crates/enfilade-complex/",
     "crates/enfilade-cpg/",
     "crates/enfilade-geom/src/allowance.rs",

@@ -1,11 +1,11 @@
-//! Adapters, as the environment asks for them: no library reads it.
+//! Opens adapters according to the environment, which no library reads.
 
 use enfilade_render::{AdapterChoice, Gpu, RenderError};
 
 const BACKEND: &str = "WGPU_BACKEND";
 
-/// Opens an adapter; no display is needed. `WGPU_BACKEND`, a list such as `vulkan,gl`, tells how it may be
-/// spoken to, as in all programs that draw with wgpu.
+/// Opens an adapter; no display is needed. `WGPU_BACKEND`, a list such as `vulkan,gl`, restricts the drivers, as in
+/// all programs that draw with wgpu.
 ///
 /// # Errors
 ///
@@ -15,7 +15,7 @@ pub fn open(choice: &AdapterChoice) -> Result<Gpu, RenderError> {
     open_with(&wgpu::Instance::new(asked), choice, None)
 }
 
-/// The same, of an instance that was made from the environment, to draw to a surface.
+/// Like [`open`], for an instance made from the environment, to draw to a surface.
 ///
 /// # Errors
 ///

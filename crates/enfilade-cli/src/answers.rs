@@ -1,4 +1,4 @@
-//! What the run-time answers, in the checker's words.
+//! Answers of the run-time, in the checker's format.
 
 use std::collections::HashMap;
 
@@ -6,16 +6,16 @@ use enfilade::cpg::World;
 use enfilade::runtime::{SeeOptions, Sight, SightState, View, Viewer};
 use enfilade_verify::{Seer, ViewAnswer, ViewQuery};
 
-/// The run-time behind the checker's door; answers the views of `verify --sight` and of the tables.
+/// The run-time as the checker queries it: answers the views of `verify --sight` and of the tables.
 pub struct Answers<'w> {
     sight: &'w Sight,
     state: SightState,
-    /// By chunk: its triangles as the batch numbers them.
+    /// For each chunk, the indices of its triangles in their batch.
     triangles: Vec<Vec<u32>>,
 }
 
 impl<'w> Answers<'w> {
-    /// Finds the number of each chunk's triangles in their batch. Time and memory grow with the world's triangles.
+    /// Finds the index of each chunk's triangles in their batch. Time and memory grow with the world's triangles.
     #[must_use]
     pub fn new(world: &World, sight: &'w Sight) -> Self {
         let mut numbers: Vec<HashMap<[u32; 3], Vec<u32>>> = Vec::new();
@@ -48,14 +48,14 @@ impl<'w> Answers<'w> {
         }
     }
 
-    /// One that answers by portals; `options: None` for the view frustum alone.
+    /// Returns a seer that answers by portals, or by the view frustum alone if `options` is `None`.
     #[must_use]
     pub fn seer(&self, options: Option<SeeOptions>) -> Seer<'_> {
         let mut viewer = Viewer::with_options(self.sight, options.unwrap_or_default());
         Box::new(move |query: &ViewQuery, answer: &mut ViewAnswer<'_>| {
             let view =
                 View::perspective(query.eye, query.toward, query.up, query.fov_y, query.aspect);
-            // A view that cannot be is answered by nothing, and shows as misses.
+            // An impossible view gets no answer, and shows up as misses.
             let Ok(view) = view else { return };
             let seen = match options {
                 Some(_) => viewer.see(self.sight, &self.state, &view),

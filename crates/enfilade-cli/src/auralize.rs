@@ -1,27 +1,27 @@
-//! From what is heard, block by block, to two channels of samples.
+//! Renders the sound that a listener hears, block by block, to two channels of samples.
 //!
-//! A delay line with delay and gain that move linearly within a block, for each ear (Zölzer, "DAFX", §3.2), and for the room's tail a
-//! network of four delay lines, fed back through a Hadamard matrix with the losses that give the time of decay (Jot & Chaigne, "Digital
-//! delay networks for designing artificial reverberators", 1991). O(samples). Delays move by a tenth of real time at most, so that a way
-//! that becomes the shortest bends the pitch and does not click.
+//! Each ear has a delay line whose delay and gain change linearly within a block (Zölzer, "DAFX", §3.2). The room's
+//! tail comes from four delay lines, fed back through a Hadamard matrix with losses that give the decay time (Jot &
+//! Chaigne, "Digital delay networks for designing artificial reverberators", 1991). O(samples). A delay changes by at
+//! most a tenth of real time, so that a switch to another shortest path bends the pitch instead of clicking.
 
 use enfilade::world::SPEED_OF_SOUND;
 
-/// Samples for which one answer of the listener holds.
+/// Samples for which one answer of the listener is used.
 pub(crate) const BLOCK: usize = 256;
-/// Delay lines of the tail, in seconds: with no common divisor to speak of.
+/// Delay lines of the tail, with almost no common divisors. [Units: s]
 const LINES: [f64; 4] = [0.0297, 0.0371, 0.0411, 0.0437];
-/// By which all is scaled, for loud rooms not to clip.
+/// Factor on all samples, so that loud rooms do not clip.
 const LEVEL: f64 = 0.25;
-/// Of real time, that a delay may change by.
+/// Largest change of a delay, as a fraction of real time.
 const FASTEST: f64 = 0.1;
 
-/// What is heard at the end of a block.
+/// The sound heard at the end of a block.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Block {
-    /// Of the way to the listener. [Units: wu]
+    /// Length of the path to the listener. [Units: wu]
     pub(crate) length: f64,
-    /// Amplitude and delay after the nearer ear, left and right. [Units: s]
+    /// Amplitude, and delay relative to the nearer ear, left and right. [Units: s]
     pub(crate) ears: [(f64, f64); 2],
     /// Amplitude of the room.
     pub(crate) room: f64,
@@ -29,11 +29,11 @@ pub(crate) struct Block {
     pub(crate) rt60: f64,
 }
 
-/// Makes sound of what is heard, block by block. The source repeats.
+/// Renders the sound heard, block by block. The source repeats.
 pub(crate) struct Renderer<'s> {
     source: &'s [f32],
     rate: f64,
-    /// Delays of the ears at the end of the block before. [Units: samples]
+    /// Delays of the ears at the end of the previous block. [Units: samples]
     delays: Option<[f64; 2]>,
     last: Block,
     tail: Tail,
@@ -56,7 +56,7 @@ impl<'s> Renderer<'s> {
         }
     }
 
-    /// The samples of the next block, left and right.
+    /// Returns the samples of the next block, left and right.
     pub(crate) fn render(&mut self, block: &Block) -> &[[f32; 2]] {
         self.out.clear();
         if self.source.is_empty() {
@@ -92,7 +92,7 @@ impl<'s> Renderer<'s> {
     }
 }
 
-/// The source at a time in samples, between two by a line; nothing before it starts.
+/// The source at a time in samples, interpolated linearly; 0 before it starts.
 fn at(source: &[f32], time: f64) -> f64 {
     if time < 0.0 {
         return 0.0;
@@ -107,7 +107,7 @@ struct Tail {
     lines: [Vec<f64>; 4],
     heads: [usize; 4],
     rate: f64,
-    /// The time of decay before, and by line what is kept of a sample, and fed: it mostly stays the same.
+    /// The previous decay time, and for each line the shares kept and fed: they rarely change.
     rt60: f64,
     shares: [(f64, f64); 4],
 }
@@ -129,13 +129,13 @@ impl Tail {
             self.shares = [0, 1, 2, 3].map(|k| {
                 let seconds = self.lines[k].len() as f64 / self.rate;
                 let kept = 10f64.powf(-3.0 * seconds / rt60.max(0.05));
-                // The energy in the line is then the input's, if the source is steady.
+                // For a steady source, the energy in the line then equals the input's.
                 (kept, (1.0 - kept * kept).sqrt())
             });
         }
         let out = [0, 1, 2, 3].map(|k| self.lines[k][self.heads[k]]);
         let [a, b, c, d] = out;
-        // A Hadamard matrix of length 1.
+        // An orthogonal Hadamard matrix.
         let mixed = [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d].map(|x| 0.5 * x);
         for (k, mixed) in mixed.into_iter().enumerate() {
             let (kept, fed) = self.shares[k];
@@ -147,7 +147,7 @@ impl Tail {
     }
 }
 
-/// A sound to try with: two soft tones, struck twice a second.
+/// A sound for trials: two soft tones, struck twice a second.
 pub(crate) fn test_sound(rate: u32) -> Vec<f32> {
     let n = rate / 2;
     let sample = |i: u32| {
@@ -163,7 +163,7 @@ pub(crate) fn test_sound(rate: u32) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// W11: the tail falls by 60 dB in its time.
+    /// W11: the tail falls by 60 dB in its decay time.
     #[test]
     fn a_tail_decays_in_its_time() {
         let rate = 8000.0;
@@ -183,7 +183,7 @@ mod tests {
         assert!((fallen - 30.0).abs() < 2.0, "{fallen}");
     }
 
-    /// W11: a way that becomes 20 m shorter at once makes no jump.
+    /// W11: a path that suddenly becomes 20 m shorter makes no jump.
     #[test]
     fn ways_that_change_make_no_clicks() {
         let source = test_sound(44100);

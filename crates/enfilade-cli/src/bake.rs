@@ -1,4 +1,4 @@
-//! `enfilade bake`: a scene becomes a world.
+//! `enfilade bake`: makes a world from a scene.
 
 mod cracks;
 pub(crate) mod delaunay;
@@ -98,8 +98,8 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     {
         writeln!(
             Warned,
-            "no separator parts the scene: its openings lie in no plane of its surfaces, if it has rooms; \
-             --method watershed or delaunay needs no planes"
+            "no separator divides the scene: if it has rooms, their openings do not lie in planes of its surfaces; \
+             --method watershed or delaunay does not need planes"
         )?;
     }
     let mut out = outputs.printed();
@@ -112,7 +112,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Ends the bake of a map whose inside is open to the void, with the way out.
+/// Ends the bake of a map whose inside is open to the void, and reports the way out.
 fn refuse_leak(
     scene: &Scene,
     config: &BakeConfig,
@@ -121,7 +121,7 @@ fn refuse_leak(
     let n_faces = scene.solids.iter().map(|s| s.faces.len()).sum();
     let allowance = config.budget.allowance(n_faces, Some(held_memory));
     let leak = find_leak(scene, (&allowance).into());
-    // What was found beyond it is not to be used; the bake ends at once, and says so.
+    // An exhausted allowance makes the search incomplete; the bake then ends with its own error at once.
     let Some(leak) = leak.filter(|_| !allowance.is_over()) else {
         return Ok(());
     };
@@ -164,7 +164,7 @@ fn refuse_leak(
     bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
 }
 
-/// Bakes on a pool of its own, with a progress line; says which method was chosen and why.
+/// Bakes on its own thread pool, with a progress line; reports the chosen method and the reason.
 pub(crate) fn bake_scene(
     scene: &Scene,
     config: &BakeConfig,
@@ -180,7 +180,7 @@ pub(crate) fn bake_scene(
     Ok(baked)
 }
 
-/// Leaks worth a line: wide enough that they may be meant.
+/// Leaks with a line: those wide enough to be intended.
 const LEAKS_SHOWN: usize = 10;
 
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
@@ -189,18 +189,18 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         Resolution::Balls { radius } => {
             writeln!(
                 err,
-                "surfaces have points for all air at least {radius:.3} m in radius"
+                "the points on surfaces resolve all air at least {radius:.3} m in radius"
             )?;
             let wanted = config.min_opening * LEAST_BALL;
             if radius > wanted {
                 writeln!(
                     Warned,
-                    "not the {wanted:.3} m that were wanted: the scene would take more points than fit memory; \
-                     narrower openings are found, but may be weighed wrongly"
+                    "coarser than the {wanted:.3} m requested: the scene would need more points than fit in memory; \
+                     narrower openings are found, but may get wrong weights"
                 )?;
             }
         }
-        // Told before the work.
+        // Reported before the work.
         Resolution::Voxels { .. } | Resolution::Planes => {}
     }
     for note in &baked.notes {
@@ -249,7 +249,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     Ok(())
 }
 
-/// What was found, in one glance.
+/// Counts of what was found.
 #[derive(Serialize)]
 pub(crate) struct Summary {
     triangles: usize,
@@ -298,7 +298,7 @@ pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<(
     Ok(())
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct BakeReport<'a> {
     #[serde(flatten)]
@@ -309,7 +309,7 @@ struct BakeReport<'a> {
     notes: &'a [String],
     /// Gaps in the model that became portals.
     gaps: usize,
-    /// By stage.
+    /// Seconds of each stage.
     seconds: BTreeMap<&'static str, f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Cameras: given, found by themselves, on a walk, on a recorded path, at random.
+//! Cameras: given, found automatically, on a walk, on a recorded path, at random.
 
 use std::path::Path;
 
@@ -13,34 +13,35 @@ use crate::input::read_text;
 /// Height of an eye above the floor. [Units: wu]
 pub const EYE_HEIGHT: f32 = 1.6;
 
-/// Angle of a picture from its lower to its upper edge, unless said otherwise. [Units: rad]
+/// Default angle of a picture from its lower to its upper edge. [Units: rad]
 pub const FOV: f32 = 1.1;
 
 fn center(cell: &Cell) -> [f32; 3] {
     [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5)
 }
 
-/// The eye of somebody who stands below `p`.
+/// The eye of a person who stands below `p`.
 fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
     let hit = lines.first_hit(p, [p[0], p[1] - 100.0, p[2]])?;
     let floor = p[1] - 100.0 * hit.t as f32;
     Some([p[0], floor + EYE_HEIGHT, p[2]])
 }
 
-/// Rooms that a photographer looks into.
+/// Most rooms that a photographer looks into.
 const ROOMS: usize = 8;
-/// How far from walls a photographer stands, at least. [Units: wu]
+/// Least distance of a photographer from walls. [Units: wu]
 const ELBOW: f32 = 0.45;
-/// Directions that are measured for the longest view.
+/// Directions probed for the longest view.
 const HEADINGS: usize = 24;
 
-/// Where a photographer would stand: in a corner of a large room, rather a furnished one, a person's height above the floor,
-/// looking along one of its longest views; of these places, the one whose picture shows most things and openings, far away,
-/// with nothing right before it. Of a world without rooms, all of it from outside. Draws some 200 small pictures.
+/// Finds the place a photographer would choose: where two walls of a large, preferably furnished, room meet, at eye
+/// height, along one of the longest views. Among these, takes the place whose picture shows most objects and
+/// openings, far away, with nothing right before it. For a world without rooms, shows all of it from outside. Draws
+/// some 200 small pictures.
 ///
 /// # Errors
 ///
-/// A picture that cannot be drawn.
+/// If a picture cannot be drawn.
 pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
     let lines = Sightlines::build(world);
     let mut best = (f32::NEG_INFINITY, overview(studio));
@@ -62,7 +63,7 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
     Ok(best.1)
 }
 
-/// The rooms with the most floor, each object in them worth a part of that; and what they are worth.
+/// The rooms with the most floor, with their worth: floor area, increased by each object.
 fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
     let mut objects = vec![0_u32; world.graph.cells.len()];
     for cell in world.details.iter().flat_map(|d| &d.cells) {
@@ -71,7 +72,7 @@ fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
     let worth = |id: CellId, cell: &Cell| {
         let height = (cell.aabb[1][1] - cell.aabb[0][1]).clamp(2.0, 4.0);
         let floor = cell.volume / height;
-        // A hall is no better for being larger still.
+        // Beyond this size, a larger hall is not better.
         floor.min(150.0) * (1.0 + (objects[id.idx()] as f32).ln_1p())
     };
     let mut out: Vec<_> = (world.graph.indoor_cells())
@@ -83,7 +84,7 @@ fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
     out
 }
 
-/// Where somebody can stand in the corners of a room, and in its middle: eyes.
+/// Eyes of a person in a room: where two walls meet, and in the middle.
 fn corners(sight: &Sight, lines: &Sightlines, id: CellId, cell: &Cell) -> Vec<[f32; 3]> {
     let [low, high] = cell.aabb;
     let middle = center(cell);
@@ -99,13 +100,13 @@ fn corners(sight: &Sight, lines: &Sightlines, id: CellId, cell: &Cell) -> Vec<[f
         if !is_here(&p) {
             return None;
         }
-        // Where it is lower than a person, or there is no floor: at half its height.
+        // At half the height of the cell if it is lower than a person or has no floor.
         Some(standing(lines, p).filter(is_here).unwrap_or(p))
     };
     let mut out: Vec<[f32; 3]> = Vec::new();
     for [u, v] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
         let corner = [[low[0], high[0]][u], middle[1], [low[2], high[2]][v]];
-        // From the corner to the middle, the first place with room for elbows.
+        // On the way from the walls to the middle, the first place with elbow room.
         let place = (1..=10).find_map(|step| {
             let t = step as f32 * 0.05;
             let p = [0, 1, 2].map(|k| corner[k] + (middle[k] - corner[k]) * t);
@@ -117,7 +118,7 @@ fn corners(sight: &Sight, lines: &Sightlines, id: CellId, cell: &Cell) -> Vec<[f
     out
 }
 
-/// Directions worth a picture: across the room, along the longest view, and between the two; a little downwards.
+/// Directions worth a picture: across the room, along the longest view, and between the two; slightly downwards.
 fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
     let angle = |i: usize| i as f32 * std::f32::consts::TAU / HEADINGS as f32;
     let free: Vec<f32> = (0..HEADINGS)
@@ -129,7 +130,7 @@ fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
                 .map_or(40.0, |h| h.t as f32 * 40.0)
         })
         .collect();
-    // Of a view, what is beside its middle counts, too.
+    // A view counts with its neighbors on both sides.
     let open = |i: usize| {
         let at = |d: usize| free[(i + HEADINGS + d - 2) % HEADINGS];
         (0..5).map(at).sum::<f32>()
@@ -160,7 +161,7 @@ fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
     out
 }
 
-/// The whole world from above, aside.
+/// The whole world, obliquely from above.
 fn overview(studio: &Studio) -> Camera {
     let [low, high] = studio.world.bounds();
     let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
@@ -170,7 +171,8 @@ fn overview(studio: &Studio) -> Camera {
     Camera::looking_at([0, 1, 2].map(|k| center[k] + back[k]), center)
 }
 
-/// How much a picture shows: objects most of all, openings of the room, depth; less where something is right before the eye.
+/// The interest of a picture: objects above all, openings of the room, depth; less if something is right before the
+/// eye.
 fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     const SMALL: [u32; 2] = [48, 27];
     let [solid, _] = studio.ids(camera, Culling::Portals, SMALL)?;
@@ -198,12 +200,12 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     let furnished = objects.len() as u32;
     objects.sort_unstable();
     objects.dedup();
-    // Deep as a whole, and no wall that fills a side of it.
+    // Deep on the whole, without a wall that fills one side.
     depths.sort_unstable_by(f32::total_cmp);
     let quarter = depths.get(depths.len() / 4).copied().unwrap_or_default();
     let view = camera.view(SMALL[0] as f32 / SMALL[1] as f32)?;
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
-    // Those of a pixel are no openings that one sees.
+    // Openings of a few pixels are not visible as such.
     let is_wide = |r: [f32; 4]| (r[2] - r[0]) * (r[3] - r[1]) > 0.01;
     let openings = (seen.visits().iter())
         .filter(|v| v.via.is_some() && is_wide(v.rectangle))
@@ -220,7 +222,8 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
         - share(sky))
 }
 
-/// A walk through the doorways of a world, a meter a view: points on the way, with the way onwards. [Units: wu]
+/// A walk through the doorways of a world, one view per meter: points, each with the direction of walking.
+/// [Units: wu]
 #[must_use]
 pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
     let mut stops = Vec::new();
@@ -231,7 +234,7 @@ pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 
     };
     let (mut cell, mut came_by) = (first, None);
     stops.push(center(&graph[cell]));
-    // Always to the neighbor that was visited least, by the first such portal.
+    // Always go to the least visited neighbor, through the first such portal.
     while stops.len() < 2 * views {
         been[cell.idx()] += 1;
         let next = graph
@@ -243,7 +246,7 @@ pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 
         stops.push(center(&graph[exit.to]));
         (cell, came_by) = (exit.to, Some(exit.id));
     }
-    // A stretch of a meter a view.
+    // One view per meter.
     let mut out = Vec::new();
     for pair in stops.windows(2) {
         let d = [0, 1, 2].map(|k| pair[1][k] - pair[0][k]);
@@ -260,7 +263,7 @@ pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 
     out
 }
 
-/// The same as cameras, at eye height where there is a floor; `fov_y` in radians.
+/// The cameras of a [`walk`], at eye height where there is a floor; `fov_y` in radians.
 #[must_use]
 pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> Vec<Camera> {
     let lines = Sightlines::build(world);
@@ -268,7 +271,7 @@ pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> V
     walk(world, sight, views)
         .into_iter()
         .map(|(p, toward)| {
-            // Straight up or down has no heading: the last one stays.
+            // A vertical direction has no heading: keep the last one.
             if toward[0].hypot(toward[2]) > 1e-3 {
                 last = toward;
             }
@@ -282,11 +285,11 @@ pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> V
         .collect()
 }
 
-/// Reads a path: a line for each camera, `eye-x eye-y eye-z look-x look-y look-z`, in meters.
+/// Reads a path: one line per camera, `eye-x eye-y eye-z look-x look-y look-z`, in meters.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, a line that is not six numbers, or no line at all.
+/// If the file cannot be read, a line is not six numbers, or there are no lines.
 pub fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
     let text = read_text("cameras", path)?;
     let mut out = Vec::new();
@@ -300,7 +303,7 @@ pub fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
             Ok(&[x, y, z, a, b, c]) if [x, y, z, a, b, c].iter().all(|v| v.is_finite()) => {
                 out.push(Camera {
                     eye: [x, y, z].map(|v| v as f32),
-                    // From the eye as it was before it was written in few digits.
+                    // From the rounded eye, so that the direction survives few digits.
                     toward: [[a, x], [b, y], [c, z]]
                         .map(|[to, from]| (to - f64::from(from as f32)) as f32),
                     fov_y,
@@ -319,21 +322,21 @@ pub fn read_path(path: &Path, fov_y: f32) -> anyhow::Result<Vec<Camera>> {
     Ok(out)
 }
 
-/// The path as [`read_path`] reads it.
+/// Formats a path as [`read_path`] reads it.
 #[must_use]
 pub fn path_text(cameras: &[Camera]) -> String {
     let mut out = String::from("# eye x y z, point looked at x y z; meters\n");
     for c in cameras {
         let [x, y, z] = c.eye;
-        // Summed with more digits than either has, so that what is read back is what was written.
+        // Summed with more digits than either has, so that reading restores what was written.
         let [a, b, d] = [0, 1, 2].map(|k| f64::from(c.eye[k]) + f64::from(c.toward[k]));
         out += &format!("{x} {y} {z} {a} {b} {d}\n");
     }
     out
 }
 
-/// A random camera of `verify --views`: mostly in a cell, now and then in an opening, or anywhere,
-/// walls and the outside included.
+/// A random camera of `verify --views`: mostly in a cell, sometimes in an opening, or anywhere, including walls and
+/// the outside.
 pub fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds: [[f32; 3]; 2]) -> Camera {
     let in_box = |rng: &mut Rng, [low, high]: [[f32; 3]; 2]| {
         [0, 1, 2].map(|k| low[k] + (high[k] - low[k]) * rng.unit() as f32)
@@ -342,7 +345,7 @@ pub fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds: [[f32;
     let kind = rng.below(10);
     let mut eye = in_box(rng, bounds);
     if kind == 0 && !graph.portals.is_empty() {
-        // On its plane but for a rounding, or a little beside it.
+        // On the portal's plane except for rounding, or slightly beside it.
         let portal = &graph.portals[rng.below(graph.portals.len())];
         let middle = portal.center();
         let corner = portal.outline[rng.below(portal.outline.len())];
@@ -368,7 +371,8 @@ pub fn random_camera(rng: &mut Rng, world: &World, sight: &Sight, bounds: [[f32;
     }
 }
 
-/// What opens nearest to where a camera looks, and how far away it is. [Units: wu] Time grows with the portals.
+/// The openable portal nearest to the center of a camera's view, with its distance. [Units: wu] Time grows with the
+/// portals.
 #[must_use]
 pub fn portal_looked_at(
     world: &World,

@@ -1,8 +1,7 @@
-//! `enfilade decimate`: the Delaunay builder step by step, with a person in the loop.
+//! `enfilade decimate`: runs the Delaunay builder step by step, under a person's control.
 //!
-//! Gjørup 1999, §4.2.3 leaves the last portals to a person who goes through the record of the
-//! decimation, back and forth, and overrules it. Commands come from standard input, a line each, so
-//! that a script can do the same.
+//! Gjørup 1999, §4.2.3 leaves the last portals to a person who goes back and forth through the record of the
+//! decimation and overrules it. Commands come from standard input, one per line, so that a script can do the same.
 
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
@@ -21,24 +20,24 @@ use crate::screen::{Warned, print_json, write_lines};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
 
-/// Shows how the Delaunay builder removes portals, one by one, and lets it be overruled.
+/// Shows how the Delaunay builder removes portals, one by one, and lets you overrule it.
 #[derive(clap::Args)]
 pub(crate) struct Decimate {
     /// Scene files, or a baked world; `-` for standard input.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
-    /// Reads commands from standard input: `n [K]` forwards, `b [K]` back, `g N` to a step, `l` lists
-    /// the steps ahead, `keep` and `join` decide about the next portal for good, `undo` takes the last
-    /// decision back, `save FILE.toml`, `bake FILE.glb`, `help`, `q`.
+    /// Read commands from standard input: `n [K]` forwards, `b [K]` back, `g N` to a step, `l` lists the steps ahead,
+    /// `keep` and `join` decide about the next portal for good, `undo` reverts the last decision, `save FILE.toml`,
+    /// `bake FILE.glb`, `help`, `q`.
     #[arg(long)]
     steps: bool,
-    /// Begin after this many steps; where it stops by itself if not given.
+    /// Begin after this many steps; at the decimation's own stop if not given.
     #[arg(long, value_name = "N")]
     at: Option<usize>,
-    /// Bake the rooms that are left then; `-` for standard output.
+    /// Bake the rooms left at that step; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
-    /// Print JSON for machines: the steps, what is left and what was baked.
+    /// Print JSON for machines: the steps, the rooms left and the baked world.
     #[arg(long, conflicts_with = "steps")]
     json: bool,
     #[command(flatten)]
@@ -50,7 +49,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         bail!("--steps reads commands from standard input; give files to read, not '-'");
     }
     let mut outputs = Outputs::reading(args.options.inputs(&args.inputs))?;
-    // Choices that were read are gone on with, and may be saved where they were.
+    // Choices that are read are extended, and may be saved to the same file.
     let mut choices = Outputs::reading(args.inputs.iter().chain(&args.options.detail))?;
     if let Some(path) = &args.output {
         outputs.write("-o", Format::World, path)?;
@@ -94,7 +93,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         if !walk.is_saved {
             writeln!(
                 Warned,
-                "the last decisions were not saved; `save FILE.toml` before the end does"
+                "the last decisions were not saved; use `save FILE.toml` before the end"
             )?;
         }
     } else {
@@ -107,7 +106,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     out.flush().context("cannot write to standard output")
 }
 
-/// What a step's portal weighed, in words where no ratio was asked.
+/// The weight of a step's portal, or a word where it is not a ratio.
 fn weight_of(step: &Step) -> String {
     match step.weight {
         f64::INFINITY => "kept by decision".to_owned(),
@@ -118,16 +117,16 @@ fn weight_of(step: &Step) -> String {
     }
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(serde::Serialize)]
 struct WalkReport {
     steps: Vec<StepReport>,
-    /// Steps taken, and those after which it stops by itself.
+    /// Steps taken, and steps until the decimation stops by itself.
     at: usize,
     stop: usize,
     cells_indoors: usize,
     others: usize,
-    /// What was baked, with `-o`.
+    /// The world baked with `-o`.
     baked: Option<Baked>,
 }
 
@@ -155,11 +154,11 @@ struct Walk<'a> {
     config: BakeConfig,
     /// Steps taken.
     at: usize,
-    /// Decisions of this walk, true to keep, in order.
+    /// Decisions of this walk in order, `true` to keep.
     made: Vec<bool>,
-    /// They are in a file.
+    /// The decisions are in a file.
     is_saved: bool,
-    /// What no world may be written over, and what no choices may.
+    /// Files that no world may overwrite, and files that no choices may overwrite.
     outputs: Outputs,
     choices: Outputs,
 }
@@ -171,20 +170,20 @@ g N             to after step N
 l               lists the steps ahead
 keep, join      decides about the next portal, for good: it stays, or it goes first
 undo            takes the last decision of this walk back
-save FILE.toml  writes all decisions; `bake --method delaunay --choices FILE.toml` obeys them
+save FILE.toml  writes all decisions; `bake --method delaunay --choices FILE.toml` applies them
 bake FILE.glb   writes a world of the cells that are left now
 q               ends";
 
-/// What is said in a walk goes to standard output, and no file.
+/// Refuses standard output, which the replies of a walk go to.
 fn in_walk(option: &str, path: &Path) -> anyhow::Result<()> {
-    refuse_stream(option, path, "a file beside what is said here")
+    refuse_stream(option, path, "a file beside the replies")
 }
 
-/// Steps that `l` shows.
+/// Steps listed by `l`.
 const AHEAD: usize = 10;
 
 impl Walk<'_> {
-    /// Does what a line says; false to end.
+    /// Executes a command line; returns `false` to end.
     fn obey(&mut self, line: &str, out: &mut impl Write) -> anyhow::Result<bool> {
         let words: Vec<&str> = line.split_whitespace().collect();
         let n = self.session.decimation.steps.len();
@@ -202,11 +201,11 @@ impl Walk<'_> {
             Some("l") => self.list(out, self.at..(self.at + AHEAD).min(n))?,
             Some(choice @ ("keep" | "join")) => self.choose(choice == "keep", out)?,
             Some("undo") => self.undo(out)?,
-            // What cannot be written is told, and no reason to lose the walk.
+            // A failed write is reported, and does not end the walk.
             Some("save") if words.len() == 2 => match self.save(Path::new(words[1])) {
                 Ok(()) => writeln!(
                     out,
-                    "wrote {0}; `enfilade bake --method delaunay --choices {0}` obeys it",
+                    "wrote {0}; `enfilade bake --method delaunay --choices {0}` applies it",
                     words[1]
                 )?,
                 Err(error) => writeln!(out, "{error:#}")?,
@@ -223,13 +222,13 @@ impl Walk<'_> {
                 writeln!(out, "'{file}' needs the name of one file to write")?;
             }
             Some("help" | "h" | "?") => write_lines(out, &HELP)?,
-            Some(other) => writeln!(out, "'{other}' is no command; `help` lists them")?,
+            Some(other) => writeln!(out, "'{other}' is not a command; `help` lists them")?,
         }
         self.show(out)?;
         Ok(true)
     }
 
-    /// Overrules what the next step does, and decimates anew up to where it then stops.
+    /// Overrules the next step, and decimates again up to the new stop.
     fn choose(&mut self, keep: bool, out: &mut impl Write) -> io::Result<()> {
         let Some(step) = self.session.decimation.steps.get(self.at) else {
             return writeln!(out, "no portal is left to decide about");
@@ -269,7 +268,7 @@ impl Walk<'_> {
         )
     }
 
-    /// Decimates anew, up to where it then stops.
+    /// Decimates again, up to the new stop.
     fn decided(&mut self) {
         self.is_saved = false;
         self.session.decimate(&self.config);
@@ -284,7 +283,8 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Rooms that are left, which are the cells indoors of a bake, and what else is: crevices and the insides of walls.
+    /// The number of rooms left, which are the indoor cells of a bake, and of other cells: crevices and the insides
+    /// of walls.
     fn left(&self) -> [usize; 2] {
         self.session.count_rooms(self.at, &self.config)
     }
@@ -383,7 +383,7 @@ mod tests {
     use enfilade::bake::delaunay::Choices;
     use enfilade_testkit::{Variant, gjorup_rooms};
 
-    /// What the walk says to some lines.
+    /// The replies of the walk to some lines.
     fn said(walk: &mut Walk<'_>, lines: &[&str]) -> String {
         let mut out = Vec::new();
         for line in lines {
@@ -444,7 +444,7 @@ mod tests {
         assert_eq!(walk.config.delaunay.choices, Choices::default());
         assert_eq!((walk.at, walk.left()[0]), (stop, n_cells));
         assert!(said(&mut walk, &["undo"]).contains("no decision"));
-        // What is kept outlasts all that has a weight.
+        // A kept portal outlasts all that have a weight.
         said(&mut walk, &["keep"]);
         let last = walk.session.decimation.steps.last().unwrap();
         assert_eq!(weight_of(last), "kept by decision");
@@ -454,7 +454,7 @@ mod tests {
             ("bake a b", "'bake' needs the name of one file"),
             ("n x", "'x' is not a number of steps"),
             ("g", "'g' needs the number of a step"),
-            ("walk", "'walk' is no command; `help`"),
+            ("walk", "'walk' is not a command; `help`"),
             ("help", "undo "),
             ("", "steps, "),
         ] {

@@ -1,4 +1,4 @@
-//! `enfilade demo`: a house of our own, baked.
+//! `enfilade demo`: bakes a house made in code.
 
 use std::path::PathBuf;
 
@@ -15,11 +15,11 @@ use crate::formats::Format;
 use crate::output::{Outputs, make_folder, write_unnamed};
 use crate::screen::{print_json, printed, write_lines};
 
-/// Makes a furnished two-storey house, bakes it, draws its plan and says what to try next.
+/// Makes a furnished two-storey house, bakes it, draws its plan and suggests what to try next.
 #[derive(clap::Args)]
 pub(crate) struct Demo {
-    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to; files of these names that are not the demo's stay as they
-    /// are, and the demo says so and ends.
+    /// Folder to write `house.glb`, `world.glb` and `plan.svg` to; the demo ends with an error rather than overwrite
+    /// other files of these names.
     #[arg(short, long, default_value = ".", value_name = "DIR")]
     output: PathBuf,
     /// Print JSON for machines.
@@ -27,10 +27,10 @@ pub(crate) struct Demo {
     json: bool,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(serde::Serialize)]
 struct DemoReport {
-    /// As text: JSON holds no other names.
+    /// As text: JSON cannot hold other names.
     files: [String; 3],
     #[serde(flatten)]
     summary: Summary,
@@ -38,7 +38,7 @@ struct DemoReport {
 
 pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
     let house = export_glb(&furnished_house().scene);
-    // As `bake` reads it: in the file's order, with its names.
+    // Read as `bake` does: in the file's order, with its names.
     let scene = decode_gltf(&house, &ImportOptions::default())?.scene;
     make_folder("-o", &args.output)?;
     let path = |name: &str| args.output.join(name);

@@ -1,11 +1,11 @@
-//! States of doors by chance, to try promises with.
+//! Random states of doors, to test promises with.
 
 use enfilade::cpg::PortalId;
 use enfilade::runtime::{Sight, SightState};
 use enfilade_testkit::Rng;
 
-/// A third of all portals with leaves shut, a third some way open, the others as the model has them; and a tenth of those
-/// without leaves closed.
+/// Shuts a third of all portals with leaves, opens a third partly, and leaves the others as in the model; closes a
+/// tenth of the portals without leaves.
 #[must_use]
 pub fn random_doors(rng: &mut Rng, sight: &Sight) -> SightState {
     let mut state = SightState::new(sight);

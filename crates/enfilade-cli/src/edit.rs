@@ -1,4 +1,4 @@
-//! `enfilade edit`: portals taken out of a world and put in.
+//! `enfilade edit`: removes portals from a world and inserts others.
 
 use std::path::PathBuf;
 
@@ -15,21 +15,21 @@ use crate::simplify::{Done, write};
 use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 
-/// Takes portals out of a world and puts new ones in.
+/// Removes portals from a world and inserts new ones.
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("edits").required(true).multiple(true)))]
 pub(crate) struct Edit {
-    /// World, whatever built it; `-` for standard input.
+    /// World from any builder; `-` for standard input.
     #[arg(value_name = "IN.glb")]
     input: PathBuf,
     /// World to write; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
-    /// Portal to take away, by its number in the input; all others between its two cells go, too.
+    /// Portal to remove, by its number in the input; all others between its two cells go, too.
     #[arg(long, value_name = "ID", group = "edits")]
     delete_portal: Vec<u32>,
-    /// Portal to put in, after those to take away are gone: the corners of a convex planar polygon in
-    /// order, which cuts the cell that holds its middle; it may reach into walls.
+    /// Portal to insert after removals, given by the vertices of a convex planar polygon in order; it cuts the cell
+    /// that contains its middle, and may reach into walls.
     #[arg(
         long,
         value_name = "X,Y,Z;X,Y,Z;…",
@@ -45,7 +45,7 @@ pub(crate) struct Edit {
     limits: Limits,
 }
 
-/// Corners of a polygon.
+/// Vertices of a polygon.
 #[derive(Clone, Debug, PartialEq)]
 struct Polygon(Vec<DVec3>);
 
@@ -55,13 +55,13 @@ fn parse_polygon(text: &str) -> Result<Polygon, String> {
             .split(',')
             .map(|n| {
                 let value = n.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-                value.ok_or_else(|| format!("corner {i}: '{}' is not a number", n.trim()))
+                value.ok_or_else(|| format!("vertex {i}: '{}' is not a number", n.trim()))
             })
             .collect::<Result<_, _>>()?;
         match numbers[..] {
             [x, y, z] => Ok(DVec3::new(x, y, z)),
             _ => Err(format!(
-                "corner {i}: '{}' has {} numbers, not three",
+                "vertex {i}: '{}' has {} numbers, not three",
                 part.trim(),
                 numbers.len()
             )),
@@ -75,7 +75,7 @@ fn parse_polygon(text: &str) -> Result<Polygon, String> {
         .collect::<Result<_, _>>()?;
     if corners.len() < 3 {
         return Err(format!(
-            "a portal needs at least 3 corners, not {}; put ';' between them",
+            "a portal needs at least 3 vertices, not {}; put ';' between them",
             corners.len()
         ));
     }
@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
         let cells = [added.cell, added.new_cell].map(|c| &added.world.graph[c]);
         let [(one, v1), (other, v2)] = cells.map(|c| (&c.name, c.volume));
         done.notes.push(format!(
-            "{} of {area:.2} m² parts {one}: now {one} ({v1:.1} m³) and {other} ({v2:.1} m³)",
+            "{} of {area:.2} m² divides {one}: now {one} ({v1:.1} m³) and {other} ({v2:.1} m³)",
             added.portals[0]
         ));
         for (kept, new) in &added.halved {
@@ -115,11 +115,11 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
         }
         world = Some(added.world);
     }
-    let world = world.context("no portal was taken away")?;
+    let world = world.context("no portal was removed")?;
     write(&outputs, &args.output, [&before, &world], done, args.json)
 }
 
-/// The world without the portals that are to be taken away.
+/// The world without the portals to remove.
 fn without_portals(args: &Edit, before: &World) -> anyhow::Result<Simplified> {
     let n = before.graph.portals.len();
     if let Some(id) = args.delete_portal.iter().find(|&&id| id as usize >= n) {
@@ -129,7 +129,7 @@ fn without_portals(args: &Edit, before: &World) -> anyhow::Result<Simplified> {
         );
     }
     let mut result: Option<Simplified> = None;
-    // Numbers change as portals go, so each is found again by its cells' new numbers.
+    // Numbers change as portals go, so find each one again by its cells' new numbers.
     let mut cell_of: Vec<u32> = (0..before.graph.cells.len() as u32).collect();
     for &id in &args.delete_portal {
         let cells = before.graph.portals[id as usize]
@@ -141,7 +141,7 @@ fn without_portals(args: &Edit, before: &World) -> anyhow::Result<Simplified> {
             now == cells || now == [cells[1], cells[0]]
         };
         let Some(portal) = world.graph.portals.iter().position(between) else {
-            // Gone already with another one between the same cells.
+            // Already removed with another portal between the same cells.
             continue;
         };
         if let Some(next) = delete_portal(world, PortalId(portal as u32)) {
@@ -151,7 +151,7 @@ fn without_portals(args: &Edit, before: &World) -> anyhow::Result<Simplified> {
             result = Some(next);
         }
     }
-    result.context("no portal was taken away")
+    result.context("no portal was removed")
 }
 
 #[cfg(test)]
@@ -164,11 +164,11 @@ mod tests {
         assert_eq!(polygon.0[0], DVec3::new(-1.0, 2.0, 3.0));
         assert_eq!(polygon.0.len(), 3);
         for (text, says) in [
-            ("1,2,3;4,5,6", "at least 3 corners, not 2"),
-            ("1,2,3;4,x,6;7,8,9", "corner 1: 'x' is not a number"),
-            ("1,2,3;4,5,6;7,8", "corner 2: '7,8' has 2 numbers"),
-            ("1,2,3;4,5,6;7,8,inf", "corner 2: 'inf' is not a number"),
-            ("", "corner 0: '' is not a number"),
+            ("1,2,3;4,5,6", "at least 3 vertices, not 2"),
+            ("1,2,3;4,x,6;7,8,9", "vertex 1: 'x' is not a number"),
+            ("1,2,3;4,5,6;7,8", "vertex 2: '7,8' has 2 numbers"),
+            ("1,2,3;4,5,6;7,8,inf", "vertex 2: 'inf' is not a number"),
+            ("", "vertex 0: '' is not a number"),
         ] {
             let error = parse_polygon(text).unwrap_err();
             assert!(error.contains(says), "{error}");

@@ -18,47 +18,47 @@ use crate::render::tell_of_pictures;
 use enfilade_cli::cameras::random_camera;
 use enfilade_cli::doors::random_doors;
 
-/// Eyes drawn for a view, should they lie on surfaces.
+/// Most eyes drawn for one view, if they lie on surfaces.
 const MAX_DRAWS: usize = 100;
 
-/// What to compare, and with what.
+/// Settings of the comparison.
 pub(crate) struct Asked<'a> {
     pub(crate) views: u64,
     pub(crate) seed: u64,
     pub(crate) size: [u32; 2],
     pub(crate) adapter: &'a AdapterChoice,
-    /// A folder that is there.
+    /// An existing folder.
     pub(crate) pictures: Option<&'a Path>,
-    /// What the command reads.
+    /// Files that the command reads and writes.
     pub(crate) outputs: Outputs,
     pub(crate) max_listed: usize,
-    /// Whether doors are open and shut by chance, anew for each view.
+    /// Open and shut doors at random, again for each view.
     pub(crate) has_doors: bool,
 }
 
-/// What was found.
+/// Results of the comparison.
 #[derive(Default, Serialize)]
 pub(crate) struct Exactness {
     views: u64,
     pixels: u64,
-    /// Pixels that show something else.
+    /// Pixels that differ.
     pub(crate) differing: u64,
     /// Views with such pixels.
     differing_views: u64,
-    /// Pixels whose middle lies on an edge, to a 64th of a pixel: both pictures are right.
+    /// Pixels whose center lies on an edge, within a 64th of a pixel: both pictures are right.
     edges: u64,
-    /// Pixels where the picture without culling shows what is seen through a crack alone that is no wider than the
-    /// adapter rounds, or than the world's tolerance.
+    /// Pixels where the picture without culling shows something through a crack alone that is at most as wide as the
+    /// adapter's rounding, or as the world's tolerance.
     cracks: u64,
-    /// Views passed over: the eye was on a surface.
+    /// Views skipped because the eye was on a surface.
     on_surface: u64,
-    /// Triangles drawn, of those drawn without culling.
+    /// Triangles drawn, and triangles drawn without culling.
     triangles: [u64; 2],
     adapter: String,
     lost: Vec<Lost>,
 }
 
-/// Something lost.
+/// An object or triangle missing from the culled picture.
 #[derive(Serialize)]
 struct Lost {
     view: u64,
@@ -71,12 +71,12 @@ struct Lost {
     at: [u32; 2],
     pixels: usize,
     expected: String,
-    /// Cells that see what is lost.
+    /// Cells that see it.
     cells: Vec<u32>,
     #[serde(skip)]
     cell_names: Vec<String>,
     found: String,
-    /// Distances along the view direction of what is lost and what is shown. [Units: wu]
+    /// Distances of the missing and of the shown surface along the view direction. [Units: wu]
     depths: [f32; 2],
 }
 
@@ -121,7 +121,7 @@ impl fmt::Display for Exactness {
     }
 }
 
-/// What a pixel shows, in words, and the cells that see it.
+/// The content of a pixel in words, and the cells that see it.
 fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) {
     match shown {
         Shown::Sky => ("the sky".into(), Vec::new()),
@@ -160,7 +160,7 @@ pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::R
     bar.start("comparing pictures", asked.views);
     let aspect = asked.size[0] as f32 / asked.size[1] as f32;
     for view in 0..asked.views {
-        // What the near plane cuts is lost to any renderer: such an eye is drawn anew.
+        // No renderer draws what the near plane cuts off, so draw another eye.
         if asked.has_doors {
             studio.state = random_doors(&mut rng, &studio.sight);
             oracle.follow(&studio.sight, &studio.state);
@@ -185,9 +185,9 @@ pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::R
         let mut lost: Vec<LostPixel> = Vec::new();
         for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
             let mut difference = a.difference(b);
-            // Each pixel once, though there are two layers of it.
+            // Each pixel once, although it has two layers.
             out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
-            // Where another opaque triangle is shown, and rightly, it hides other things as well.
+            // If another opaque triangle is shown, and rightly, it hides other things as well.
             let is_hidden_by_that = |l: &LostPixel| {
                 let [before, now] = [&whole[0], &culled[0]].map(|p| p.at(l.at));
                 layer == 1
@@ -258,7 +258,7 @@ fn describe(
     }
 }
 
-/// Everything, what is drawn, and both apart: side by side, with frames around what is lost.
+/// Everything, the culled picture, and both from outside: side by side, with frames around the missing parts.
 fn picture_of_loss(
     studio: &mut Studio,
     camera: &Camera,

@@ -1,10 +1,10 @@
-//! What the outputs hold, and the extensions that say so.
+//! Formats of the outputs, and the file extensions of each.
 
 use std::path::Path;
 
 use anyhow::bail;
 
-/// What a command writes to a file.
+/// The content of an output file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     World,
@@ -28,9 +28,9 @@ struct Row {
     format: Format,
     /// In words, with an article.
     name: &'static str,
-    /// That say what it is, in lower case; the first is the usual one.
+    /// Extensions in lower case; the first is the usual one.
     extensions: &'static [&'static str],
-    /// Whether it may go to standard output.
+    /// `true` if it may go to standard output.
     is_streamed: bool,
 }
 
@@ -39,7 +39,7 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
         format,
         name,
         extensions,
-        // A search that was saved is read again.
+        // A saved search is read again.
         is_streamed: !matches!(format, Format::Search),
     }
 }
@@ -60,22 +60,18 @@ const TABLE: [Row; 15] = [
     row(Format::Choices, "decisions as TOML", &["toml"]),
     row(
         Format::Leak,
-        "a way as lines of text",
+        "a path as lines of text",
         &["pts", "lin", "txt"],
     ),
     row(Format::Visible, "visible sets as text", &["pvs", "txt"]),
     row(Format::Pairs, "pairs as text", &["txt"]),
     row(Format::Statistics, "statistics as JSON", &["json"]),
     row(Format::Evidence, "evidence", &["ev", "evidence"]),
-    row(
-        Format::Search,
-        "a search to go on with",
-        &["search", "checkpoint"],
-    ),
+    row(Format::Search, "a saved search", &["search", "checkpoint"]),
     row(Format::Manual, "a manual page", &["1"]),
 ];
 
-/// Extensions of what no command writes: pictures, models, sounds, films, documents, archives, programs.
+/// Extensions of formats that no command writes: pictures, models, sounds, films, documents, archives, programs.
 const FOREIGN: [&str; 154] = [
     "3ds", "3mf", "7z", "aac", "abc", "ac3", "aif", "aiff", "amr", "ape", "au", "avi", "avif",
     "bam", "blend", "bmp", "bsp", "bz2", "c", "cpp", "css", "csv", "cub", "dae", "dds", "dll",
@@ -97,8 +93,8 @@ impl Format {
         row.expect("each format has a row")
     }
 
-    /// Refuses a name whose extension says that the file holds something else. Extensions that nobody knows say nothing:
-    /// a temporary name is as good as any.
+    /// Refuses a name whose extension belongs to another format. Unknown extensions are accepted: a temporary name is
+    /// as good as any.
     pub(crate) fn check(self, option: &str, path: &Path) -> anyhow::Result<()> {
         let row = self.row();
         let extension = path.extension().unwrap_or_default().to_string_lossy();
@@ -119,7 +115,7 @@ impl Format {
         );
     }
 
-    /// Refuses standard output for what is of no use there.
+    /// Refuses standard output for formats that are of no use there.
     pub(crate) fn check_stream(self, option: &str) -> anyhow::Result<()> {
         let row = self.row();
         if !row.is_streamed {

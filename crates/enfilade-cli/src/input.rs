@@ -1,4 +1,4 @@
-//! What commands read: files, and standard input for `-`.
+//! Inputs of commands: files, and standard input for `-`.
 
 use std::fs::File;
 use std::io::{self, Read, StdinLock};
@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
 
-/// Whether a path stands for standard input or output. A file of that name is `./-`.
+/// Returns `true` if a path stands for standard input or output. A file of that name is `./-`.
 #[must_use]
 pub fn is_stream(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// What an input is called in messages.
+/// The name of an input in messages.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
     if is_stream(path) {
@@ -23,15 +23,15 @@ pub fn name_of(path: &Path) -> String {
     }
 }
 
-/// Reads a world, a portal file or evidence, from a file or standard input, of at most as many bytes as a scene may have
+/// Reads a world, a portal file or evidence from a file or standard input, up to the size allowed for scenes
 /// ([`Limits::max_file_bytes`]).
 ///
-/// A GLB says in its head how long it is: of what does not end there, no more than a byte is read. Of what is none of the
-/// three, only the beginning.
+/// A GLB states its length in its head: beyond that, at most one byte is read. An input in none of the three formats
+/// is read only at its beginning.
 ///
 /// # Errors
 ///
-/// What cannot be read, or is longer; the error names it.
+/// If the input cannot be read or is longer; the error names it.
 pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     let length = |head: &[u8]| {
         let is_known = head.trim_ascii_start().is_empty()
@@ -42,21 +42,21 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
 }
 
-/// [`read`], of what is nothing but a GLB: of anything else, only the head is read.
+/// Like [`read`], for a GLB only: for any other input, only the head is read.
 ///
 /// # Errors
 ///
-/// As [`read`]; not for what is no GLB, of which a decoder has more to say.
+/// As [`read`]; not if the input is not a GLB, which a decoder reports in more detail.
 pub fn read_glb(path: &Path) -> anyhow::Result<Vec<u8>> {
     let length = |head: &[u8]| glb_length(head).unwrap_or(0);
     read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
 }
 
-/// Reads a short text that somebody wrote. `what` it is stands in the errors, as in "cannot read settings a.toml".
+/// Reads a short text written by a person. `what` names it in errors, as in "cannot read settings a.toml".
 ///
 /// # Errors
 ///
-/// What cannot be read, is no UTF-8, or is longer than 64 MiB; the error names it.
+/// If the input cannot be read, is not UTF-8, or is longer than 64 MiB; the error names it.
 pub fn read_text(what: &str, path: &Path) -> anyhow::Result<String> {
     let read = || {
         let bytes = read_headed(path, |_| u64::MAX, MAX_TEXT)?;
@@ -94,12 +94,12 @@ pub fn import_scene(
 }
 
 const HEAD: u64 = 12;
-/// As much as an error repeats of what is no file of ours.
+/// Bytes of an unknown format to read: as much as an error quotes.
 const BEGINNING: u64 = 4096;
-/// No settings and no path of cameras are longer. [Units: bytes]
+/// Settings and paths of cameras are never longer. [Units: bytes]
 const MAX_TEXT: u64 = 64 << 20;
 
-/// The length that a GLB says it has.
+/// The length that a GLB states.
 fn glb_length(head: &[u8]) -> Option<u64> {
     let length = head.strip_prefix(b"glTF")?.get(4..8)?;
     Some(u32::from_le_bytes(length.try_into().ok()?).into())
@@ -117,12 +117,12 @@ fn read_headed(path: &Path, length: impl Fn(&[u8]) -> u64, limit: u64) -> io::Re
     };
     let mut bytes = Vec::new();
     from.by_ref().take(HEAD).read_to_end(&mut bytes)?;
-    // One more, which tells whoever decodes it that there is too much.
+    // One byte more, so that the decoder notices the excess.
     let most = length(&bytes).min(limit).saturating_add(1);
     from.take(most.saturating_sub(HEAD))
         .read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
-        let text = format!("more than {limit} bytes, which is the most that is read");
+        let text = format!("more than {limit} bytes, the most that is read");
         return Err(io::Error::other(text));
     }
     Ok(bytes)

@@ -1,4 +1,4 @@
-//! `enfilade inspect`: what a world holds.
+//! `enfilade inspect`: prints the contents of a world.
 
 mod doors;
 mod objects;
@@ -27,7 +27,7 @@ pub(crate) struct Inspect {
     json: bool,
     #[command(flatten)]
     limits: Limits,
-    /// Instead of all that: the objects that this cell sees, by its name or id, with their triangles.
+    /// Instead, list the objects that this cell sees, given by name or id, with their triangles.
     #[arg(long, value_name = "CELL")]
     objects: Option<String>,
 }
@@ -84,7 +84,7 @@ struct PortalReport<'a> {
     fittings: Vec<FittingReport>,
 }
 
-/// An opening to outdoors that may be a hole of the model.
+/// An opening to the outdoors that may be a hole of the model.
 #[derive(Serialize)]
 struct HoleReport {
     portal: u32,
@@ -101,7 +101,7 @@ struct SealReport {
     largest_position: [f64; 3],
 }
 
-/// Times and peaks differ from run to run and are not in the file, which is the same every time.
+/// Times and memory peaks differ from run to run and are not in the file, which is the same every time.
 #[derive(Serialize)]
 struct Stats<'a> {
     input_triangles: u64,
@@ -200,7 +200,7 @@ fn kind_name(kind: PortalKind) -> &'static str {
 fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
     let mut by_volume: Vec<(usize, &Cell)> = graph.cells.iter().enumerate().collect();
-    // Ids break ties, so that the table is the same every time.
+    // Ids break ties, so that the table is reproducible.
     by_volume.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     writeln!(
         out,
@@ -241,7 +241,7 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
         let [x, y, z] = p.center();
         let [one, other] = p.cells.map(|c| &graph[c].name);
         let cells = format!("{one} – {other}");
-        // As a text, so that it is as wide as the column.
+        // A string, so that it is padded to the column.
         let id = id.to_string();
         writeln!(
             out,
@@ -262,7 +262,7 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     write_totals(out, world)
 }
 
-/// Openings to outdoors that may be holes of the model, if any.
+/// Lists openings to the outdoors that may be holes of the model, if any.
 pub(crate) fn write_holes(
     out: &mut impl Write,
     graph: &CellPortalGraph,
@@ -301,7 +301,7 @@ pub(crate) fn write_holes(
     Ok(true)
 }
 
-/// What gaps of the model were closed, if any.
+/// Lists the gaps of the model that were closed, if any.
 pub(crate) fn write_seals(out: &mut impl Write, world: &World) -> io::Result<()> {
     let seals = Seals::of(world);
     if seals.count == 0 {

@@ -1,6 +1,6 @@
-//! What the command `enfilade` and the benchmarks share: files, cameras and values of arguments.
+//! Code shared by the command `enfilade` and the benchmarks: files, cameras and values of arguments.
 //!
-//! A tool's own library, without promises to others; programs use the crate `enfilade`.
+//! An internal library without promises to others; programs use the crate `enfilade`.
 
 pub mod adapter;
 pub mod answers;

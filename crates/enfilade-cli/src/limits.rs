@@ -1,8 +1,9 @@
-//! Limits of a command's time and memory, as its caller sets them.
+//! Limits of a command's time and memory, set by the user.
 //!
-//! Loops that can end early spend from an [`Allowance`]; what a scene or an argument would take out of all proportion is refused
-//! before, whatever is said here. Beyond both, a thread looks at clock and memory, so that the bounds hold for code that asks neither:
-//! decoders, drivers of graphics cards. It ends the process, but not in the middle of an output.
+//! Loops that can end early spend from an [`Allowance`]; work out of all proportion to a scene or an argument is
+//! refused beforehand, whatever the limits. Beyond both, a thread watches the clock and the memory, so that the
+//! limits also hold for code that checks neither: decoders, drivers of graphics cards. It ends the process, but not
+//! in the middle of an output.
 
 use std::io::Write;
 use std::sync::TryLockError;
@@ -22,30 +23,31 @@ pub(crate) struct Limits {
     /// End without a result after this long.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
-    /// End without a result rather than take more memory: a number and K, M, G or T.
+    /// End without a result rather than use more memory: a number and K, M, G or T.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     max_memory: Option<u64>,
 }
 
-/// Between two looks: memory grows by some 10 MB in that time at most.
+/// Time between two checks: memory grows by at most about 10 MB meanwhile.
 const PAUSE: Duration = Duration::from_millis(5);
-/// Returns the time that a command gets if it does not end by itself: promised is half as much again and a second.
+/// Returns the time after which a command that does not end by itself is ended: the promise is half as much again and
+/// a second.
 fn with_grace(time: Duration) -> Duration {
     (time.saturating_add(time / 5)).saturating_add(Duration::from_millis(400))
 }
 
-/// An output that is being written is waited for.
+/// Longest wait for an output that is being written.
 const WRITING_TIME: Duration = Duration::from_secs(1);
 
 impl Limits {
-    /// Holds the bounds from now on; what loops may spend.
+    /// Starts enforcing the limits; returns the allowance for loops.
     pub(crate) fn begin(&self) -> anyhow::Result<Allowance> {
         watch(self.max_time, self.max_memory)?;
         Ok(self.allowance())
     }
 
     fn allowance(&self) -> Allowance {
-        // A time too long to be counted is no bound.
+        // A time too long for the clock is not a bound.
         let end = self.max_time.and_then(|t| Instant::now().checked_add(t));
         Allowance::new(u64::MAX, end)
     }
@@ -58,7 +60,7 @@ impl Limits {
         self.max_memory
     }
 
-    /// The error of a loop that ended because its time was up.
+    /// The error of a loop that ended because the time was up.
     pub(crate) fn time_is_up(&self) -> anyhow::Error {
         anyhow::Error::msg(late(self.max_time.unwrap_or_default()))
     }
@@ -66,15 +68,15 @@ impl Limits {
 
 fn late(time: Duration) -> String {
     format!(
-        "not done within {} s (--max-time); give it more, or less to do",
+        "not done within {} s (--max-time); raise the limit or reduce the work",
         time.as_secs_f64()
     )
 }
 
-/// Ends the process once it takes longer or more than it may.
+/// Ends the process once it exceeds a limit.
 pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyhow::Result<()> {
     if max_memory.is_some() && memory().is_none() {
-        bail!("--max-memory: this system does not say how much memory a process takes");
+        bail!("--max-memory: this system does not report the memory of a process");
     }
     if max_time.is_none() && max_memory.is_none() {
         return Ok(());
@@ -91,10 +93,10 @@ pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyh
         {
             let [taken, most] = [taken, most].map(|b| b as f64 / f64::from(1 << 20));
             end(&format!(
-                "takes {taken:.0} MiB, and {most:.0} MiB were allowed (--max-memory); give it more, or less to do"
+                "uses {taken:.0} MiB, and {most:.0} MiB were allowed (--max-memory); raise the limit or reduce the work"
             ));
         }
-        // Without a bound on memory, there is nothing to see before the time is up.
+        // Without a bound on memory, there is nothing to check before the time is up.
         let left = hard.map_or(Duration::MAX, |t| t.saturating_sub(start.elapsed()));
         let pause = if max_memory.is_some() {
             PAUSE.min(left)
@@ -110,10 +112,10 @@ pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyh
     Ok(())
 }
 
-/// Says why, and ends the process once no output is being written any more.
+/// Reports the reason, and ends the process as soon as no output is being written.
 fn end(why: &str) -> ! {
     let start = Instant::now();
-    // Held to the end, so that none begins.
+    // Held to the end, so that no output begins.
     let _none_is_written = loop {
         match WRITING.try_lock() {
             Err(TryLockError::WouldBlock) if start.elapsed() < WRITING_TIME => {
@@ -123,7 +125,7 @@ fn end(why: &str) -> ! {
         }
     };
     let _ = writeln!(Warned, "enfilade: {why}");
-    // Without the handlers that drivers left for the end: their threads are still at work, and would be freed under.
+    // Skips the exit handlers of drivers, which would free memory that their threads still use.
     signal_hook::low_level::exit(1);
 }
 

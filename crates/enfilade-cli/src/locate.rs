@@ -1,4 +1,4 @@
-//! `enfilade locate`: points in, cells out.
+//! `enfilade locate`: finds the cells of points.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
@@ -13,35 +13,33 @@ use crate::screen::{print_json, printed_at_once};
 use enfilade_cli::input::is_stream;
 use enfilade_cli::world::read_world;
 
-/// Reads `x y z` lines (meters, +Y up) and prints the id of each point's cell, `-` where there is
-/// none.
+/// Reads `x y z` lines (meters, +Y up) and prints the id of each point's cell, or `-` if there is none.
 #[derive(clap::Args)]
 pub(crate) struct Locate {
     /// World written by `enfilade bake`.
     world: PathBuf,
-    /// Instead of points: print the cells that see the object of this name, an id a line; `*` and `?` in PATTERN stand
-    /// for other letters, and it may name the nodes above, as in 'storey 2/*/IfcDoor*'.
+    /// Instead of points: print the cells that see the object of this name, one id per line; in PATTERN, `*` and `?`
+    /// match other letters, and it may include the nodes above, as in 'storey 2/*/IfcDoor*'.
     #[arg(long, value_name = "PATTERN")]
     object: Option<String>,
-    /// Print JSON for machines: the ids of all points, `null` where there is no cell, when all lines are read; with `--object` those
-    /// of its cells.
+    /// Print JSON for machines: the ids of all points, `null` if there is no cell, once all lines are read; with
+    /// `--object`, the ids of its cells.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(serde::Serialize)]
 struct LocateReport {
     cells: Vec<Option<u32>>,
 }
 
-/// Longest line that is read; three numbers never take as much, and a file without line ends must
-/// not fill the memory.
+/// Longest line: three numbers are always shorter, and a file without line ends must not fill the memory.
 const MAX_LINE: u64 = 4096;
 
-/// Longest pattern: what it has come to is kept for each node of the tree of names.
+/// Longest pattern: matching keeps its state for each node of the tree of names.
 const MAX_PATTERN: usize = 1000;
 
 pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
@@ -50,7 +48,7 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
         return locate_object(&read_world(&args.world)?, pattern, args.json);
     }
     if is_stream(&args.world) {
-        bail!("standard input has the points; give the world as a file, not '-'");
+        bail!("standard input is for the points; give the world as a file, not '-'");
     }
     let world = read_world(&args.world)?;
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
@@ -67,15 +65,15 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     locate_lines(locator, input, output)
 }
 
-/// Prints the cells of all sources whose name or path fits.
+/// Prints the cells of all sources whose name or path matches.
 fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()> {
     if pattern.len() > MAX_PATTERN {
-        bail!("--object: a pattern of at most {MAX_PATTERN} letters is needed");
+        bail!("--object: the pattern must have at most {MAX_PATTERN} letters");
     }
     let found = sources_named(world, pattern);
     if !found.contains(&true) {
         bail!(
-            "no object is called '{pattern}'; `enfilade inspect --objects CELL` lists those that a cell sees"
+            "no object is called '{pattern}'; `enfilade inspect --objects CELL` lists the objects that a cell sees"
         );
     }
     let cells = world.cells_of_sources(|source| found[source as usize]);
@@ -90,9 +88,11 @@ fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()>
     output.flush().context("cannot write to standard output")
 }
 
-/// By source, whether its name or path fits the pattern, or that of one above it: the cells of a storey are those of what it holds.
+/// Returns for each source `true` if its name or path, or that of one above it, matches the pattern: the cells of a
+/// storey are those of its contents.
 ///
-/// Paths are read on from where those above ended, not each from the top: linear in the names, however deep they are nested.
+/// Matching continues from the state of the source above, not from the top: linear in the names, however deep they
+/// are nested.
 fn sources_named(world: &World, pattern: &str) -> Vec<bool> {
     let glob = Glob::new(pattern);
     let mut is_parent = vec![false; world.sources.len()];
@@ -100,7 +100,8 @@ fn sources_named(world: &World, pattern: &str) -> Vec<bool> {
         is_parent[parent as usize] = true;
     }
     let mut is_found: Vec<bool> = Vec::with_capacity(world.sources.len());
-    // States of the sources that have others below and are not found yet: if a path has begun, and how far it has come in the pattern.
+    // States of sources that have others below and do not match yet: `true` once a path has begun, and the state of
+    // its match.
     let mut paths: Vec<Option<(bool, GlobState)>> = Vec::with_capacity(world.sources.len());
     for (i, node) in world.sources.iter().enumerate() {
         let parent = node.parent.map(|p| p as usize);
@@ -134,18 +135,18 @@ fn locate_lines<R: Read>(
             Some(cell) => writeln!(output, "{}", cell.0)?,
             None => output.write_all(b"-\n")?,
         }
-        // Someone who asks one point at a time is waiting for the answer.
+        // A user who queries one point at a time waits for the answer.
         if is_waiting {
             output.flush()?;
         }
         Ok(())
     });
-    // The answers before a line that is no point are answers.
+    // Print the answers before a malformed line.
     output.flush()?;
     done
 }
 
-/// Calls `answer` for the point of each line, with whether no other has come yet.
+/// Calls `answer` for the point of each line; the flag is `true` if no further line has arrived yet.
 fn each_point<R: Read>(
     mut input: BufReader<R>,
     mut answer: impl FnMut(DVec3, bool) -> io::Result<()>,

@@ -1,9 +1,10 @@
 //! The `enfilade` command: arguments → library calls → report.
 //!
-//! Results go to standard output, progress and messages to standard error; `-` is standard input among inputs and standard
-//! output among outputs, and then the results go to standard error, too; `--quiet` leaves errors and warnings alone there.
-//! Exit code 0: done;
-//! 1: could not, or a promise is broken (the message says why and what to do); 2: wrong usage.
+//! Results go to standard output, progress and messages to standard error; `--quiet` leaves only errors and warnings.
+//! `-` is standard input among inputs and standard output among outputs; in the latter case, results go to standard
+//! error, too.
+//!
+//! Exit code 0: done; 1: failed, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
 mod auralize;
 mod bake;
@@ -40,12 +41,12 @@ use clap::{CommandFactory, Parser, Subcommand};
 use enfilade::geom::{is_hidden, shown};
 use screen::{Warned, be_quiet, is_broken_pipe};
 
-/// Finds the rooms and doorways of a 3D scene; answers what can be seen from where.
+/// Finds the rooms and doorways of a 3D scene and computes what is visible from where.
 #[derive(Parser)]
-// The name and version that worlds have as their generator.
+// The name and version that worlds record as their generator.
 #[command(name = "enfilade", version, about)]
 struct Cli {
-    /// Say nothing on standard error but errors, and warnings about the result.
+    /// Print only errors and warnings about the result on standard error.
     #[arg(short, long, global = true)]
     quiet: bool,
     #[command(subcommand)]
@@ -109,7 +110,7 @@ fn main() -> ExitCode {
     };
     match run(cli) {
         Ok(()) => ExitCode::SUCCESS,
-        // The reader of our output has seen enough, as in `enfilade inspect X.glb | head`.
+        // The reader closed our output early, as in `enfilade inspect X.glb | head`.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             let _ = writeln!(Warned, "enfilade: {error:#}");
@@ -118,8 +119,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Ends with what is wrong, or with the help that was asked for. The message repeats arguments, and a shell makes arguments
-/// of the names of files: of those that hold hidden characters, it is told by names that can be shown.
+/// Ends with a usage error, or with the requested help. The message repeats arguments, which a shell may make from
+/// file names: arguments with hidden characters are shown escaped.
 fn wrong_usage(error: &clap::Error) -> ! {
     let args = || std::env::args_os().map(|a| a.to_string_lossy().into_owned());
     if args().any(|a| a.contains(is_hidden)) {

@@ -1,4 +1,4 @@
-//! `enfilade completions` and `enfilade man`: what shells and manuals know of the commands, from the commands themselves.
+//! `enfilade completions` and `enfilade man`: shell completions and manual pages, generated from the commands.
 
 use std::path::{Path, PathBuf};
 
@@ -9,17 +9,17 @@ use crate::formats::Format;
 use crate::output::{Outputs, make_folder, write_unnamed};
 use crate::screen::pass_on;
 
-/// Prints what a shell needs to complete commands and options.
+/// Prints a script that makes a shell complete commands and options.
 #[derive(clap::Args)]
 pub(crate) struct Completions {
     /// The shell; e.g. `enfilade completions bash > ~/.local/share/bash-completion/completions/enfilade`.
     shell: Shell,
 }
 
-/// Writes manual pages, one for each command; over earlier ones of its own, and over no other file.
+/// Writes manual pages, one for each command; overwrites its own earlier pages, and no other file.
 #[derive(clap::Args)]
 pub(crate) struct Man {
-    /// Folder to write `enfilade.1`, `enfilade-bake.1` and so on to; made if it is not there.
+    /// Folder for `enfilade.1`, `enfilade-bake.1` and so on; created if missing.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
@@ -27,7 +27,7 @@ pub(crate) struct Man {
 pub(crate) fn completions(args: &Completions, mut command: clap::Command) -> anyhow::Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "enfilade", &mut script);
-    // By ourselves: the generator ends the program where the reader went away.
+    // Written here: the generator ends the program if the reader has gone away.
     pass_on(|out| Ok(out.write_all(&script)?)).context("cannot write to standard output")
 }
 
@@ -51,7 +51,7 @@ pub(crate) fn man(args: &Man, command: clap::Command) -> anyhow::Result<()> {
     write_unnamed("DIR", &files, is_page)
 }
 
-/// Whether a file is a page of this program's, of any version.
+/// Returns `true` if a file is a manual page of this program, of any version.
 fn is_page(path: &Path, bytes: &[u8]) -> bool {
     let title = format!(".TH {} 1", path.file_stem().unwrap_or_default().display());
     let mut lines = bytes.split(|&b| b == b'\n');

@@ -1,6 +1,6 @@
-//! Memory that this process takes.
+//! Memory use of this process.
 
-/// Resident memory, where the system says: on Linux. [Units: bytes]
+/// Resident memory, if the system reports it: on Linux. [Units: bytes]
 #[must_use]
 pub fn held_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

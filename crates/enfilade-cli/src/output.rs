@@ -1,4 +1,4 @@
-//! Where the commands write: files whole or not at all, none of them an input, and standard output for `-`.
+//! Outputs of commands: files, written whole or not at all and never over an input, and standard output for `-`.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -17,12 +17,12 @@ use crate::screen::{Told, is_broken_pipe, pass_on, printed};
 /// Held while an output is written.
 pub(crate) static WRITING: Mutex<()> = Mutex::new(());
 
-/// Writes `bytes` to `path`, [whole or not at all](enfilade::whole), or to standard output where it is `-`.
+/// Writes `bytes` to `path`, [whole or not at all](enfilade::whole), or to standard output if it is `-`.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     write_streamed(path, |out| Ok(out.write_all(bytes)?))
 }
 
-/// The same for what is made while it is written.
+/// Like [`write_whole`], for data made while it is written.
 pub(crate) fn write_streamed(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
@@ -30,9 +30,9 @@ pub(crate) fn write_streamed(
     let _is_writing = WRITING.lock();
     if is_stream(path) {
         return match pass_on(fill) {
-            // Who prints a table may stop where the reader does; half a file is none.
+            // A printed table may stop when its reader does; half a file is a failure.
             Err(e) if is_broken_pipe(&e) => bail!(
-                "standard output was closed before the whole file was written; what was read of it is cut off"
+                "standard output was closed before the whole file was written; the part that was read is cut off"
             ),
             done => done.map_err(|e| explained(e, || "cannot write to standard output".to_owned())),
         };
@@ -41,14 +41,14 @@ pub(crate) fn write_streamed(
     written.map_err(|e| {
         explained(e, || {
             format!(
-                "cannot write {}; choose another place, or make room there",
+                "cannot write {}; choose another place, or free space there",
                 path.display()
             )
         })
     })
 }
 
-/// Adds what could not be written, unless it was something else that failed while it was.
+/// Adds the failed action to an I/O error; leaves other errors as they are.
 fn explained(error: anyhow::Error, what: impl FnOnce() -> String) -> anyhow::Error {
     if error.is::<io::Error>() {
         error.context(what())
@@ -57,10 +57,10 @@ fn explained(error: anyhow::Error, what: impl FnOnce() -> String) -> anyhow::Err
     }
 }
 
-/// What was written.
+/// An output that was written.
 #[derive(serde::Serialize)]
 pub(crate) struct Written {
-    /// `None` for standard output. As text: JSON holds no other names.
+    /// `None` for standard output. As text: JSON cannot hold other names.
     file: Option<String>,
     bytes: usize,
 }
@@ -74,7 +74,7 @@ impl Written {
     }
 }
 
-/// The line that says so.
+/// The line that reports it.
 impl fmt::Display for Written {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "wrote ")?;
@@ -86,10 +86,10 @@ impl fmt::Display for Written {
     }
 }
 
-/// What a command reads and what it will write: no file is both, and none is written by two.
+/// The files that a command reads and will write: none is both, and none is written twice.
 #[derive(Clone, Default)]
 pub(crate) struct Outputs {
-    /// By resolved path: an input as it was given, or the option of an output.
+    /// Keyed by resolved path: an input as given, or the option of an output.
     known: HashMap<PathBuf, Known>,
     /// The option that writes to standard output.
     streamed: Option<&'static str>,
@@ -102,7 +102,7 @@ enum Known {
 }
 
 impl Outputs {
-    /// Of a command that reads these files. Refused where two of them are standard input.
+    /// For a command that reads these files. Refused if two of them are standard input.
     pub(crate) fn reading<'a>(
         inputs: impl IntoIterator<Item = &'a PathBuf>,
     ) -> anyhow::Result<Self> {
@@ -121,13 +121,13 @@ impl Outputs {
         Ok(out)
     }
 
-    /// Takes down what the inputs turned out to refer to. Refused where one of these is an output.
+    /// Records the files that the inputs refer to. Refused if one of them is an output.
     pub(crate) fn read(&mut self, references: &[PathBuf]) -> anyhow::Result<()> {
         for path in references {
             let resolved = whole::followed(path);
             if let Some(Known::Output(option)) = self.known.get(&resolved) {
                 bail!(
-                    "the scene refers to {}, so that is the input, too; choose another name with {option}",
+                    "the scene refers to {}, so it is an input, too; choose another name with {option}",
                     path.display()
                 );
             }
@@ -136,9 +136,9 @@ impl Outputs {
         Ok(())
     }
 
-    /// Takes down that `option` names a file to write. Refused where that is an input or what another option writes, says by
-    /// its extension that it is something else, or cannot be written: asked before minutes of work are spent on what goes
-    /// there.
+    /// Records that `option` names a file to write. Refused if it is an input or another option's output, if its
+    /// extension belongs to another format, or if it cannot be written: checked before minutes of work are spent on
+    /// it.
     pub(crate) fn write(
         &mut self,
         option: &'static str,
@@ -157,7 +157,7 @@ impl Outputs {
         }
     }
 
-    /// The same for several files of one folder, of which the first is tried.
+    /// Like [`write`](Self::write), for several files of one folder; only the first is tested for writing.
     pub(crate) fn write_all(
         &mut self,
         option: &'static str,
@@ -165,7 +165,7 @@ impl Outputs {
         paths: &[PathBuf],
     ) -> anyhow::Result<()> {
         for path in paths {
-            // What is a pipe or a terminal on both sides is no file that could be lost.
+            // A pipe or a terminal on both sides is not a file that could be lost.
             if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
                 continue;
             }
@@ -192,7 +192,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Where results are printed: standard output, or standard error where a file goes there.
+    /// The writer for printed results: standard output, or standard error if a file goes there.
     pub(crate) fn printed(&self) -> Box<dyn Write> {
         if self.streamed.is_some() {
             Box::new(Told)
@@ -202,9 +202,9 @@ impl Outputs {
     }
 }
 
-/// Writes files into the folder that `option` names. Nobody named the files, so none is written over that may be somebody's:
-/// what is there already stays if it is the same, and is refused, before any is written, if it is a link or not an earlier
-/// one of ours.
+/// Writes files into the folder that `option` names. The user did not name the files, so none may overwrite a file of
+/// the user's: an existing file stays if it is equal; before any is written, links and files that are not earlier
+/// ones of ours are refused.
 pub(crate) fn write_unnamed(
     option: &str,
     files: &[(PathBuf, Vec<u8>)],
@@ -220,11 +220,10 @@ pub(crate) fn write_unnamed(
                 if found == *bytes {
                     continue;
                 }
-                (!is_ours(path, &found))
-                    .then_some("is there, and is another file than would be written")
+                (!is_ours(path, &found)).then_some("is there, and differs from the file to write")
             }
-            Ok(meta) if meta.is_symlink() => Some("is a link, and what it leads to would be lost"),
-            _ => Some("is there, and is no file"),
+            Ok(meta) if meta.is_symlink() => Some("is a link, and its target would be lost"),
+            _ => Some("is there, and is not a file"),
         };
         if let Some(why) = refused {
             bail!(
@@ -239,7 +238,7 @@ pub(crate) fn write_unnamed(
         .try_for_each(|(path, bytes)| write_whole(path, bytes))
 }
 
-/// Makes the folder that `option` names, unless it is there.
+/// Makes the folder that `option` names, unless it exists.
 pub(crate) fn make_folder(option: &str, path: &Path) -> anyhow::Result<()> {
     refuse_stream(option, path, "several files")?;
     fs::create_dir_all(path).with_context(|| {
@@ -250,11 +249,11 @@ pub(crate) fn make_folder(option: &str, path: &Path) -> anyhow::Result<()> {
     })
 }
 
-/// Refuses standard output for what is not one file.
+/// Refuses standard output for anything but a single file.
 pub(crate) fn refuse_stream(option: &str, path: &Path, what: &str) -> anyhow::Result<()> {
     if is_stream(path) {
         bail!(
-            "{option} names {what}, which do not go to standard output; give it another name than '-'"
+            "{option} names {what}, which cannot go to standard output; give it another name than '-'"
         );
     }
     Ok(())
@@ -264,7 +263,7 @@ pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
     whole::followed(a) == whole::followed(b)
 }
 
-/// Whether `path` can be written.
+/// Tests if `path` can be written.
 fn check_target(path: &Path, option: &str) -> anyhow::Result<()> {
     whole::try_write(path).with_context(|| {
         let missing = path

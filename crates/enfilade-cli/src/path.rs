@@ -1,4 +1,4 @@
-//! `enfilade path`: how one walks from a point to another.
+//! `enfilade path`: finds the walk from one point to another.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -13,21 +13,21 @@ use crate::screen::{print_json, printed_at_once};
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
-/// Prints the way that someone walks from a point to another: its length, the portals it passes, and the points where it bends.
+/// Prints the walk from one point to another: its length, the portals it passes, and the points where it bends.
 ///
-/// Over floors, stairs and ramps, around walls; through doors, which are open but for those of `--closed`, not through windows.
-/// Furniture is not in the way.
+/// Leads over floors, stairs and ramps, around walls; through doors, which are open except for `--closed`, not
+/// through windows. Ignores furniture.
 #[derive(clap::Args)]
 pub(crate) struct WalkedPath {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where it starts, in meters: at the feet, or any height up to the head.
+    /// Start, in meters: at the feet, or at any height up to the head.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     from: [f32; 3],
-    /// Where it ends, in meters.
+    /// End, in meters.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     to: [f32; 3],
-    /// The walker keeps so far from walls, in meters.
+    /// Distance that the walker keeps from walls, in meters.
     #[arg(long, value_name = "METERS", default_value_t = 0.3)]
     radius: f64,
     /// The walker's height, in meters.
@@ -36,7 +36,7 @@ pub(crate) struct WalkedPath {
     /// The highest step, up or down, in meters.
     #[arg(long, value_name = "METERS", default_value_t = 0.4)]
     step: f64,
-    /// Portals that are closed, by number.
+    /// Closed portals, by number.
     #[arg(long, value_name = "PORTAL,…", value_delimiter = ',')]
     closed: Vec<u32>,
     /// Print JSON for machines.
@@ -46,7 +46,7 @@ pub(crate) struct WalkedPath {
     limits: Limits,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(serde::Serialize)]
 struct PathReport {
     length: f64,
@@ -85,9 +85,9 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
     let found = PathSearch::new().find(&map, &layout, ends, is_open, &mut path);
     let side = map.floors().side();
     match found {
-        // They are a quarter of the radius wide where the world is not too large for that.
+        // Squares are a quarter of the radius wide unless the world is too large for that.
         Err(NoPath::NoWay) if side > 0.26 * args.radius => bail!(
-            "{}; in squares of {side:.3} m, which the floors are laid out in, doorways narrower than {:.2} m may be missed",
+            "{}; with floors divided into squares of {side:.3} m, doorways narrower than {:.2} m may be missed",
             NoPath::NoWay,
             2.0 * (args.radius + side)
         ),

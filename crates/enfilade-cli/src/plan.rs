@@ -13,22 +13,23 @@ use crate::screen::print_json;
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
-/// What stands for a storey's name in the name of an output.
+/// Placeholder for a storey's name in the name of an output.
 const PLACE: &str = "{}";
 
 /// Draws floor plans: rooms colored and named, doorways at their width.
 ///
-/// A storey is floors that meet and do not lie above each other. Spaces in which nobody can stand have plans of their own, named
-/// 2a, 2b, …, where there is no room for them on that of the storey below. One sheet shows all plans; a PDF has a page for each.
+/// A storey consists of connected floors, none above another. Spaces without a floor to stand on have their own
+/// plans, named 2a, 2b, …, if the plan of the storey below has no room for them. One sheet shows all plans; a PDF has
+/// a page for each.
 #[derive(clap::Args)]
 pub(crate) struct Plan {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write: a .svg or a .png with all plans on one sheet, or a .pdf with a page for each. With `{}` in the name, as in
-    /// `plan-{}.svg`, a file for each storey, by its name. `-` is SVG to standard output.
+    /// File to write: a .svg or a .png with all plans on one sheet, or a .pdf with a page for each. With `{}` in the
+    /// name, as in `plan-{}.svg`, one file for each storey, by its name. `-` is SVG to standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Draw this storey only, by the name that its plan has, `1` or `2a`, or by the name of a room on it. May be repeated.
+    /// Draw only this storey, given by its name, `1` or `2a`, or by the name of a room on it. May be repeated.
     #[arg(long, value_name = "N|ROOM")]
     storey: Vec<String>,
     /// Height of the cut above each floor, in meters.
@@ -40,17 +41,17 @@ pub(crate) struct Plan {
     /// Paper of a .pdf: A0 to A5, Letter or Tabloid; A4 if not given.
     #[arg(long, value_name = "PAPER", value_parser = paper)]
     paper: Option<Paper>,
-    /// Scale of a .pdf, as in 1:100; the largest in use that fits the paper if not given.
+    /// Scale of a .pdf, as in 1:100; the largest common scale that fits the paper if not given.
     #[arg(long, value_name = "1:N", value_parser = scale)]
     scale: Option<f64>,
-    /// Print what was written as JSON for machines; nothing is printed otherwise.
+    /// Print a report on the files as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(serde::Serialize)]
 #[serde(untagged)]
 enum PlanReport<'a> {
@@ -72,7 +73,7 @@ struct StoreyReport<'a> {
     cells: Vec<u32>,
 }
 
-/// What the file is.
+/// The kind of the file.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Svg,
@@ -141,7 +142,7 @@ impl<'a> StoreyReport<'a> {
     }
 }
 
-/// What the extension says; refused where an option is for another kind of file.
+/// The kind by the extension; refused if an option is for another kind of file.
 fn kind(args: &Plan) -> anyhow::Result<Kind> {
     let extension = args.output.extension().unwrap_or_default();
     let extension = extension.to_string_lossy().to_ascii_lowercase();
@@ -158,7 +159,7 @@ fn kind(args: &Plan) -> anyhow::Result<Kind> {
     for (option, is_given, of, extension) in misplaced {
         if is_given && kind != of {
             bail!(
-                "{option} is of use to a {extension} only, and {} is none; leave {option} out, or give -o a name that ends in {extension}",
+                "{option} applies only to a {extension} file, not to {}; leave {option} out, or give -o a name that ends in {extension}",
                 if is_stream(&args.output) {
                     "standard output".into()
                 } else {
@@ -216,7 +217,7 @@ fn drawn(args: &Plan, kind: Kind, plans: &Plans, which: &[usize]) -> anyhow::Res
         Kind::Png => {
             let width = args.width.unwrap_or(2400);
             let picture = plans.sheet(which).to_png(width);
-            picture.context("no picture was drawn; --width says how wide it is to be")?
+            picture.context("no picture was drawn; change --width")?
         }
         Kind::Pdf => {
             let pages: Vec<Drawing> = if which.is_empty() {
@@ -230,7 +231,7 @@ fn drawn(args: &Plan, kind: Kind, plans: &Plans, which: &[usize]) -> anyhow::Res
     })
 }
 
-/// The output's name for a storey.
+/// The output's name for one storey.
 fn named(path: &Path, storey: &str) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(name.replace(PLACE, storey))

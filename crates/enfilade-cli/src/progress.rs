@@ -1,4 +1,4 @@
-//! Progress on standard error: a bar on a terminal, lines now and then in a log.
+//! Progress on standard error: a bar on a terminal, occasional lines in a log.
 
 use std::io::Write as _;
 use std::sync::{Arc, Mutex};
@@ -12,26 +12,26 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use crate::progress_lines::{Now, Pace, Ticker};
 use crate::screen::{Told, Warned, is_quiet, is_watched};
 
-/// Whether bars are drawn.
+/// Returns `true` if bars are drawn.
 fn is_shown() -> bool {
     is_watched() && !is_quiet()
 }
 
-/// Writes what is under way into a log now and then, where there is one to write to and no bar.
+/// Starts occasional log lines about the work under way, if standard error is a log.
 fn log(now: impl Fn() -> Option<Now> + Send + 'static) -> Option<Ticker> {
     let is_logged = !is_watched() && !is_quiet();
     is_logged.then(|| Ticker::start(Pace::default(), now, Told))
 }
 
-/// A line on the terminal that shows the stage under way, how far it is and the time left.
+/// A line on the terminal that shows the stage under way, its progress and the time left.
 ///
-/// Where standard error is no terminal, a line of the log now and then. The line disappears when dropped.
+/// If standard error is not a terminal, writes occasional log lines. The line disappears when dropped.
 pub(crate) struct StageBar {
     bar: ProgressBar,
     _log: Option<Ticker>,
 }
 
-/// What a line of the log says of a stage without an estimate of its own.
+/// The log line for a stage without a time estimate of its own.
 fn stage_line(bar: &ProgressBar) -> Option<Now> {
     let stage = bar.message();
     if bar.is_finished() || stage.is_empty() {
@@ -63,14 +63,14 @@ impl StageBar {
         }
     }
 
-    /// Begins a stage of `total` steps; 0 where nobody knows how many.
+    /// Begins a stage of `total` steps; 0 if the number is unknown.
     pub(crate) fn start(&self, stage: &str, total: u64) {
         let template = if total > 0 {
             "{msg:>24} {wide_bar} {percent:>3} %  {eta} left"
         } else {
             "{msg:>24} {spinner}  {elapsed}"
         };
-        // Templates are constants; a style that does not parse would be seen at once.
+        // Templates are constants; a style that does not parse would be noticed at once.
         if let Ok(style) = ProgressStyle::with_template(template) {
             self.bar.set_style(style);
         }
@@ -79,12 +79,12 @@ impl StageBar {
         self.bar.set_message(stage.to_owned());
     }
 
-    /// Says how many steps of the stage are done.
+    /// Sets the number of steps done.
     pub(crate) fn set(&self, done: u64) {
         self.bar.set_position(done);
     }
 
-    /// Takes the line away.
+    /// Removes the line.
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -96,10 +96,10 @@ impl Drop for StageBar {
     }
 }
 
-/// Seconds that a stage takes for a million voxels and for a thousand triangles.
+/// Expected seconds of a stage per million voxels and per thousand triangles.
 ///
-/// Measured on buildings of 1 to 17 million voxels with two cores. Only their proportions matter
-/// for long: what the first stages take on this machine and scene scales the rest.
+/// Measured on buildings of 1 to 17 million voxels with two cores. Soon only the proportions matter: the measured
+/// times of the first stages scale the rest.
 fn cost(stage: Stage) -> [f64; 2] {
     match stage {
         Stage::Structure => [0.0, 0.002],
@@ -115,29 +115,29 @@ fn cost(stage: Stage) -> [f64; 2] {
         Stage::Complex => [0.0, 0.015],
         Stage::Partition => [0.001, 0.012],
         Stage::Geometry => [0.0, 0.001],
-        // A stage that nobody has measured yet.
+        // A stage without measurements.
         _ => [0.005, 0.005],
     }
 }
 
-/// How much of a run of stages is left, by what they should take and what those before took.
+/// Estimates the time left of a run of stages, from expected times and from the times that earlier stages took.
 struct TimeLeft {
-    /// Seconds that each stage should take.
+    /// Expected seconds of each stage.
     expected: Vec<f64>,
     /// The stage under way.
     at: usize,
-    /// Seconds that the stages before it took.
+    /// Seconds that the earlier stages took.
     spent: f64,
 }
 
 impl TimeLeft {
-    /// The table's seconds count as much as this long of watching. [Units: s]
+    /// The expected seconds weigh as much as this long of measuring. [Units: s]
     const TRUST: f64 = 0.5;
 
     fn new(stages: &[Stage], n_voxels: f64, n_triangles: f64) -> Self {
         let seconds = |&stage: &Stage| {
             let [of_voxels, of_triangles] = cost(stage);
-            // Even a stage with nothing to do is seen for a moment.
+            // Even a stage with nothing to do is visible for a moment.
             1e-3 + n_voxels / 1e6 * of_voxels + n_triangles / 1e3 * of_triangles
         };
         Self {
@@ -153,16 +153,17 @@ impl TimeLeft {
         self.spent = spent;
     }
 
-    /// Seconds to go, `elapsed` seconds into the stage under way.
+    /// Seconds left, `elapsed` seconds into the stage under way.
     fn left(&self, elapsed: f64) -> f64 {
         let rest: f64 = self.expected[self.at..].iter().skip(1).sum();
         let now = self.expected.get(self.at).copied().unwrap_or(0.0);
-        // A stage that is late tells about those behind it, too.
+        // A late stage suggests that later ones take longer, too.
         let pace = self.pace().max(elapsed / now.max(1e-3) * 0.5);
         (pace * now - elapsed).max(0.1 * elapsed) + pace * rest
     }
 
-    /// The time left in words, `elapsed` seconds into the stage under way: none where it has taken longer than it should.
+    /// The time left in words, `elapsed` seconds into the stage under way; not a number if the stage takes longer
+    /// than expected.
     fn in_words(&self, elapsed: f64) -> String {
         let now = self.expected.get(self.at).copied().unwrap_or(0.0);
         if elapsed > self.pace() * now + Self::TRUST {
@@ -171,20 +172,20 @@ impl TimeLeft {
         format!("about {} left", clock(self.left(elapsed)))
     }
 
-    /// How many times as long the stages before took as they should have.
+    /// Ratio of actual to expected time of the earlier stages.
     fn pace(&self) -> f64 {
         let done: f64 = self.expected[..self.at].iter().sum();
         (self.spent + Self::TRUST) / (done + Self::TRUST)
     }
 
-    /// The share that is done, from 0 to 1, `elapsed` seconds into the stage under way.
+    /// The fraction done, from 0 to 1, `elapsed` seconds into the stage under way.
     fn share(&self, elapsed: f64) -> f64 {
         let done = self.spent + elapsed;
         done / (done + self.left(elapsed)).max(1e-9)
     }
 }
 
-/// `1:05` for 65 seconds; hours only where there are any.
+/// `1:05` for 65 seconds; hours only if there are any.
 fn clock(seconds: f64) -> String {
     let s = seconds.round() as u64;
     match s / 3600 {
@@ -193,7 +194,7 @@ fn clock(seconds: f64) -> String {
     }
 }
 
-/// `65 s` for 65 seconds, `4 min` for 245; an estimate has no more digits than it deserves.
+/// `65 s` for 65 seconds, `4 min` for 245: no more digits than an estimate deserves.
 fn in_words(seconds: f64) -> String {
     match seconds.round() {
         0.0 => "less than 1 s".into(),
@@ -203,14 +204,14 @@ fn in_words(seconds: f64) -> String {
     }
 }
 
-/// The progress of a bake: stages by name, the share done and the time left.
+/// The progress of a bake: name of the stage, fraction done and time left.
 pub(crate) struct BakeBar {
     bar: ProgressBar,
     _log: Option<Ticker>,
     state: Arc<Mutex<Clock>>,
-    /// Voxels and triangles that there are to do with.
+    /// Numbers of voxels and triangles to process.
     work: (f64, f64),
-    /// Edge of a voxel as asked for. [Units: wu]
+    /// Requested edge of a voxel. [Units: wu]
     wanted: f64,
 }
 
@@ -226,7 +227,7 @@ impl Clock {
         self.stage_began.elapsed().as_secs_f64()
     }
 
-    /// What a line of the log says of the stage under way.
+    /// The log line for the stage under way.
     fn line(&self) -> Option<Now> {
         let at = self.left.at;
         let stage = self.stages.get(at)?.name();
@@ -247,7 +248,7 @@ impl BakeBar {
     /// Cells of the drawn bar.
     const CELLS: usize = 30;
 
-    /// A bar for a bake of `scene`; where standard error is no terminal, lines of a log.
+    /// Makes the bar for a bake of `scene`; log lines if standard error is not a terminal.
     pub(crate) fn new(scene: &Scene, config: &BakeConfig) -> Self {
         let now = Instant::now();
         let is_shown = is_shown();
@@ -269,7 +270,7 @@ impl BakeBar {
                 write(&state.lock().expect("no panic holds it"), out);
             }
         };
-        // The template is a constant; one that does not parse would be seen at once.
+        // The template is a constant; one that does not parse would be noticed at once.
         if let Ok(style) = ProgressStyle::with_template("{msg:>24} {share} {left}") {
             let style = style
                 .with_key(
@@ -312,7 +313,7 @@ impl BakeBar {
 
 impl Progress for BakeBar {
     fn method(&self, method: Method, reason: &str) {
-        // Whoever closed standard error does not want to know.
+        // If standard error is closed, nobody reads it: ignore the failure.
         self.bar.suspend(|| {
             let _ = writeln!(Told, "method {}: {reason}", method.name());
         });
@@ -353,7 +354,7 @@ impl Progress for BakeBar {
     }
 }
 
-/// What will be done, before it is done.
+/// The work ahead, as a line.
 fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64) -> String {
     let n = (nx * ny * nz) as f64 / 1e6;
     let memory = memory / 1e6;
@@ -363,14 +364,14 @@ fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64) -> Strin
     )
 }
 
-/// That voxels are larger than was asked for, if they are.
+/// A line that reports larger voxels than requested, or nothing.
 fn coarser(edge: f64, wanted: f64) -> String {
-    // The grid grows its voxels by tenths, if at all.
+    // The grid enlarges its voxels by tenths.
     if edge <= wanted * 1.05 {
         return String::new();
     }
     format!(
-        "not the {} m that were wanted: those would be more voxels than are allowed (--max-memory, and max_voxels in a \
+        "coarser than the {} m requested, which would exceed the number of voxels allowed (--max-memory, and max_voxels in a \
          --config file)\n",
         (wanted * 1e9).round() / 1e9
     )
@@ -382,7 +383,7 @@ impl Drop for BakeBar {
     }
 }
 
-/// About how many voxels and structural triangles a bake has to do with.
+/// Approximate numbers of voxels and structural triangles of a bake.
 fn work_of(scene: &Scene, config: &BakeConfig) -> (f64, f64) {
     let mut bounds = Aabb::EMPTY;
     let mut n_triangles = 0;
@@ -398,7 +399,7 @@ fn work_of(scene: &Scene, config: &BakeConfig) -> (f64, f64) {
         }
     }
     let voxel = config.voxel.unwrap_or(config.min_opening / 6.0);
-    // Two meters of air around it, more or less.
+    // About two meters of air around the scene.
     let size = (bounds.size() + 2.0) / voxel;
     let n_voxels = (size.x * size.y * size.z).min(config.max_voxels as f64);
     (
@@ -433,7 +434,7 @@ mod tests {
     fn a_slow_machine_stretches_what_is_to_come() {
         let mut t = of_stages(&[2.0, 10.0, 8.0]);
         t.begin(1, 20.0);
-        // Ten times as slow, as far as two seconds can tell.
+        // Ten times as slow, as far as two seconds can show.
         let left = t.left(0.0);
         assert!((130.0..180.0).contains(&left), "{left}");
     }
@@ -456,7 +457,7 @@ mod tests {
         t.begin(1, 2.0);
         assert_eq!(t.in_words(0.5), "about 0:04 left");
         assert_eq!(t.in_words(1.6), "longer than expected");
-        // A machine twice as slow is not late so soon.
+        // A machine half as fast is late later.
         t.begin(1, 4.5);
         assert!(t.in_words(1.6).ends_with("left"));
         assert_eq!(t.in_words(10.0), "longer than expected");

@@ -1,16 +1,16 @@
-//! Progress in logs: a line now and then, where no bar can be drawn.
+//! Progress in logs: an occasional line, where no bar can be drawn.
 
 use std::io::Write;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How often a line may come, and how often one comes at least.
+/// Least and greatest time between lines.
 #[derive(Clone, Copy)]
 pub(crate) struct Pace {
-    /// A stage that ends sooner has no line.
+    /// A stage that ends sooner gets no line.
     pub(crate) least: Duration,
-    /// A stage that goes on for longer has another line.
+    /// A longer stage gets another line.
     pub(crate) most: Duration,
 }
 
@@ -23,25 +23,25 @@ impl Default for Pace {
     }
 }
 
-/// What is under way: the stage, and a line about it.
+/// The work under way: the stage, and a line about it.
 pub(crate) struct Now {
     pub(crate) stage: String,
     pub(crate) line: String,
 }
 
-/// Which lines are due.
+/// Decides which lines are due.
 struct Lines {
     pace: Pace,
-    /// The stage of the last line, and when it came.
+    /// The stage of the last line, and its time.
     last: Option<(String, Duration)>,
 }
 
 impl Lines {
-    /// The line to write `at` this time, if any; asked every [`Pace::least`].
+    /// Returns the line due at time `at`, if any; called every [`Pace::least`].
     fn due(&mut self, now: Option<Now>, at: Duration) -> Option<String> {
         let Now { stage, line } = now?;
         let is_due = self.last.as_ref().is_none_or(|(last, when)| {
-            // Clocks differ by a little from one tick to the next.
+            // Intervals between ticks vary slightly.
             *last != stage || at + self.pace.least / 2 >= *when + self.pace.most
         });
         is_due.then(|| {
@@ -51,15 +51,15 @@ impl Lines {
     }
 }
 
-/// Writes lines until it is dropped, on a thread of its own.
+/// Writes lines until it is dropped, on its own thread.
 pub(crate) struct Ticker {
-    /// Nothing is sent: it ends when this goes.
+    /// Carries no messages: the thread ends when this is dropped.
     end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Ticker {
-    /// Asks `now` what is under way, and writes that to `out` as often as `pace` says.
+    /// Calls `now` for the work under way, and writes its line to `out` at the given pace.
     pub(crate) fn start(
         pace: Pace,
         now: impl Fn() -> Option<Now> + Send + 'static,
@@ -71,14 +71,14 @@ impl Ticker {
         let tick = move || {
             while ended.recv_timeout(pace.least) == Err(RecvTimeoutError::Timeout) {
                 if let Some(line) = lines.due(now(), began.elapsed()) {
-                    // Whoever closed it does not want to know.
+                    // If the output is closed, nobody reads it: ignore the failure.
                     let _ = writeln!(out, "{line}");
                 }
             }
         };
         Self {
             end: Some(end),
-            // Without a thread there is no progress to read, and the work goes on.
+            // Without a thread there are no progress lines, and the work goes on.
             thread: std::thread::Builder::new().spawn(tick).ok(),
         }
     }
@@ -149,7 +149,7 @@ mod tests {
         drop(ticker);
         assert_eq!(text(), "at work\n");
         assert_eq!(Arc::strong_count(&kept.0), 1, "the thread is gone");
-        // One that is due in an hour ends without waiting for that.
+        // A ticker whose next line is due in an hour ends without waiting.
         let pace = Pace {
             least: Duration::from_secs(3600),
             ..pace

@@ -1,4 +1,4 @@
-//! `enfilade pvs`: what can be seen from where, before run-time.
+//! `enfilade pvs`: computes visibility before run-time.
 
 use std::fs;
 use std::io::{self, Write};
@@ -25,57 +25,58 @@ use enfilade_cli::values::{bytes, seconds};
 
 mod statistics;
 
-/// Computes the potentially visible set of a world or a Quake portal file: for each cell, what can be seen
-/// from it. Writes it as text.
+/// Computes the potentially visible set of a world or a Quake portal file: for each cell, the cells visible from it.
+/// Writes it as text.
 #[derive(clap::Args)]
 pub(crate) struct Pvs {
-    /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3); `-` for standard input.
+    /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM or Quake 3); `-` for standard input.
     input: PathBuf,
-    /// Where to write the answer, as text; `-` for standard output. Beside the input, as X.pvs, if not given.
+    /// File for the answer, as text; `-` for standard output. X.pvs beside the input if not given.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Write the world with the answer in it, for programs to ask; may be the input itself.
+    /// Write the world with the answer in it, for use at run-time; may be the input itself.
     #[arg(long, value_name = "OUT.glb", conflicts_with = "far")]
     into: Option<PathBuf>,
-    /// Keep in that world which triangles and objects can be seen by pair of cells, by which the run-time draws less.
+    /// Also store, for each pair of cells, the triangles and objects of one visible from the other, so that the
+    /// run-time draws less.
     #[arg(long, requires = "into")]
     parts: bool,
-    /// Keep in that world the visible volume of each pair of cells: what of one cell the portals leave to be seen from the other,
-    /// as convex pieces.
+    /// Also store the visible volume of each pair of cells: the part of one cell that is visible from the other
+    /// through portals, as convex pieces.
     #[arg(long, requires = "into")]
     volumes: bool,
-    /// How thoroughly to look.
+    /// Thoroughness of the search.
     #[arg(long, value_enum, default_value_t = PvsMode::Exact)]
     mode: PvsMode,
-    /// Stop searching after this long; the answer is then larger than need be, and no less right.
+    /// Stop searching after this long; the answer is then larger than necessary, but still correct.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     budget: Option<Duration>,
     /// End without an answer after this long.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
-    /// Refuse a graph that is estimated to take more, before anything is allocated, and end rather than take more: a number and K, M,
-    /// G or T.
+    /// Refuse a graph whose estimate is larger, before anything is allocated, and end rather than use more memory: a
+    /// number and K, M, G or T.
     #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = bytes)]
     max_memory: u64,
-    /// Nothing farther than this is seen.
+    /// Treat everything farther than this as hidden.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     far: Option<f64>,
-    /// Write down why each pair counts as visible or hidden, for `enfilade verify --evidence`.
+    /// Record why each pair counts as visible or hidden, for `enfilade verify --evidence`.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
-    /// Save the search here every half a minute and when --budget ends it, and go on from there
-    /// next time; refused for another graph or other settings, removed when the search is done.
+    /// Save the search to this file every half minute and when --budget ends it, and continue from it next time;
+    /// refused for another graph or other settings, removed when the search is done.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Write what can be seen from each cell, for modellers: cells, objects and triangles, and the ten worst
-    /// viewpoints; as JSON.
+    /// Write statistics for modelers as JSON: the cells, objects and triangles visible from each cell, and the ten
+    /// worst viewpoints.
     #[arg(long, value_name = "FILE")]
     statistics: Option<PathBuf>,
-    /// Write the pairs that see each other, each once, for radiosity and acoustics: of cells, and of
-    /// the surfaces of a world; as text.
+    /// Write the pairs that see each other, each once, for radiosity and acoustics: pairs of cells, and of the
+    /// surfaces of a world; as text.
     #[arg(long, value_name = "FILE")]
     mutual: Option<PathBuf>,
-    /// Threads to use; as many as there are cores if not given. The result is the same.
+    /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Print JSON for machines.
@@ -85,43 +86,43 @@ pub(crate) struct Pvs {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum PvsMode {
-    /// Sides of planes only.
+    /// Separating planes only.
     Fast,
-    /// All that planes and lines can settle.
+    /// All that planes and lines can decide.
     Exact,
 }
 
-/// What is printed.
+/// The printed report.
 #[derive(serde::Serialize)]
 struct PvsReport {
     cells: usize,
     portals: usize,
-    /// Ordered pairs, each cell with itself among them.
+    /// Ordered pairs, including each cell with itself.
     pairs: usize,
     mean_visible: f64,
     mean_visible_percent: f64,
-    /// Pairs that a line proves: the lower bound.
+    /// Pairs proved visible by a line: the lower bound.
     proved_visible: usize,
-    /// Pairs that count as visible because neither was proved.
+    /// Pairs that count as visible because nothing was proved.
     undecided: usize,
-    /// Pairs left by the sides of planes alone.
+    /// Pairs that separating planes alone leave.
     base_pairs: u64,
     complete: bool,
     lines: usize,
     steps: u64,
     seconds: f64,
-    /// Triangles of walls and objects that can be seen from a cell, on average: of what its visible volumes meet, and of whole cells. Absent
-    /// where none of --parts, --volumes, --statistics and --mutual asks for it.
+    /// Mean numbers of triangles of walls and objects visible from a cell: those that its visible volumes meet, and
+    /// those of whole cells. Absent without --parts, --volumes, --statistics and --mutual.
     #[serde(skip_serializing_if = "Option::is_none")]
     mean_triangles: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mean_triangles_of_cells: Option<f64>,
-    /// All triangles, where these are given.
+    /// All triangles, if those are given.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<usize>,
-    /// By cell, how many cells can be seen from it.
+    /// For each cell, the number of visible cells.
     visible_cells: Vec<usize>,
-    /// The ten cells from which most can be seen, the worst first.
+    /// The ten cells with most visible cells, the worst first.
     worst: Vec<usize>,
     /// Their names.
     #[serde(skip)]
@@ -135,7 +136,7 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     let graph = &input.graph;
     if args.into.is_some() && input.world.is_none() {
         bail!(
-            "{} is a portal file: only a world holds an answer (--into)",
+            "{} is a portal file: only a world can store an answer (--into)",
             name_of(&args.input)
         );
     }
@@ -184,17 +185,17 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     print(outputs.printed(), &report, args.json)
 }
 
-/// What to look through.
+/// The graph to search, and its world if it has one.
 struct Input {
     graph: SightGraph,
     walls: Option<Vec<Triangle>>,
     world: Option<World>,
-    /// Changes with the file.
+    /// Hash of the file.
     hash: u64,
 }
 
 impl Input {
-    /// The name of a cell; clusters of a portal file have none but by number.
+    /// The name of a cell. Clusters of a portal file are named by number.
     fn name(&self, cell: usize) -> String {
         let id = CellId(cell as u32);
         let world = self.world.as_ref();
@@ -202,7 +203,7 @@ impl Input {
     }
 }
 
-/// Reads a portal file or a world as a graph to look through; with a world, what stands in the way.
+/// Reads a portal file or a world as a graph for visibility; for a world, also the blocking triangles.
 pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Vec<Triangle>>)> {
     let input = read_input(path)?;
     Ok((input.graph, input.walls))
@@ -210,7 +211,7 @@ pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Vec<
 
 fn read_input(path: &Path) -> anyhow::Result<Input> {
     let bytes = read(path)?;
-    // FNV-1a: tells files apart, not forgers.
+    // FNV-1a: distinguishes files; not safe against forgery.
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     });
@@ -229,7 +230,7 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
     }
     let text = std::str::from_utf8(&bytes)
         .ok()
-        .with_context(|| format!("{}: no text, so no portal file", name_of(path)))?;
+        .with_context(|| format!("{}: not text, so not a portal file", name_of(path)))?;
     let file = read_prt(text).with_context(|| name_of(path))?;
     Ok(Input {
         graph: sight_graph(&file),
@@ -249,8 +250,8 @@ pub(crate) fn sight_graph(file: &PrtFile) -> SightGraph {
     )
 }
 
-/// What is written, looked at before the work, and where the answer goes. Only `--into` may be the input itself: the world
-/// stays what it was, with an answer in it.
+/// Checks the outputs before the work, and returns them with the path of the answer. Only `--into` may be the input
+/// itself: it keeps the world and adds an answer.
 fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
     let path = match &args.output {
         Some(path) => path.clone(),
@@ -300,7 +301,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         bar.set(done);
         args.budget.is_none_or(|budget| start.elapsed() < budget)
     };
-    // A search that cannot be saved goes on; what could not be written is said at its end.
+    // A search that cannot be saved goes on; the error is reported at its end.
     let mut unsaved = None;
     let mut save = |bytes: Vec<u8>| {
         if let Some(path) = &args.checkpoint {
@@ -339,7 +340,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
     Ok(vis)
 }
 
-/// What of each cell can be seen from each other: volumes, and what is in them.
+/// Adds the visible parts for each pair of cells: volumes, and their contents.
 fn add_parts(args: &Pvs, world: &World, pvs: &mut cpg::Pvs) -> anyhow::Result<()> {
     let (volumes, parts) = pool(args)?.install(|| see_parts(world, pvs))?;
     pvs.parts = Some(parts);
@@ -354,7 +355,7 @@ fn pool(args: &Pvs) -> anyhow::Result<rayon::ThreadPool> {
         .context("cannot start threads; try --threads 1")
 }
 
-/// What was saved before, if anything was.
+/// The saved search, if any.
 fn read_checkpoint(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
@@ -396,7 +397,7 @@ fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
     }
 }
 
-/// Notes of the text file: nothing that differs from run to run.
+/// Notes of the text file: only what is the same on every run.
 fn notes(report: &PvsReport, mode: PvsMode) -> Vec<String> {
     let mode = match mode {
         PvsMode::Fast => "fast",
@@ -445,7 +446,7 @@ fn print(mut out: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::
     if !r.complete {
         writeln!(
             out,
-            "stopped by --budget: the answer is larger than need be"
+            "stopped by --budget: the answer is larger than necessary"
         )?;
     }
     let worst: Vec<String> = r

@@ -1,4 +1,4 @@
-//! `enfilade render`: pictures, without a display.
+//! `enfilade render`: draws pictures, without a display.
 
 use std::fmt;
 use std::io::Write;
@@ -22,27 +22,27 @@ use enfilade_cli::input::name_of;
 use enfilade_cli::values::{door, point, size};
 use enfilade_cli::world::read_world;
 
-/// Draws a picture of a world, or one for each camera of a path, to PNG files; needs no display.
+/// Draws a picture of a world, or one for each camera of a path, to PNG files; does not need a display.
 #[derive(clap::Args)]
 pub(crate) struct Render {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write the picture, `-` for standard output; of a path, `walk.png` becomes `walk-0001.png` and so on.
+    /// File for the picture, `-` for standard output; for a path, `walk.png` becomes `walk-0001.png` and so on.
     #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
-    /// Where the eye is, in meters; without it, a place with much to see is looked for.
+    /// Position of the eye, in meters; a place with much to see if not given.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "look")]
     eye: Option<[f32; 3]>,
     /// The point looked at, in meters; not a direction.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "eye")]
     look: Option<[f32; 3]>,
-    /// A picture for each line of this file: eye and point looked at, `x y z x y z`.
+    /// Draw a picture for each line of this file: eye and point looked at, `x y z x y z`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "walk"])]
     path: Option<PathBuf>,
-    /// So many pictures on a walk through the doorways, 10,000 at most.
+    /// Draw this many pictures on a walk through the doorways, 10,000 at most.
     #[arg(long, value_name = "N", conflicts_with = "eye", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     walk: Option<u32>,
-    /// Write the cameras of the pictures to this file, for --path.
+    /// Write the cameras of the pictures to this file, for use with --path.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Angle from the lower to the upper edge of the picture, in degrees.
@@ -51,55 +51,55 @@ pub(crate) struct Render {
     /// Width and height of the picture.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     size: [u32; 2],
-    /// What is drawn: all, what meets the view, or what is seen through portals.
+    /// Set of things to draw: everything, all in the view, or all visible through portals.
     #[arg(long, value_enum, default_value_t = RenderMode::Portals)]
     mode: RenderMode,
-    /// How surfaces are painted: as they look, by cell, or by how often pixels are drawn.
+    /// Colors of surfaces: lit materials, one color per cell, or how often pixels are drawn.
     #[arg(long, value_enum, default_value_t = Colors::Lit)]
     paint: Colors,
-    /// Outline the portals that something is seen through, and what each narrows the view to.
+    /// Outline the portals in view, and the view as each one narrows it.
     #[arg(long)]
     portals: bool,
     /// Show the world from above, with the view and what is culled: dark is out of view, red behind
     /// walls, orange hidden by a large polygon.
     #[arg(long)]
     above: bool,
-    /// Take off what is higher than this, in meters, and light the rest evenly; with --above, 0.5 above the eye by default.
+    /// Remove everything higher than this, in meters, and light the rest evenly; with --above, 0.5 above the eye by
+    /// default.
     #[arg(long, value_name = "METERS", allow_hyphen_values = true)]
     cut: Option<f32>,
-    /// Portals that are closed, by number: their leaves are shut; where there are none, a panel fills them.
+    /// Portals to close, by number: their leaves are shut, and a panel fills those without leaves.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     close: Vec<u32>,
-    /// Leaves of a portal stand so far on their way from shut (0) to open (1); as the model has them, where nothing is said.
+    /// How far the leaves of a portal are open, from shut (0) to open (1); as in the model if not given.
     #[arg(long, value_name = "ID=SHARE", value_delimiter = ',', value_parser = door)]
     door: Vec<(u32, f32)>,
-    /// Portals that cover fewer pixels are not looked through: the mean color of the cell behind stands
-    /// in for it.
+    /// Do not look through portals that cover fewer pixels: the mean color of the cell behind replaces the view.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     stop: f32,
-    /// Nothing stands in for what --stop leaves out.
+    /// Leave the portals of --stop empty.
     #[arg(long, requires = "stop")]
     stop_at_nothing: bool,
-    /// Objects in cells that are seen through fewer pixels are not drawn.
+    /// Do not draw objects in cells that are seen through fewer pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     objects: f32,
-    /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels.
+    /// Draw objects with fewer triangles if that moves their surface by at most this many pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     lod: f32,
-    /// No shadows, no dark corners, the same daylight everywhere: quicker.
+    /// No shadows, no ambient occlusion, the same daylight everywhere: faster.
     #[arg(long)]
     plain: bool,
-    /// What draws: `best`, `gpu`, `software`, or part of a name.
+    /// Adapter to draw with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
-    /// Print what was drawn as JSON for machines; of a path, its pictures one by one in a list.
+    /// Print a report on the pictures as JSON for machines; for a path, as a list.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// What is drawn.
+/// The set of things to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RenderMode {
     Everything,
@@ -131,7 +131,7 @@ fn angle(text: &str) -> Result<f32, String> {
     }
 }
 
-/// Reads a world and puts it on an adapter.
+/// Reads a world and loads it on an adapter.
 pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
     let world = read_world(path)?;
     let studio = Studio::new(enfilade_cli::adapter::open(adapter)?, &world)
@@ -140,26 +140,26 @@ pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(Worl
     Ok((world, studio))
 }
 
-/// Says which pictures of textures are not drawn.
+/// Warns about texture pictures that are not drawn.
 pub(crate) fn tell_of_pictures(studio: &Studio) -> anyhow::Result<()> {
     for (n, why) in [
         (studio.world.n_missing_pictures(), "missing or damaged"),
         (
             studio.world.n_large_pictures(),
-            "larger than 8192x8192, or all of them than 512 MiB and 128 times their files",
+            "larger than 8192x8192, or in total than 512 MiB and 128 times their files",
         ),
     ] {
         if n > 0 {
             writeln!(
                 Warned,
-                "enfilade: {n} pictures of textures are {why}; drawn without"
+                "enfilade: {n} texture pictures are {why}; drawn without them"
             )?;
         }
     }
     Ok(())
 }
 
-/// Computes the light of each place; where the adapter cannot hold it, says so, and all places are lit alike.
+/// Computes the light of each place; if the adapter cannot hold it, warns, and all places are lit alike.
 pub(crate) fn light(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
     if let Err(error) = studio.add_light(world) {
         writeln!(Warned, "enfilade: all rooms are lit alike: {error}")?;
@@ -167,7 +167,7 @@ pub(crate) fn light(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A picture at twice the size, halved: smooth edges.
+/// Draws a picture at twice the size and halves it: smooth edges.
 pub(crate) fn smooth(
     size: [u32; 2],
     draw: impl FnOnce([u32; 2]) -> anyhow::Result<Picture>,
@@ -188,7 +188,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         outputs.write("--record", Format::Cameras, record)?;
     }
     if is_path {
-        // Names of the pictures follow when their number is known.
+        // The names of the pictures follow when their number is known.
         refuse_stream("-o", &args.output, "several pictures")?;
         Format::Picture.check("-o", &args.output)?;
     } else {
@@ -227,13 +227,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         let mut drawn_size = args.size;
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
-            // As many pixels for one as pictures are drawn larger.
+            // In pixels of the larger picture.
             let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
             studio.sparing = Sparing {
                 stop_below: args.stop * scale,
                 stop_at_nothing: args.stop_at_nothing,
                 objects_below: args.objects * scale,
-                // A length: the pictures' edges are as many times larger.
+                // A length, so it scales with the picture's edge.
                 lod: args.lod * scale.sqrt(),
             };
             if args.above {
@@ -283,7 +283,7 @@ fn set_doors(args: &Render, studio: &mut Studio) -> anyhow::Result<()> {
     for &(p, share) in &args.door {
         if studio.sight.leaves(PortalId(p)).is_empty() {
             bail!(
-                "--door: portal {p} has no leaf that moves; `enfilade inspect` lists those that have, --close fills any"
+                "--door: portal {p} has no leaf that moves; `enfilade inspect` lists those with leaves; --close fills any"
             );
         }
         studio.state.set_leaves(PortalId(p), share);
@@ -294,7 +294,7 @@ fn set_doors(args: &Render, studio: &mut Studio) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// How pictures look.
+/// The look of pictures.
 fn style_of(args: &Render) -> Style {
     Style {
         paint: match args.paint {
@@ -303,14 +303,14 @@ fn style_of(args: &Render) -> Style {
             Colors::Overdraw => Paint::Overdraw,
         },
         dark_corners: !args.plain,
-        // Under a ceiling that was taken off, its shadow would stay.
+        // The shadow of a removed ceiling would stay.
         shadows: !args.plain && args.cut.is_none(),
         daylight: !args.plain && args.cut.is_none(),
         cut_above: args.cut.unwrap_or(f32::INFINITY),
     }
 }
 
-/// Where to draw from, if no path says it.
+/// The cameras to draw from, if no path gives them.
 fn cameras(args: &Render, studio: &mut Studio, world: &World) -> anyhow::Result<Vec<Camera>> {
     let fov_y = args.fov.to_radians();
     if let Some(n) = args.walk {
@@ -328,10 +328,10 @@ fn numbered(path: &Path, n: usize) -> PathBuf {
     path.with_file_name(format!("{stem}-{n:04}.png"))
 }
 
-/// What was drawn.
+/// The report on a picture.
 #[derive(serde::Serialize)]
 struct Drawn {
-    /// As text: JSON holds no other names.
+    /// As text: JSON cannot hold other names.
     file: String,
     eye: [f32; 3],
     look: [f32; 3],
@@ -350,7 +350,7 @@ impl Drawn {
         studio: &mut Studio,
         world: &World,
         camera: &Camera,
-        // The picture as it was drawn, before it was halved: what is spared depends on its pixels.
+        // The size before halving: sparing depends on its pixels.
         (file, size): (PathBuf, [u32; 2]),
     ) -> anyhow::Result<Self> {
         let view = camera.view(size[0] as f32 / size[1] as f32)?;
@@ -389,7 +389,7 @@ impl fmt::Display for Drawn {
     }
 }
 
-/// Outlines of the portals seen through, and the rectangles they narrow the view to.
+/// Outlines of the portals in view, and the rectangles that they narrow the view to.
 pub(crate) fn portal_marks(
     studio: &mut Studio,
     world: &World,
@@ -401,7 +401,7 @@ pub(crate) fn portal_marks(
     let mut marks = Vec::new();
     for p in seen.portals() {
         let outline = &world.graph[*p].outline;
-        // As thick as a frame of 20 mm, so that far ones are thin; and none thinner than a pixel of the finished picture.
+        // As wide as a frame of 20 mm, so that far ones are thin; at least a pixel of the finished picture.
         let focal = size[1] as f32 * 0.5 / (camera.fov_y * 0.5).tan();
         let nearest = (outline.iter())
             .map(|c| {
@@ -440,7 +440,7 @@ pub(crate) fn portal_marks(
     Ok(marks)
 }
 
-/// The world from above, with the view frozen: what is drawn of it, and what is culled and why.
+/// Draws the world from above with the view frozen: what is drawn, and what is culled and why.
 pub(crate) fn above(
     studio: &mut Studio,
     world: &World,
@@ -462,7 +462,7 @@ pub(crate) fn above(
         on_top: true,
     };
     let mut marks = Vec::new();
-    // Walls along the view have no side to be seen by: their edges where they are cut.
+    // Walls along the view have no visible side: draw their edges at the cut.
     for segment in section(world, cut) {
         marks.push(line(
             Shape::Line(segment),
@@ -474,7 +474,7 @@ pub(crate) fn above(
         let outline = world.graph[*p].outline.clone();
         marks.push(line(Shape::Outline(outline), [1.0, 0.42, 0.0, 1.0], width));
     }
-    // Rooms are what pictures from above are of: the ground around them is not.
+    // Pictures from above show rooms, not the ground around them.
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
     for (_, cell) in world.graph.indoor_cells() {
@@ -511,7 +511,7 @@ pub(crate) fn above(
         })
         .collect();
     marks.push(line(Shape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));
-    // A little aslant, so that walls have a side.
+    // Slightly oblique, so that walls have a side.
     let toward = [0.0, -1.0, -0.38];
     let height = (z * 0.94 + (high[1] - low[1]) * 0.38).max(x / aspect) * 1.06;
     let projection = Projection::parallel(center, toward, height, aspect, reach.max(50.0) * 2.0);
@@ -524,14 +524,14 @@ pub(crate) fn above(
     let frame = Frame {
         projection,
         list: &list,
-        // What is drawn looks as it does; a floor of many rooms has no one cell's color.
+        // Drawn parts keep their look; a floor of many rooms has no single cell's color.
         style,
         marks: &marks,
     };
     Ok(studio.explained(&view, &frame, size)?)
 }
 
-/// Where a level plane cuts the structure.
+/// The segments where a level plane cuts the structure.
 fn section(world: &World, height: f32) -> Vec<[[f32; 3]; 2]> {
     let mut out = Vec::new();
     for batch in &world.batches {

@@ -1,4 +1,4 @@
-//! `enfilade report`: one page about a world.
+//! `enfilade report`: writes a page about a world.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -22,31 +22,31 @@ use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
-/// Writes one self-contained page: plans, the graph, what can be seen from where, tables, pictures.
+/// Writes a self-contained page: plans, the graph, visibility, tables, pictures.
 #[derive(clap::Args)]
 pub(crate) struct Report {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where to write the page; `-` for standard output.
+    /// File for the page; `-` for standard output.
     #[arg(short, long, value_name = "HTML")]
     output: PathBuf,
-    /// Views on the walk that is measured, 100,000 at most.
+    /// Number of views on the measured walk, 100,000 at most.
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     views: u32,
-    /// What draws the pictures: `best`, `gpu`, `software`, or part of a name.
+    /// Adapter to draw pictures with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
-    /// No pictures: nothing is needed to draw them.
+    /// Leave out pictures: no adapter is needed.
     #[arg(long)]
     no_pictures: bool,
-    /// Print what was written as JSON for machines; nothing is printed otherwise.
+    /// Print a report on the page as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(serde::Serialize)]
 struct PageReport<'a> {
     #[serde(flatten)]
@@ -56,10 +56,10 @@ struct PageReport<'a> {
 }
 
 const SIZE: [u32; 2] = [960, 540];
-/// Openings looked at from openings to find out what can be seen; after that, what is not decided counts as visible. Twice
-/// what a clinic of 660 rooms takes. A count and no time, so that the page of a world is the same every time.
+/// Limit of the visibility search, in openings tested from openings; pairs that are undecided then count as visible.
+/// Twice what a clinic of 660 rooms needs. A count instead of a time, so that the page of a world is always the same.
 const BUDGET: u64 = 2_000_000;
-/// Worlds that are made to take long take no longer, and then the page may differ.
+/// Time limit for worlds made to take long; the page may differ then.
 const LONGEST: Duration = Duration::from_secs(300);
 
 pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
@@ -123,8 +123,9 @@ fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
     let graph = SightGraph::of_graph(&world.graph);
     let out = see_all(&graph, &VisConfig::default(), &mut context)?;
     if !out.is_complete {
-        notes
-            .push("Visibility was not searched to its end: it shows more than can be seen.".into());
+        notes.push(
+            "The visibility search did not finish: the matrix shows more than can be seen.".into(),
+        );
     }
     Ok(out.cells)
 }
@@ -163,7 +164,7 @@ fn row(cells: &[&str]) -> Vec<String> {
     cells.iter().map(ToString::to_string).collect()
 }
 
-/// The counts that the papers give of their scenes.
+/// The counts by which the papers describe their scenes.
 fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
     let graph = &world.graph;
     let (n_cells, n_portals) = (graph.cells.len(), graph.portals.len());
@@ -184,7 +185,7 @@ fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
     let most_seen = by_cell.max().unwrap_or(0);
     Table {
         title: "In numbers".into(),
-        note: "As the sources describe their scenes.".into(),
+        note: "The numbers by which the literature describes scenes.".into(),
         rows: vec![
             row(&["", "all", "mean of a room", "most of a room"]),
             row(&["rooms (outdoors included)", &n_cells.to_string(), "", ""]),
@@ -261,7 +262,7 @@ fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figur
         Ok(studio.picture(&camera, Culling::Portals, style, &marks, size)?)
     })?;
     out.push(Figure {
-        caption: "The same view: doorways in orange, what each narrows the view to in blue.".into(),
+        caption: "The same view: doorways in orange, the narrowed views in blue.".into(),
         png: picture.to_png()?,
     });
     let picture = smooth(SIZE, |size| above(&mut studio, world, &camera, None, size))?;
@@ -274,7 +275,7 @@ fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figur
     let mut eyes: Vec<[f32; 3]> = Vec::new();
     for step in worst {
         let e = step.camera.eye;
-        // Of a place, one picture will do.
+        // One picture of a place is enough.
         let is_near = |o: &[f32; 3]| (0..3).map(|k| (o[k] - e[k]).powi(2)).sum::<f32>() < 9.0;
         if eyes.len() == 3 || eyes.iter().any(is_near) {
             continue;

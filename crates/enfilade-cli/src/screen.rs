@@ -1,9 +1,9 @@
-//! What is said, on standard output and standard error: nothing gets there but text.
+//! Writers for standard output and standard error that print plain text only.
 //!
-//! Names of objects, cells and files are strangers' text, and on a terminal text can be a command, or look like a line of
-//! ours. So all that is printed goes through the writers here, and `cargo xtask tidy` knows it: a call of `writeln!` writes
-//! one line, whatever is in it, with [hidden characters escaped](shown). Text of several lines is [written as
-//! such](write_lines) by who has escaped the names in it.
+//! Names of objects, cells and files come from strangers, and on a terminal text can be a command, or look like a
+//! line of ours. So everything goes through the writers here, which `cargo xtask tidy` checks: a call of `writeln!`
+//! writes one line, whatever its contents, with [hidden characters escaped](shown). Text of several lines is [written
+//! as such](write_lines) by code that has escaped the names in it.
 
 use std::fmt;
 use std::io::{self, BufWriter, IsTerminal as _, StdoutLock, Write};
@@ -12,20 +12,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Context;
 use enfilade::geom::{is_hidden, shown};
 
-/// Whether `--quiet` was given: once, before any command runs.
+/// `true` if `--quiet` was given; set once, before any command runs.
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 
-/// From now on [`Told`] says nothing.
+/// Silences [`Told`] from now on.
 pub(crate) fn be_quiet() {
     IS_QUIET.store(true, Ordering::Relaxed);
 }
 
-/// Whether nothing but errors and warnings is to be said.
+/// Returns `true` if only errors and warnings are printed.
 pub(crate) fn is_quiet() -> bool {
     IS_QUIET.load(Ordering::Relaxed)
 }
 
-/// Whether somebody watches standard error.
+/// Returns `true` if standard error is a terminal.
 pub(crate) fn is_watched() -> bool {
     io::stderr().is_terminal()
 }
@@ -35,12 +35,12 @@ pub(crate) fn printed() -> Screen<StdoutLock<'static>> {
     Screen(io::stdout().lock())
 }
 
-/// The same for long ones, which nobody waits for; to be flushed.
+/// Like [`printed`], buffered for long results that nobody waits for; needs a flush.
 pub(crate) fn printed_at_once() -> Screen<BufWriter<StdoutLock<'static>>> {
     Screen(BufWriter::with_capacity(1 << 16, io::stdout().lock()))
 }
 
-/// Bytes of a file to standard output, as they are.
+/// Writes bytes of a file to standard output, unchanged.
 pub(crate) fn pass_on(
     fill: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
@@ -49,7 +49,7 @@ pub(crate) fn pass_on(
     Ok(out.flush()?)
 }
 
-/// Tells an error that came of a reader who has seen enough.
+/// Returns `true` for an error caused by a reader that closed the pipe.
 pub(crate) fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error
         .chain()
@@ -57,14 +57,15 @@ pub(crate) fn is_broken_pipe(error: &anyhow::Error) -> bool {
         .any(|e| e.kind() == io::ErrorKind::BrokenPipe)
 }
 
-/// A writer of text for people: one call of `writeln!` is one line.
+/// A writer of text for people: each call of `writeln!` makes one line.
 pub(crate) struct Screen<W>(W);
 
-/// Standard error, for what is said beside the work; `--quiet` silences it. Where nobody reads it any more, as in
+/// Standard error, for messages beside the result; silenced by `--quiet`. If the reader closes it, as in
 /// `enfilade bake … 2>&1 | head -2`, the work goes on.
 pub(crate) struct Told;
 
-/// The same for errors, and for warnings: the result is not what was asked for, or probably not what was meant.
+/// Standard error, for errors, and for warnings that the result is not what was requested or probably not what was
+/// meant.
 pub(crate) struct Warned;
 
 impl<W: Write> Write for Screen<W> {
@@ -118,7 +119,7 @@ impl Write for Warned {
     }
 }
 
-/// What one call writes: a line, or a piece of one.
+/// The text of one call: a line, or a piece of one.
 fn escaped_line(text: fmt::Arguments<'_>) -> String {
     let text = text.to_string();
     match text.strip_suffix('\n') {
@@ -127,15 +128,15 @@ fn escaped_line(text: fmt::Arguments<'_>) -> String {
     }
 }
 
-/// Bytes keep their lines.
+/// Escapes bytes, but keeps their lines.
 fn escaped_lines(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let lines = text.split('\n').map(|line| shown(line).to_string());
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Writes text of several lines, the last of which need not end. Names in it are escaped already, or a line break in one of
-/// them would begin a line of its own.
+/// Writes text of several lines and ends the last one. Names in it must be escaped already: a line break in a name
+/// would begin a line of its own.
 pub(crate) fn write_lines(out: &mut impl Write, text: &impl fmt::Display) -> io::Result<()> {
     let mut text = text.to_string();
     if !text.is_empty() && !text.ends_with('\n') {
@@ -153,7 +154,7 @@ pub(crate) fn print_json(mut out: impl Write, value: &impl serde::Serialize) -> 
         .context("cannot write to standard output")
 }
 
-/// JSON whose strings show what is in them: the same value, with hidden characters escaped as JSON does it.
+/// JSON with hidden characters escaped in its strings: the same value.
 pub(crate) fn json_text(json: &str) -> String {
     let mut out = String::with_capacity(json.len());
     for c in json.chars() {

@@ -1,4 +1,4 @@
-//! `enfilade see`: what one view sees.
+//! `enfilade see`: prints what one view sees.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -15,29 +15,28 @@ use crate::screen::{self, printed_at_once};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
 
-/// Prints the cells, portals and triangles that a view sees, near to far, and how long it took to
-/// find out.
+/// Prints the cells, portals and triangles that a view sees, near to far, and the time of the query.
 #[derive(clap::Args)]
 pub(crate) struct See {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where the eye is, in meters.
+    /// Position of the eye, in meters.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     eye: [f32; 3],
     /// The point looked at, in meters; not a direction. +Y is up in the picture.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     look: [f32; 3],
-    /// Angle from the lower to the upper edge of the picture, in degrees; from 180 on, and where the
-    /// picture is wider than 170 degrees, everything around the eye is answered.
+    /// Angle from the lower to the upper edge of the picture, in degrees; from 180 on, and if the picture is wider
+    /// than 170 degrees, the view is all around the eye.
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     fov: f32,
     /// Width and height of the picture; only their ratio counts.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     size: [u32; 2],
-    /// Nothing farther than this along the view direction is seen, in meters.
+    /// Treat everything farther than this along the view direction as hidden, in meters.
     #[arg(long, value_name = "METERS")]
     far: Option<f32>,
-    /// How portals narrow the view: by rectangles, by their outlines, or by outlines of 8 edges.
+    /// Way in which portals narrow the view: by rectangles, by their outlines, or by outlines of 8 edges.
     #[arg(long, value_enum, default_value_t = SeeMode::PolygonK)]
     mode: SeeMode,
     /// Print JSON for machines.
@@ -47,7 +46,7 @@ pub(crate) struct See {
     limits: Limits,
 }
 
-/// How portals narrow the view.
+/// Ways in which portals narrow the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SeeMode {
     Rect,
@@ -65,7 +64,7 @@ impl SeeMode {
     }
 }
 
-/// Times a view is asked; the least is printed.
+/// Times that a view is queried; the least is printed.
 const REPEATS: usize = 21;
 
 pub(crate) fn run(args: &See) -> anyhow::Result<()> {
@@ -102,7 +101,7 @@ pub(crate) fn run(args: &See) -> anyhow::Result<()> {
     out.flush().context("cannot write to standard output")
 }
 
-/// Triangles seen of structure and of details.
+/// Numbers of visible triangles of structure and of details.
 fn triangles(sight: &Sight, seen: &Seen<'_>) -> [u64; 2] {
     let chunks = seen.chunks().iter();
     let structure = chunks

@@ -1,4 +1,4 @@
-//! `enfilade simplify`: a graph becomes a simpler one, of cells within bounds.
+//! `enfilade simplify`: simplifies a graph until its cells are within bounds.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -21,45 +21,46 @@ use enfilade_cli::input::{name_of, read};
 /// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
 #[derive(clap::Args)]
 pub(crate) struct Simplify {
-    /// World, whatever built it, or Quake portal file (PRT1, PRT2, PRT1-AM, or that of Quake 3); `-` for standard input.
+    /// World from any builder, or Quake portal file (PRT1, PRT2, PRT1-AM or Quake 3); `-` for standard input.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// World or portal file to write, as the input is; PRT1 becomes PRT2, whose leaves are the clusters that
-    /// were. `-` for standard output.
+    /// World or portal file to write, of the same kind as the input; PRT1 becomes PRT2, whose leaves are the clusters
+    /// of the input. `-` for standard output.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Merge until there are no more cells than this, as far as the cost bound and the outdoors allow.
+    /// Merge until there are at most this many cells, as far as the cost bound and the outdoors allow.
     #[arg(long, value_name = "N")]
     max_cells: Option<usize>,
-    /// Merge until there are no more portals than this, as far as the cost bound allows.
+    /// Merge until there are at most this many portals, as far as the cost bound allows.
     #[arg(long, value_name = "N")]
     max_portals: Option<usize>,
     /// Merge cells that cost less than this, as far as the upper bound allows.
     #[arg(long, value_name = "COST", value_parser = parse_cost)]
     min_cost: Option<f64>,
-    /// Cells that cost more than this are cut, and none is merged to more; what cannot be met is told.
+    /// Cut cells that cost more than this, and merge none to more; cells that cannot be cut are reported.
     #[arg(long, value_name = "COST", value_parser = parse_cost)]
     max_cost: Option<f64>,
     /// With `--max-cost`, for worlds: cut the outdoors, too.
     #[arg(long)]
     split_outdoors: bool,
-    /// Merge rooms with the outdoors, too, where a bound cannot be met otherwise; without it, portals that lead outdoors all stay.
+    /// Also merge rooms with the outdoors if a bound cannot be met otherwise; without it, all portals to the outdoors
+    /// stay.
     #[arg(long)]
     join_outdoors: bool,
-    /// How portals are compared [default: expected-triangles]; those of a portal file, which has no surfaces, by
-    /// their area.
+    /// Order in which portals are removed [default: expected-triangles]; in a portal file, which has no surfaces, by
+    /// area.
     #[arg(long, value_enum)]
     metric: Option<MetricName>,
-    /// What a triangle costs; in a portal file, a triangle of a solid face or, where it has none, a leaf.
+    /// Cost of a triangle; in a portal file, of a triangle of a solid face or, without faces, of a leaf.
     #[arg(long, value_name = "COST", value_parser = parse_cost, default_value_t = 1.0)]
     triangle_cost: f64,
-    /// What a square meter costs.
+    /// Cost of a square meter.
     #[arg(long, value_name = "COST", value_parser = parse_cost, default_value_t = 0.0)]
     area_cost: f64,
-    /// Multiplies the cost of detail objects; 0 where only structure counts.
+    /// Factor on the cost of detail objects; 0 to count only structure.
     #[arg(long, value_name = "FACTOR", value_parser = parse_cost, default_value_t = 1.0)]
     detail_cost: f64,
-    /// Multiplies the cost of a material, e.g. `--material-cost water=3`.
+    /// Factor on the cost of a material, e.g. `--material-cost water=3`.
     #[arg(long, value_name = "NAME=FACTOR", value_parser = parse_material)]
     material_cost: Vec<(String, f64)>,
     /// Print JSON for machines.
@@ -71,7 +72,7 @@ pub(crate) struct Simplify {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum MetricName {
-    /// Triangles that sampled views draw more without the portal.
+    /// Triangles that sampled views draw in addition without the portal.
     ExpectedTriangles,
     /// Volume that sees the portal, times the difference of the cells' costs.
     VisibleVolume,
@@ -162,7 +163,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     )
 }
 
-/// Refuses a number of portals that is not reached though all rooms became one.
+/// Refuses a number of portals that merging all rooms does not reach.
 fn check_portals(args: &Simplify, world: &World) -> anyhow::Result<()> {
     let graph = &world.graph;
     let outward = graph.portals.iter().filter(|p| {
@@ -179,7 +180,7 @@ fn check_portals(args: &Simplify, world: &World) -> anyhow::Result<()> {
     }
 }
 
-/// That more are left than were asked for, if so.
+/// A warning that more are left than requested, if so.
 fn too_many(most: Option<usize>, n: usize, what: &str) -> Option<String> {
     let most = most.filter(|&most| n > most)?;
     Some(format!(
@@ -187,11 +188,11 @@ fn too_many(most: Option<usize>, n: usize, what: &str) -> Option<String> {
     ))
 }
 
-/// That a cell of a portal file costs more than it may, if one does.
+/// A warning that a cell of a portal file exceeds the cost bound, if one does.
 fn over_bound(args: &Simplify, max_cost: f64) -> Option<String> {
     let max = args.max_cost.filter(|m| max_cost > *m)?;
     Some(format!(
-        "a cell costs {max_cost:.0}, more than {max}, and did before; only a bake can cut it"
+        "a cell costs {max_cost:.0}, more than {max}, as in the input; only a bake can cut it"
     ))
 }
 
@@ -209,7 +210,7 @@ fn simplify_portal_file(
         || !args.material_cost.is_empty()
     {
         bail!(
-            "--metric, --split-outdoors, --join-outdoors, --area-cost and --material-cost ask for surfaces, which a portal file does not have"
+            "--metric, --split-outdoors, --join-outdoors, --area-cost and --material-cost need surfaces, which a portal file does not have"
         );
     }
     let file = read_prt(text).with_context(|| name_of(&args.input))?;
@@ -230,7 +231,8 @@ fn simplify_portal_file(
     compared.print(outputs.printed(), args.json, ["clusters", "cluster"])
 }
 
-/// What the clusters of a portal file cost: by their solid faces, which Quake 3's files have, else by their leaves.
+/// The costs of the clusters of a portal file: by their solid faces, which Quake 3's files have, else by their
+/// leaves.
 fn cluster_costs(file: &PrtFile, cost: &CostModel) -> Vec<f64> {
     let mut costs = vec![0.0; file.n_clusters as usize];
     for face in &file.faces {
@@ -244,7 +246,7 @@ fn cluster_costs(file: &PrtFile, cost: &CostModel) -> Vec<f64> {
     costs
 }
 
-/// What a file made from another one has, compared with it.
+/// A file compared with the one that it was made from.
 #[derive(Serialize)]
 pub(crate) struct Compared {
     #[serde(flatten)]
@@ -252,16 +254,16 @@ pub(crate) struct Compared {
     /// Before and after.
     cells: [usize; 2],
     portals: [usize; 2],
-    /// The least and the most that a cell costs, where cells were merged.
+    /// The least and the greatest cost of a cell, if cells were merged.
     costs: Option<[f64; 2]>,
-    /// What was done, in words.
+    /// The changes, in words.
     notes: Vec<String>,
-    /// What could not be met.
+    /// Bounds that could not be met.
     warning: Option<String>,
 }
 
 impl Compared {
-    /// Prints what differs; what could not be met is a warning, too.
+    /// Prints the differences; a bound that could not be met is also a warning.
     fn print(&self, mut out: Box<dyn Write>, is_json: bool, what: [&str; 2]) -> anyhow::Result<()> {
         if let Some(warning) = &self.warning {
             write_lines(&mut Warned, warning)?;
@@ -285,7 +287,7 @@ impl Compared {
     }
 }
 
-/// What was done to a world, and what it gave.
+/// The changes to a world.
 #[derive(Default)]
 pub(crate) struct Done {
     pub(crate) costs: Option<[f64; 2]>,
@@ -293,7 +295,7 @@ pub(crate) struct Done {
     pub(crate) warning: Option<String>,
 }
 
-/// Writes a world made from another one, and says how they compare.
+/// Writes a world made from another one, and reports how they compare.
 pub(crate) fn write(
     outputs: &Outputs,
     path: &Path,

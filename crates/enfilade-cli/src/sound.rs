@@ -1,4 +1,4 @@
-//! `enfilade sound`: what a walking listener hears of a source.
+//! `enfilade sound`: renders a source as a walking listener hears it.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -20,53 +20,54 @@ use crate::screen::print_json;
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world;
 
-/// Renders what a listener hears of a source while walking from point to point: through openings and closed doors, from where the
-/// sound comes, with the rooms' reverberation.
+/// Renders a source as a listener hears it who walks from point to point: through openings and closed doors, from the
+/// direction of the sound, with the rooms' reverberation.
 #[derive(clap::Args)]
 pub(crate) struct Sound {
     /// World written by `enfilade bake`; `-` for standard input.
     world: PathBuf,
-    /// Where the listener's ears are, in meters: points to walk along, at 1.4 m/s for an hour at most; at one point for 3 seconds.
+    /// Positions of the listener's ears, in meters: points to walk along at 1.4 m/s, for an hour at most; a single
+    /// point lasts 3 seconds.
     #[arg(long, value_name = "X,Y,Z;…", value_parser = point, value_delimiter = ';', required = true, allow_hyphen_values = true)]
     listener: Vec<[f32; 3]>,
-    /// Where the source is, in meters.
+    /// Position of the source, in meters.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     source: [f32; 3],
-    /// What it plays, over and over: the first channel of a WAV file. A test sound without it.
+    /// Sound that the source repeats: the first channel of a WAV file. A test sound if not given.
     #[arg(long, value_name = "FILE")]
     wav: Option<PathBuf>,
-    /// Portals that are closed, by number.
+    /// Closed portals, by number.
     #[arg(long, value_name = "PORTAL,…", value_delimiter = ',')]
     closed: Vec<u32>,
-    /// Where to write the sound, a WAV file of two channels of 16 bits.
+    /// File for the sound, a WAV file of two channels of 16 bits.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Print JSON for machines: what is heard along the walk, ten times a second.
+    /// Print JSON for machines: the sound along the walk, ten times a second.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     limits: Limits,
 }
 
-/// [Units: wu/s]
+/// Speed of walking. [Units: wu/s]
 const SPEED: f64 = 1.4;
-/// How long one stands at a single point. [Units: s]
+/// Time at a single point. [Units: s]
 const STANDING: f64 = 3.0;
-/// The longest walk: its sound of 192 kHz still is a WAV file, which has at most 4 GiB. [Units: s]
+/// The longest walk: at 192 kHz it still fits a WAV file, which has at most 4 GiB. [Units: s]
 const LONGEST: f64 = 3600.0;
-/// Samples of `--wav` that are held: 25 minutes of 44.1 kHz.
+/// Most samples of `--wav` held in memory: 25 minutes at 44.1 kHz.
 const MOST_SAMPLES: usize = 1 << 26;
 const RATE: u32 = 44100;
-/// Work of a block, in units of [`Allowance`]: most of it is the search for ways.
+/// Work of a block, in units of [`Allowance`]: mostly the search for paths.
 const WORK_A_BLOCK: u64 = 500;
 
-/// A line of what is heard.
+/// A line of the report.
 #[derive(serde::Serialize)]
 struct HeardLine {
     seconds: f64,
     position: [f64; 3],
     cell: u32,
-    /// Of the shortest way; `null` where none leads.
+    /// Length of the shortest path; `null` if there is none.
     length: Option<f64>,
     direction: [f64; 3],
     gain_db: Option<f64>,
@@ -128,7 +129,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     print_table(out, &rows)
 }
 
-/// A walk and the source that is heard on it.
+/// A walk, with the source to hear.
 struct HeardWalk<'a> {
     points: &'a [DVec3],
     n_blocks: usize,
@@ -137,7 +138,7 @@ struct HeardWalk<'a> {
 }
 
 impl HeardWalk<'_> {
-    /// Hands out what is heard block by block; returns lines for the reader.
+    /// Passes the sound of each block to `each`; returns lines for the reader.
     fn hear(
         &self,
         args: &Sound,
@@ -167,7 +168,7 @@ impl HeardWalk<'_> {
             }
             let time = k as f64 * self.seconds_of_block;
             let (at, ahead) = place(self.points, time * SPEED, source);
-            // In a doorway's solid frame one hears what one heard before it.
+            // In solid matter, such as a door frame, the last sound continues.
             let Some(cell) = layout.locate(at) else {
                 match &before {
                     Some(last) => each(last)?,
@@ -208,7 +209,7 @@ impl HeardWalk<'_> {
     }
 }
 
-/// A room is left and entered over a fifth of a second.
+/// Moves a value towards another with a time constant of a fifth of a second: leaving and entering a room is gradual.
 fn follow(before: Option<f64>, now: f64, seconds: f64) -> f64 {
     let share = 1.0 - (-seconds / 0.2).exp();
     before.map_or(now, |b| b + (now - b) * share)
@@ -218,7 +219,7 @@ fn exact(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// The points of a walk, and how long it takes. [Units: wu, s] Refused where it takes longer than is rendered.
+/// The points of a walk, and its duration. [Units: wu, s] Refused if it takes longer than is rendered.
 fn path(listener: &[[f32; 3]]) -> anyhow::Result<(Vec<DVec3>, f64)> {
     let points: Vec<DVec3> = listener.iter().copied().map(exact).collect();
     let length: f64 = points.windows(2).map(|p| p[0].distance(p[1])).sum();
@@ -229,8 +230,8 @@ fn path(listener: &[[f32; 3]]) -> anyhow::Result<(Vec<DVec3>, f64)> {
     };
     if seconds > LONGEST {
         bail!(
-            "--listener: the walk takes longer than {LONGEST} s, {:.2} km, which is the most that is rendered; give nearer points, \
-             or a part of the walk at a time",
+            "--listener: the walk takes longer than {LONGEST} s, {:.2} km, the most that is rendered; give closer points, \
+             or render the walk in parts",
             LONGEST * SPEED / 1000.0
         );
     }
@@ -241,7 +242,7 @@ fn n_blocks(seconds: f64, rate: u32) -> usize {
     (seconds * f64::from(rate) / BLOCK as f64).ceil() as usize
 }
 
-/// Where the walker is after a length, and where the walker looks: ahead, and towards the source if standing.
+/// The position of the walker after a length, and the direction of view: ahead, or towards the source if standing.
 fn place(points: &[DVec3], mut length: f64, source: DVec3) -> (DVec3, DVec3) {
     let mut ahead = (source - points[0]) * DVec3::new(1.0, 0.0, 1.0);
     for leg in points.windows(2) {
@@ -262,7 +263,7 @@ fn decibels(gain: f64) -> Option<f64> {
     (gain > 0.0).then(|| 20.0 * gain.log10())
 }
 
-/// The rate of a WAV file, and of its first channel as much as is heard in so many seconds.
+/// The rate of a WAV file, and as much of its first channel as is heard in so many seconds.
 fn read_wav(path: &Path, seconds: f64) -> anyhow::Result<(u32, Vec<f32>)> {
     let name = || path.display().to_string();
     let mut reader = hound::WavReader::open(path).with_context(name)?;
@@ -275,7 +276,7 @@ fn read_wav(path: &Path, seconds: f64) -> anyhow::Result<(u32, Vec<f32>)> {
         );
     }
     let channels = usize::from(spec.channels.max(1));
-    // Between the last sample and the one after it, too.
+    // One more, to interpolate after the last sample.
     let n = n_blocks(seconds, spec.sample_rate) * BLOCK + 1;
     let most = n.min(MOST_SAMPLES + 1);
     let samples: Result<Vec<f32>, _> = match spec.sample_format {
@@ -291,11 +292,11 @@ fn read_wav(path: &Path, seconds: f64) -> anyhow::Result<(u32, Vec<f32>)> {
     };
     let samples = samples.with_context(name)?;
     if samples.is_empty() {
-        bail!("{}: a sound of a sample or more is needed", name());
+        bail!("{}: the sound has no samples", name());
     }
     if samples.len() > MOST_SAMPLES {
         bail!(
-            "{}: more than {MOST_SAMPLES} samples, {} s, are to be heard; cut it, or give it a lower rate",
+            "{}: more than {MOST_SAMPLES} samples, {} s, would be played; cut it, or lower its rate",
             name(),
             MOST_SAMPLES / spec.sample_rate as usize
         );
@@ -303,7 +304,8 @@ fn read_wav(path: &Path, seconds: f64) -> anyhow::Result<(u32, Vec<f32>)> {
     Ok((spec.sample_rate, samples))
 }
 
-/// The head of a WAV file of two channels of 16 bits: as its length is known before, it can be written to what is read on the way.
+/// The head of a WAV file of two channels of 16 bits. The length is known beforehand, so that the file can be
+/// streamed.
 fn wav_head(n_samples: usize, rate: u32) -> Vec<u8> {
     const FRAME: u32 = 4;
     let n_bytes = n_samples as u32 * FRAME;

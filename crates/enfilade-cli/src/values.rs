@@ -1,4 +1,4 @@
-//! Values of arguments that several commands take.
+//! Argument values shared by several commands.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use std::time::Duration;
 ///
 /// # Errors
 ///
-/// Anything but three finite numbers; the text says what is needed.
+/// For anything but three finite numbers; the text says what is needed.
 pub fn point(text: &str) -> Result<[f32; 3], String> {
     let numbers: Result<Vec<f32>, _> = text.split(',').map(|w| w.trim().parse()).collect();
     match numbers.as_deref() {
@@ -19,7 +19,7 @@ pub fn point(text: &str) -> Result<[f32; 3], String> {
 ///
 /// # Errors
 ///
-/// Anything else; the text says what is needed.
+/// For anything else; the text says what is needed.
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     let parse = || {
         let (w, h) = text.split_once('x')?;
@@ -33,7 +33,7 @@ pub fn size(text: &str) -> Result<[u32; 2], String> {
 ///
 /// # Errors
 ///
-/// Anything else; the text says what is needed.
+/// For anything else; the text says what is needed.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     text.parse()
         .ok()
@@ -41,11 +41,11 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "a number of seconds of at least 0 is needed".into())
 }
 
-/// Reads `ID=SHARE`: a portal, and how far its leaves are open, 0 to 1.
+/// Reads `ID=SHARE`: a portal, and the fraction by which its leaves are open, 0 to 1.
 ///
 /// # Errors
 ///
-/// Anything else; the text says what is needed.
+/// For anything else; the text says what is needed.
 pub fn door(text: &str) -> Result<(u32, f32), String> {
     let parse = || {
         let (id, share) = text.split_once('=')?;
@@ -61,7 +61,7 @@ pub fn door(text: &str) -> Result<(u32, f32), String> {
 ///
 /// # Errors
 ///
-/// Anything else, and a number without a unit; the text says what is needed.
+/// For anything else, and a number without a unit; the text says what is needed.
 pub fn bytes(text: &str) -> Result<u64, String> {
     let parse = || {
         let split = text.find(|c: char| c.is_ascii_alphabetic())?;

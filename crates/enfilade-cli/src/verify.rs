@@ -1,4 +1,4 @@
-//! `enfilade verify`: does a world keep its promises?
+//! `enfilade verify`: tests the promises of a world.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -26,21 +26,19 @@ use enfilade_cli::input::{import_scene, name_of, read};
 use enfilade_cli::values::size;
 use enfilade_cli::world::read_world;
 
-/// Tries the promises of a world with random sight lines; exits with 1 when one is broken.
+/// Tests the promises of a world with random sight lines; exits with 1 if one is broken.
 #[derive(clap::Args)]
 pub(crate) struct Verify {
     /// World written by `enfilade bake`; with --evidence, a Quake portal file too; `-` for standard input.
     world: PathBuf,
-    /// Check this evidence, which `enfilade pvs --evidence` wrote, instead of the
-    /// promises.
+    /// Check this evidence, written by `enfilade pvs --evidence`, instead of the promises.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
-    /// The scene that it was baked from: its structural triangles decide what blocks, instead of
-    /// those that the world holds, and its details must be where the world has them. It is read by the settings below; give those
-    /// of the bake.
+    /// Scene that the world was baked from: its structural triangles, not those in the world, then block sight, and
+    /// its details must be where the world has them. It is read with the settings below; give those of the bake.
     #[arg(long, num_args = 1.., value_name = "IN")]
     source: Vec<PathBuf>,
-    /// The files of the source whose objects are all detail, as in the bake.
+    /// Files of the source whose objects are all detail, as in the bake.
     #[arg(long, value_name = "FILE", requires = "source")]
     detail: Vec<PathBuf>,
     #[command(flatten)]
@@ -48,37 +46,37 @@ pub(crate) struct Verify {
     /// Segments for `sealed`, and as many rays for `complete`.
     #[arg(long, default_value_t = 1_000_000, value_name = "N")]
     rays: u64,
-    /// Try short segments for `sealed` across every face of the locator's leaves, too. Finds slits however small, and openings of micrometers
-    /// that a bake leaves where triangles miss each other.
+    /// Also test `sealed` with short segments across every face of the locator's leaves. Finds slits however small,
+    /// including openings of micrometers that a bake leaves where triangles miss each other.
     #[arg(long)]
     faces: bool,
-    /// Views tried for *conservative per frame*, with 100 rays in each: what they hit must be in the
-    /// run-time's answer. 0: none.
+    /// Views for *conservative per frame*, with 100 rays in each: the run-time's answer must contain all that they
+    /// hit. 0: none.
     #[arg(long, default_value_t = 10_000, value_name = "N")]
     sight: u64,
-    /// Views drawn with and without culling by portals, and compared pixel by pixel.
+    /// Views to draw with and without culling by portals, and to compare pixel by pixel.
     #[arg(long, default_value_t = 0, value_name = "N")]
     views: u64,
-    /// Doors are shut and open by chance, anew for each of these views.
+    /// Open and shut doors at random, again for each of these views.
     #[arg(long, requires = "views")]
     doors: bool,
-    /// Size of these pictures.
+    /// Size of the compared pictures.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
     view_size: [u32; 2],
     /// Draw the views that differ, with and without culling, to PNG files in this folder.
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
-    /// What draws the views: `best`, `gpu`, `software`, or part of a name.
+    /// Adapter to draw the views with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
     /// Start of the random sequences; equal seeds give equal reports.
     #[arg(long, default_value_t = 1, value_name = "S")]
     seed: u64,
-    /// Distance up to which planes may be snapped and corners rounded, in meters; from the size of
-    /// the scene when left out.
+    /// Distance up to which planes may be snapped and vertices rounded, in meters; from the size of the scene if not
+    /// given.
     #[arg(long, value_name = "METERS", value_parser = positive)]
     tolerance: Option<f64>,
-    /// Kinds of failure listed at most.
+    /// Most kinds of failure listed.
     #[arg(long, default_value_t = 20, value_name = "N")]
     list: usize,
     /// Print JSON for machines.
@@ -189,7 +187,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Asks the run-time what random views see, and casts rays in them.
+/// Queries the run-time for random views, and casts rays in them.
 fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
     let sight = Sight::build(world).with_context(|| name_of(&args.world))?;
     let answers = Answers::new(world, &sight);
@@ -207,7 +205,7 @@ fn verify_sight(args: &Verify, world: &World) -> anyhow::Result<ViewReport> {
     Ok(report)
 }
 
-/// Checks every claim of the evidence about what can be seen.
+/// Checks every claim of the evidence about visibility.
 fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
     let (graph, walls) = read_graph(&args.world)?;
     let bytes = read(evidence)?;
@@ -253,7 +251,7 @@ fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Scene> {
     Ok(imported.scene)
 }
 
-/// The structural triangles of a scene, as the builder saw them.
+/// The structural triangles of a scene, as the builder read them.
 fn structure_of(scene: &Scene) -> Vec<Triangle> {
     scene
         .triangle_sources(Role::Structural)
@@ -261,7 +259,7 @@ fn structure_of(scene: &Scene) -> Vec<Triangle> {
         .collect()
 }
 
-/// Whether the world's details are those of the scene.
+/// Problems if the world's details are not those of the scene.
 fn detail_problems(world: &World, scene: &Scene) -> Vec<String> {
     let numbers = 0..scene.objects.len() as u32;
     let role = |&i: &u32| scene.objects[i as usize].role;

@@ -8,11 +8,11 @@ use enfilade::cpg::wire::decode_glb;
 
 use crate::input::{name_of, read_glb};
 
-/// Reads the world that `bake` wrote to `path`, or that comes from standard input where that is `-`.
+/// Reads a world written by `bake` from `path`, or from standard input if that is `-`.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, or is no valid world; the error names it.
+/// If the file cannot be read or is not a valid world; the error names it.
 pub fn read_world(path: &Path) -> anyhow::Result<World> {
     decode_glb(&read_glb(path)?).with_context(|| name_of(path))
 }

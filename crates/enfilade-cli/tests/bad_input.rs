@@ -1,8 +1,8 @@
 //! Broken, hostile and mistaken input through the built command.
 //!
-//! Each case must end with the right exit code and a message that names the file, the place and what
-//! to do, and must leave nothing behind: no output, no temporary file. On Linux every run has an
-//! address space of 3 GiB only, so one that asks for unbounded memory is aborted, and fails here.
+//! Each case must end with the right exit code and a message that names the file, the place and the remedy, and must
+//! leave nothing behind: no output, no temporary file. On Linux every run has an address space of 3 GiB only, so that
+//! one that requests unbounded memory is aborted, and fails here.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_testkit::{furnished_house, mixed};
 
-/// A folder of one test alone, removed in the end.
+/// A folder for one test, removed at its end.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -29,7 +29,7 @@ impl Folder {
         path
     }
 
-    /// Names of all files in it.
+    /// Names of all its files.
     fn files(&self) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(&self.0)
             .unwrap()
@@ -55,7 +55,7 @@ impl Folder {
         command.output().unwrap()
     }
 
-    /// Bakes `args`, which must end with `code`, say all of `words` and leave the folder as it was.
+    /// Bakes `args`: must end with `code`, print all of `words` and leave the folder as it was.
     fn refused(&self, code: i32, args: &[&str], words: &[&str]) {
         let before = self.files();
         let done = self.bake(args);
@@ -69,7 +69,7 @@ impl Folder {
         assert_eq!(self.files(), before, "{args:?} left files behind");
     }
 
-    /// `bake FILE -o out.glb` must end with 1, name the file and say all of `words`.
+    /// Runs `bake FILE -o out.glb`: must end with 1, name the file and print all of `words`.
     fn refused_file(&self, name: &str, bytes: impl AsRef<[u8]>, words: &[&str]) {
         self.write(name, bytes);
         let mut all = vec![name];
@@ -85,7 +85,7 @@ impl Drop for Folder {
     }
 }
 
-/// A GLB of this JSON and binary chunk.
+/// A GLB with this JSON and binary chunk.
 fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     let mut json = json.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -101,7 +101,7 @@ fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The parts of a small glTF document that cases change.
+/// The parts of a small glTF document that cases vary.
 struct Document {
     nodes: String,
     accessors: String,
@@ -241,7 +241,7 @@ fn a_small_file_cannot_ask_for_a_lot_of_memory() {
         {"attributes":{"TRANSLATION":2}}}}"#
         .into();
     folder.refused_file("instances.glb", d.glb(), &["asks for", "node 0 'Thing'"]);
-    // The same, each with a long name.
+    // The same, with a long name each.
     d.accessors = d.accessors.replace("1900000", "100000");
     d.nodes = d.nodes.replace("Thing", &"Thing".repeat(1000));
     folder.refused(1, &["none.glb", "-o", "out.glb"], &["none.glb"]);
@@ -299,7 +299,7 @@ fn broken_numbers_and_references_are_named_with_their_place() {
     folder.refused_file("own-child.glb", with_nodes(own), &["node 0", "cycle"]);
     let ring = r#"{"children":[1]},{"children":[2]},{"mesh":0,"children":[0]}"#;
     folder.refused_file("ring.glb", with_nodes(ring), &["node 0", "cycle"]);
-    // Thirty levels, each twice below the one above: a thousand million ways down.
+    // Thirty levels, each twice below the one above: a billion paths down.
     let level = |i: usize| format!(r#"{{"children":[{0},{0}]}}"#, i + 1);
     let levels: Vec<String> = (0..30).map(level).collect();
     let diamond = format!("{},{{}}", levels.join(","));
@@ -393,7 +393,7 @@ fn a_slip_of_the_unit_is_noticed() {
         &["far.glb", "-o", "out.glb"],
         &["--origin 500005,1,-199998"],
     );
-    // What the messages say to do helps.
+    // The advice in the messages works.
     for args in [
         ["wide.glb", "--unit", "0.002"],
         ["tiny.glb", "--unit", "2000"],
@@ -434,7 +434,7 @@ fn outputs_that_cannot_be_are_noticed_before_the_work() {
     let words = ["e.toml", "is the input"];
     folder.refused(1, &["in.glb", "--config", "e.toml", "-o", "e.toml"], &words);
     assert_eq!(fs::read(&input).unwrap(), bytes);
-    // The input of these does not exist: the output is looked at first.
+    // The input does not exist in these cases: the output is checked first.
     let words = ["there is no folder", "lost", "-o"];
     folder.refused(1, &["none.glb", "-o", "lost/out.glb"], &words);
     fs::create_dir(folder.0.join("dir")).unwrap();
@@ -499,7 +499,7 @@ fn settings_out_of_range_are_wrong_usage() {
     wrong(&["--colour"], &["--colour"]);
     folder.refused(2, &["in.glb"], &["--output"]);
     folder.refused(2, &["-o", "out.glb"], &["<IN>"]);
-    // The widest voxel that is allowed finds nothing, and does no harm.
+    // The widest allowed voxel finds nothing, and does no harm.
     let done = folder.bake(&["in.glb", "-o", "out.glb", "--voxel", "10"]);
     assert_eq!(done.status.code(), Some(0), "{done:?}");
 }
@@ -526,7 +526,7 @@ fn a_settings_file_is_understood_or_its_line_is_shown() {
     wrong("voxel = ", &["line 1"]);
     wrong("max_voxels = 10", &["line 1", "at least 1000"]);
     wrong("max_voxels = -10", &["line 1"]);
-    // Too few for voxels that a door would fit.
+    // Too few voxels for a door.
     folder.write("e.toml", "max_voxels = 10000");
     let args = ["in.glb", "-o", "out.glb", "--config", "e.toml"];
     folder.refused(
@@ -541,7 +541,7 @@ fn a_settings_file_is_understood_or_its_line_is_shown() {
     folder.refused(1, &args, &["cannot read settings none.toml"]);
 }
 
-/// A cube of 4 m, each side two triangles, with the faces `skip` left out; corners as OBJ text.
+/// A cube of 4 m, two triangles per side, without the faces `skip`; as OBJ text.
 fn obj_cube(skip: &[usize]) -> String {
     let mut text = String::from("o Shell\n");
     for i in 0..8 {
@@ -607,7 +607,7 @@ fn broken_obj_ply_and_stl_are_refused_with_the_line() {
     folder.refused_file("short.stl", &text[..60], &[]);
 }
 
-/// The number behind the first `at` of a leak line, as x y z.
+/// The numbers after the first `at` of each leak line, as x y z.
 fn leak_places(said: &str) -> Vec<[f64; 3]> {
     said.lines()
         .filter_map(|l| l.trim().strip_prefix("at "))
@@ -639,7 +639,7 @@ fn a_scene_with_holes_builds_and_says_where_it_leaks() {
     assert!(places.iter().any(is_crack), "{said}");
     assert_eq!(folder.files(), ["in.glb", "out.glb"]);
 
-    // Half a room: it cannot be one, and the bake still ends well.
+    // Half a room is not a room, and the bake still succeeds.
     folder.write("open.obj", obj_cube(&[3]));
     let done = folder.bake(&["open.obj", "-o", "out.glb"]);
     assert_eq!(done.status.code(), Some(0), "{done:?}");
@@ -648,8 +648,8 @@ fn a_scene_with_holes_builds_and_says_where_it_leaks() {
 #[test]
 fn a_room_with_a_piece_of_wall_missing_builds_and_says_where() {
     let folder = Folder::new("missing-piece");
-    // A box of 5 x 2.6 x 4 m. In the wall x = 0 a triangle is missing, in the ceiling a square, and
-    // the wall z = 4 has a window.
+    // A box of 5 x 2.6 x 4 m. A triangle is missing in the wall x = 0, a square in the ceiling, and the wall z = 4
+    // has a window.
     let (mut obj, mut n) = (String::new(), 0);
     let mut face = |corners: &[[f64; 3]]| {
         for [x, y, z] in corners {

@@ -1,4 +1,4 @@
-//! Bad worlds, bad cameras and missing textures: a message, or a picture that holds all there is to see.
+//! Bad worlds, bad cameras and missing textures: an error message, or a complete picture.
 
 use std::fs;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ impl Folder {
             .unwrap()
     }
 
-    /// Runs a command that must fail with 1, say `words` and leave nothing behind.
+    /// Runs a command: must fail with 1, print `words` and leave nothing behind.
     fn refused(&self, args: &[&str], words: &str) {
         let n_files = || fs::read_dir(&self.0).unwrap().count();
         let before = n_files();
@@ -43,7 +43,7 @@ impl Folder {
         assert_eq!(n_files(), before, "{args:?} left something");
     }
 
-    /// Draws `out.png` of 64 × 36 pixels; returns its bytes and what was said.
+    /// Draws `out.png` of 64 × 36 pixels; returns its bytes and the messages.
     fn drawn(&self, args: &[&str]) -> (Vec<u8>, String) {
         let out = self.0.join("out.png");
         let _ = fs::remove_file(&out);
@@ -68,7 +68,7 @@ fn grid() -> World {
     room_grid(&GridParams::offices(12, 1))
 }
 
-/// The same file with `from` in its JSON replaced by `to`, which is as long.
+/// The same file with `from` in its JSON replaced by `to`, of equal length.
 fn with_json(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let mut out = bytes.to_vec();
@@ -92,7 +92,7 @@ fn broken_worlds_and_those_of_other_versions_are_refused_by_all_that_draws() {
     folder.write("head.glb", &whole[..20 + length / 2]);
     folder.write("empty.glb", b"");
     folder.write("text.glb", b"no world");
-    // The version that the extension states.
+    // The version in the extension.
     folder.write(
         "newer.glb",
         &with_json(&whole, "\"version\":1", "\"version\":9"),
@@ -127,10 +127,10 @@ fn worlds_without_rooms_or_walls_are_drawn_as_they_are() {
     folder.write("world.glb", &encode_glb(&World::default()).unwrap());
     let looking = ["--eye", "0,0,0", "--look", "1,0,0"];
     let (sky, _) = folder.drawn(&looking);
-    // The same with everything: there is nothing.
+    // The same with everything drawn: there is nothing.
     let all = [&looking[..], &["--mode", "everything"]].concat();
     assert_eq!(folder.drawn(&all).0, sky);
-    // Without a camera as well: one is found.
+    // Without a camera, too: the command finds one.
     folder.drawn(&[]);
     folder.drawn(&["--above"]);
     folder.refused(
@@ -146,7 +146,7 @@ fn worlds_without_rooms_or_walls_are_drawn_as_they_are() {
         ],
         "no room to walk in",
     );
-    // Surfaces and no cells: all that meets the view.
+    // Surfaces without cells: everything in the view is drawn.
     let mut world = grid();
     world.graph = enfilade_cpg::CellPortalGraph::default();
     for batch in &mut world.batches {
@@ -176,7 +176,7 @@ fn eyes_in_walls_outside_and_far_away_see_what_everything_shows() {
     let sight = enfilade::runtime::Sight::build(&world).unwrap();
     let [low, high] = world.graph.cells[0].aabb;
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
-    // Through the floor in steps of a millimeter: some of them are in no cell.
+    // Through the floor in steps of a millimeter: some points are in no cell.
     let in_floor = (0..400)
         .map(|i| [middle[0], low[1] - i as f32 * 1e-3, middle[2]])
         .find(|&p| sight.locate(p).is_none());

@@ -1,5 +1,5 @@
-//! What a bake may take: said before the work, and held. On Linux each bake here has an address space of 4 GiB: one that asks for
-//! more than its budget is aborted, and fails.
+//! Budgets of a bake: reported before the work, and kept. On Linux each bake here has an address space of 4 GiB: one
+//! that requests more than its budget is aborted, and fails.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -78,7 +78,7 @@ fn voxels_that_cannot_be_are_refused_with_those_that_can() {
     ] {
         let (done, said) = bake(&dir, args);
         assert_eq!(done.status.code(), Some(1), "{args:?}: {said}");
-        // No number of hundreds of digits.
+        // No number with hundreds of digits.
         assert!(said.lines().all(|l| l.len() < 400), "{args:?}: {said}");
         let (_, way) = said.split_once("give --voxel ").expect(&said);
         let finest: f64 = way.split(' ').next().unwrap().parse().unwrap();
@@ -86,7 +86,7 @@ fn voxels_that_cannot_be_are_refused_with_those_that_can() {
         assert!(way.contains("--max-memory"), "{said}");
         assert_eq!(fs::read(dir.join("w.glb")).unwrap(), b"old");
     }
-    // The way out is one.
+    // The advice works.
     let (_, said) = bake(&dir, &["--voxel", "0.05", "--max-memory", "15M"]);
     let (_, way) = said.split_once("give --voxel ").expect(&said);
     let finest = way.split(' ').next().unwrap();
@@ -101,7 +101,7 @@ fn a_coarser_answer_says_so_and_voxels_are_told_before() {
     let (done, said) = bake(&dir, &["--max-memory", "15M", "--max-time", "600"]);
     assert!(done.status.success(), "{said}");
     assert!(said.contains("voxels of 0.1"), "{said}");
-    assert!(said.contains("not the 0.1 m that were wanted"), "{said}");
+    assert!(said.contains("coarser than the 0.1 m requested"), "{said}");
     let (done, said) = bake(&dir, &[]);
     assert!(done.status.success(), "{said}");
     assert!(said.contains("voxels of 0.100 m"), "{said}");
@@ -109,6 +109,6 @@ fn a_coarser_answer_says_so_and_voxels_are_told_before() {
         said.contains("about") && said.contains(" MB and "),
         "{said}"
     );
-    assert!(!said.contains("wanted"), "{said}");
+    assert!(!said.contains("coarser"), "{said}");
     fs::remove_dir_all(&dir).unwrap();
 }

@@ -1,4 +1,4 @@
-//! Runs the binary on worlds made in code.
+//! Runs the command on worlds made in code.
 
 #[path = "../../enfilade-cpg/tests/common/mod.rs"]
 mod common;
@@ -23,7 +23,7 @@ fn enfilade(args: &[&str], stdin: &str) -> Output {
     let mut input = child.stdin.take().unwrap();
     let text = stdin.to_owned();
     let writer = std::thread::spawn(move || {
-        // The command may have given up reading; that is what the test then looks at.
+        // The command may have stopped reading; the test checks the result of that.
         let _ = input.write_all(text.as_bytes());
     });
     let output = child.wait_with_output().unwrap();
@@ -87,7 +87,7 @@ fn inspect_tells_machines_of_suspected_holes() {
     let [a, b, c, _] = world.graph.portals[1].outline[..] else {
         panic!("the window is no rectangle")
     };
-    // Half a rectangle is what a missing triangle leaves.
+    // A missing triangle leaves half a rectangle.
     world.graph.portals[1].outline = vec![a, b, c];
     world.graph.portals[1].pieces = vec![vec![a, b, c]];
     world.graph.portals[1].area = 2.0;
@@ -101,11 +101,11 @@ fn inspect_tells_machines_of_suspected_holes() {
     assert_eq!(hole["position"].as_array().unwrap().len(), 3);
 }
 
-/// What the demo says to try next is tried, but for the window and the user's own file.
+/// Runs the demo's hints, except for the window and the user's own file.
 #[test]
 fn the_demo_makes_a_house_and_its_hints_work() {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("demo");
-    // Files of an earlier version are in the way.
+    // Files of an earlier version would be in the way.
     let _ = fs::remove_dir_all(&dir);
     let done = enfilade(&["demo", "-o", dir.to_str().unwrap()], "");
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));

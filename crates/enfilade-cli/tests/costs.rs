@@ -1,4 +1,4 @@
-//! Bounds on what cells cost, from the command line: honoured by every builder, or told why not.
+//! Bounds on the costs of cells, from the command line: kept by every builder, or reported as unmet.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ fn said(done: &Output) -> String {
     String::from_utf8_lossy(&done.stderr).into_owned()
 }
 
-/// A hall of 10 x 4 x 8 m with six columns, closed but for a door, as an OBJ file of material `stone`.
+/// A hall of 10 x 4 x 8 m with six columns, closed except for a door, as an OBJ file with material `stone`.
 fn hall(name: &str) -> String {
     let mut boxes = vec![
         ([-0.2, -0.2, -0.2], [10.2, 0.0, 8.2]),
@@ -67,7 +67,7 @@ fn hall(name: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// What the cells of a world cost at most, in triangles, and how many there are.
+/// The largest cost of a cell of a world, in triangles, and the number of cells.
 fn cells(world: &str) -> (u64, usize) {
     let done = enfilade(&["inspect", world, "--json"]);
     let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();

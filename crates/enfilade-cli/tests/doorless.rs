@@ -1,10 +1,10 @@
-//! Bakes two rooms whose door is shut: by a leaf, by something called a wall, or by nothing.
+//! Bakes two rooms whose door is shut by a leaf, by an object called a wall, or not at all.
 
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-/// Boxes as an OBJ file of this test alone: name, least and greatest corner.
+/// Boxes as an OBJ file of this test alone: name, minimum and maximum.
 fn obj(file: &str, boxes: &[(&str, [f64; 3], [f64; 3])]) -> PathBuf {
     let mut text = String::new();
     for (i, (name, min, max)) in boxes.iter().enumerate() {
@@ -30,8 +30,8 @@ fn obj(file: &str, boxes: &[(&str, [f64; 3], [f64; 3])]) -> PathBuf {
     path
 }
 
-/// Rooms of 4 x 4 x 2.6 m side by side. The west one has a doorway to the outside, and a doorway
-/// between them is shut by an object of the given name.
+/// Rooms of 4 x 4 x 2.6 m side by side. The west one has a doorway to the outside; an object of the given name shuts
+/// a doorway between them.
 fn shut_rooms(file: &str, leaf: &str) -> PathBuf {
     obj(
         file,
@@ -41,11 +41,11 @@ fn shut_rooms(file: &str, leaf: &str) -> PathBuf {
             ("c", [-0.2, 0.0, -0.2], [8.4, 2.6, 0.0]),
             ("d", [-0.2, 0.0, 4.0], [8.4, 2.6, 4.2]),
             ("e", [8.2, 0.0, 0.0], [8.4, 2.6, 4.0]),
-            // The outer wall and its doorway.
+            // The outer wall with its doorway.
             ("f", [-0.2, 0.0, 0.0], [0.0, 2.6, 1.5]),
             ("g", [-0.2, 0.0, 2.5], [0.0, 2.6, 4.0]),
             ("h", [-0.2, 2.1, 1.5], [0.0, 2.6, 2.5]),
-            // The inner one, its doorway and what shuts it.
+            // The inner wall, its doorway and the object that shuts it.
             ("i", [4.0, 0.0, 0.0], [4.2, 2.6, 1.5]),
             ("j", [4.0, 0.0, 2.5], [4.2, 2.6, 4.0]),
             ("k", [4.0, 2.1, 1.5], [4.2, 2.6, 2.5]),
@@ -100,7 +100,7 @@ fn a_leaf_without_a_name_is_found() {
     assert!(text.lines().any(of_leaf), "{text}");
     assert!(!text.contains("no doorway"), "{text}");
     assert_eq!(n_doors(&done), "1");
-    // As it was: a leaf is a wall.
+    // Without automatic roles, a leaf is a wall.
     let done = bake(&input, &["--auto-roles", "off"]);
     assert!(said(&done).contains("1 room has no doorway"));
 }

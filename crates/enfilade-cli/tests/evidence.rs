@@ -1,4 +1,4 @@
-//! Two checkers of evidence that share no line, one of them in Python, agree: on what holds, and on what was tampered with.
+//! Two checkers of evidence without common code, one of them in Python, agree: on valid and on tampered evidence.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -19,7 +19,7 @@ fn enfilade(args: &[&Path]) -> Output {
     command.args(args).output().unwrap()
 }
 
-/// The body of evidence, changed, with sums that fit.
+/// Evidence with a changed body, and with matching sums.
 fn tampered(evidence: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut body = Vec::new();
     let mut decoder = flate2::read::ZlibDecoder::new(&evidence[24..]);
@@ -96,7 +96,7 @@ fn a_checker_in_python_agrees() {
         n_refused += usize::from(rust == Some(1));
     }
     assert!(n_refused >= 8, "{n_refused}");
-    // Neither takes what is not whole.
+    // Both refuse incomplete evidence.
     for bytes in [&whole[..whole.len() - 1], &whole[..20], b"ENFEVID4"] {
         fs::write(&changed, bytes).unwrap();
         assert_eq!(both(&changed).map(|done| done.status.code()), [Some(1); 2]);

@@ -1,4 +1,4 @@
-//! What all commands have in common: JSON for machines, quiet, completions and manual pages.
+//! Conventions of all commands: JSON for machines, quiet, completions and manual pages.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,7 +10,7 @@ use enfilade::import::export_glb;
 use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
-/// What `--json` of each command has in it, among other things; files are those that the rows before left.
+/// Keys in the `--json` output of each command; the files come from the rows before.
 const COMMANDS: [(&str, &[&str]); 18] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
@@ -62,7 +62,7 @@ const COMMANDS: [(&str, &[&str]); 18] = [
     ),
 ];
 
-/// What prints nothing that a machine would read: a script for a shell, files, a window.
+/// Commands without output for machines: a script for a shell, files, a window.
 const OTHERS: [&str; 4] = ["completions", "help", "man", "view"];
 
 /// A folder of this test alone.
@@ -79,14 +79,14 @@ fn run(dir: &Path, args: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_enfilade"))
         .args(args.split_whitespace())
         .current_dir(dir)
-        // A layer of Mesa's Vulkan looks for a display otherwise, and says that there is none.
+        // A Vulkan layer of Mesa otherwise looks for a display, and reports that there is none.
         .env("NODEVICE_SELECT", "1")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Two points for `locate`, one of them in the floor; nobody else reads them.
+    // Two points for `locate`, one of them in the floor; no other command reads them.
     let _ = child.stdin.take().unwrap().write_all(b"2 1 2\n2 -0.1 2\n");
     child.wait_with_output().unwrap()
 }
@@ -131,7 +131,7 @@ fn every_command_that_prints_answers_in_one_json_object_and_quietly_if_asked() {
     let located: Value = serde_json::from_slice(&located.stdout).unwrap();
     let cells = located["cells"].as_array().unwrap();
     assert!(cells.len() == 2 && cells[0].is_u64() && cells[1].is_null());
-    // Where a file goes to standard output, what is printed goes aside.
+    // If a file goes to standard output, results go to standard error.
     let done = run(
         &dir,
         "sound world.glb --listener 2,1,2 --source 3,1,2 --json -o -",

@@ -1,4 +1,4 @@
-//! Limits of commands: refused beforehand where an argument asks for too much, ended where it turns out so.
+//! Limits of commands: excessive arguments are refused beforehand, other work ends at the limit.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use enfilade_testkit::{GridParams, room_grid};
 struct Folder(PathBuf);
 
 impl Folder {
-    /// With a world of rooms and outdoors, `w.glb`.
+    /// Makes a folder with a world of rooms and outdoors, `w.glb`.
     fn new(name: &str) -> Self {
         let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("limits-{name}"));
         let _ = fs::remove_dir_all(&dir);
@@ -29,7 +29,7 @@ impl Folder {
             .unwrap()
     }
 
-    /// Runs a command that must end with `code`, say all of `words` and write nothing.
+    /// Runs a command: must end with `code`, print all of `words` and write nothing.
     fn refused(&self, args: &[&str], code: i32, words: &[&str]) {
         let n_files = || fs::read_dir(&self.0).unwrap().count();
         let before = n_files();
@@ -56,7 +56,7 @@ fn commands_that_can_take_long_have_bounds_and_keep_to_them() {
             assert!(help.contains(option), "{command} {option}");
         }
     }
-    // Without a limit they would take hours, or gigabytes.
+    // Without a limit they would need hours, or gigabytes.
     let rays = ["verify", "w.glb", "--rays", "100000000000"];
     let late = [&rays[..], &["--max-time", "0.2"]].concat();
     folder.refused(&late, 1, &["within 0.2 s", "--max-time"]);
@@ -75,7 +75,7 @@ fn commands_that_can_take_long_have_bounds_and_keep_to_them() {
     ];
     let late = [&heard[..], &["--max-time", "0"]].concat();
     folder.refused(&late, 1, &["--max-time"]);
-    // A command that is done in time is not touched.
+    // A command that ends in time is not affected.
     let done = folder.run(&[
         "inspect",
         "w.glb",
@@ -160,7 +160,7 @@ fn an_object_is_found_deep_below_others() {
         parent: i.checked_sub(1),
         extras: String::new(),
     };
-    // All that there is comes from the last one.
+    // All geometry comes from the last one.
     world.sources = (0..4000).map(|i| node(i, "ab")).collect();
     let last = world.sources.len() as u32;
     world.sources.push(node(last, "cd"));

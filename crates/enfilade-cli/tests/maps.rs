@@ -29,7 +29,7 @@ fn boxed(min: [i32; 3], max: [i32; 3]) -> String {
     out + "}\n"
 }
 
-/// Two rooms with a doorway, a light in the first; the ceiling may end early.
+/// Two rooms with a doorway, a light in the first; the ceiling starts at `ceiling_from`, which may leave a gap.
 fn map(ceiling_from: i32) -> String {
     let boxes = [
         ([-16, -16, -16], [288, 144, 0]),
@@ -92,7 +92,7 @@ fn a_map_is_baked_by_partition_verified_simplified_and_edited() {
             value["portals"].as_array().unwrap().len(),
         ]
     };
-    // Two rooms, and what is in the doorway.
+    // Two rooms, and the space in the doorway.
     assert_eq!(cells(&world), [3, 2]);
     let simple = folder.path("simple.glb");
     let out = enfilade(&["simplify", &world, "-o", &simple, "--max-cells", "2"]);
@@ -136,13 +136,13 @@ fn a_portal_is_put_in_and_what_parts_nothing_is_refused() {
             .success()
     );
     let edit = |more: &[&str]| enfilade(&[&["edit", &world, "-o", &edited], more].concat());
-    // The first room is 4 by 3 by 4 meters, from the origin to -z; the doorway goes first.
+    // The first room is 4 by 3 by 4 meters, from the origin to -z; the doorway is removed first.
     let across = "2,-1,1;2,-1,-5;2,4,-5;2,4,1";
     let out = edit(&["--delete-portal", "0", "--add-portal", across]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let told = text(&out.stdout);
     assert!(
-        told.contains("of 12.00 m² parts cell-1: now cell-1 (24.0 m³)"),
+        told.contains("of 12.00 m² divides cell-1: now cell-1 (24.0 m³)"),
         "{told}"
     );
     assert!(told.contains("cost of a cell"), "{told}");
@@ -168,7 +168,7 @@ fn a_portal_is_put_in_and_what_parts_nothing_is_refused() {
             "not convex at corner 2, 2.00,1.00,-2.00",
         ),
         ("20,-1,1;20,-1,-5;20,4,-5;20,4,1", 1, "lies in no cell"),
-        ("2,-1,1;2,-1", 2, "corner 1: '2,-1' has 2 numbers"),
+        ("2,-1,1;2,-1", 2, "vertex 1: '2,-1' has 2 numbers"),
     ] {
         let out = edit(&["--add-portal", across, "--add-portal", polygon]);
         let error = text(&out.stderr);
@@ -236,7 +236,7 @@ fn a_broken_map_is_refused_with_its_place() {
     assert!(!Path::new(&world).exists());
 }
 
-/// Separators among brushes, or among triangles where there are none.
+/// Checks the separators among brushes, or among triangles if there are none.
 fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
     use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
     use enfilade::geom::scene::{Role, TriangleSource};
@@ -264,8 +264,8 @@ fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
     let boxes: Vec<Aabb> = scene.solids.iter().map(ConvexSolid::aabb).collect();
     let tree = BoxTree::new(&boxes);
     let surfaces = Bvh::build(&triangles);
-    // Brushes meet their neighbors within the tree's tolerance, some hundredths of a millimeter at this
-    // size; corners that rounding moved may stray by a few of those.
+    // Brushes meet their neighbors within the tree's tolerance, some hundredths of a millimeter at this size; rounded
+    // vertices may stray by a few times that.
     let eps = 1e-3;
     let is_on_solid = |p: DVec3| {
         let mut found = surfaces.nearest(p, eps).is_some();
@@ -290,7 +290,7 @@ fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
             }
         }
     }
-    // Joins leaves across all portals but some; the root of a set is its least leaf.
+    // Joins leaves across all portals except some; the root of a set is its smallest leaf.
     let n_leaves = portals.iter().flat_map(|p| p.0).max().unwrap_or(0) as usize + 1;
     let of_separator: std::collections::BTreeSet<usize> =
         separators.iter().flatten().copied().collect();
@@ -389,7 +389,7 @@ fn a_brush_that_stands_twice_changes_nothing_but_its_own_line() {
         (n("cells"), n("portals"))
     };
     let (once, wall) = (map(-16), boxed([128, 0, 0], [144, 48, 96]));
-    // The same brush again, and one that shares a face's plane with it and reaches further.
+    // The same brush again, and one that shares a face's plane with it and reaches farther.
     let again = wall.clone() + &boxed([128, 0, -8], [144, 40, 96]);
     let twice = once.replacen(&wall, &(wall.clone() + &again), 1);
     assert_ne!(once, twice);

@@ -1,4 +1,4 @@
-//! Objects of the input are found in the world by their names, with the commands `inspect --objects` and `locate --object`.
+//! The commands `inspect --objects` and `locate --object` find objects of the input in the world by name.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};

@@ -8,7 +8,7 @@ use enfilade_geom::scene::Scene;
 use enfilade_testkit::mixed::{pitched_roof_attic, rooms_with_closet};
 use enfilade_testkit::{TowerParams, office_tower, shuffled_glb};
 
-/// The bytes of the world that files are baked to, in a folder.
+/// The bytes of the world baked from files in a folder.
 fn baked(dir: &Path, files: &[&str], method: &str) -> Vec<u8> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
     command.current_dir(dir).arg("bake").args(files);

@@ -1,4 +1,4 @@
-//! No command writes over what it reads, nor two outputs to one file.
+//! No command overwrites its input, or writes two outputs to one file.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use enfilade_testkit::{GridParams, room_grid};
 
 const INPUTS: [&str; 4] = ["w.glb", "s.obj", "c.toml", "p.txt"];
 
-/// A folder with a world, a scene, settings and a path of cameras, and what was in them.
+/// A folder with a world, a scene, settings and a path of cameras; returns it with the contents of these files.
 fn folder(name: &str) -> (PathBuf, Vec<Vec<u8>>) {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("outputs-{name}"));
     let _ = fs::remove_dir_all(&dir);
@@ -64,7 +64,7 @@ fn no_command_writes_over_an_input_or_twice() {
         cases.push(("plan w.glb -o here/w.glb", is_input));
         cases.push(("plan link.glb -o w.glb", is_input));
         cases.push(("pvs w.glb -o a --mutual here/a", twice));
-        // Links to what is not there yet, one of them through another link.
+        // Links to files that do not exist yet, one of them through another link.
         std::os::unix::fs::symlink("new", dir.join("to-new")).unwrap();
         std::os::unix::fs::symlink("here/to-new", dir.join("to-link")).unwrap();
         cases.push(("pvs w.glb -o a --evidence new --mutual to-new", twice));
@@ -274,7 +274,7 @@ fn files_that_nobody_named_are_not_written_over() {
         assert_eq!(others(), 0, "nothing is written before all can be");
         #[cfg(unix)]
         {
-            // What a link leads to is not the demo's to write, be it there or not.
+            // The target of a link is not the demo's to write, whether it exists or not.
             for other in ["w.glb", "none"] {
                 let before = fs::read(dir.join(other)).ok();
                 fs::remove_file(&target).unwrap();

@@ -93,7 +93,7 @@ fn counts_are_those_of_the_picture() {
         ]);
         assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
         let said: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-        // Pictures are drawn at twice their size and halved: four pixels for one.
+        // Pictures are drawn at twice their size and halved: four pixels for each.
         let size = [320, 180];
         let camera = Camera {
             fov_y: enfilade_cli::cameras::FOV,
@@ -136,7 +136,7 @@ fn overdraw_has_a_scale() {
     let done = enfilade(&[&["render", &world, "-o", out.to_str().unwrap()], &args[..]].concat());
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
     let picture = enfilade_render::Picture::from_png(&fs::read(&out).unwrap()).unwrap();
-    // White stands for 16 and more, which nothing in these rooms is drawn.
+    // White stands for 16 draws and more, which these rooms never need.
     let white = picture
         .rgba
         .chunks_exact(4)
@@ -165,7 +165,7 @@ fn a_photographer_stands_in_a_corner_and_sees_far() {
         (camera.eye[1] - low[1] - EYE_HEIGHT).abs() < 0.05,
         "{camera:?}"
     );
-    // Nearer to walls than to the middle, on both axes, and turned towards the middle.
+    // Closer to walls than to the middle, on both axes, and turned towards the middle.
     let middle = [0, 2].map(|k| (low[k] + high[k]) * 0.5);
     let from = [camera.eye[0] - middle[0], camera.eye[2] - middle[1]];
     for (k, axis) in [(0, 0), (1, 2)] {
@@ -175,7 +175,7 @@ fn a_photographer_stands_in_a_corner_and_sees_far() {
         );
     }
     assert!(camera.toward[0] * from[0] + camera.toward[2] * from[1] < 0.0);
-    // A world without rooms is looked at from outside, all of it.
+    // A world without rooms is shown from outside, all of it.
     let mut shell = world.clone();
     for cell in &mut shell.graph.cells {
         cell.outdoor = true;

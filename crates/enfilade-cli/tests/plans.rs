@@ -1,4 +1,5 @@
-//! Plans of generated and of real scenes: every room is drawn and named, and there are as many storeys as one would count.
+//! Plans of generated and of real scenes: every room is drawn and named, and the number of storeys is as a person
+//! counts.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ fn baked(dir: &Path, name: &str, scene: &[&str]) -> World {
     enfilade::open(world).unwrap()
 }
 
-/// The cells that elements with this beginning are about.
+/// The cells of the elements with these beginnings.
 fn cells(svg: &str, starts: &[&str]) -> BTreeSet<u32> {
     let lines = svg
         .lines()
@@ -47,7 +48,7 @@ fn cells(svg: &str, starts: &[&str]) -> BTreeSet<u32> {
     lines.filter_map(id).collect()
 }
 
-/// Asks that each indoor cell is drawn as its own and named, and returns the number of storeys.
+/// Checks that each indoor cell is drawn and named, and returns the number of storeys.
 fn check(name: &str, world: &World) -> usize {
     let svg = plan_svg(world, &PlanOptions::default());
     let indoor: BTreeSet<u32> = world.graph.indoor_cells().map(|(id, _)| id.0).collect();
@@ -100,7 +101,7 @@ fn every_room_of_real_scenes_is_on_a_plan() {
         ("institute/scene.glb", 5..=5),
         ("kit-edc/scene.glb", 3..=3),
         ("recast-dungeon/scene.glb", 1..=1),
-        // Floors at 11 heights, and what lies above each other lies above each other.
+        // Floors at 11 heights, of which some lie above others.
         ("quake/id_e1m1.map", 2..=3),
         ("foreign/darkzone.map", 2..=4),
     ] {
@@ -159,7 +160,7 @@ fn the_extension_says_what_is_written_and_a_storey_can_be_chosen() {
             .unwrap()
             .contains("Storey 2 of 3")
     );
-    // The attic, by its room.
+    // The attic, by the name of its room.
     let done = plan("-o attic.svg --storey cell-1 --json");
     let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(told["storeys"].as_array().unwrap().len(), 1, "{told}");

@@ -1,4 +1,4 @@
-//! `pvs` and `verify --evidence` as a user runs them.
+//! `pvs` and `verify --evidence` as users run them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -85,7 +85,7 @@ fn a_search_without_time_is_saved_and_taken_up_again() {
     assert!(done.status.success(), "{done:?}");
     assert!(String::from_utf8_lossy(&done.stdout).contains("--budget"));
     assert!(saved.exists());
-    // Another graph does not take it, and leaves it.
+    // Another graph is refused, and leaves the checkpoint as it is.
     let other = place("parts-other.prt");
     fs::write(&other, PRT.replace("(3 0 5 )", "(3 0 4 )")).unwrap();
     let done = enfilade(&[p, &other, o, &pvs, c, &saved]);
@@ -112,7 +112,7 @@ fn a_world_has_statistics_and_mutual_lists() {
     let cells = json["cells"].as_array().unwrap();
     assert_eq!(cells.len(), world.graph.cells.len());
     let n = |c: &serde_json::Value, key: &str| c[key].as_u64().unwrap();
-    // The sums by hand: the text says which cells see which.
+    // Sums computed from the text, which lists the visible cells.
     let rows = enfilade::import::read_pvs_text(&fs::read_to_string(&pvs).unwrap()).unwrap();
     let mut n_hidden = 0;
     for (c, (row, from)) in rows.rows.iter().zip(cells).enumerate() {
@@ -138,7 +138,7 @@ fn a_world_has_statistics_and_mutual_lists() {
         n_hidden += n(from, "triangles_of_cells") - n(from, "triangles");
         let destinations = from["destinations"].as_array().unwrap();
         assert_eq!(destinations.len() as u64, n(from, "cells"));
-        // What two cells share counts for both.
+        // Things that two cells share count for both.
         let sum: u64 = destinations.iter().map(|d| n(d, "triangles")).sum();
         assert!(sum >= n(from, "triangles"), "cell {c}");
     }
@@ -181,7 +181,7 @@ fn a_world_keeps_parts_and_volumes_where_asked() {
         assert_eq!(kept.parts.is_some(), asked.contains(&parts));
         assert_eq!(kept.volumes.is_some(), asked.contains(&volumes));
     }
-    // Only a world holds them.
+    // Only a world can store them.
     let done = enfilade(&[Path::new("pvs"), &glb, o, &pvs, parts]);
     assert_eq!(done.status.code(), Some(2));
 }
@@ -235,8 +235,8 @@ fn evidence_of_real_portal_files_is_accepted() {
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
         PathBuf::from,
     );
-    // Random grids are too regular: planes that hold edges of two openings, which maps are full of, once
-    // were cut by twice here and once there.
+    // Random grids are too regular: maps are full of planes through edges of two openings, which once were not cut by
+    // consistently.
     for map in ["id_e1m7", "lq_e0m1"] {
         let prt = scenes.join("quake").join(map).with_extension("prt");
         if !prt.exists() {
@@ -287,18 +287,18 @@ fn a_portal_file_is_simplified_and_answers_as_before() {
     assert!(said.contains("clusters       4 → 3"), "{said}");
     assert!(said.contains("portals        3 → 2"), "{said}");
     let text = fs::read_to_string(&simple).unwrap();
-    // Leaves are the clusters that were.
+    // Leaves are the clusters of the input.
     assert!(text.starts_with("PRT2\n4\n3\n2\n"), "{text}");
     assert!(text.ends_with("\n0 1 -1\n2 -1\n3 -1\n"), "{text}");
     let done = enfilade(&[Path::new("pvs"), &simple, o, &pvs]);
     assert!(done.status.success(), "{done:?}");
     let text = fs::read_to_string(&pvs).unwrap();
     assert!(text.contains("\n0: 0-2\n1: 0-2\n2: 0-2\n"), "{text}");
-    // What needs surfaces is refused.
+    // Metrics that need surfaces are refused.
     let [metric, volume] = ["--metric", "visible-volume"].map(Path::new);
     let done = enfilade(&[command, &prt, o, &simple, n, three, metric, volume]);
     assert_eq!(done.status.code(), Some(1));
-    // No cell of more than two leaves, however few are asked for.
+    // No cell of more than two leaves, however few cells are requested.
     let [max, two, one] = ["--max-cost", "2", "1"].map(Path::new);
     let done = enfilade(&[command, &prt, o, &simple, n, one, max, two]);
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
@@ -313,7 +313,7 @@ fn a_world_takes_the_answer_along_and_a_portal_file_cannot() {
     let [p, o, i] = ["pvs", "-o", "--into"].map(Path::new);
     let done = enfilade(&[p, &glb, o, &pvs, i, &told]);
     assert!(done.status.success(), "{done:?}");
-    // Named as the world names it, not by its number.
+    // Named by the world's name, not by number.
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
     let most = said
         .lines()

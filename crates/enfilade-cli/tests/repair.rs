@@ -1,4 +1,4 @@
-//! `bake --repair` as a user runs it.
+//! `bake --repair` as users run it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn place(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
-/// A room of 4 x 3 x 5 m, seen from within, one corner of one triangle half a millimeter off.
+/// A room of 4 x 3 x 5 m, seen from within; one vertex of one triangle is off by half a millimeter.
 const ROOM: &str = "o Room\nv 0 0 0\nv 4 0 0\nv 0 3 0\nv 4 3 0\nv 0 0 5\nv 4 0 5\nv 0 3 5\nv 4 3 5\n\
     v 4 3 5.0005\nf 1 3 7\nf 1 7 5\nf 2 6 8\nf 2 8 4\nf 1 5 6\nf 1 6 2\nf 3 4 8\nf 3 8 7\nf 1 2 4\n\
     f 1 4 3\nf 5 7 9\nf 5 8 6\n";
@@ -35,7 +35,7 @@ fn a_bake_repairs_on_request_and_says_what_it_changed() {
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     let line = format!("{:<30} {:>9}", "corners welded", 1);
     assert!(said.contains(&line), "{said}");
-    // The world has the triangles that were repaired, and says so.
+    // The world has the repaired triangles, and records the repair.
     let done = enfilade(&[
         "verify", &better, "--source", &obj, "--repair", "--rays", "20000",
     ]);
@@ -44,7 +44,7 @@ fn a_bake_repairs_on_request_and_says_what_it_changed() {
     let has = |bytes: &[u8], key: &str| bytes.windows(key.len()).any(|w| w == key.as_bytes());
     assert!(has(&settings, "repair.weld"));
     assert!(!has(&fs::read(&plain).unwrap(), "repair.weld"));
-    // Less than the gap closes nothing; what is no distance is refused.
+    // A distance below the gap closes nothing; an invalid distance is refused.
     let done = enfilade(&["bake", "--repair=0.0001", &obj, "-o", &better]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert!(!said.contains("corners welded"), "{said}");

@@ -1,6 +1,6 @@
-//! Opens the page of `enfilade report` in a browser without a window, and uses it as a reader would.
+//! Opens the page of `enfilade report` in a headless browser, and uses it as a reader would.
 //!
-//! Needs Chromium; where there is none, it says so and passes. There is no network for it.
+//! Needs Chromium; without it, prints a note and passes. The browser has no network.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +9,7 @@ use enfilade::cpg::Cell;
 use enfilade::import::export_glb;
 use enfilade_testkit::furnished_house;
 
-/// What the reader does, in the page, and what comes of it: an element `answers` at the end of the page.
+/// The actions of a reader in the page, and their results: an element `answers` at the end of the page.
 const READER: &str = r##"<script>
 addEventListener("load", () => {
   const one = (query) => document.querySelector(query);
@@ -17,7 +17,7 @@ addEventListener("load", () => {
   const seen = (query) => [...document.querySelectorAll(query)].filter((e) => e.getClientRects().length > 0).length;
   const point = (element) => element.dispatchEvent(new PointerEvent("pointerover", { bubbles: true }));
   const answers = {};
-  // Pictures in the page are no requests.
+  // Pictures in the page are not requests.
   answers.requests = performance.getEntriesByType("resource").filter((e) => !e.name.startsWith("data:")).length;
   answers.errors = window.errors;
   const cell = one("tr[data-cell]").dataset.cell;
@@ -43,7 +43,7 @@ addEventListener("load", () => {
   answers.rows_hidden = rows - seen("tr[data-cell]");
   answers.matrices = [matrices, seen(".matrix")];
   answers.matrix_rows = [...document.querySelectorAll(".matrix")].filter((e) => e.getClientRects().length > 0)[0].querySelectorAll("g").length;
-  // Disks of the graph lie apart, and their numbers are as large as the text of the page can be read.
+  // Disks of the graph lie apart, and their numbers are legible.
   const disks = [...document.querySelectorAll(".graph g:not(.void) circle")].map((e) => e.getBoundingClientRect());
   answers.disks = disks.length;
   answers.overlaps = disks.flatMap((a, i) => disks.slice(i + 1).filter((b) =>
@@ -92,7 +92,7 @@ fn report(dir: &Path, world: &str) -> String {
     std::fs::read_to_string(dir.join("page.html")).unwrap()
 }
 
-/// What the reader found; `None` where there is no browser.
+/// The results of the reader; `None` without a browser.
 fn read(dir: &Path, page: &str) -> Option<serde_json::Value> {
     let Some(browser) = chromium() else {
         eprintln!("skipped: there is no Chromium to open the page in; apt-get install chromium");
@@ -113,7 +113,7 @@ fn read(dir: &Path, page: &str) -> Option<serde_json::Value> {
             "--disable-component-update",
             "--disable-sync",
             "--disable-dev-shm-usage",
-            // Whatever the page asks for by a name is not found.
+            // Requests by host name fail.
             "--host-resolver-rules=MAP * ~NOTFOUND",
             "--window-size=1100,1600",
             "--virtual-time-budget=5000",
@@ -135,7 +135,7 @@ fn read(dir: &Path, page: &str) -> Option<serde_json::Value> {
     Some(serde_json::from_str(json).unwrap())
 }
 
-/// A house, and a space above a ceiling, in which nobody can stand.
+/// A house, and a space above a ceiling without a floor to stand on.
 fn house(dir: &Path) -> String {
     let scene = dir.join("house.glb");
     std::fs::write(&scene, export_glb(&furnished_house().scene)).unwrap();
@@ -154,7 +154,7 @@ fn house(dir: &Path) -> String {
         .unwrap();
     assert!(done.status.success(), "{done:?}");
     let mut world = enfilade::open(dir.join("world.glb")).unwrap();
-    // No floor, and no doorway: all that makes a void.
+    // Without floor and doorway: the marks of a void.
     world.graph.cells.push(Cell {
         name: "cavity".into(),
         aabb: [[4.0, 2.7, 4.0], [5.0, 2.8, 5.0]],

@@ -1,5 +1,5 @@
-//! What is printed is data: names with commands to the terminal, line breaks and turned text, in everything that has a name,
-//! through every command.
+//! All output is plain text: names with terminal commands, line breaks and reversed text, in everything that has a
+//! name, through every command.
 
 #![cfg(unix)]
 
@@ -15,14 +15,14 @@ use enfilade::cpg::wire::encode_glb;
 use enfilade::import::export_glb;
 use serde_json::Value;
 
-/// Sets the title, rings, clears, begins lines, colors by C1, turns text around, and hides in between.
+/// Sets the title, rings, clears, begins lines, colors by C1, reverses text, and hides characters in between.
 const NAME: &str = "odd\u{1b}]0;owned\u{7}\u{1b}[2J\nwrote all.glb (1.0 MB)\r\u{0}\u{9b}31m\u{202e}gnp\u{2066}x\u{200f}\u{61c}\u{7f}\u{200b}\u{2028}";
-/// The same without what no file name holds.
+/// The same without characters that file names cannot contain.
 const FILE: &str = "odd\u{1b}]0;owned\u{7}\u{1b}[2J\nwrote all.glb (1.0 MB)\u{9b}31m\u{202e}";
-/// What is seen of both.
+/// The visible form of both.
 const SEEN: &str = r"odd\u{1b}]0;owned\u{7}\u{1b}[2J\nwrote all.glb";
 
-/// By characters that nobody sees, as a list of its own; `true` for a line that a name began.
+/// Returns the harm in a text: a hidden character, by an independent list, or a line that a name began.
 fn is_harmful(text: &str) -> Option<String> {
     let is_hidden = |c: char| {
         (c.is_control() && c != '\n')
@@ -42,7 +42,7 @@ fn folder(name: &str) -> PathBuf {
     dir
 }
 
-/// Runs a line of words, of which `@X` is the file X of the odd name, and `@@` the name itself.
+/// Runs a line of words, in which `@X` is the file X with the odd name, and `@@` the name itself.
 fn run(dir: &Path, line: &str, input: &str) -> Output {
     let args = line.split(' ').map(|word| match word.split_once('@') {
         Some((before, "@")) => OsString::from(format!("{before}{NAME}").replace('\0', "")),
@@ -66,7 +66,7 @@ fn run_args(dir: &Path, args: impl Iterator<Item = impl AsRef<OsStr>>, input: &s
     child.wait_with_output().unwrap()
 }
 
-/// Runs the line, and sees that all is shown and nothing is done.
+/// Runs the line, and checks that the output is harmless.
 fn check(dir: &Path, line: &str, input: &str, code: i32, is_named: bool) {
     let done = run(dir, line, input);
     check_done(line, &done, code, is_named);
@@ -92,7 +92,7 @@ fn check_done(line: &str, done: &Output, code: i32, is_named: bool) {
     assert_eq!(is_seen, is_named, "{line}: {begin}");
 }
 
-/// A scene whose every name is the odd one, baked, with cells of such names.
+/// A scene with the odd name everywhere, and its world, with cells of such names.
 fn scene_and_world(dir: &Path) {
     let mut scene = enfilade_testkit::furnished_house().scene;
     for o in &mut scene.objects {
@@ -120,14 +120,15 @@ fn scene_and_world(dir: &Path) {
     world.graph.statistics.counts.insert(NAME.into(), 1.0);
     let bytes = encode_glb(&world).unwrap();
     fs::write(dir.join(format!("{FILE}w.glb")), &bytes).unwrap();
-    // One that breaks promises and says so by names: each object lies elsewhere.
+    // A world that breaks promises, so that messages contain names: each object lies elsewhere.
     for detail in &mut world.details {
         detail.cells.clear();
     }
     fs::write(dir.join("broken.glb"), encode_glb(&world).unwrap()).unwrap();
 }
 
-/// The same GLB with the odd name where [`export_glb`] writes none: in its asset, its scenes, and nodes that stand for nothing.
+/// The same GLB with the odd name where [`export_glb`] writes none: in its asset, its scenes, and nodes without a
+/// mesh.
 fn with_names(glb: &[u8]) -> Vec<u8> {
     let n = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
     let mut json: Value = serde_json::from_slice(&glb[20..20 + n]).unwrap();
@@ -337,7 +338,7 @@ fn no_error_repeats_a_name_as_it_is() {
     ] {
         check(&dir, line, "", 1, true);
     }
-    // What is wrong usage says so by what was given.
+    // Usage errors repeat the arguments.
     for line in [
         "inspect w.glb @@",
         "bake s.obj -o o.glb --voxel @@",
@@ -347,7 +348,7 @@ fn no_error_repeats_a_name_as_it_is() {
     ] {
         check(&dir, line, "", 2, true);
     }
-    // Names that are no text at all, and what is said to a walk through a decimation.
+    // Names that are not text, and the commands of a walk through a decimation.
     let odd = OsString::from_vec(b"odd\x1b]0;owned\x07\x1b[2J\nwrote all.glb\x9b\xff.glb".to_vec());
     fs::copy(dir.join("w.glb"), dir.join(&odd)).unwrap();
     for line in ["inspect", "bake --voxel 0.2 -o", "bake --json -o"] {

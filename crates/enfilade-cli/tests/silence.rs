@@ -1,4 +1,4 @@
-//! No bake without rooms, or with more cracks than doors, says nothing; and the line that shows where a room leaks.
+//! Warnings of bakes without rooms, or with more cracks than doors; and the line that shows where a room leaks.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use enfilade_cpg::wire::decode_glb;
 
-/// Corners and faces of objects, as OBJ.
+/// Vertices and faces of objects, as OBJ.
 #[derive(Default)]
 struct Obj {
     text: String,
@@ -155,7 +155,7 @@ fn no_bake_without_rooms_is_silent() {
     assert!(said(&done).len() > 20, "{}", said(&done));
 }
 
-/// Numbers that follow a word.
+/// The numbers after a word.
 fn point_after(text: &str, word: &str) -> [f64; 3] {
     let (_, rest) = text
         .split_once(word)
@@ -171,7 +171,7 @@ fn a_leak_path_is_a_line_of_the_world_and_nothing_else() {
     let input = open_rooms(2).write("leaking.obj");
     let world = input.with_extension("world.glb");
     let read = || decode_glb(&std::fs::read(&world).unwrap()).unwrap();
-    // Without rooms the way is told, but written only when it is asked for.
+    // Without rooms the way out is reported, but written only on request.
     let done = bake(&input, &[]);
     assert!(
         said(&done).contains("--leak-path writes it"),
@@ -191,7 +191,7 @@ fn a_leak_path_is_a_line_of_the_world_and_nothing_else() {
     let with = read();
     let ([x, ..], [.., z]) = (with.leak_path[0], with.leak_path[with.leak_path.len() - 1]);
     assert!((4.2..8.2).contains(&x) && z < -0.5);
-    // Nothing but the line is other than before.
+    // Only the line differs.
     let mut plain = with.clone();
     plain.leak_path.clear();
     assert_eq!(format!("{plain:?}"), format!("{without:?}"));
@@ -214,7 +214,7 @@ fn a_leak_path_is_a_line_of_the_world_and_nothing_else() {
         "--rays",
         "2000",
     ]);
-    // As a scene it has the triangles that it had, and lines are no objects.
+    // Read as a scene, it has the same triangles, and lines are not objects.
     let again = bake(&world, &["-v"]);
     assert_eq!(row(&again, "triangles"), row(&done, "triangles"));
     assert_eq!(row(&again, "detail objects"), 0);
@@ -239,7 +239,7 @@ fn a_leak_path_from_nowhere_is_refused() {
 
 #[test]
 fn more_cracks_than_doors_are_told_and_can_be_closed() {
-    // Six rooms in a row whose parting walls end 20 mm below the ceiling; a door leads into the first.
+    // Six rooms in a row whose partition walls end 20 mm below the ceiling; a door leads into the first.
     let mut obj = Obj::default();
     let end = 4.2 * 6.0;
     obj.cuboid([-0.2, -0.2, -0.2], [end, 0.0, 4.2]);
@@ -268,7 +268,7 @@ fn more_cracks_than_doors_are_told_and_can_be_closed() {
     let done = bake(&input, &["--smallest-hole", width]);
     assert_eq!(row(&done, "cracks"), 0, "{width}: {text}");
     assert!(
-        !said(&done).contains("surfaces do not meet"),
+        !said(&done).contains("surfaces that should meet"),
         "{}",
         said(&done)
     );

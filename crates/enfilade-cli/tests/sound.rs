@@ -51,7 +51,7 @@ fn energy(samples: &[f64]) -> f64 {
     samples.iter().map(|s| s * s).sum()
 }
 
-/// W11: a closed door takes 20 dB and more; equal questions have equal bytes.
+/// W11: a closed door takes 20 dB and more; equal runs give equal bytes.
 #[test]
 fn a_closed_door_is_heard() {
     let (world, [a, _, b]) = two_rooms("sound-closed.glb");
@@ -69,7 +69,7 @@ fn a_closed_door_is_heard() {
     assert!(fallen > 20.0, "{fallen} dB");
 }
 
-/// W11: on a walk through the doorway no sample jumps by more than the source's own do.
+/// W11: on a walk through the doorway no sample jumps by more than the source's own samples do.
 #[test]
 fn a_walk_has_no_clicks_and_a_table() {
     let (world, [a, door, b]) = two_rooms("sound-walk.glb");
@@ -97,7 +97,8 @@ fn a_walk_has_no_clicks_and_a_table() {
     assert!(rows.iter().all(|r| r["rt60"].as_f64().unwrap() > 0.1));
     assert_ne!(rows[0]["cell"], rows[rows.len() - 1]["cell"]);
     let samples = samples(&wav);
-    // The test sound: slopes of 0.5 * (440 + 0.5 * 660) Hz at 44.1 kHz; at a quarter, and at most 3 times for direct sound and room.
+    // The test sound has slopes of 0.5 * (440 + 0.5 * 660) Hz at 44.1 kHz; at a quarter, and at most 3 times that for
+    // direct sound and room.
     let most = 3.0 * 0.25 * 0.5 * (440.0 + 330.0) * std::f64::consts::TAU / 44100.0;
     for k in 0..2 {
         let channel: Vec<f64> = samples.iter().skip(k).step_by(2).copied().collect();

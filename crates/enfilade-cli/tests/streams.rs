@@ -29,7 +29,7 @@ fn run(dir: &PathBuf, line: &str, input: &[u8]) -> Output {
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     let input = input.to_vec();
-    // Who does not read it to its end closes the pipe.
+    // A command that stops reading closes the pipe.
     let feeder = std::thread::spawn(move || drop(stdin.write_all(&input)));
     let done = child.wait_with_output().unwrap();
     feeder.join().unwrap();
@@ -45,7 +45,7 @@ fn a_command_in_a_pipe_answers_as_with_files() {
     let dir = folder("pipe");
     let world = fs::read(dir.join("w.glb")).unwrap();
     let n_files = fs::read_dir(&dir).unwrap().count();
-    // A line, the same with files, and the file of which the first prints the bytes; without one, what is printed is equal.
+    // A line, the same with files, and the file whose bytes the first prints; without a file, both print the same.
     for (piped, filed, file) in [
         ("plan - -o -", "plan w.glb -o x.svg", Some("x.svg")),
         ("pvs - -o -", "pvs w.glb -o x.pvs", Some("x.pvs")),
@@ -87,7 +87,7 @@ fn a_command_in_a_pipe_answers_as_with_files() {
         assert!(other.status.success(), "{filed}: {}", said(&other));
         if let Some(file) = file {
             assert!(one.stdout == fs::read(dir.join(file)).unwrap(), "{piped}");
-            // What is printed otherwise went aside.
+            // Results otherwise printed go to standard error.
             assert_eq!(other.stdout.is_empty(), said(&one).is_empty(), "{piped}");
         } else if !piped.starts_with("see") {
             assert!(one.stdout == other.stdout, "{piped}");
@@ -120,7 +120,7 @@ fn a_scene_is_baked_from_one_pipe_into_another() {
     let filed = run(&dir, "bake house.glb -o x.glb --voxel 0.2", b"");
     assert!(filed.status.success(), "{}", said(&filed));
     assert!(done.stdout == fs::read(dir.join("x.glb")).unwrap());
-    // Formats are told by content; what refers to other files has no folder to look in.
+    // Formats are recognized by content; a scene that refers to other files has no folder to look in.
     let obj = b"v 0 0 0\nv 4 0 0\nv 0 3 0\nf 1 2 3\n";
     let done = run(&dir, "bake - -o -", obj);
     assert!(done.stdout.starts_with(b"glTF"), "{}", said(&done));
@@ -202,7 +202,7 @@ fn an_endless_stream_is_no_world_and_takes_no_memory() {
             .output()
             .unwrap();
         assert_eq!(done.status.code(), Some(1), "{line}: {}", said(&done));
-        // Its head is enough to tell.
+        // The head is enough to decide.
         assert!(!said(&done).contains("cannot read"), "{}", said(&done));
     }
     for (line, says) in [

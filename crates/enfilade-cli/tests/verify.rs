@@ -1,4 +1,4 @@
-//! Runs `verify` and `plan` on a house made by hand.
+//! Runs `verify` and `plan` on a hand-made house.
 
 #[path = "../../enfilade-verify/tests/common/mod.rs"]
 mod common;

@@ -1,4 +1,4 @@
-//! `view`, in a window on a display of its own: keys and clicks as somebody would give them.
+//! `view`, in a window on its own display: keys and clicks as a user would give them.
 #![cfg(all(target_os = "linux", feature = "view"))]
 
 use std::fs;
@@ -13,7 +13,7 @@ use enfilade_cpg::World;
 use enfilade_cpg::wire::encode_glb;
 use enfilade_testkit::{GridParams, room_grid};
 
-/// Software draws slowly on a busy machine; what never comes fails all the same.
+/// Software draws slowly on a busy machine; a missing answer still fails.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A display that ends with the test.
@@ -63,13 +63,13 @@ impl Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        // Nothing to be done where it has ended already.
+        // Ignore the error if it has ended already.
         let _ = self.server.kill();
         let _ = self.server.wait();
     }
 }
 
-/// The window's process, and what it says on standard error.
+/// The window's process, and its standard error.
 struct Viewer {
     process: Child,
     said: Receiver<String>,
@@ -149,7 +149,7 @@ fn has(tool: &str) -> bool {
     std::env::split_paths(&path).any(|dir| dir.join(tool).is_file())
 }
 
-/// A place before a doorway that is looked through along +x.
+/// A place in front of a doorway that faces along +x.
 fn before_a_doorway(world: &World) -> [f32; 3] {
     let graph = &world.graph;
     let door = graph.portals.iter().find(|p| {
@@ -157,7 +157,7 @@ fn before_a_doorway(world: &World) -> [f32; 3] {
         let floor = graph[p.cells[0]].aabb[0][1];
         p.normal[0].abs() > 0.99
             && p.cells.iter().all(|c| !graph[*c].outdoor)
-            // Somebody of 1.6 m looks through it.
+            // A person of 1.6 m looks through it.
             && heights().fold(f32::INFINITY, f32::min) < floor + 0.2
             && heights().fold(0.0, f32::max) > floor + 1.7
     });
@@ -188,7 +188,7 @@ fn folder() -> PathBuf {
 #[test]
 fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     if !(has("Xvfb") && has("xdotool")) {
-        // `cargo xtask test` installs them, and lets nobody pass without.
+        // `cargo xtask test` installs them, and does not let the test pass without.
         assert!(
             std::env::var_os("ENFILADE_NEEDS_WINDOW").is_none(),
             "Xvfb or xdotool is missing"
@@ -213,8 +213,8 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
         assert!(Instant::now() < end, "no window: {:?}", viewer.heard());
         sleep(Duration::from_millis(100));
     }
-    // F12 goes down while the pointer is at no window, and stays down until the server repeats it: it is not pressed in the
-    // window that gets the focus meanwhile.
+    // F12 goes down while the pointer is at no window, and stays down until the server repeats it: it is not pressed
+    // in the window that gets the focus meanwhile.
     assert!(display.tool(&["mousemove", "639", "479", "keydown", "F12"]));
     assert!(display.tool(&[&window[..], &["windowfocus"]].concat()));
     assert!(display.tool(&["sleep", "1.5", "keyup", "F12"]));
@@ -224,10 +224,10 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     assert!(!heard.contains("shot"), "{heard}");
     key("Tab");
     viewer.wait_to_hear("the mouse is free");
-    // It stands where a window without a manager stands: in the upper left corner.
+    // Without a window manager, the window is at the upper left of the screen.
     let click = || assert!(display.tool(&["mousemove", "160", "120", "click", "1"]));
-    // Presses F12; returns the picture and how many triangles the last frame drew. Pictures are numbered by the viewer alone:
-    // a busy server may repeat a key, so that there are more of them than were asked for.
+    // Presses F12; returns the picture and the number of triangles in the last frame. Only the viewer numbers
+    // pictures: a busy server may repeat a key, so that there are more than requested.
     let shot = || {
         viewer.heard();
         key("F12");
@@ -240,8 +240,8 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
         assert!(png.starts_with(b"\x89PNG"));
         (png, n_triangles)
     };
-    // Takes pictures until one draws something and less than `most` triangles: the frame that shows a change is soon, but not at once, and keys may come before the
-    // first frame, which takes seconds on a busy machine.
+    // Takes pictures until one draws something and fewer than `most` triangles: a change may appear only after a few
+    // frames, and keys may arrive before the first frame, which takes seconds on a busy machine.
     let shot_below = |most: u64| {
         let end = Instant::now() + PATIENCE;
         std::iter::repeat_with(shot)
@@ -256,17 +256,18 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     assert_ne!(open, closed, "a door hides what is behind it");
     click();
     viewer.wait_to_hear("is open");
-    // All that decides what is drawn, and small portals spared and not: none of it ends the walk.
+    // All modes, and small portals spared and not: none of it ends the walk.
     for name in ["m", "m", "m", "m", "l", "l"] {
         key(name);
     }
-    // Records a walk. A busy machine may draw no frame while the key is down, so it walks until the recording has moved.
+    // Records a walk. A busy machine may draw no frame while the key is down, so repeat until the recording has
+    // moved.
     let walk = dir.join("walk.txt");
     let walked_along_x = || {
         key("F4");
         assert!(display.tool(&["keydown", "w", "sleep", "1.5", "keyup", "w"]));
         key("F5");
-        // A folder is in the way: the viewer says so and keeps the recording.
+        // A folder is in the way: the viewer reports it and keeps the recording.
         viewer.wait_to_hear("cannot write walk.txt");
         fs::remove_dir(&walk).unwrap();
         key("F5");
@@ -283,7 +284,7 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     key("Escape");
     assert_eq!(viewer.ends().code(), Some(0));
 
-    // Walks it again, and closes at its end by itself.
+    // Repeats the walk, and closes at its end by itself.
     let again = Viewer::open(&display, &dir, &["--path", "walk.txt"]);
     assert_eq!(again.ends().code(), Some(0));
 }

@@ -1,4 +1,4 @@
-//! What a bake says of models with more cracks than doors.
+//! Advice on models with more cracks than doors.
 
 use std::io::{self, Write};
 
@@ -6,14 +6,15 @@ use enfilade::bake::BakeOutput;
 use enfilade::bake::complex::CRACK_WIDTH;
 use enfilade::cpg::PortalKind;
 
-/// Share of the cracks that the proposed width closes, at least.
+/// Least fraction of the cracks that the proposed width closes.
 const MOST: f64 = 0.9;
-/// A gap is closed where no ball passes, and balls are a little wider than cracks where corners are moved.
+/// A gap is closed if no ball passes, and balls are slightly wider than cracks where vertices are moved.
 const MARGIN: f64 = 1.1;
-/// Widths are proposed in steps of so much. [Units: wu]
+/// Proposed widths are multiples of this. [Units: wu]
 const STEP: f64 = 0.005;
 
-/// Says that there are more cracks than doorways and windows, if so, and what closes most of them.
+/// Reports if there are more cracks than doorways and windows, with the width that closes most of them. Returns `true`
+/// if so.
 pub(super) fn write_cracks(out: &mut impl Write, baked: &BakeOutput) -> io::Result<bool> {
     let portals = &baked.world.graph.portals;
     let n = portals
@@ -28,7 +29,7 @@ pub(super) fn write_cracks(out: &mut impl Write, baked: &BakeOutput) -> io::Resu
     let plural = if n == 1 { "" } else { "s" };
     writeln!(
         out,
-        "{n} crack{plural}, and {} doorways and windows: surfaces do not meet that are meant to{}",
+        "{n} crack{plural}, and {} doorways and windows: surfaces that should meet do not{}",
         portals.len() - n,
         match proposal {
             Some((width, n_closed)) =>
@@ -39,12 +40,12 @@ pub(super) fn write_cracks(out: &mut impl Write, baked: &BakeOutput) -> io::Resu
     Ok(true)
 }
 
-/// A round width below which most of some cracks are, and how many. [Units: wu]
+/// Returns a round width that exceeds most of the crack widths, and the number of cracks below it. [Units: wu]
 fn closing(mut widths: Vec<f64>) -> Option<(f64, usize)> {
     widths.sort_by(f64::total_cmp);
     let most = (widths.len() as f64 * MOST).ceil() as usize;
     let widest = *widths.get(most.checked_sub(1)?)?;
-    // In whole steps, so that the width is printed as it is meant.
+    // In whole steps, so that the printed width is exact.
     let steps = (widest * MARGIN / STEP).ceil();
     let width = (steps * STEP * 1000.0).round() / 1000.0;
     Some((width, widths.partition_point(|&w| w < width)))

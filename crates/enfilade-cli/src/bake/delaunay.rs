@@ -1,4 +1,4 @@
-//! What the Delaunay builder can be told, and the file that holds a person's choices.
+//! Options of the Delaunay builder, and the file that holds a person's choices.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,14 +12,13 @@ use super::values::parse_toml;
 
 #[derive(clap::Args)]
 pub(crate) struct DelaunayOptions {
-    /// With the Delaunay builder: how portals are weighed.
+    /// With the Delaunay builder: weight of a portal.
     #[arg(long, value_enum, default_value_t = WeightName::ScaleFree)]
     weight: WeightName,
-    /// With the Delaunay builder: portals of less weight are removed; the weight's own value if not
-    /// given.
+    /// With the Delaunay builder: remove portals of less weight; a default of the weight if not given.
     #[arg(long, value_name = "WEIGHT", value_parser = parse_stop)]
     stop: Option<f64>,
-    /// With the Delaunay builder: file of choices, as `decimate` saves them.
+    /// With the Delaunay builder: file of choices, as saved by `decimate`.
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) choices: Option<PathBuf>,
 }
@@ -58,7 +57,7 @@ impl DelaunayOptions {
     }
 }
 
-/// Places of portals that a person decided on. [Units: m]
+/// Positions of portals that a person decided on. [Units: m]
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct ChoicesFile {
@@ -81,7 +80,7 @@ fn read_choices(path: &Path) -> anyhow::Result<Choices> {
     })
 }
 
-/// Choices as text of their file.
+/// Returns choices as the text of their file.
 pub(crate) fn choices_text(choices: &Choices) -> String {
     let mut text = String::from(
         "# Portals that stay, and portals whose two rooms become one, by their middles in meters.\n",

@@ -1,16 +1,15 @@
-//! What a bake says of scenes without rooms, and of rooms that no doorway leads to: mostly ones whose door leaf was taken for
-//! a wall.
+//! Advice on scenes without rooms, and on rooms without a doorway: most often, their door leaf was taken for a wall.
 
 use std::io::{self, Write};
 
 use enfilade::cpg::{Cell, CellPortalGraph, PortalKind};
 
-/// Rooms worth a line.
+/// Rooms with a line.
 const SHOWN: usize = 5;
-/// Lower or narrower cells are ducts and hollow walls: nobody stands in them. [Units: wu]
+/// Lower or narrower cells are ducts and hollow walls: too small for a person. [Units: wu]
 const PERSON: [f32; 3] = [0.6, 1.8, 0.6];
 
-/// Says which rooms have windows and cracks at most, if any, largest first; whether there are any.
+/// Reports the rooms that have only windows and cracks, largest first. Returns `true` if there are any.
 pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
     let mut rooms: Vec<&Cell> = graph
         .indoor_cells()
@@ -44,7 +43,7 @@ pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> i
     Ok(true)
 }
 
-/// Says that a scene has no room, if it has none, and what is mostly the reason; whether it has none.
+/// Reports that a scene has no room, with the usual reasons. Returns `true` if so.
 pub(super) fn write_roomless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
     if graph.indoor_cells().next().is_some() {
         return Ok(false);
@@ -56,9 +55,9 @@ pub(super) fn write_roomless(out: &mut impl Write, graph: &CellPortalGraph) -> i
     let [x, y, z] = size;
     writeln!(
         out,
-        "no room was found: all air in these {x:.1} × {y:.1} × {z:.1} m is open to outdoors. If that size is wrong, give \
-         --unit or --up; if rooms have openings as wide as they are, there is nothing to part them; if what encloses them \
-         was taken for furniture, see -v and use --structural-name 'PATTERN'"
+        "no room was found: all air in these {x:.1} × {y:.1} × {z:.1} m is open to the outdoors. If that size is wrong, give \
+         --unit or --up; if rooms have openings as wide as they are, nothing divides them; if their walls \
+         were taken for furniture, look with -v and use --structural-name 'PATTERN'"
     )?;
     Ok(true)
 }

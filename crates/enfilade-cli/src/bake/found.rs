@@ -1,4 +1,4 @@
-//! What a bake says of its scene before the work: the files, what each object counts as, the model's faults.
+//! Report on the scene before the work: files, role of each object, faults of the model.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -10,7 +10,7 @@ use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
 
 use crate::screen::{Told, Warned, write_lines};
 
-/// Says what was read; with `verbose`, the roles of the objects and all that was noticed, too.
+/// Reports what was read; with `verbose`, also the roles of the objects and all notes of the import.
 pub(super) fn report_import(
     scene: &Scene,
     report: &ImportReport,
@@ -30,7 +30,7 @@ pub(super) fn report_import(
             "repaired (leave out --repair to have the model as it was):"
         )?;
         write_lines(&mut err, repair)?;
-        "what is left of the model's faults"
+        "remaining faults of the model"
     } else {
         "the model as found (nothing was changed)"
     };
@@ -50,24 +50,24 @@ pub(super) fn report_import(
     Ok(())
 }
 
-/// Names of objects that are given for a reason.
+/// Most names listed for one reason.
 const NAMES: usize = 3;
-/// Reasons of a role that have a line.
+/// Most reasons of a role with a line.
 const REASONS: usize = 30;
 
-/// Objects of a role that have it for one reason.
+/// Objects that have a role for one reason.
 struct Group<'a> {
-    /// As the first of them has it.
+    /// The reason of the first one.
     reason: &'a str,
-    /// Not all have the same numbers in it.
+    /// The numbers in the reason differ between objects.
     is_mixed: bool,
     n: usize,
-    /// The first few different ones.
+    /// The first few distinct names.
     names: Vec<&'a str>,
     has_more_names: bool,
 }
 
-/// The objects by role and reason, a line each: how many they are, and the names of a few. Most come first.
+/// The objects by role and reason, a line each: their number and a few names. Largest groups first.
 fn roles(scene: &Scene) -> String {
     let mut text = String::new();
     for (role, name) in [(Role::Structural, "structural"), (Role::Detail, "detail")] {
@@ -120,12 +120,12 @@ fn groups(scene: &Scene, role: Role) -> Vec<Group<'_>> {
             }
         }
     }
-    // A stable sort: of equals, the one that came first.
+    // A stable sort: equal groups keep their order.
     groups.sort_by_key(|g| std::cmp::Reverse(g.n));
     groups
 }
 
-/// A reason with `…` for each number: what is said of many objects of different size.
+/// A reason with `…` for each number: common to objects of different size.
 fn without_numbers(reason: &str) -> String {
     let mut out = String::new();
     let mut is_in_number = false;
@@ -175,7 +175,7 @@ mod tests {
                 "detail         500  fills an opening of … m: part 1, part 3, part 5, …",
             ]
         );
-        // Each for a reason of its own: the rest is a line, too.
+        // Each object has a reason of its own: the rest becomes one line, too.
         for (i, o) in scene.objects.iter_mut().enumerate() {
             o.role = Role::Detail;
             o.reason = format!("below '{}'", "x".repeat(i + 1));

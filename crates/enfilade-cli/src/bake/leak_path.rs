@@ -1,4 +1,4 @@
-//! What a bake says of the way out of air that should be a room.
+//! Report on the way out of air that should be a room.
 
 use std::io::{self, Write};
 
@@ -11,17 +11,17 @@ use enfilade_cli::memory::held_memory;
 use crate::progress::StageBar;
 use crate::screen::{Told, Warned};
 
-/// A way out that was looked for, or why there is none to show.
+/// A way out, or the reason why there is none to show.
 pub(super) struct LeakPath {
     found: Result<LeakTrail, NoTrail>,
-    /// It is written into the world, too.
+    /// Requested by the user, and so also written into the world.
     is_asked: bool,
 }
 
-/// Looks for the widest way out that `--leak-path` asks for.
+/// Finds the widest way out as requested by `--leak-path`.
 ///
 /// # Errors
-/// When no room can be at the point that it gives; what else may be wrong is told with the bake's results.
+/// If a room cannot be at the given point; other failures are reported with the bake's results.
 pub(super) fn look_as_asked(
     scene: &Scene,
     config: &BakeConfig,
@@ -40,7 +40,7 @@ pub(super) fn look_as_asked(
     }
 }
 
-/// Looks for the widest way out after a bake that found no room.
+/// Finds the widest way out after a bake without rooms.
 pub(super) fn look_unasked(
     scene: &Scene,
     config: &BakeConfig,
@@ -70,7 +70,7 @@ fn look(
 }
 
 impl LeakPath {
-    /// The line for the world, if one was asked for and found.
+    /// The line for the world, if one was requested and found.
     pub(super) fn points(&self) -> Vec<[f32; 3]> {
         match &self.found {
             Ok(trail) if self.is_asked => {
@@ -81,7 +81,7 @@ impl LeakPath {
         }
     }
 
-    /// Where that is said: unasked, it tells why there is no room.
+    /// The writer for the report: a way out that was not requested explains a warning.
     pub(super) fn says(&self) -> Box<dyn Write> {
         if self.is_asked {
             Box::new(Told)
@@ -90,7 +90,7 @@ impl LeakPath {
         }
     }
 
-    /// Says where the way out is, and what to do about it.
+    /// Reports the way out, and what to do about it.
     pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let trail = match &self.found {
             Ok(trail) => trail,
@@ -110,8 +110,8 @@ impl LeakPath {
             "it is nowhere much narrower than the room: a wall, floor or roof is missing there, or was taken for furniture \
              (look with -v, then --structural-name 'PATTERN')"
         } else {
-            "if that is a hole of the model, close it there; if what closes it was taken for furniture, use --structural-name \
-             'PATTERN'; if it is a doorway or a window, the model is tight"
+            "if that is a hole in the model, close it; if the object that closes it was taken for furniture, use --structural-name \
+             'PATTERN'; if it is a doorway or a window, the model has no leak"
         };
         writeln!(out, "  {advice}")?;
         if self.is_asked {

@@ -1,6 +1,6 @@
-//! What a bake can be told, on the command line and in a settings file.
+//! Options of a bake, on the command line and in a settings file.
 //!
-//! Every value is checked where it is read, so that a wrong one is shown at its place.
+//! Every value is checked where it is read, so that an error message names its place.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -20,17 +20,16 @@ use super::values::{
     parse_unit, parse_weld,
 };
 
-/// How scenes are read: the same for what is baked and what it is compared with.
+/// Options for reading scenes, shared by the baked scene and the scene that a world is compared with.
 #[derive(clap::Args)]
 pub(crate) struct SceneOptions {
-    /// Objects whose object, mesh or material name fits this pattern (`*`, `?`) are detail.
+    /// Objects whose object, mesh or material name matches this pattern (`*`, `?`) are detail.
     #[arg(long, value_name = "PATTERN")]
     detail_name: Vec<String>,
-    /// Objects whose name fits this pattern are structural, whatever else says they are detail.
+    /// Objects whose name matches this pattern are structural, even if another rule makes them detail.
     #[arg(long, value_name = "PATTERN")]
     structural_name: Vec<String>,
-    /// Whether small things that one sees around are detail where nothing else says what they are
-    /// [default: on].
+    /// Make small free-standing objects detail if no other rule gives them a role [default: on].
     #[arg(long, value_enum)]
     auto_roles: Option<Switch>,
     /// The input's unit: m, cm, mm, in, ft, or a number of meters.
@@ -39,26 +38,25 @@ pub(crate) struct SceneOptions {
     /// The input's up axis.
     #[arg(long, value_enum)]
     up: Option<UpAxis>,
-    /// Point of the scene, in meters and with y up, that becomes the origin.
+    /// Point of the scene that becomes the origin, in meters with y up.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
-    /// Read files that the scene refers to (buffers, pictures, materials) outside its own folder, too; leave it out for scenes
-    /// of strangers.
+    /// Also read files outside the scene's folder that the scene refers to (buffers, pictures, materials); unsafe for
+    /// scenes from strangers.
     #[arg(long)]
     allow_outside: bool,
-    /// The program IfcConvert of IfcOpenShell, by which IFC is read [default: the one on the PATH].
+    /// Program IfcConvert of IfcOpenShell, used to read IFC [default: the one on the PATH].
     #[arg(long, value_name = "PATH")]
     ifc_convert: Option<PathBuf>,
-    /// Repair structural triangles: weld corners along open edges within METERS (0.001 if not given), split
-    /// T-junctions, turn shells alike, drop what is there twice, fill small holes; each change is counted.
+    /// Repair structural triangles: weld vertices along open edges within METERS (0.001 if not given), split
+    /// T-junctions, orient shells consistently, drop duplicates, fill small holes; each change is counted.
     #[arg(long, value_name = "METERS", num_args = 0..=1, require_equals = true,
         default_missing_value = "0.001", value_parser = parse_weld)]
     repair: Option<f64>,
-    /// With `--repair`, and in itself asking for it: fill holes whose box has a diagonal of up to METERS; 0 fills none
-    /// [default: 0.1].
+    /// Fill holes whose box has a diagonal of up to METERS; implies `--repair`; 0 fills none [default: 0.1].
     #[arg(long, value_name = "METERS", value_parser = parse_hole, allow_hyphen_values = true)]
     repair_holes: Option<f64>,
-    /// Settings file in TOML; what is given on the command line wins.
+    /// Settings file in TOML; the command line takes precedence.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
 }
@@ -70,26 +68,27 @@ pub(crate) struct BakeOptions {
     pub(crate) detail: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) scene: SceneOptions,
-    /// How cells are found.
+    /// Method that finds the cells.
     #[arg(long, value_enum, default_value_t = MethodName::Auto)]
     method: MethodName,
     #[command(flatten)]
     pub(crate) delaunay: super::delaunay::DelaunayOptions,
-    /// Where to write the way out of a map that leaks, as lines of `x y z` in meters.
+    /// File for the way out of a map that leaks, as lines of `x y z` in meters.
     #[arg(long, value_name = "FILE.pts")]
     pub(super) leak: Option<PathBuf>,
-    /// Go on although the map leaks.
+    /// Continue although the map leaks.
     #[arg(long)]
     pub(super) allow_leak: bool,
-    /// Say where the widest way from a room to outdoors is narrowest, and write it into the world as a line: from the middle of
-    /// the largest air with walls around, or from a point of the world that should be in a room.
+    /// Report the narrowest place on the widest way from a room to the outdoors, and write the way into the world as
+    /// a line: from the middle of the largest air with walls around, or from a point of the world that should be in a
+    /// room.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, num_args = 0..=1, require_equals = true)]
     pub(super) leak_path: Option<Option<DVec3>>,
-    /// Cells that cost less, in triangles if no other costs are set, are merged with neighbors [default: 50 in levels of
-    /// brushes, 0 elsewhere].
+    /// Merge cells that cost less with neighbors; costs are in triangles if nothing else is set [default: 50 in
+    /// levels of brushes, 0 elsewhere].
     #[arg(long, value_name = "COST")]
     min_cost: Option<u32>,
-    /// Cells that cost more are cut, and none is merged to more; what cannot be met is told.
+    /// Cut cells that cost more, and merge none to more; cells that cannot be cut are reported.
     #[arg(long, value_name = "COST")]
     max_cost: Option<u32>,
     /// With `--max-cost`: cut the outdoors, too.
@@ -101,21 +100,21 @@ pub(crate) struct BakeOptions {
     /// Width in meters of the narrowest opening that must be found [default: 0.6].
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     min_opening: Option<f64>,
-    /// Narrower openings, in meters, are gaps of the model and closed by seals; 0 leaves them open, as cracks [default:
-    /// 0.01, and more where triangles that should meet miss each other by more].
+    /// Close openings narrower than this, in meters, with seals, as gaps of the model; 0 leaves them open, as cracks
+    /// [default: 0.01, and more if triangles that should meet miss each other by more].
     #[arg(long, value_name = "METERS", value_parser = parse_hole, allow_hyphen_values = true)]
     smallest_hole: Option<f64>,
-    /// Memory to take at most, a number and K, M, G or T: voxels and points are as many as fit [default: 8G, and less for few
-    /// triangles].
+    /// Most memory to use, a number and K, M, G or T: sets the number of voxels and points [default: 8G, and less for
+    /// few triangles].
     #[arg(long, value_name = "BYTES", value_parser = enfilade_cli::values::bytes)]
     max_memory: Option<u64>,
-    /// End without a world after this long; if not given, where the work is out of all proportion to the triangles.
+    /// End without a world after this long; if not given, when the work is out of proportion to the triangles.
     #[arg(long, value_name = "SECONDS", value_parser = enfilade_cli::values::seconds)]
     max_time: Option<Duration>,
-    /// Threads to use; as many as there are cores if not given. The result is the same.
+    /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) threads: Option<u16>,
-    /// Print the roles of the objects by their reasons, notes of the import and stage times.
+    /// Print the roles of objects with their reasons, notes of the import and stage times.
     #[arg(short, long)]
     pub(super) verbose: bool,
 }
@@ -135,8 +134,8 @@ enum Switch {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum MethodName {
-    /// The partition where all structure is made of brushes, the watershed for everything else; tetrahedra where it finds one
-    /// cell or none in a curved surface that is closed but for its ends, which may have branches.
+    /// The partition if all structure is made of brushes, else the watershed; tetrahedra if that finds one cell or
+    /// none in a curved surface, perhaps branched, that is closed except at its ends.
     Auto,
     /// Voxels, distances, watershed.
     Watershed,
@@ -175,14 +174,14 @@ struct ConfigFile {
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct BspTable {
-    /// Whether the shape of openings makes rooms of cells.
+    /// `true` if the shape of openings makes cells rooms.
     rooms: Option<bool>,
     heuristic: Option<HeuristicName>,
     grid: Option<Length>,
     tetrahedra: Option<Length>,
-    /// A point and a normal each.
+    /// A point and a normal for each.
     planes: Vec<[f64; 6]>,
-    /// Two opposite corners each.
+    /// Two opposite vertices for each.
     boxes: Vec<[f64; 6]>,
     min_cost: Option<Amount>,
     max_cost: Option<Amount>,
@@ -230,11 +229,11 @@ impl ConfigFile {
     }
 }
 
-/// Cells of fewer triangles are merged with a neighbor if nothing else is said: the merging threshold
-/// of Lefebvre & Hornus 2003, table 2.
+/// Default bound below which cells are merged with a neighbor, in triangles: the merging threshold of Lefebvre &
+/// Hornus 2003, table 2.
 const MERGE_BELOW: f64 = 50.0;
 
-/// Bounds on what cells cost.
+/// Bounds on the costs of cells.
 fn resolve_costs(options: &BakeOptions, table: &BspTable) -> anyhow::Result<SimplifySettings> {
     let max_cost = options
         .max_cost
@@ -271,7 +270,7 @@ fn resolve_costs(options: &BakeOptions, table: &BspTable) -> anyhow::Result<Simp
     Ok(costs)
 }
 
-/// What only the partition is told.
+/// Settings of the partition alone.
 fn resolve_bsp(table: BspTable) -> anyhow::Result<BspConfig> {
     let plane = |[x, y, z, nx, ny, nz]: [f64; 6]| {
         let normal = DVec3::new(nx, ny, nz).try_normalize();
@@ -310,17 +309,17 @@ fn resolve_bsp(table: BspTable) -> anyhow::Result<BspConfig> {
     })
 }
 
-/// Everything that a bake is told, resolved.
+/// All settings of a bake, resolved.
 pub(crate) struct Resolved {
     pub(crate) import: ImportOptions,
     pub(crate) config: BakeConfig,
-    /// Nothing was said of what cells are merged below: that is for levels of brushes alone.
+    /// No bound for merging was given: the default applies to levels of brushes alone.
     merges_brushes_only: bool,
 }
 
 impl Resolved {
-    /// The settings for a scene. A room of a building has few triangles, and the shape of its openings says that it is one:
-    /// small cells are merged by default only where cells are those of a partition of brushes.
+    /// Returns the settings for a scene. A room of a building has few triangles, and the shape of its openings shows
+    /// that it is a room: by default, small cells are merged only in a partition of brushes.
     pub(crate) fn config_for(&self, scene: &Scene) -> BakeConfig {
         let mut config = self.config.clone();
         let is_of_brushes =
@@ -333,7 +332,7 @@ impl Resolved {
 }
 
 impl BakeOptions {
-    /// All files that are read, `scene` among them.
+    /// All files to read, including `scene`.
     pub(crate) fn inputs<'a>(&'a self, scene: &'a [PathBuf]) -> impl Iterator<Item = &'a PathBuf> {
         scene
             .iter()
@@ -343,7 +342,7 @@ impl BakeOptions {
     }
 }
 
-/// The converter of IFC, which is a process of its own, keeps to what the command may take.
+/// Holds the converter of IFC, a separate process, to the limits of the command.
 pub(crate) fn bound_converter(
     options: &mut ImportOptions,
     max_time: Option<Duration>,
@@ -355,7 +354,7 @@ pub(crate) fn bound_converter(
     }
 }
 
-/// Command line and settings file, resolved.
+/// Resolves command line and settings file.
 pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let file = options.scene.file()?;
     let mut import_options = options.scene.resolve_with(&file);
@@ -420,12 +419,12 @@ impl SceneOptions {
         }
     }
 
-    /// Command line and settings file, resolved.
+    /// Resolves command line and settings file.
     pub(crate) fn resolve(&self) -> anyhow::Result<ImportOptions> {
         Ok(self.resolve_with(&self.file()?))
     }
 
-    /// What is put right: nothing unless the command line or the settings file says so.
+    /// Repairs to make: none unless the command line or the settings file requests them.
     fn repair_with(&self, file: &ConfigFile) -> Option<RepairOptions> {
         let weld = self.repair.or(file.repair.as_ref().map(|v| v.0));
         let hole = self
@@ -438,7 +437,7 @@ impl SceneOptions {
         })
     }
 
-    /// The one given, or the one on the PATH.
+    /// The given converter, or the one on the PATH.
     fn ifc_converter(&self) -> Option<IfcConverter> {
         let name = format!("IfcConvert{}", std::env::consts::EXE_SUFFIX);
         let on_path = || {
@@ -510,7 +509,7 @@ mod tests {
         const DOCS: &str = include_str!("../../../../docs/settings.md");
         let mut n = 0;
         for table in ["", "[merge]\n", "[bsp]\n"] {
-            // An unknown key is answered with all that are known.
+            // The error for an unknown key lists all known keys.
             let problem = toml::from_str::<ConfigFile>(&format!("{table}unknown = 1")).err();
             let problem = problem.unwrap().to_string();
             let (_, known) = problem.split_once("expected one of").unwrap();

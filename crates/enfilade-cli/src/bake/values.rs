@@ -6,10 +6,10 @@ use std::ops::RangeInclusive;
 use enfilade::geom::DVec3;
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 
-/// The longest voxel and the widest "narrowest opening": past it no room is left to find.
+/// Upper limit of voxel edges and opening widths: beyond it, there are no rooms left to find. [Units: wu]
 const LONGEST: f64 = 10.0;
 
-/// Reads TOML; where it is not understood, the error says so on one line, by line and column.
+/// Parses TOML; errors are one line with line and column.
 pub(super) fn parse_toml<T: DeserializeOwned>(text: &str) -> anyhow::Result<T> {
     toml::from_str(text).map_err(|error: toml::de::Error| {
         let before = error.span().and_then(|at| text.get(..at.start));
@@ -83,10 +83,10 @@ pub(super) fn parse_unit(text: &str) -> Result<f64, String> {
     })
 }
 
-/// What a repair takes as its distance. [Units: wu]
+/// Range of a repair's distance. [Units: wu]
 const WELDS: RangeInclusive<f64> = 1e-6..=0.1;
 
-/// What the importer takes as a unit.
+/// Range of units that the importer accepts. [Units: wu]
 const UNITS: RangeInclusive<f64> = 1e-9..=1e9;
 
 pub(super) fn parse_point(text: &str) -> Result<DVec3, String> {
@@ -100,7 +100,7 @@ pub(super) fn parse_point(text: &str) -> Result<DVec3, String> {
     }
 }
 
-/// A length of the settings file. [Units: wu]
+/// A length in the settings file. [Units: wu]
 pub(super) struct Length(pub(super) f64);
 
 impl<'de> Deserialize<'de> for Length {
@@ -133,7 +133,7 @@ impl<'de> Deserialize<'de> for Hole {
     }
 }
 
-/// A number of the settings file that is at least 0.
+/// A number of at least 0 in the settings file.
 pub(super) struct Amount(pub(super) f64);
 
 impl<'de> Deserialize<'de> for Amount {
@@ -149,7 +149,7 @@ impl<'de> Deserialize<'de> for Amount {
     }
 }
 
-/// A number of voxels of the settings file.
+/// A number of voxels in the settings file.
 pub(super) struct Budget(pub(super) usize);
 
 impl<'de> Deserialize<'de> for Budget {
@@ -165,10 +165,10 @@ impl<'de> Deserialize<'de> for Budget {
     }
 }
 
-/// What the bake takes as a budget.
+/// The least budget that the bake accepts. [Units: vx]
 const LEAST_VOXELS: usize = 1000;
 
-/// A unit of the settings file: a name or a number.
+/// A unit in the settings file: a name or a number.
 pub(super) struct Unit(pub(super) f64);
 
 impl<'de> Deserialize<'de> for Unit {

@@ -1,4 +1,4 @@
-//! What fills openings, as `inspect` shows it.
+//! Objects in openings, as `inspect` shows them.
 
 use enfilade::cpg::{Fitting, FittingPart, MotionKind, PortalKind, World};
 use serde::Serialize;
@@ -61,7 +61,7 @@ impl FittingReport {
     }
 }
 
-/// How many doors have leaves, and how these move; `None` where there are no doors.
+/// The number of doors with leaves, and the motion of these; `None` if there are no doors.
 pub(super) fn summary(world: &World) -> Option<String> {
     let is_door = |kind| kind == PortalKind::Door;
     let doors = world.graph.portals.iter().filter(|p| is_door(p.kind));

@@ -1,4 +1,4 @@
-//! The objects that a cell sees, by the names that the input has for them.
+//! The objects that a cell sees, by their names in the input.
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 
 use crate::screen::print_json;
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct Objects<'a> {
     objects: Vec<Object<'a>>,
@@ -27,7 +27,7 @@ struct Object<'a> {
     extras: Option<&'a RawValue>,
 }
 
-/// Writes the objects of the cell of this name or id, those with most triangles first.
+/// Writes the objects that the cell of this name or id sees, those with most triangles first.
 pub(super) fn write(
     out: &mut impl Write,
     world: &World,

@@ -1,7 +1,7 @@
-//! What a set of visible cells means for who made the scene: numbers by cell, and pairs that see each other.
+//! Statistics of visible cells for the author of a scene: numbers for each cell, and pairs that see each other.
 //!
-//! After Dirkse, section 7.6.3 (statistics for the modeller) and 7.6.2 (objects by cell), and Gjørup,
-//! section 3.2.2 (pairs for radiosity).
+//! After Dirkse, section 7.6.3 (statistics for the modeler) and 7.6.2 (objects by cell), and Gjørup, section 3.2.2
+//! (pairs for radiosity).
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,12 +11,12 @@ use std::ops::Range;
 use enfilade::cpg::{CellId, PartNumbers, Pvs, SightGraph, World};
 use enfilade::geom::DVec3;
 
-/// What can be seen from each cell.
+/// Statistics of all cells.
 #[derive(serde::Serialize)]
 pub(super) struct Statistics {
-    /// By cell.
+    /// Indexed by cell.
     cells: Vec<FromCell>,
-    /// The ten viewpoints from which most can be seen, the worst first: by triangles, then by cells.
+    /// The ten viewpoints with most visible, the worst first: by triangles, then by cells.
     worst: Vec<Viewpoint>,
     /// Triangles of walls and objects in the world.
     #[serde(rename = "triangles")]
@@ -26,18 +26,18 @@ pub(super) struct Statistics {
 #[derive(serde::Serialize)]
 struct FromCell {
     name: String,
-    /// Cells that can be seen, itself among them.
+    /// Number of visible cells, including itself.
     cells: usize,
-    /// Detail objects that can be seen, and their numbers in the world.
+    /// Number of visible detail objects, and their indices in the world.
     objects: usize,
     visible_objects: Vec<u32>,
-    /// Triangles of walls and objects that can be seen.
+    /// Number of visible triangles of walls and objects.
     triangles: usize,
-    /// Detail objects and triangles of the cells that can be seen, whether or not they can be seen themselves.
+    /// Numbers of detail objects and triangles of the visible cells, including those not visible themselves.
     objects_of_cells: usize,
     triangles_of_cells: usize,
-    /// What of each cell can be seen, by cell; of these numbers the sum may be more than the whole, as what two cells share counts
-    /// for both.
+    /// The visible part of each cell. The sum of these numbers may exceed the total, because things that two cells
+    /// share count for both.
     destinations: Vec<Destination>,
 }
 
@@ -52,14 +52,15 @@ struct Destination {
 struct Viewpoint {
     cell: usize,
     name: String,
-    /// A point among the cell's doorways, or its middle where it has none. [Units: wu]
+    /// A point among the cell's doorways, or its middle if it has none. [Units: wu]
     point: [f64; 3],
     cells: usize,
     triangles: usize,
 }
 
 impl Statistics {
-    /// By the parts that `visible` has, or by whole cells where it has none. Time: pairs of cells times what is in the second.
+    /// Counts the parts in `visible`, or whole cells if it has none. Time: pairs of cells times the contents of the
+    /// second.
     pub(super) fn new(visible: &Pvs, world: Option<&World>, graph: &SightGraph) -> Self {
         let contents = world.map(Contents::new);
         let mut first_pair = 0;
@@ -95,7 +96,7 @@ impl Statistics {
         }
     }
 
-    /// Triangles that a cell sees, and those of the cells that it sees, on average.
+    /// Means over all cells: triangles visible from a cell, and triangles of its visible cells.
     pub(super) fn mean_triangles(&self) -> [f64; 2] {
         let n = self.cells.len().max(1) as f64;
         let sums = self.cells.iter().fold([0, 0], |[a, b], cell| {
@@ -120,13 +121,13 @@ impl FromCell {
     }
 }
 
-/// What is in each cell, by [`PartNumbers`].
+/// The contents of each cell, as [`PartNumbers`].
 struct Contents {
     numbers: PartNumbers,
-    /// By detail object, the triangles of those before it, and then of all.
+    /// For each detail object, the number of triangles of those before it; then of all.
     of_details: Vec<usize>,
     by_cell: Vec<Vec<Range<u32>>>,
-    /// By cell, the batches that are seen from it without passing a portal.
+    /// For each cell, the batches visible without passing a portal.
     batches: Vec<Vec<u32>>,
 }
 
@@ -226,11 +227,11 @@ fn viewpoint(c: usize, world: Option<&World>, graph: &SightGraph) -> DVec3 {
     }
 }
 
-/// Pairs that may see each other, each once, as text: `MUT1`, then a line a cell with the greater numbers that it
-/// sees, as ranges; with a world, the same for its surfaces: its batches of structural triangles.
+/// The pairs that may see each other, each once, as text: `MUT1`, then one line per cell with the visible cells of
+/// greater number, as ranges; for a world, the same for its surfaces, which are its batches of structural triangles.
 ///
-/// Two surfaces may see each other where there are two cells, one of each, and something of either surface may be seen from the other's cell: by the
-/// parts that `visible` has, or by whole cells where it has none.
+/// Two surfaces may see each other if there is a cell of each such that a part of either surface is visible from the
+/// other's cell: by the parts in `visible`, or by whole cells if it has none.
 pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
     let mut out = String::from("MUT1\n");
     let _ = writeln!(out, "cells {}", visible.n_cells());
@@ -246,10 +247,10 @@ pub(super) fn mutual(visible: &Pvs, world: Option<&World>) -> String {
     out
 }
 
-/// By surface, those that it may see and that may see it, ascending.
+/// For each surface, those that it may see and that may see it, ascending.
 fn mutual_surfaces(visible: &Pvs, world: &World) -> Vec<BTreeSet<u32>> {
     let contents = Contents::new(world);
-    // By pair of cells, the surfaces of the second that the first may see.
+    // For each pair of cells, the surfaces of the second that the first may see.
     let mut seen: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
     for (pair, (a, b)) in visible.pairs().enumerate() {
         let in_sight = |batch: u32| {
@@ -276,7 +277,7 @@ fn mutual_surfaces(visible: &Pvs, world: &World) -> Vec<BTreeSet<u32>> {
     out
 }
 
-/// `a: 3-5 9`, of ascending numbers those greater than `a`.
+/// Writes `a: 3-5 9`: of ascending numbers, those greater than `a`, as ranges.
 fn put_greater(out: &mut String, a: usize, seen: impl Iterator<Item = u32>) {
     let mut ranges: Vec<(u32, u32)> = Vec::new();
     for b in seen.filter(|&b| b as usize > a) {

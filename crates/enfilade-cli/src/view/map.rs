@@ -1,28 +1,28 @@
-//! The map in the window's corner: what a level cut at the eye's height goes through, by the locator.
+//! The map in the window: a level cut at the eye's height, from the locator.
 
 use egui::{Align2, Color32, ColorImage, Pos2, Rect, Stroke, TextureHandle, TextureOptions, Vec2};
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::DVec3;
 use enfilade_render::{Camera, cell_color};
 
-/// Points along the longer side of the map, at most.
+/// Most points along the longer side of the map.
 const POINTS: f32 = 360.0;
-/// The cut is made anew when the eye is so much higher or lower. [Units: wu]
+/// The cut is remade when the eye has moved up or down by this. [Units: wu]
 const STEP: f32 = 0.25;
-/// A cell of less on the map has no name there. [Units: px²]
+/// Cells smaller than this on the map get no name. [Units: px²]
 const ROOM_FOR_A_NAME: f32 = 900.0;
 
-/// What the map shows of a frame.
+/// State of a frame that the map shows.
 pub(super) struct MapShown<'a> {
     pub(super) camera: Camera,
-    /// Cells that are seen, ascending.
+    /// Visible cells, ascending.
     pub(super) cells: &'a [u32],
     pub(super) closed: &'a [u32],
-    /// 1 for all of the world; more for the surroundings of the eye.
+    /// 1 for the whole world; more for the surroundings of the eye.
     pub(super) zoom: f32,
 }
 
-/// A name on the map: the point of the cell nearest to its middle, and how many points the cell has.
+/// A name on the map: the point of the cell nearest to its middle, and the number of points of the cell.
 struct Label {
     cell: u32,
     at: [f32; 2],
@@ -33,16 +33,16 @@ struct Label {
 pub(super) struct Map {
     names: Vec<String>,
     is_outdoor: Vec<bool>,
-    /// By portal: two ends and the height.
+    /// For each portal: two ends and the height range.
     portals: Vec<([f32; 2], [f32; 2], [f32; 2])>,
     low: [f32; 2],
     high: [f32; 2],
-    /// Points in a row, and rows.
+    /// Points in a row, and number of rows.
     n: [usize; 2],
     /// Height of the cut, and the cell of each of its points.
     cut: Option<(f32, Vec<Option<CellId>>)>,
     labels: Vec<Label>,
-    /// The cut in colors, and which cells were seen in it.
+    /// The cut in colors, and the cells visible in it.
     picture: Option<(TextureHandle, Vec<u32>)>,
 }
 
@@ -51,14 +51,14 @@ impl Map {
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         for (_, cell) in world.graph.indoor_cells() {
             for (k, axis) in [0, 2].into_iter().enumerate() {
-                // With a margin, so that outer walls have room.
+                // With a margin for outer walls.
                 low[k] = low[k].min(cell.aabb[0][axis] - 0.5);
                 high[k] = high[k].max(cell.aabb[1][axis] + 0.5);
             }
         }
         let portals = world.graph.portals.iter().map(|p| {
             let flat = |c: &[f32; 3]| [c[0], c[2]];
-            // The two corners farthest apart, seen from above.
+            // The two vertices farthest apart, seen from above.
             let mut ends = ([0.0; 2], [0.0; 2]);
             let mut longest = -1.0;
             let (mut bottom, mut top) = (f32::INFINITY, f32::NEG_INFINITY);
@@ -92,7 +92,7 @@ impl Map {
         self.low[0] >= self.high[0]
     }
 
-    /// The middle of a point of the cut. [Units: wu]
+    /// The center of a point of the cut. [Units: wu]
     fn point(&self, i: usize) -> [f32; 2] {
         let at = [i % self.n[0], i / self.n[0]];
         [0, 1].map(|k| {
@@ -101,7 +101,7 @@ impl Map {
         })
     }
 
-    /// Cuts the world anew where the eye is at another height.
+    /// Cuts the world again if the eye is at another height.
     pub(super) fn follow(&mut self, world: &World, eye: [f32; 3]) {
         let is_near = |cut: &(f32, _)| (cut.0 - eye[1]).abs() < STEP;
         if self.is_empty() || self.cut.as_ref().is_some_and(is_near) {
@@ -122,7 +122,7 @@ impl Map {
                 (*sum, *n) = ([sum[0] + p[0], sum[1] + p[1]], *n + 1);
             }
         }
-        // The middle of a room around a corner may lie in another.
+        // The middle of an L-shaped room may lie in another cell.
         let mut nearest = vec![(f32::INFINITY, [0.0; 2]); self.names.len()];
         for (i, cell) in cells.iter().enumerate() {
             if let Some(cell) = cell {
@@ -146,7 +146,7 @@ impl Map {
         self.picture = None;
     }
 
-    /// The cut in colors: cells that are seen are bright.
+    /// Colors the cut: visible cells are bright.
     fn paint(&mut self, context: &egui::Context, seen: &[u32]) {
         let Some((_, cells)) = &self.cut else { return };
         if self.picture.as_ref().is_some_and(|(_, of)| of == seen) {
@@ -207,7 +207,7 @@ impl Map {
             };
             painter.line_segment([place(*a), place(*b)], Stroke::new(2.0, color));
         }
-        // In points of the screen, what a point of the cut covers.
+        // The screen points that one point of the cut covers.
         let cover = scale * scale * size[0] * size[1] / (self.n[0] * self.n[1]) as f32;
         for label in &self.labels {
             let is_outdoor = self.is_outdoor[label.cell as usize];

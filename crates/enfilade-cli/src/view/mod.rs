@@ -37,21 +37,21 @@ use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
 
-/// Opens a window to walk through a world: W A S D and the mouse; F1 there tells the rest.
+/// Opens a window to walk through a world: W A S D and the mouse; F1 in the window lists all keys.
 #[derive(clap::Args)]
 pub(crate) struct View {
     /// World written by `enfilade bake`.
     world: PathBuf,
-    /// Where to begin, in meters; without it, a place with much to see is looked for.
+    /// Start, in meters; a place with much to see if not given.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     eye: Option<[f32; 3]>,
     /// Walk along this path, a camera a frame, and close at its end.
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
-    /// Where F5 writes the path walked since F4, for --path here and in `render`.
+    /// File that F5 writes the path since F4 to, for --path here and in `render`.
     #[arg(long, value_name = "FILE", default_value = "path.txt")]
     record: PathBuf,
-    /// Where F12 writes pictures; `shot.png` becomes `shot-1.png` and so on.
+    /// File that F12 writes pictures to; `shot.png` becomes `shot-1.png` and so on.
     #[arg(long, value_name = "PNG", default_value = "shot.png")]
     screenshot: PathBuf,
     /// Size of the window.
@@ -60,16 +60,16 @@ pub(crate) struct View {
     /// Leave the mouse free at first: drag to look around; Tab captures it.
     #[arg(long)]
     free_mouse: bool,
-    /// Portals that cover fewer pixels are not looked through, as in `render`; L turns that off and on.
+    /// Do not look through portals that cover fewer pixels, as in `render`; L turns that off and on.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     stop: f32,
-    /// Objects in cells that are seen through fewer pixels are not drawn, as in `render`; L turns that off and on.
+    /// Do not draw objects in cells that are seen through fewer pixels, as in `render`; L turns that off and on.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     objects: f32,
-    /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels.
+    /// Draw objects with fewer triangles if that moves their surface by at most this many pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     lod: f32,
-    /// What draws: `best`, `gpu`, `software`, or part of a name.
+    /// Adapter to draw with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
     #[command(flatten)]
@@ -79,7 +79,7 @@ pub(crate) struct View {
 pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     args.limits.begin()?;
     let outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
-    // Where they may be written is asked when a key asks for them: most walks write nothing.
+    // Writability is tested when a key requests a file: most walks write none.
     for (option, format, path) in [
         ("--record", Format::Cameras, &args.record),
         ("--screenshot", Format::Picture, &args.screenshot),
@@ -112,16 +112,16 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     }
 }
 
-/// How far a click reaches, in lengths of the view direction.
+/// Reach of a click, in lengths of the view direction.
 const CLICK: f32 = 30.0;
 
 struct App<'a> {
     args: &'a View,
     world: World,
     lines: Sightlines,
-    /// Cameras still to come.
+    /// Cameras still to show.
     path: Option<VecDeque<Camera>>,
-    /// What was read, and what was written in this walk.
+    /// Files read, and files written in this walk.
     outputs: Outputs,
     open: Option<Open>,
     failed: Option<anyhow::Error>,
@@ -149,7 +149,7 @@ impl ApplicationHandler for App<'_> {
         match event {
             WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => open.resize(size),
-            // The panel has nothing that Tab could go to, and a key that it took may be released all the same.
+            // The panel has no use for Tab, and keys that it took may still be released.
             WindowEvent::KeyboardInput {
                 event,
                 is_synthetic,
@@ -164,7 +164,7 @@ impl ApplicationHandler for App<'_> {
             }
             WindowEvent::Focused(is_focused) => {
                 open.keys.clear();
-                // Who is away has the mouse; who comes back gets what was chosen.
+                // The mouse is free while another window has the focus, and held as chosen afterwards.
                 open.hold(is_focused && open.wants_mouse);
             }
             WindowEvent::MouseWheel { delta, .. } if !is_taken => open.zoom(match delta {
@@ -238,7 +238,7 @@ impl App<'_> {
             .get_default_config(&gpu.adapter, size.width.max(1), size.height.max(1))
             .ok_or_else(|| anyhow!("{} cannot draw to this window", gpu.name()))?;
         let formats = surface.get_capabilities(&gpu.adapter).formats;
-        // Shading is in linear light: the window's texture does the rest.
+        // Shading is in linear light: the window's texture format converts it.
         if let Some(&format) = formats.iter().find(|f| f.is_srgb()) {
             config.format = format;
         }
@@ -259,7 +259,7 @@ impl App<'_> {
         };
         let [x, y, z] = start.toward;
         let shown = Shown {
-            // Software draws the plain picture several times as fast.
+            // The software adapter draws the plain picture several times as fast.
             plain: studio.gpu.is_software(),
             spares: studio.sparing != Sparing::default(),
             zoom: 1.0,
@@ -289,7 +289,8 @@ impl App<'_> {
         })
     }
 
-    /// Acts on a key that goes down, once. Synthetic events report keys that were down already when the window got the focus.
+    /// Acts once when a key goes down. Synthetic events report keys that were down already when the window got the
+    /// focus.
     fn on_key(
         &mut self,
         events: &ActiveEventLoop,
@@ -319,7 +320,7 @@ impl App<'_> {
                 open.studio.sparing = match (on, asked == Sparing::default()) {
                     (false, _) => Sparing::default(),
                     (true, false) => asked,
-                    // Nothing was asked for: portals of 16 by 16 pixels, objects seen through twice that.
+                    // Defaults: portals of 16 by 16 pixels, objects seen through four times that area.
                     (true, true) => Sparing {
                         stop_below: 256.0,
                         objects_below: 1024.0,
@@ -351,7 +352,7 @@ impl App<'_> {
                     let written = self.outputs.write("--record", Format::Cameras, record);
                     match written.and_then(|()| write_whole(record, text.as_bytes())) {
                         Ok(()) => open.say(format!("wrote {}", record.display())),
-                        // What was walked stays, and so does the window.
+                        // The recording stays, and so does the window.
                         Err(why) => {
                             open.recorded = Some(path);
                             open.warn(format!("{why:#}"));
@@ -360,7 +361,7 @@ impl App<'_> {
                 }
             }
             KeyCode::F12 => {
-                // The walk goes on, whatever becomes of its pictures.
+                // The walk goes on even if a picture fails.
                 let asked_of_it = (self.args.screenshot.as_path(), &self.args.adapter);
                 if let Err(why) = open.shot(asked_of_it, &self.world, &mut self.outputs) {
                     open.warn(format!("no picture: {why:#}"));
@@ -371,7 +372,7 @@ impl App<'_> {
         Ok(())
     }
 
-    /// Opens or closes what the pointer is at.
+    /// Opens or closes the portal at the pointer.
     fn toggle_portal(&mut self) {
         let Some(open) = &mut self.open else { return };
         let [w, h] = [open.config.width, open.config.height].map(f64::from);
@@ -389,7 +390,7 @@ impl App<'_> {
             toward: (forward + right * x + up * y).to_array(),
             ..camera
         };
-        // The leaf that is there, or else the opening.
+        // The leaf at the pointer, or else the opening.
         let end = [0, 1, 2].map(|k| ray.eye[k] + ray.toward[k] * CLICK);
         let hit = self.lines.pick(&open.studio.state, ray.eye, end);
         let leaf_of = match hit.ok().flatten().map(|h| h.target) {
@@ -431,7 +432,7 @@ impl App<'_> {
         open.draw(&self.world, &camera, seconds)
     }
 
-    /// What of far away rooms is spared, as asked for.
+    /// The sparing of distant rooms that the options request.
     fn sparing(&self) -> Sparing {
         Sparing {
             stop_below: self.args.stop,

@@ -1,18 +1,18 @@
-//! What decides what is drawn in the window.
+//! Modes of culling in the window.
 
 use enfilade_render::Culling;
 
-/// What decides what is drawn.
+/// The method that decides what is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Mode {
     /// Portals, clipped by the processor.
     #[default]
     Portals,
-    /// Portals, each asked of the adapter by an occlusion query.
+    /// Portals, each tested on the adapter by an occlusion query.
     Queries,
     /// The view frustum.
     Frustum,
-    /// Nothing: all is drawn.
+    /// No culling: everything is drawn.
     Everything,
 }
 
@@ -29,13 +29,13 @@ impl Mode {
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Portals => "portals",
-            Self::Queries => "portals, asked of the adapter",
+            Self::Queries => "portals, occlusion queries",
             Self::Frustum => "frustum culling",
             Self::Everything => "everything",
         }
     }
 
-    /// What pictures of it are drawn by: the adapter's answer and the processor's show the same.
+    /// The culling for pictures of this mode: occlusion queries and the processor show the same.
     pub(super) fn culling(self) -> Culling {
         match self {
             Self::Portals | Self::Queries => Culling::Portals,

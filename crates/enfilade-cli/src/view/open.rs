@@ -1,4 +1,4 @@
-//! The window, while it is open: what is in it, and how it is drawn.
+//! The open window: its contents, and how they are drawn.
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
@@ -22,7 +22,7 @@ use crate::output::{Outputs, write_whole};
 use crate::render::{light, portal_marks};
 use enfilade_cli::cameras::FOV;
 
-/// What there is once the window is.
+/// State that exists once the window is open.
 pub(super) struct Open {
     pub(super) window: Arc<Window>,
     pub(super) surface: wgpu::Surface<'static>,
@@ -33,25 +33,25 @@ pub(super) struct Open {
     pub(super) yaw: f32,
     pub(super) pitch: f32,
     pub(super) keys: BTreeSet<KeyCode>,
-    /// Where the pointer is, and where it went down, in pixels.
+    /// Position of the pointer, and where it was pressed, in pixels.
     pub(super) pointer: [f64; 2],
     pub(super) pressed_at: Option<[f64; 2]>,
     pub(super) shown: Shown,
     pub(super) mode: Mode,
-    /// Whether the pointer is held in the window, and its movements turn the view.
+    /// `true` if the pointer is held in the window, and its movements turn the view.
     pub(super) is_captured: bool,
-    /// Whether it is meant to be, while the window has the keyboard.
+    /// `true` if it should be, while the window has the keyboard.
     pub(super) wants_mouse: bool,
-    /// Whether the light of each place was computed, or cannot be.
+    /// `true` if the light of each place was computed, or cannot be.
     pub(super) has_asked_for_light: bool,
-    /// Doors that turn: how far their leaves are open, and shall be.
+    /// Moving doors: how far their leaves are open now, and at the end.
     pub(super) turning: Vec<(PortalId, [f32; 2])>,
     pub(super) recorded: Option<Vec<Camera>>,
     pub(super) n_shots: u32,
     pub(super) last: Instant,
 }
 
-/// The name of the cell that the middle of the picture shows: the air before what is met there.
+/// The name of the cell in the middle of the picture: of the air before the surface there.
 pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> String {
     const FAR: f32 = 1000.0;
     let [.., forward] = camera.axes();
@@ -73,22 +73,22 @@ impl Open {
         self.shown.zoom = (self.shown.zoom * 1.25_f32.powf(notches)).clamp(1.0, 40.0);
     }
 
-    /// Holds the pointer in the window, or lets go of it; returns whether that could be done.
+    /// Holds the pointer in the window, or releases it; returns `true` on success.
     pub(super) fn hold(&mut self, on: bool) -> bool {
-        // Some systems lock it in its place, others only keep it inside.
+        // Some systems lock the pointer in place, others only keep it inside.
         self.is_captured = on
             && (self.window.set_cursor_grab(CursorGrabMode::Locked))
                 .or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined))
                 .is_ok();
         if !self.is_captured {
-            // Nothing is lost where there was nothing to let go of.
+            // Releasing a free pointer may fail without harm.
             let _ = self.window.set_cursor_grab(CursorGrabMode::None);
         }
         self.window.set_cursor_visible(!self.is_captured);
         self.is_captured == on
     }
 
-    /// The same for good, and says so.
+    /// Holds or releases the pointer as the user chose, and reports it.
     pub(super) fn capture(&mut self, on: bool) {
         self.wants_mouse = on;
         match (self.hold(on), on) {
@@ -100,13 +100,13 @@ impl Open {
         }
     }
 
-    /// In the window, and on standard error for who comes back to the terminal.
+    /// Shows a message in the window, and on standard error for the terminal.
     pub(super) fn say(&mut self, message: String) {
         let _ = writeln!(crate::screen::Told, "enfilade: {message}");
         self.shown.message = message;
     }
 
-    /// The same for what could not be done.
+    /// Like [`say`](Self::say), for failures.
     pub(super) fn warn(&mut self, message: String) {
         let _ = writeln!(crate::screen::Warned, "enfilade: {message}");
         self.shown.message = message;
@@ -130,7 +130,7 @@ impl Open {
         }
     }
 
-    /// Where the keys lead. [Units: wu/s]
+    /// The velocity that the pressed keys request. [Units: wu/s]
     pub(super) fn wish(&self) -> DVec3 {
         let [right, _, forward] = self.camera().axes().map(|v| v.as_dvec3());
         let key = |code| f64::from(u8::from(self.keys.contains(&code)));
@@ -175,7 +175,7 @@ impl Open {
                     .configure(&self.studio.gpu.device, &self.config);
                 return Ok(());
             }
-            // Hidden, or late: the next frame will do.
+            // Hidden or late: draw in the next frame.
             _ => return Ok(()),
         };
         let aspect = size[0] as f32 / size[1] as f32;
@@ -239,7 +239,7 @@ impl Open {
         Ok(())
     }
 
-    /// Opens or closes a portal: its leaves begin to turn; one without them is closed or opened at once.
+    /// Opens or closes a portal: its leaves begin to move; one without leaves changes at once.
     pub(super) fn toggle(&mut self, portal: PortalId) {
         let state = &mut self.studio.state;
         let before = self.turning.iter().position(|(p, _)| *p == portal);
@@ -265,9 +265,9 @@ impl Open {
         ));
     }
 
-    /// Turns leaves for a time.
+    /// Moves leaves for a time step.
     pub(super) fn turn_leaves(&mut self, seconds: f64) {
-        /// From shut to open. [Units: s]
+        /// Time from shut to open. [Units: s]
         const TIME: f32 = 0.7;
         let by = seconds as f32 / TIME;
         for (portal, [share, to]) in &mut self.turning {
@@ -281,7 +281,7 @@ impl Open {
         self.turning.retain(|(_, [share, to])| share != to);
     }
 
-    /// A picture of the world as it is shown now, without the panel.
+    /// Writes a picture of the world as shown now, without the panel.
     pub(super) fn shot(
         &mut self,
         (screenshot, adapter): (&Path, &AdapterChoice),
@@ -292,11 +292,11 @@ impl Open {
         let stem = screenshot.file_stem().unwrap_or_default().to_string_lossy();
         let to = screenshot.with_file_name(format!("{stem}-{}.png", self.n_shots));
         let camera = self.camera();
-        // In a studio of its own: a window's pictures do not come back.
+        // In a separate studio: pictures of a window cannot be read back.
         let mut studio = Studio::new(enfilade_cli::adapter::open(adapter)?, world)?;
         studio.state = self.studio.state.clone();
         studio.sparing = Sparing {
-            // Its levels would have to be made again.
+            // Its levels would have to be rebuilt.
             lod: 0.0,
             ..self.studio.sparing
         };

@@ -1,4 +1,4 @@
-//! What lies over the picture: counters, frame times, a crosshair, a small map, help.
+//! The panel over the picture: counters, frame times, a crosshair, a small map, help.
 
 use std::collections::VecDeque;
 
@@ -11,7 +11,7 @@ use winit::window::Window;
 use super::map::{Map, MapShown};
 use super::mode::Mode;
 
-/// What the panel shows.
+/// The contents of the panel.
 #[derive(Default)]
 pub(super) struct Shown {
     pub(super) help: bool,
@@ -20,17 +20,17 @@ pub(super) struct Shown {
     pub(super) paint: Paint,
     pub(super) cells: Vec<u32>,
     pub(super) closed: Vec<u32>,
-    /// Triangles drawn, of all, and draws.
+    /// Triangles drawn, triangles in total, and draw calls.
     pub(super) counts: [u64; 3],
     pub(super) camera: Option<Camera>,
     pub(super) mode: Mode,
-    /// Waits for the adapter and queries, where it was asked about portals.
+    /// Waits for the adapter, and occlusion queries, in the mode that uses them.
     pub(super) queries: Option<[u32; 2]>,
     /// Name of the cell at the crosshair.
     pub(super) ahead: String,
-    /// Whether far away rooms and objects are spared.
+    /// `true` if distant rooms and objects are spared.
     pub(super) spares: bool,
-    /// Of the map, over showing all of it.
+    /// Magnification of the map, relative to the whole.
     pub(super) zoom: f32,
     pub(super) is_recording: bool,
     pub(super) flies: bool,
@@ -62,12 +62,12 @@ mouse          look around; Tab: let go of it, then drag
 click          open or close the door or doorway there
 wheel, + -     zoom of the map
 F              fly; Q and E: down and up
-M              drawn: portals, portals asked of the adapter,
+M              drawn: portals, portals by occlusion queries,
                frustum, everything
 L              spare small portals and what is behind them
 C              paint: lit, cells, overdraw
 O              outline doorways and narrowed views
-P              plain: no shadows, no dark corners
+P              plain: no shadows, no ambient occlusion
 F4, F5         record a path; write it
 F12            picture to a file
 F1             this help
@@ -93,7 +93,7 @@ impl Panel {
         }
     }
 
-    /// Whether the panel wants an event for itself.
+    /// Returns `true` if the panel consumes an event.
     pub(super) fn on_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
         self.state.on_window_event(window, event).consumed
     }
@@ -177,7 +177,7 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
         shown.mode.words()
     );
     if let Some([rounds, queries]) = shown.queries {
-        text += &format!("\n{queries} portals asked about in {rounds} rounds");
+        text += &format!("\n{queries} occlusion queries in {rounds} rounds");
     }
     for (is_so, words) in [
         (shown.spares, "small portals spared"),
@@ -221,7 +221,7 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
     }
 }
 
-/// What a click is at, and the cell that is there.
+/// Draws the point that a click hits, and the name of its cell.
 fn draw_crosshair(painter: &egui::Painter, at: Pos2, name: &str) {
     for (width, color) in [(3.0, Color32::from_black_alpha(140)), (1.0, Color32::WHITE)] {
         for d in [Vec2::new(8.0, 0.0), Vec2::new(0.0, 8.0)] {
@@ -236,7 +236,7 @@ fn draw_crosshair(painter: &egui::Painter, at: Pos2, name: &str) {
     }
 }
 
-/// Frame times: a bar each, up to 50 ms, a line at 16.7 ms.
+/// Draws frame times: a bar each, up to 50 ms, with a line at 16.7 ms.
 fn draw_times(painter: &egui::Painter, screen: Rect, times: &VecDeque<f32>) {
     let graph = Rect::from_min_size(
         screen.left_bottom() + Vec2::new(10.0, -70.0),

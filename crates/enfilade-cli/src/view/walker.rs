@@ -1,4 +1,4 @@
-//! Somebody who walks in the window, or flies: the walker of the living world, with an eye of its own.
+//! A person who walks in the window, or flies: the walker of the living world, with an eye of its own.
 
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
@@ -7,7 +7,7 @@ use enfilade::world::{Build, Contacts, Layout, Walker as Body};
 
 use enfilade_cli::cameras::EYE_HEIGHT;
 
-/// A body in a world; or, when it flies, an eye.
+/// A body in a world or, when it flies, an eye.
 pub(super) struct Walker {
     layout: Layout,
     contacts: Contacts,
@@ -34,8 +34,8 @@ impl Walker {
         }
     }
 
-    /// Moves by `wish` (meters a second) for `seconds`, stopped by walls, furniture, leaves of doors as `state` has them, and
-    /// portals that it closes.
+    /// Moves by `wish` (meters per second) for `seconds`; walls, furniture, leaves of doors as in `state`, and
+    /// portals closed there stop it.
     pub(super) fn step(&mut self, wish: DVec3, seconds: f64, state: &SightState) {
         if self.flies {
             self.eye += wish * seconds.clamp(0.0, 0.1);
@@ -57,7 +57,7 @@ mod tests {
     use enfilade::geom::scene::{Mesh, Primitive};
     use enfilade_testkit::{GridParams, room_grid};
 
-    /// Rooms in a row, and somebody in the middle of the first.
+    /// Rooms in a row, and a person in the middle of the first.
     fn rooms(n: usize) -> World {
         room_grid(&GridParams {
             size: [n, 1, 1],
@@ -158,7 +158,7 @@ mod tests {
         let mut world = rooms(1);
         let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
         let x = (low[0] + high[0]) * 0.5 + 0.5;
-        // Steep: 19 cm up on 23 cm.
+        // Steep: steps 19 cm high and 23 cm deep.
         for i in 1..=4 {
             let n = f64::from(i);
             let from = [x + 0.23 * n, low[1], low[2]];
@@ -220,7 +220,7 @@ mod tests {
             walker.eye.x
         };
         let wall = hole.min.x;
-        // The model has it shut.
+        // The door is shut in the model.
         assert!(reached(&world, None, false) < wall && reached(&world, Some(0.0), false) < wall);
         assert!(
             reached(&world, Some(1.0), false) > wall && reached(&world, Some(1.0), true) < wall
