@@ -13,8 +13,6 @@ const STILL: &[&str] = &[
     "crates/enfilade-cli/",
     "crates/enfilade-complex/",
     "crates/enfilade-cpg/",
-    "crates/enfilade-geom/src/allowance.rs",
-    "crates/enfilade-import/",
     "crates/enfilade-render/",
     "crates/enfilade-report/",
     "crates/enfilade-testkit/examples/generate.rs",
