@@ -12,8 +12,6 @@ const STILL: &[&str] = &[
     "crates/enfilade-bench/",
     "crates/enfilade-complex/",
     "crates/enfilade-cpg/",
-    "crates/enfilade-geom/src/allowance.rs",
-    "crates/enfilade-import/",
     "crates/enfilade-render/",
     "crates/enfilade-testkit/examples/generate.rs",
     "crates/enfilade-testkit/src/disturb.rs",

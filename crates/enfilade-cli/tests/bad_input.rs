@@ -214,7 +214,7 @@ fn a_small_file_cannot_ask_for_a_lot_of_memory() {
         d.primitives = r#"{"attributes":{"POSITION":0}}"#.into();
         d
     };
-    let damaged = ["asks for", "damaged", "mesh 0"];
+    let damaged = ["needs", "damaged", "mesh 0"];
     folder.refused_file("zeros.glb", numbers(99_000_000, "").glb(), &damaged);
     let sparse = r#","sparse":{"count":1,"indices":{"bufferView":1,"componentType":5123},
         "values":{"bufferView":0}}"#;
@@ -228,7 +228,7 @@ fn a_small_file_cannot_ask_for_a_lot_of_memory() {
 
     let mut d = numbers(1_000_000, "");
     d.primitives = vec![r#"{"attributes":{"POSITION":0,"NORMAL":0}}"#; 90].join(",");
-    folder.refused_file("again.glb", d.glb(), &["asks for", "primitive"]);
+    folder.refused_file("again.glb", d.glb(), &["needs", "primitive"]);
 
     let mut d = tetrahedron(4.0);
     d.accessors += r#",{"componentType":5125,"count":290000000,"type":"SCALAR"}"#;
@@ -240,8 +240,8 @@ fn a_small_file_cannot_ask_for_a_lot_of_memory() {
     d.nodes = r#"{"mesh":0,"name":"Thing","extensions":{"EXT_mesh_gpu_instancing":
         {"attributes":{"TRANSLATION":2}}}}"#
         .into();
-    folder.refused_file("instances.glb", d.glb(), &["asks for", "node 0 'Thing'"]);
-    // The same, with a long name each.
+    folder.refused_file("instances.glb", d.glb(), &["needs", "node 0 'Thing'"]);
+    // The same, each with a long name.
     d.accessors = d.accessors.replace("1900000", "100000");
     d.nodes = d.nodes.replace("Thing", &"Thing".repeat(1000));
     folder.refused(1, &["none.glb", "-o", "out.glb"], &["none.glb"]);
@@ -279,7 +279,7 @@ fn broken_numbers_and_references_are_named_with_their_place() {
         for at in (0..48).step_by(12) {
             d.bin[at..at + 4].copy_from_slice(&bad.to_le_bytes());
         }
-        let words = ["no triangles", "no finite numbers"];
+        let words = ["no triangles", "not finite"];
         folder.refused_file(&format!("{name}.glb"), d.glb(), &words);
     }
     let mut d = tetrahedron(4.0);

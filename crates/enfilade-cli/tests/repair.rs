@@ -33,7 +33,7 @@ fn a_bake_repairs_on_request_and_says_what_it_changed() {
     let done = enfilade(&["bake", "--repair", &obj, "-o", &better]);
     assert!(done.status.success(), "{done:?}");
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    let line = format!("{:<30} {:>9}", "corners welded", 1);
+    let line = format!("{:<30} {:>9}", "vertices welded", 1);
     assert!(said.contains(&line), "{said}");
     // The world has the repaired triangles, and records the repair.
     let done = enfilade(&[
@@ -47,7 +47,7 @@ fn a_bake_repairs_on_request_and_says_what_it_changed() {
     // A distance below the gap closes nothing; an invalid distance is refused.
     let done = enfilade(&["bake", "--repair=0.0001", &obj, "-o", &better]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(!said.contains("corners welded"), "{said}");
+    assert!(!said.contains("vertices welded"), "{said}");
     let done = enfilade(&["bake", "--repair=5", &obj, "-o", &better]);
     assert_eq!(done.status.code(), Some(2));
 }

@@ -1,24 +1,24 @@
-//! How much work may be done: asked inside long loops, so that no input makes them run away.
+//! Limits on work, time and memory, checked inside long loops so that no input makes them run away.
 
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::Instant;
 
-/// How much work looks at the clock once. About half a millisecond.
+/// Work between two looks at the clock. About half a millisecond.
 const LOOK: u64 = 1 << 12;
 
-/// How much work looks once at the memory that is held, which takes longer. About ten milliseconds.
+/// Work between two looks at the memory held, which take longer. About ten milliseconds.
 const LOOK_AT_MEMORY: u64 = 1 << 16;
 
-/// Memory of a program before it has any work: its code, and the libraries that it links. [Units: bytes]
+/// Memory of a program before any work: its code and the libraries it links. [Units: bytes]
 pub const PROGRAM: u64 = 64 << 20;
 
-/// Tells the memory that the process holds, where the system says. [Units: bytes]
+/// Returns the memory that the process holds; `None` if the system does not report it. [Units: bytes]
 pub type MemoryProbe = fn() -> Option<u64>;
 
-/// What is left to be spent on one task, by all its threads.
+/// The budget of one task, shared by all its threads.
 ///
-/// Work is counted in units of about 100 ns, the cut of a polygon. Whether it suffices does not depend on threads: what is
-/// spent is a sum. Once it is over, loops end early with a result that makes no sense, and who gave it must ask
+/// Work is counted in units of about 100 ns, the cut of a polygon. It is a sum, so the number of threads does
+/// not matter. Once the budget is spent, loops end early with a meaningless result; their callers must check
 /// [`Allowance::end`].
 #[derive(Debug)]
 pub struct Allowance {
@@ -26,18 +26,18 @@ pub struct Allowance {
     most: AtomicU64,
     until: Option<Instant>,
     memory: Option<(u64, MemoryProbe)>,
-    /// The end that was seen at a look, [`LATE`] or [`FULL`]; 0 for none.
+    /// The end found at the last look, [`LATE`] or [`FULL`]; 0 for none.
     seen: AtomicU8,
 }
 
-/// Why an allowance is over.
+/// The reason why an allowance is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// All the work is done that was allowed.
+    /// The allowed work is done.
     Work,
     /// The time is up.
     Time,
-    /// More memory is held than was allowed.
+    /// The process holds more memory than allowed.
     Memory,
 }
 
@@ -51,7 +51,7 @@ impl Default for Allowance {
 }
 
 impl Allowance {
-    /// An allowance of so much work, until then.
+    /// Allows `most` units of work, and none after `until`.
     #[must_use]
     pub fn new(most: u64, until: Option<Instant>) -> Self {
         Self {
@@ -63,14 +63,14 @@ impl Allowance {
         }
     }
 
-    /// Adds that it is over when the process holds more than so many bytes by the probe, and [`PROGRAM`] besides.
+    /// Adds a limit on memory: over when the probe returns more than `bytes` plus [`PROGRAM`].
     #[must_use]
     pub fn holding(mut self, bytes: u64, probe: MemoryProbe) -> Self {
         self.memory = Some((bytes.saturating_add(PROGRAM), probe));
         self
     }
 
-    /// Adds some: the task has turned out larger, by what is bounded elsewhere.
+    /// Adds work: the task turned out larger, by an amount that is bounded elsewhere.
     pub fn grant(&self, work: u64) {
         let most = self.most().saturating_add(work);
         self.most.store(most, Ordering::Relaxed);
@@ -80,10 +80,11 @@ impl Allowance {
         self.most.load(Ordering::Relaxed)
     }
 
-    /// Spends some; says whether to go on. A few nanoseconds, and a look at clock and memory now and then.
+    /// Spends work; returns `false` once it is over. A few nanoseconds, and now and then a look at clock and
+    /// memory.
     #[inline]
     pub fn spend(&self, work: u64) -> bool {
-        // What is not done any more is not counted.
+        // Counts only work that is done.
         if self.spent() > self.most() || self.seen.load(Ordering::Relaxed) != 0 {
             return false;
         }
@@ -95,7 +96,7 @@ impl Allowance {
         after <= self.most() && self.seen.load(Ordering::Relaxed) == 0
     }
 
-    /// A filter for what a loop goes through: spends so much on each item, and lets none pass once all is over.
+    /// Returns a filter for a loop's items: spends `work` on each, and rejects all once the allowance is over.
     pub fn each<T: ?Sized>(&self, work: u64) -> impl Fn(&T) -> bool + Copy + '_ {
         move |_| self.spend(work)
     }
@@ -112,7 +113,7 @@ impl Allowance {
         }
     }
 
-    /// Why it is over, if it is; looks at clock and memory. What was once seen stays.
+    /// Returns the reason why it is over, if it is; looks at clock and memory. An end by time or memory stays.
     #[must_use]
     pub fn end(&self) -> Option<End> {
         if self.seen.load(Ordering::Relaxed) == 0 {
@@ -125,20 +126,20 @@ impl Allowance {
         }
     }
 
-    /// Whether it is over; looks at clock and memory.
+    /// Returns `true` if it is over; looks at clock and memory.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.end().is_some()
     }
 
-    /// What was spent.
+    /// Returns the work spent.
     #[must_use]
     pub fn spent(&self) -> u64 {
         self.spent.load(Ordering::Relaxed)
     }
 }
 
-/// An allowance, or none for loops that may spend as much as they want.
+/// An allowance, or none for loops without a limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Purse<'a>(Option<&'a Allowance>);
 
@@ -155,13 +156,13 @@ impl<'a> Purse<'a> {
         Self(None)
     }
 
-    /// Spends some; says whether to go on.
+    /// Spends work; returns `false` once the allowance is over.
     #[inline]
     pub fn spend(self, work: u64) -> bool {
         self.0.is_none_or(|allowance| allowance.spend(work))
     }
 
-    /// A filter as [`Allowance::each`].
+    /// Returns a filter like [`Allowance::each`].
     pub fn each<T: ?Sized>(self, work: u64) -> impl Fn(&T) -> bool + Copy + 'a {
         move |_| self.spend(work)
     }

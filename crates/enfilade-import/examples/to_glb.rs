@@ -1,5 +1,5 @@
-//! Reads scenes of any format, says what was noticed and what is odd about them, and writes one
-//! GLB: `to_glb OUT.glb IN...`.
+//! Reads scenes of any format, prints the reports of import and cleaning, and writes one GLB:
+//! `to_glb OUT.glb IN...`.
 
 use enfilade_import::{CleaningOptions, ImportOptions, cleaning_report, export_glb, import};
 use std::error::Error;
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = std::time::Instant::now();
     let options = CleaningOptions::default();
     let report = cleaning_report(&imported.scene, Some(&imported.report), &options)?;
-    eprintln!("{report}\nlooked at in {:?}", start.elapsed());
+    eprintln!("{report}\nchecked in {:?}", start.elapsed());
     std::fs::write(out, export_glb(&imported.scene))?;
     Ok(())
 }

@@ -1,10 +1,10 @@
-//! Roles of objects that nothing is said about, by the openings they fill and by what they hide.
+//! Roles of objects that no name or rule decides, from the openings they fill and how little they hide.
 //!
-//! Door leaves and panes are found first (`fillers`), then what is small and one can see around, what
-//! is large and one sees through, and other furniture (`furniture`); only that becomes detail.
-//! The judge errs to *structural*: a chair taken for a wall costs a portal or two, a piece of a wall
-//! taken for a chair opens a room. So whatever stands between two things stays: the piece of a wall
-//! between floor and ceiling, the lintel between two jambs, the tile between its neighbors.
+//! Door leaves and panes are found first (`fillers`), then small objects with free space around them, large
+//! objects one sees through, and other furniture (`furniture`); only these become detail. The test errs to
+//! *structural*: a chair taken for a wall costs a portal or two, a piece of a wall taken for a chair opens a
+//! room. So everything that stands between two things stays: the piece of a wall between floor and ceiling, the
+//! lintel between two jambs, the tile between its neighbors.
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
@@ -16,67 +16,66 @@ mod fillers;
 mod furniture;
 mod units;
 
-/// The reason of objects that no rule fitted.
+/// Reason of objects that match no rule.
 pub(crate) const DEFAULT: &str = "default";
 
-/// Longest edge of what may stand in a room: a bed or a sofa, not a door. [Units: wu]
+/// Longest edge of an object that may stand in a room: a bed or a sofa, not a door. [Units: wu]
 const SMALL: f64 = 2.0;
 /// The same as a share of the scene's diagonal: chairs are not large in their room.
 const SMALL_SHARE: f64 = 0.25;
 /// A plate is thinner than this share of its middle edge.
 const PLATE: f64 = 0.2;
-/// What is nearer than this touches. [Units: wu]
+/// Objects nearer than this touch. [Units: wu]
 const NEAR: f64 = 0.05;
-/// How far into the object that is looked for, as kits let their pieces overlap. [Units: wu]
+/// Depth below the surface from which contact is searched, as kits let their pieces overlap. [Units: wu]
 const INTO: f64 = 0.02;
-/// Cells along each edge of a side; one in four of them touched, and the side is.
+/// Cells along each edge of a side. A side is touched if a quarter of its cells are.
 const CELLS: usize = 3;
 const TOUCHED: usize = CELLS * CELLS / 4;
-/// A side that others touch must go on beyond the object in so many of four directions, as the floor
-/// around a chair does. The next brick of a wall ends where this one does.
+/// The surface that touches a side must continue beyond the object in this many of four directions, as the
+/// floor around a chair does. The next brick of a wall ends where this one does.
 const GOES_ON: usize = 3;
-/// Where it is looked for beyond the object. [Units: wu]
+/// Distances beyond the object at which it must continue. [Units: wu]
 const BEYOND: [f64; 2] = [0.03, 0.12];
-/// Rails and grilles fill less than this share of their box. Piers beside a wide opening may, too,
-/// and so the following limits.
+/// Rails and grilles fill less than this share of their box. Piers beside a wide opening may, too; hence the
+/// next two limits.
 const SPARSE: f64 = 0.15;
-/// Rails and grilles are no thicker than this. [Units: wu]
+/// Largest thickness of rails and grilles. [Units: wu]
 const FLAT: f64 = 0.3;
-/// Each connected part of a rail is a bar, and no wider than this. [Units: wu]
+/// Largest width of a bar. Each connected part of a rail is a bar. [Units: wu]
 const BAR: f64 = 0.12;
-/// A surface whose open rim lies on others is a piece of a shell, as the reveal of a doorway is that
-/// was split from its wall; unless so little of it does, in edges of its box, that it may be the
-/// open ends of a chair's legs.
+/// A surface whose open rim lies on others is a piece of a shell, such as the reveal of a doorway that was
+/// split from its wall. A rim shorter than this, in edges of its box, may be the open ends of a chair's legs.
 const RIM_SHARE: f64 = 0.25;
-/// The rim lies on what is nearer than this. [Units: wu]
+/// Distance within which a rim lies on another surface. [Units: wu]
 const ON: f64 = 1e-3;
-/// Where more than this share of the structural surface would be detail, the scene is built of small
-/// pieces and nothing in it is furniture.
+/// If detail would exceed this share of the structural surface, the scene is built of small pieces and none of
+/// them is furniture.
 const MOST: f64 = 0.3;
-/// So many small objects are no furniture, either; and looking at each takes time.
+/// More small objects than this are not furniture, either; and testing each takes time.
 const MOST_OBJECTS: usize = 50_000;
 
-/// How often what is left is asked again: a stack of so many boxes is furniture.
+/// Passes over the objects that are left: a stack of this many boxes is furniture.
 const ROUNDS: usize = 4;
 
-/// What is known of one structural object.
+/// Measures of one structural object.
 struct Shape {
     object: usize,
-    /// Its own, in the list of all.
+    /// Its triangles in the list of all.
     triangles: Range<usize>,
     bounds: Aabb,
-    /// Surface, one side. [Units: wu²]
+    /// Area of its surface, one side. [Units: wu²]
     area: f64,
-    /// Surface as seen along each axis, front and back counted. [Units: wu²]
+    /// Area projected along each axis, front and back counted. [Units: wu²]
     shadow: DVec3,
-    /// Nothing is said about it.
+    /// No rule decides its role.
     is_open: bool,
 }
 
-/// Gives objects that nothing is said about a role by size and occlusion, with the reason.
+/// Decides by size and occlusion the role of objects that no rule decides, and records the reason.
 ///
-/// Leaves scenes of fewer than three structural objects as they are: there is nothing to compare
-/// with. O(t log t) for t structural triangles, and O(log t) a small object.
+/// Leaves scenes of fewer than three structural objects unchanged: there is nothing to compare with. O(t log t)
+/// for t structural triangles, and O(log t) per small object.
 pub(crate) fn judge(scene: &mut Scene) {
     let n_open = scene.objects.iter().filter(|o| is_open(o)).count();
     let n_structural = scene
@@ -112,7 +111,7 @@ pub(crate) fn judge(scene: &mut Scene) {
     };
     let mut found: Vec<(usize, String)> = Vec::new();
     let mut detail_area = 0.0;
-    // What stands on furniture, or below it, is seen when that is gone.
+    // Objects on or below furniture become free once it is gone.
     for _ in 0..ROUNDS {
         let before = found.len();
         for shape in shapes
@@ -120,7 +119,7 @@ pub(crate) fn judge(scene: &mut Scene) {
             .filter(|s| s.is_open && !judge.is_gone[s.object])
         {
             if let Some(reason) = judge.reason(shape) {
-                // The leaves of a plant are more surface than it hides.
+                // The leaves of a plant have more area than they hide.
                 detail_area += shape.area.min(shape.bounds.surface_area());
                 found.push((shape.object, reason));
             }
@@ -147,19 +146,19 @@ pub(crate) fn judge(scene: &mut Scene) {
     }
 }
 
-/// What is asked about each object that is no filler.
+/// Tests of each object that is not a filler.
 struct Judge<'a> {
     triangles: &'a [Triangle],
     owners: &'a [u32],
     bvh: Option<&'a Bvh>,
-    /// Of the structure. [Units: wu]
+    /// Diagonal of the structure's box. [Units: wu]
     diagonal: f64,
     /// Objects known to be detail.
     is_gone: Vec<bool>,
 }
 
 impl Judge<'_> {
-    /// Why an object is detail, if it is.
+    /// Returns the reason why an object is detail; `None` if it is structural.
     fn reason(&self, shape: &Shape) -> Option<String> {
         let own = &self.triangles[shape.triangles.clone()];
         let size = shape.bounds.size();
@@ -190,12 +189,12 @@ impl Judge<'_> {
             let upright = units::upright(shape.object as u32, own);
             reason = furniture::reason(&upright, &shape.bounds, self.diagonal, &meets, &touches);
         }
-        // The rim is asked last, as it costs most.
+        // The rim comes last, as it costs most.
         reason.filter(|_| !goes_on_at_its_rim(own, &shape.bounds, &touches))
     }
 }
 
-/// Whether an object is a row of bars, level, upright or inclined.
+/// Returns `true` if an object is a row of bars, level, upright or inclined.
 fn is_rail(shape: &Shape, own: &[Triangle]) -> bool {
     if shape.bounds.size().min_element() > FLAT || fill(shape) >= SPARSE {
         return false;
@@ -207,7 +206,7 @@ fn is_rail(shape: &Shape, own: &[Triangle]) -> bool {
     })
 }
 
-/// Objects all of whose things fill openings become detail.
+/// Makes detail of objects whose units all fill openings.
 fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) {
     let units: Vec<Unit> = shapes
         .iter()
@@ -229,7 +228,7 @@ fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bv
     };
     let is_open = |unit: &Unit| is_open(&scene.objects[unit.object as usize]);
     let found = fillers::fillers(&units, &is_open, &around);
-    // An object's role is one, so each of its things must fill an opening, or belong to one that does.
+    // An object has one role, so each of its units must fill an opening or belong to one that does.
     let mut reasons = vec![None; units.len()];
     for (unit, reason) in found {
         reasons[unit as usize] = Some(reason);
@@ -253,7 +252,7 @@ fn is_open(object: &enfilade_geom::scene::Object) -> bool {
     object.role == Role::Structural && object.reason == DEFAULT
 }
 
-/// Each structural object's shape; all their triangles, and the object of each.
+/// Returns the shape of each structural object, the triangles of all, and the object of each triangle.
 fn shapes_of(scene: &Scene) -> (Vec<Shape>, Vec<Triangle>, Vec<u32>) {
     let mut shapes: Vec<Shape> = Vec::new();
     let mut triangles = Vec::new();
@@ -286,15 +285,15 @@ fn shapes_of(scene: &Scene) -> (Vec<Shape>, Vec<Triangle>, Vec<u32>) {
     (shapes, triangles, owners)
 }
 
-/// The largest surface that a shape shows along an axis, as a share of its box's largest side. Both
-/// sides of a closed shape count, as half each.
+/// Returns the largest projected area along an axis, as a share of the box's largest side. Both sides of a
+/// closed shape count, each as half.
 fn fill(shape: &Shape) -> f64 {
     let size = shape.bounds.size();
     let sides = DVec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
     0.5 * shape.shadow.max_element() / sides.max_element().max(f64::MIN_POSITIVE)
 }
 
-/// Whether others begin where the surface ends.
+/// Returns `true` if other objects begin where the surface ends.
 fn goes_on_at_its_rim(
     triangles: &[Triangle],
     bounds: &Aabb,
@@ -320,8 +319,8 @@ fn goes_on_at_its_rim(
     on_others > RIM_SHARE * 4.0 * bounds.size().element_sum()
 }
 
-/// Why one sees around a small object, if one does: it stands, hangs or leans, and stands between
-/// nothing.
+/// Returns the reason why a small object has free space around it: it stands, hangs or leans, and not between
+/// two things. `None` if it has not.
 fn seen_around(bounds: &Aabb, touches: &dyn Fn(&Aabb) -> bool) -> Option<String> {
     const SIDES: [[&str; 2]; 3] = [
         ["a side", "a side"],
@@ -335,7 +334,7 @@ fn seen_around(bounds: &Aabb, touches: &dyn Fn(&Aabb) -> bool) -> Option<String>
     let mut touched = Vec::new();
     for axis in 0..3 {
         let sides = [false, true].map(|high| is_side_touched(bounds, axis, high, touches));
-        // Between two things; or the rim of a plate, which goes on in what it touches.
+        // Touched on both sides, or at the rim of a plate, which continues in its neighbor.
         let is_rim = is_plate && size[axis] > sorted[0];
         if sides == [true, true] || is_rim && sides != [false, false] {
             return None;
@@ -358,15 +357,15 @@ fn seen_around(bounds: &Aabb, touches: &dyn Fn(&Aabb) -> bool) -> Option<String>
     ))
 }
 
-/// Whether others touch a side of the box. Its margin is not looked at: the floor below touches that
-/// of every other side.
+/// Returns `true` if other objects touch a side of the box. Ignores the side's margin, which the floor below
+/// touches on every other side.
 fn is_side_touched(
     bounds: &Aabb,
     axis: usize,
     high: bool,
     touches: &dyn Fn(&Aabb) -> bool,
 ) -> bool {
-    /// Rounding to `f32` moves what was flush. [Units: wu]
+    /// Rounding to `f32` moves flush surfaces by less. [Units: wu]
     const FLUSH: f64 = 1e-4;
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let size = bounds.size();
@@ -384,7 +383,7 @@ fn is_side_touched(
     n >= TOUCHED.max(1)
 }
 
-/// Where contact is looked for at a side, across it.
+/// Returns the range across a side in which contact is searched.
 fn skin(bounds: &Aabb, axis: usize, high: bool) -> (f64, f64) {
     let into = INTO.min(0.25 * bounds.size()[axis]);
     if high {
@@ -394,7 +393,7 @@ fn skin(bounds: &Aabb, axis: usize, high: bool) -> (f64, f64) {
     }
 }
 
-/// In how many of four directions what touches a side goes on beyond it.
+/// Returns the number of directions, of four, in which the surface that touches a side continues beyond it.
 fn n_goes_on(bounds: &Aabb, axis: usize, high: bool, touches: &dyn Fn(&Aabb) -> bool) -> usize {
     let mut n = 0;
     for k in [(axis + 1) % 3, (axis + 2) % 3] {

@@ -21,7 +21,7 @@ pub(crate) struct Builder<'a> {
     pub(crate) report: ImportReport,
     /// The file being read.
     pub(crate) path: PathBuf,
-    /// Where its relative references start; `None` when read from memory.
+    /// Folder of its relative references; `None` when read from memory.
     folder: Option<PathBuf>,
     pub(crate) base: DMat4,
     scene: Scene,
@@ -32,16 +32,16 @@ pub(crate) struct Builder<'a> {
     n_image_bytes: u64,
     /// Bytes read from files.
     n_read_bytes: u64,
-    /// Bytes that what was read asks for in memory, here or when it is baked.
+    /// Memory that the input takes, here or when it is baked. [Units: bytes]
     n_held_bytes: u64,
-    /// Meshes made from other meshes: which, mirrored or not, which primitives.
+    /// Meshes made from other meshes: source, mirrored or not, primitives.
     variants: HashMap<(u32, bool, MeshPart), u32>,
-    /// Of the meshes so far.
+    /// Grid steps of the meshes so far.
     steps: GridSteps,
     origins: Origins,
 }
 
-/// Which primitives of a mesh.
+/// The primitives of a mesh that a variant keeps.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum MeshPart {
     All,
@@ -52,16 +52,16 @@ enum MeshPart {
 /// A mesh to be placed.
 pub(crate) struct Placement<'n> {
     pub(crate) mesh: u32,
-    /// Names to judge the role by: the node's own, its mesh's.
+    /// Names that decide the role: the node's own, its mesh's.
     pub(crate) names: [&'n str; 2],
     /// Names of the nodes above, nearest first.
     pub(crate) ancestors: &'n [&'n str],
     /// One object each.
     pub(crate) transforms: &'n [DMat4],
-    /// Why it moves, if it does.
+    /// The reason why it moves, if it does.
     pub(crate) moves: Option<&'static str>,
     pub(crate) place: &'n str,
-    /// What the input says it is, as [`Builder::add_source`] gave it.
+    /// Its node in the tree of names, from [`Builder::add_source`].
     pub(crate) source: Option<u32>,
 }
 
@@ -147,7 +147,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Places a mesh whose role its format tells; the transform must not mirror. Its index.
+    /// Places a mesh whose format decides its role, and returns its index. The transform must not mirror.
     pub(crate) fn place_as(
         &mut self,
         mesh: u32,
@@ -200,14 +200,15 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Says that so many bytes were read, of this file or one that it refers to.
+    /// Adds to the bytes read, of this file or one that it refers to.
     pub(crate) fn add_read_bytes(&mut self, n: u64) {
         self.n_read_bytes = self.n_read_bytes.saturating_add(n);
     }
 
-    /// Says that bytes read were unpacked, so that a compressed file may hold what it could in plain.
+    /// Adds the unpacked size of compressed bytes, so that a compressed file may hold as much as an uncompressed one.
     ///
-    /// Up to [`MAX_UNPACKING`] times what it is: what unpacks further has no more numbers in it, only more zeros.
+    /// At most [`MAX_UNPACKING`] times the packed size: bytes that unpack further hold no more numbers, only more
+    /// zeros.
     pub(crate) fn add_unpacked_bytes(&mut self, packed: u64, plain: u64) {
         let most = packed.saturating_mul(MAX_UNPACKING);
         self.add_read_bytes(plain.min(most).saturating_sub(packed));
@@ -233,7 +234,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Bytes that may be asked for before [`ImportError::Bomb`].
+    /// Returns the memory left before [`ImportError::Bomb`]. [Units: bytes]
     pub(crate) fn memory_left(&self) -> u64 {
         self.max_held_bytes().saturating_sub(self.n_held_bytes)
     }
@@ -310,7 +311,7 @@ impl<'a> Builder<'a> {
         self.scene.meshes.len() as u32 - 1
     }
 
-    /// As [`Builder::push_mesh`], a mesh of which some positions were rounded to a grid; `steps` as in [`GridSteps`].
+    /// As [`Builder::push_mesh`], for a mesh with positions rounded to a grid; `steps` as in [`GridSteps`].
     pub(crate) fn push_quantized_mesh(&mut self, mesh: Mesh, steps: Vec<f32>) -> u32 {
         let made = self.push_mesh(mesh);
         if steps.iter().any(|&s| s > 0.0) {
@@ -319,7 +320,7 @@ impl<'a> Builder<'a> {
         made
     }
 
-    /// Drops triangles at vertices that are no finite numbers, and those vertices.
+    /// Drops vertices with a coordinate that is not finite, and their triangles.
     ///
     /// A NaN would make every box that it enters meaningless.
     pub(crate) fn drop_nonfinite(&mut self, place: &str, primitive: &mut Primitive) {
@@ -364,19 +365,17 @@ impl<'a> Builder<'a> {
         }
         self.note(
             place,
-            "coordinates that are no finite numbers; those triangles are dropped",
+            "coordinates that are not finite; their triangles are dropped",
         );
     }
 
-    /// Places a mesh: judges its role, splits it where only a part can be seen through, and
-    /// keeps the placement's determinant positive.
+    /// Places a mesh: decides its role, splits off see-through parts, and keeps the placement's determinant positive.
     ///
-    /// A mirroring placement turns front faces into back faces. So the mesh itself is mirrored
-    /// (`x` negated and the winding turned round, once for all its mirrored placements) and the
-    /// placement mirrored back: each corner stays exactly where it was, and no reader of the
-    /// scene has to think of the determinant's sign.
+    /// A mirroring placement turns front faces into back faces. So the mesh itself is mirrored (`x` negated and the
+    /// winding reversed, once for all its mirrored placements) and the placement mirrored back: every vertex stays
+    /// exactly in place, and no reader of the scene needs the determinant's sign.
     pub(crate) fn place(&mut self, placement: &Placement<'_>) -> Result<(), ImportError> {
-        // Counted first, so that placements that are then left out cost bounded time, too.
+        // Counts first, so that placements that are left out cost bounded time, too.
         let n_placed = placement.transforms.len() as u64;
         self.check_objects(placement.place, n_placed)?;
         self.n_placements = self.n_placements.saturating_add(n_placed);
@@ -445,7 +444,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// What a mesh is where it is placed, and whether one can see through a part of it alone.
+    /// Returns the verdict on a placed mesh, and `true` if it has both opaque and see-through parts.
     fn judge(&self, placement: &Placement<'_>, mesh: &Mesh) -> (Verdict, bool) {
         let drawn = || mesh.primitives.iter().filter(|p| !p.indices.is_empty());
         let is_clear: Vec<bool> = drawn().map(|p| self.is_see_through(p)).collect();
@@ -465,7 +464,7 @@ impl<'a> Builder<'a> {
         (verdict, is_mixed)
     }
 
-    /// The transform with a positive determinant, and whether it takes the mirrored mesh for that.
+    /// Returns the transform with a positive determinant, and `true` if it needs the mirrored mesh.
     fn unmirrored(
         &mut self,
         placement: &Placement<'_>,
@@ -495,7 +494,7 @@ impl<'a> Builder<'a> {
             .is_some_and(|m| m.transparent || self.options.roles.is_clear_material(&m.name))
     }
 
-    /// The mesh, mirrored and reduced to a part as asked; made once.
+    /// Returns the mesh, mirrored or reduced to a part on request; each variant is made once.
     fn variant(
         &mut self,
         placement: &Placement<'_>,
@@ -540,13 +539,13 @@ impl<'a> Builder<'a> {
             mesh.primitives.iter_mut().for_each(mirror);
             self.note(
                 placement.place,
-                "mirrored placement; its mesh is mirrored and its winding turned round",
+                "mirrored placement; its mesh is mirrored and its winding reversed",
             );
         }
         if part == MeshPart::SeeThrough {
             self.note(
                 placement.place,
-                "an object of opaque and see-through parts; split in two",
+                "an object with opaque and see-through parts; split in two",
             );
         }
         let made = self.push_quantized_mesh(mesh, kept_steps);
@@ -554,7 +553,7 @@ impl<'a> Builder<'a> {
         Ok(made)
     }
 
-    /// Ends the import: drops meshes that nothing places, puts everything in order, and makes one what quantization parted.
+    /// Ends the import: drops unplaced meshes, sorts the scene, and joins vertices that quantization separated.
     pub(crate) fn finish(mut self) -> (Scene, ImportReport) {
         let mut remap = vec![u32::MAX; self.scene.meshes.len()];
         let mut kept = Vec::new();
@@ -575,7 +574,7 @@ impl<'a> Builder<'a> {
         let n_welded = weld_quantized(&mut self.scene, &steps);
         if n_welded > 0 {
             let text = format!(
-                "quantized positions: {n_welded} corners that were less than half a step of their grids apart made one"
+                "quantized positions: joined {n_welded} vertices less than half a step of their grids apart"
             );
             self.report.note(&self.path, "meshes", text);
         }
@@ -583,10 +582,10 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// How many times its size a compressed part counts as read. Triangles of buildings take 18 bytes or more in plain, and one or
-/// two compressed.
+/// Largest ratio of unpacked to packed bytes that counts as read. Triangles of buildings take 18 bytes or more
+/// uncompressed, and one or two compressed.
 const MAX_UNPACKING: u64 = 16;
-/// Room for an object, its texts aside.
+/// Memory of an object without its texts.
 const OBJECT_BYTES: u64 = 2 * size_of::<Object>() as u64;
-/// A triangle in world space, as the decomposition holds it.
+/// Memory of a world-space triangle in the decomposition.
 const TRIANGLE_BYTES: u64 = size_of::<Triangle>() as u64;

@@ -1,7 +1,7 @@
-//! What is odd about a scene's surface, found and counted, never changed.
+//! Finds and counts defects of a scene's surface, and changes nothing.
 //!
-//! Corners closer than the welding distance count as one. Edges are sorted, not hashed, and the
-//! only search in space is bounded by a budget, so that a million triangles take seconds.
+//! Vertices closer than the welding distance count as one. Edges are sorted, not hashed, and every search in space
+//! has a budget, so that a million triangles take seconds.
 
 use crate::repair::holes_of;
 use crate::report::Finding;
@@ -13,17 +13,17 @@ use enfilade_geom::{DVec3, Triangle, shown, triangle_area_normal};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-/// What counts as odd.
+/// Thresholds and scope of the search for defects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CleaningOptions {
-    /// Corners at most this far apart count as one. [Units: wu] [Limit: 1e-9 to 1]
+    /// Largest distance of vertices that count as one. [Units: wu] [Limit: 1e-9 to 1]
     pub weld: f64,
-    /// A corner this near to the inside of an open edge makes a T-junction. [Units: wu]
+    /// Largest distance of a vertex from the inside of an open edge that makes a T-junction. [Units: wu]
     /// [Limit: at least `weld`, at most 1]
     pub t_junction: f64,
-    /// Look at detail objects, too.
+    /// Include detail objects.
     pub has_detail: bool,
-    /// Pairs of triangles looked at for crossing ones, at most; 0 looks at none.
+    /// Most pairs of triangles tested for crossing; 0 tests none.
     pub crossing_pairs: u64,
 }
 
@@ -38,67 +38,66 @@ impl Default for CleaningOptions {
     }
 }
 
-/// What is odd about a scene's surface. Counts with a few places each, in world space.
+/// Defects of a scene's surface: counts with a few places each, in world space.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CleaningReport {
-    /// Triangles looked at.
+    /// Triangles examined.
     pub n_triangles: u64,
     /// Vertices equal to an earlier one of their primitive in every attribute.
     pub duplicate_vertices: Finding,
-    /// Triangles with the same three corners as an earlier one, in any order and object.
+    /// Triangles with the same three vertices as an earlier one, in any order and object.
     pub duplicate_triangles: Finding,
     /// Triangles lower than the welding distance: a point or a line.
     pub degenerate_triangles: Finding,
     /// Ends of open edges that lie inside another open edge.
     pub t_junctions: Finding,
-    /// Whether the search for T-junctions went through to its end.
+    /// The search for T-junctions was completed.
     pub is_complete: bool,
     /// Edges used by one triangle only, over all objects.
     pub open_edges: Finding,
-    /// Loops of open edges across which the surface around them goes on, the largest first: triangles are missing. Rims of
-    /// sheets are none, and neither is a whole face that is missing: a box may be meant to be open.
+    /// Loops of open edges across which the surrounding surface continues, largest first: triangles are missing. Rims
+    /// of sheets do not count, nor does a missing whole face: a box may be meant to be open.
     pub holes: Finding,
-    /// Whether the search for them went through to its end; none is made among more than two million triangles.
+    /// The search for holes was completed. It is skipped above two million triangles.
     pub is_holes_complete: bool,
     /// Edges used by more than two triangles of one object.
     pub non_manifold_edges: Finding,
-    /// Triangles turned against most of those that they hang together with.
+    /// Triangles turned against most of their shell.
     pub flipped_triangles: Finding,
-    /// Closed shells whose front faces look inwards: turned inside out, or rooms modeled from
-    /// within.
+    /// Closed shells whose front faces look inwards: inside out, or rooms modeled from within.
     pub inverted_shells: Finding,
-    /// Pairs of triangles of one object that share no corner and of which one runs through the other.
+    /// Pairs of triangles of one object that share no vertex and run through each other.
     pub crossing_triangles: Finding,
-    /// Whether the search for them went through to its end.
+    /// The search for crossing triangles was completed.
     pub is_crossing_complete: bool,
-    /// What the shells of the objects are.
+    /// Shells of the objects, by kind.
     pub shells: ShellCounts,
-    /// From the import: polygons with a corner that turns inwards.
+    /// From the import: polygons with a reflex vertex.
     pub concave_polygons: Finding,
     /// From the import: polygons whose outline crosses itself.
     pub crossing_polygons: Finding,
-    /// From the import: polygons with a corner more than 1 mm off their plane.
+    /// From the import: polygons with a vertex more than 1 mm off their plane.
     pub non_planar_polygons: Finding,
-    /// From the import: vertices that are no finite numbers, dropped with their triangles.
+    /// From the import: vertices with a coordinate that is not finite, dropped with their triangles.
     pub nonfinite_vertices: Finding,
 }
 
-/// Triangles of an object that hang together over edges with exactly two of them make a shell; how many are what
-/// (after Gjørup 1999, §2.4.1).
+/// Numbers of shells by kind. A shell is triangles of an object connected over edges with exactly two of them (after
+/// Gjørup 1999, §2.4.1).
 ///
-/// Where triangles are turned against each other, most of them decide.
+/// Where triangles disagree in orientation, the majority decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShellCounts {
-    /// Closed, front faces outwards: what is inside is matter.
+    /// Closed, front faces outwards: solid matter inside.
     pub solids: u64,
-    /// Closed, front faces inwards: what is inside is a room, or the shell is inside out.
+    /// Closed, front faces inwards: a room inside, or a shell that is inside out.
     pub rooms: u64,
-    /// With a rim, with an edge that more than two triangles use, or with one side only.
+    /// With a rim, an edge that more than two triangles use, or one side only.
     pub open: u64,
 }
 
 impl CleaningReport {
-    /// The findings with what to call them, in the order shown.
+    /// Returns the findings with their names, in display order.
     #[must_use]
     pub fn findings(&self) -> [(&'static str, &Finding); 14] {
         [
@@ -120,7 +119,7 @@ impl CleaningReport {
     }
 }
 
-/// Rows of what there is; what is nowhere has none.
+/// One row for each finding that occurs.
 impl fmt::Display for CleaningReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut found = self
@@ -143,13 +142,13 @@ impl fmt::Display for CleaningReport {
             writeln!(f)?;
         }
         if !self.is_complete {
-            writeln!(f, "T-junctions: at least; the search was stopped")?;
+            writeln!(f, "T-junctions: lower bound; the search was stopped")?;
         }
         if !self.is_crossing_complete {
-            writeln!(f, "crossing triangles: at least; the search was stopped")?;
+            writeln!(f, "crossing triangles: lower bound; the search was stopped")?;
         }
         if !self.is_holes_complete {
-            writeln!(f, "holes in surfaces: at least; the search was stopped")?;
+            writeln!(f, "holes in surfaces: lower bound; the search was stopped")?;
         }
         let ShellCounts {
             solids,
@@ -165,9 +164,9 @@ impl fmt::Display for CleaningReport {
     }
 }
 
-/// Looks for what is odd in a scene; `import` adds what was found while reading it.
+/// Finds defects in a scene and adds those that `import` found while reading it.
 ///
-/// Time: `n log n` for `n` triangles; memory: about 150 bytes a triangle.
+/// Time: `n log n` for `n` triangles; memory: about 150 bytes per triangle.
 ///
 /// # Errors
 ///
@@ -211,7 +210,7 @@ pub fn cleaning_report(
     Ok(report)
 }
 
-/// Most triangles among which holes are looked for: it takes 300 bytes a triangle.
+/// Most triangles for the search for holes, which takes 300 bytes per triangle.
 const MAX_HOLE_TRIANGLES: u64 = 2_000_000;
 
 fn find_holes(report: &mut CleaningReport, scene: &Scene) {
@@ -253,7 +252,7 @@ impl Soup {
                 let welded: Vec<u32> = points.iter().map(|&x| welder.weld(x)).collect();
                 for (t, corners) in primitive.indices.chunks_exact(3).enumerate() {
                     let corners = [corners[0], corners[1], corners[2]];
-                    // Points that are no numbers cannot be welded to anything.
+                    // Points that are not finite cannot be welded.
                     if corners.iter().any(|&i| !points[i as usize].is_finite()) {
                         continue;
                     }
@@ -299,7 +298,7 @@ fn world_points(object: &Object, primitive: &Primitive) -> Vec<DVec3> {
         .collect()
 }
 
-/// Gives points that lie within the distance of an earlier one that one's number.
+/// Numbers points; a point within the distance of an earlier one gets its number.
 struct Welder {
     distance: f64,
     points: Vec<DVec3>,
@@ -319,7 +318,7 @@ impl Welder {
     }
 
     fn weld(&mut self, p: DVec3) -> u32 {
-        // Cells four distances wide: most points lie well inside and need one look.
+        // Cells four distances wide: most points lie well inside and need one lookup.
         let width = 4.0 * self.distance;
         let cell = |q: DVec3| (q / width).floor().to_array().map(|c| c as i64);
         let reach = DVec3::splat(self.distance);
@@ -410,7 +409,7 @@ struct EdgeUse {
     ends: [u32; 2],
     object: u32,
     triangle: u32,
-    /// Walked from the greater end to the smaller.
+    /// Traversed from the greater end to the lesser.
     is_reverse: bool,
 }
 
@@ -481,7 +480,7 @@ fn find_odd_edges(
 struct ShellSum {
     n: [u64; 2],
     is_unclosed: bool,
-    /// Six times the volume, front faces outwards, were all turned as the root is.
+    /// Six times the volume with all triangles oriented as the root is, front faces outwards.
     volume: f64,
 }
 
@@ -516,7 +515,7 @@ fn find_odd_shells(report: &mut CleaningReport, scene: &Scene, soup: &Soup, shel
         }
         let (root, is_turned) = shells.root(t as u32);
         *slot = (root, is_turned);
-        // About a point of the shell, so that its digits are not lost to its place.
+        // Relative to a point of the shell, to keep precision far from the origin.
         let origin = soup.corners(root as usize)[0];
         let [a, b, c] = soup.corners(t).map(|p| p - origin);
         let sum = &mut sums[root as usize];

@@ -2,12 +2,12 @@
 
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
 
-/// Visits each pair of triangles of which an edge of one runs through the inside of the other: the first of them, and
-/// where. `false` if the search was stopped after `budget` pairs whose boxes meet.
+/// Visits each pair of triangles where an edge of one runs through the inside of the other: the first triangle and
+/// the point. `false` if the search stopped after `budget` pairs whose boxes meet.
 ///
 /// Edges that only touch, and triangles in one plane, do not cross: both ends of the edge must lie more than
-/// `distance` off the plane, and the point more than that inside. [Units: wu] Pairs are found by a tree of boxes:
-/// `n log n` for `n` triangles, and the pairs.
+/// `distance` off the plane, and the point more than that inside. [Units: wu] A tree of boxes finds the pairs:
+/// `n log n` for `n` triangles, plus the pairs.
 pub(crate) fn for_each(
     triangles: &[Triangle],
     distance: f64,
@@ -40,7 +40,7 @@ pub(crate) fn for_each(
     true
 }
 
-/// Where an edge of one runs through the inside of the other.
+/// Returns the point where an edge of one triangle runs through the inside of the other.
 fn crossing(a: &Triangle, b: &Triangle, distance: f64) -> Option<DVec3> {
     let through = |edges: &Triangle, face: &Triangle| {
         (0..3).find_map(|k| pierced(edges[k], edges[(k + 1) % 3], face, distance))
@@ -48,7 +48,7 @@ fn crossing(a: &Triangle, b: &Triangle, distance: f64) -> Option<DVec3> {
     through(a, b).or_else(|| through(b, a))
 }
 
-/// Where a segment runs through a triangle, more than `distance` from its edges.
+/// Returns the point where a segment runs through a triangle, more than `distance` from its edges.
 fn pierced(from: DVec3, to: DVec3, face: &Triangle, distance: f64) -> Option<DVec3> {
     let normal = triangle_area_normal(face).try_normalize()?;
     let (d, e) = ((from - face[0]).dot(normal), (to - face[0]).dot(normal));

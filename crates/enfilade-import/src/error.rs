@@ -1,10 +1,10 @@
-//! What can go wrong on the way in, with the place and the way out.
+//! Errors of the import, each with its place and a remedy.
 
 use std::path::{Path, PathBuf};
 
 use enfilade_geom::shown;
 
-/// Why an import stopped. Every text says what was found, where, and what to change.
+/// The reason why an import stopped. The text names the problem, the place and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
@@ -13,10 +13,10 @@ pub enum ImportError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said; part of the text, and so no source of its own.
+        /// The system's message; part of the text, and so not a source of its own.
         reason: std::io::Error,
     },
-    /// The file is of no format that is read here.
+    /// The file has none of the supported formats.
     #[error(
         "{}: not a glTF, GLB, OBJ, PLY, STL, IFC or Quake map file; convert it to GLB (Blender and most modelers export it)",
         shown(path.display())
@@ -32,17 +32,17 @@ pub enum ImportError {
         path: PathBuf,
         /// Element, index or line.
         place: String,
-        /// What is wrong and what to change.
+        /// The problem and the remedy.
         problem: String,
     },
-    /// The file is sound but uses something that is not read here.
+    /// The file is sound but uses an unsupported feature.
     #[error("{}: {} is not supported; {}", shown(path.display()), shown(feature), shown(advice))]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What it uses.
+        /// The unsupported feature.
         feature: String,
-        /// What to do instead.
+        /// The remedy.
         advice: String,
     },
     /// A limit of [`crate::Limits`] would be passed.
@@ -55,18 +55,18 @@ pub enum ImportError {
         path: PathBuf,
         /// Element, index or line.
         place: String,
-        /// What there is too much of.
+        /// The quantity that is too large.
         what: &'static str,
-        /// How much there is.
+        /// Its value.
         n: u64,
-        /// How much is allowed.
+        /// The largest allowed value.
         limit: u64,
     },
-    /// The input asks for far more memory than its size explains.
+    /// The input needs far more memory than its size explains.
     #[error(
-        "{}: {}: asks for {n} bytes of memory, over {limit}, the most for input of this size; \
-         it is damaged or made to harm, or places large structural meshes very often: split it, or \
-         make those detail",
+        "{}: {}: needs {n} bytes of memory, more than {limit}, the most for input of this size; \
+         it is damaged or malicious, or places large structural meshes very often: split it, or \
+         make those meshes detail",
         shown(path.display()), shown(place)
     )]
     Bomb {
@@ -74,7 +74,7 @@ pub enum ImportError {
         path: PathBuf,
         /// Element, index or line.
         place: String,
-        /// Bytes asked for so far.
+        /// Bytes needed so far.
         n: u64,
         /// Bytes allowed.
         limit: u64,
@@ -84,7 +84,7 @@ pub enum ImportError {
     NoTriangles {
         /// The files, comma separated.
         paths: String,
-        /// What to look at.
+        /// The remedy.
         advice: String,
     },
     /// The scene is far larger or smaller than a building: the unit is probably wrong.
@@ -102,20 +102,20 @@ pub enum ImportError {
         bound: String,
         /// The one object without which the scene would fit.
         offender: Option<String>,
-        /// What to do.
+        /// The remedy.
         advice: String,
     },
-    /// An option makes no sense.
+    /// An option is invalid.
     #[error("{option}: {problem}")]
     BadOption {
         /// The option.
         option: &'static str,
-        /// What is wrong with it.
+        /// The problem with it.
         problem: String,
     },
 }
 
-/// A length that fits a line, however wrong it is.
+/// Formats a length short enough for one line, however wrong it is.
 fn meters(length: f64) -> String {
     if length.abs() < 1e7 {
         format!("{length:.4}")

@@ -1,7 +1,7 @@
 //! Writes a [`Scene`] as a plain GLB (Khronos, *glTF 2.0 Specification*, version 2.0.1).
 //!
-//! Meshes, materials with their extensions, textures and pictures are kept; objects become nodes
-//! below the scene. Roles are told by the names alone, so that other programs see nothing odd.
+//! Meshes, materials with their extensions, textures and pictures are kept; objects become nodes below the scene.
+//! Only names carry the roles, so that other programs see nothing unusual.
 
 use enfilade_geom::scene::{Mesh, Object, Primitive, Scene};
 use enfilade_geom::{DMat3, DMat4, DVec3};
@@ -15,9 +15,9 @@ const F32: u32 = 5126;
 
 /// Writes the scene as one GLB.
 ///
-/// Left out, because glTF has no place for them: triangles without vertices, empty meshes and the
-/// objects that place them, pictures without bytes or of a format that no extension names. The
-/// same scene gives the same bytes. Time and memory grow linearly.
+/// Omits content that glTF cannot hold: triangles without vertices, empty meshes and the objects that place them,
+/// pictures without bytes or in a format that no extension names. The same scene gives the same bytes. Linear time
+/// and memory.
 ///
 /// # Panics
 ///
@@ -92,12 +92,12 @@ pub fn export_glb(scene: &Scene) -> Vec<u8> {
     container(&Value::Object(root), writer.bin)
 }
 
-/// Whether the transform is a translation, rotation and scale, as glTF asks of a node.
+/// Returns `true` if the transform is a translation, rotation and scale, as glTF requires of a node.
 ///
 /// Flattened hierarchies may shear: a rotation below an uneven scale.
 fn is_trs(m: &DMat4) -> bool {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(|c| c.truncate().normalize_or_zero());
-    // 1e-6: far above rounding, far below what the validator calls a shear.
+    // 1e-6: far above rounding, far below the validator's limit for shear.
     let is_square = [x.dot(y), y.dot(z), z.dot(x)]
         .iter()
         .all(|d| d.abs() < 1e-6);
@@ -105,11 +105,11 @@ fn is_trs(m: &DMat4) -> bool {
     is_square && volume.is_normal()
 }
 
-/// The mesh in world space.
+/// Returns the mesh in world space.
 fn baked(mesh: &Mesh, transform: &DMat4) -> Mesh {
     let linear = DMat3::from_mat4(*transform);
     let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
-    // The cofactors carry normals, also where there is no inverse.
+    // Cofactors transform normals even where there is no inverse.
     let sign = if linear.determinant() < 0.0 {
         -1.0
     } else {
@@ -190,14 +190,14 @@ struct Writer {
     extensions: BTreeSet<String>,
 }
 
-/// Textures as written, and where each of the scene's went.
+/// The written textures, and the new index of each of the scene's.
 #[derive(Default)]
 struct Textures {
     defs: Vec<Value>,
     samplers: Vec<Value>,
 }
 
-/// Name of the extension that a picture format needs; empty if it needs none.
+/// Returns the name of the extension that a picture format needs; empty if it needs none.
 fn image_extension(mime: &str) -> Option<&'static str> {
     Some(match mime {
         "image/png" | "image/jpeg" => "",
@@ -238,7 +238,7 @@ impl Writer {
                 let bound = values
                     .iter()
                     .fold(first, |b, v| std::array::from_fn(|k| f(b[k], v[k])));
-                // Written as the exact value of the f32, which a reader may compare with.
+                // The exact value of the f32, as readers may compare with it.
                 bound.map(f64::from).to_vec()
             };
             accessor["min"] = bound(f32::min).into();
@@ -284,7 +284,7 @@ impl Writer {
             let normals: Vec<_> = primitive.normals.iter().map(|n| unit(*n)).collect();
             attributes.insert("NORMAL".into(), self.floats(&normals, false).into());
         }
-        // A tangent means nothing without its normal.
+        // A tangent is meaningless without its normal.
         if !primitive.tangents.is_empty() && !primitive.normals.is_empty() {
             check(primitive.tangents.len());
             let tangents: Vec<_> = primitive
@@ -380,7 +380,7 @@ impl Writer {
             .collect()
     }
 
-    /// Notes the extensions in use, and drops references to textures that are not there.
+    /// Records the extensions in use, and drops references to missing textures.
     fn visit_material(&mut self, value: &mut Value, n_textures: usize) {
         let Value::Object(fields) = value else {
             return;
@@ -403,7 +403,7 @@ impl Writer {
     }
 }
 
-/// A material without JSON, as made by generators.
+/// Returns the JSON of a material without any, as generators make it.
 fn described(material: &enfilade_geom::scene::Material) -> Value {
     let mut value = json!({
         "pbrMetallicRoughness": {
@@ -423,10 +423,10 @@ fn described(material: &enfilade_geom::scene::Material) -> Value {
     value
 }
 
-/// Of length 1, as glTF wants it; `+Y` where there is no direction.
+/// Returns the direction with length 1, as glTF requires; `+Y` for a zero vector.
 fn unit(n: [f32; 3]) -> [f32; 3] {
     let length = n.iter().map(|c| c * c).sum::<f32>().sqrt();
-    // Already of length 1 within what the validator accepts: kept bit for bit.
+    // The validator accepts it as length 1: kept bit for bit.
     if (length - 1.0).abs() < 1e-4 {
         n
     } else if length > 0.0 && length.is_finite() {

@@ -1,17 +1,17 @@
-//! How large a scene is, and whether that speaks of a wrong unit.
+//! Checks of a scene's size for a wrong unit.
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, DVec3};
 
 use crate::{FileReport, ImportError, ImportOptions, ImportReport};
 
-/// The files of a report, comma separated.
+/// Returns the files of a report, comma separated.
 pub(crate) fn paths_of(report: &ImportReport) -> String {
     let path = |f: &FileReport| f.path.display().to_string();
     report.files.iter().map(path).collect::<Vec<_>>().join(", ")
 }
 
-/// Refuses scenes that are far larger or smaller than any building, or far off.
+/// Returns an error for scenes far larger or smaller than any building, or far off the origin.
 pub(crate) fn check(
     scene: &Scene,
     report: &ImportReport,
@@ -22,7 +22,7 @@ pub(crate) fn check(
         .map(|i| scene.object_aabb(i))
         .collect();
     let has_structure = scene.objects.iter().any(|o| o.role == Role::Structural);
-    // A sky dome or a landscape may be as large as it likes, if it is detail.
+    // A sky dome or a landscape may have any size if it is detail.
     let counted: Vec<usize> = (0..boxes.len())
         .filter(|&i| !has_structure || scene.objects[i].role == Role::Structural)
         .collect();
@@ -39,7 +39,7 @@ pub(crate) fn check(
         })
     };
     let longest = size.max_element();
-    // The unit of a map is known, and skies stand where they like.
+    // The unit of a map is known, and skies may stand anywhere.
     let is_known = !scene.solids.is_empty() && options.unit.is_none();
     if longest.is_nan() || longest > limits.max_extent && !is_known {
         let limit = limits.max_extent;
@@ -62,7 +62,7 @@ pub(crate) fn check(
             return error(
                 format!("smaller than {} m", limits.min_extent),
                 None,
-                "all its corners lie in one point; export it again".into(),
+                "all its vertices lie in one point; export it again".into(),
             );
         }
         let factor = if longest * 100.0 >= 2.0 {
@@ -109,12 +109,12 @@ pub(crate) fn check(
     Ok(())
 }
 
-/// Six digits are enough to type, and hide the dust of binary fractions.
+/// Rounds to six digits: short to type, and free of the residue of binary fractions.
 fn significant(x: f64) -> f64 {
     format!("{x:.6e}").parse().unwrap_or(x)
 }
 
-/// The one object without which the rest would fit, if there is one.
+/// Returns the one object without which the rest would fit, if there is one.
 fn offender(boxes: &[Aabb], counted: &[usize], limit: f64) -> Option<usize> {
     let n = counted.len();
     if n < 2 {
@@ -135,15 +135,15 @@ fn offender(boxes: &[Aabb], counted: &[usize], limit: f64) -> Option<usize> {
     None
 }
 
-/// A scene whose least edge is longer was not modeled in meters: few buildings are as high, wide and long. [Units: wu]
+/// Longest plausible shortest edge of a scene in meters: few buildings are as high, wide and long. [Units: wu]
 const TALL: f64 = 60.0;
 
-/// Units that numbers may mean, in meters.
+/// Units that the numbers may be in, in meters.
 const UNITS: [(&str, f64); 3] = [("mm", 0.001), ("cm", 0.01), ("in", 0.0254)];
 
-/// Why the unit may be wrong, where none was given and the format has none of its own: said before hours pass.
+/// Returns a warning, before hours pass, that the unit may be wrong: only if none was given and the format has none.
 ///
-/// A landscape may be as large; so nothing is refused or changed.
+/// A landscape may be as large; so nothing is rejected or changed.
 pub(crate) fn unit_doubt(
     scene: &Scene,
     report: &ImportReport,
@@ -159,7 +159,7 @@ pub(crate) fn unit_doubt(
         .fold(Aabb::EMPTY, |b, i| b.union(scene.object_aabb(i)))
         .size();
     let (least, longest) = (size.min_element(), size.max_element());
-    // A storey at least, and no higher than what stands in doubt.
+    // At least a storey high, and not so high as to be doubtful itself.
     let fits =
         |meters: f64| least * meters >= 2.0 && least * meters <= TALL && longest * meters >= 3.0;
     let names: Vec<&str> = UNITS.iter().filter(|u| fits(u.1)).map(|u| u.0).collect();
@@ -167,8 +167,8 @@ pub(crate) fn unit_doubt(
         return None;
     }
     Some(format!(
-        "{}: the scene is {:.0} x {:.0} x {:.0} m if its numbers are meters, far more than a building; if it is one, give \
-         their unit: --unit {}",
+        "{}: the scene is {:.0} x {:.0} x {:.0} m if its numbers are meters, far more than a building; if it is one, give the \
+         unit of its numbers: --unit {}",
         paths_of(report),
         size.x,
         size.y,

@@ -1,4 +1,4 @@
-//! Files on disk, read with a limit, and the pictures among them.
+//! Files on disk, read with a size limit, and detection of picture formats.
 
 use crate::ImportError;
 use std::fs::File;
@@ -16,7 +16,7 @@ pub(crate) fn open_file(path: &Path, limit: u64) -> Result<File, ImportError> {
         path: path.to_path_buf(),
         reason,
     };
-    // Asked before opening: opening a pipe would wait for a writer, and a device never ends.
+    // Checked before opening: opening a pipe would wait for a writer, and a device never ends.
     let meta = std::fs::metadata(path).map_err(read_error)?;
     if !meta.is_file() {
         return Err(read_error(std::io::Error::other("not a regular file")));
@@ -27,11 +27,11 @@ pub(crate) fn open_file(path: &Path, limit: u64) -> Result<File, ImportError> {
     File::open(path).map_err(read_error)
 }
 
-/// Bytes that tell what something is.
+/// Bytes needed to detect a format.
 const HEAD: u64 = 1 << 16;
 
-/// Reads all of what has at most `limit` bytes, if its head is worth it: `length` says of that, and whether it is all there
-/// is, how many bytes there can be. Of what has more, one more is read.
+/// Reads an input of at most `limit` bytes, head first. `length` gets the head and whether it is the whole input, and
+/// returns the most bytes that the input can have; one byte more is read of a longer input.
 pub(crate) fn read_headed(
     mut from: impl Read,
     path: &Path,
@@ -51,7 +51,7 @@ pub(crate) fn read_headed(
     Ok(bytes)
 }
 
-/// Reads all of what has at most `limit` bytes; `path` is its name in messages.
+/// Reads a whole input of at most `limit` bytes; `path` is its name in messages.
 pub(crate) fn read_up_to(from: impl Read, path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
     let mut bytes = Vec::new();
     from.take(limit.saturating_add(1))
@@ -76,7 +76,7 @@ fn too_large(path: &Path, n: u64, limit: u64) -> ImportError {
     }
 }
 
-/// Decodes a `data:` URI; `None` if it is none, an error text if it is a bad one.
+/// Decodes a `data:` URI. `None` if it is another URI, an error text if it is malformed.
 pub(crate) fn decode_data_uri(uri: &str) -> Option<Result<(String, Vec<u8>), String>> {
     use base64::Engine;
     let rest = uri
@@ -99,17 +99,18 @@ pub(crate) fn decode_data_uri(uri: &str) -> Option<Result<(String, Vec<u8>), Str
         );
         engine
             .decode(body)
-            .map_err(|e| format!("data URI is no base64: {e}"))
+            .map_err(|e| format!("data URI is not base64: {e}"))
     } else {
         Ok(percent_encoding::percent_decode_str(body).collect())
     };
     Some(bytes.map(|bytes| (mime, bytes)))
 }
 
-/// Reads a file that a scene in `folder` refers to, of at most `limit` bytes, and where it is, or says why it is refused.
+/// Reads a file of at most `limit` bytes that a scene in `folder` refers to. Returns its path and
+/// bytes, or the reason for refusal.
 ///
-/// The one way to such files: whoever wrote the scene chooses the reference, and whoever reads it owns the disk. So the file
-/// must lie in the scene's folder or below, also once links are followed, unless `may_leave` says otherwise.
+/// All such files are read here: the author of the scene chooses the reference, but the disk is the reader's. So the
+/// file must lie in the scene's folder or below, even after following links, unless `may_leave` is set.
 pub(crate) fn read_reference(
     folder: Option<&Path>,
     reference: &str,
@@ -124,7 +125,7 @@ pub(crate) fn read_reference(
     Ok((path, bytes))
 }
 
-/// The file that a reference means.
+/// Returns the path of the file that a reference names.
 fn resolve(folder: Option<&Path>, reference: &str, may_leave: bool) -> Result<PathBuf, String> {
     let Some(folder) = folder else {
         return Err(format!(
@@ -141,7 +142,7 @@ fn resolve(folder: Option<&Path>, reference: &str, may_leave: bool) -> Result<Pa
         .map_err(|e| format!("cannot find the folder {}: {e}", here.display()))?;
     let decoded = percent_encoding::percent_decode_str(reference).decode_utf8_lossy();
     let named = named(&root, &decoded.replace('\\', "/"), reference, may_leave)?;
-    // A name may hold a literal percent sign that nobody escaped.
+    // A name may contain an unescaped percent sign.
     let path = if decoded == reference || named.exists() {
         named
     } else {
@@ -150,7 +151,7 @@ fn resolve(folder: Option<&Path>, reference: &str, may_leave: bool) -> Result<Pa
             .filter(|p| p.exists())
             .unwrap_or(named)
     };
-    // What does not exist is told by whoever reads it.
+    // A missing file is an error only when it is read.
     let path = path.canonicalize().unwrap_or(path);
     if may_leave || path.starts_with(&root) {
         Ok(path)
@@ -159,9 +160,9 @@ fn resolve(folder: Option<&Path>, reference: &str, may_leave: bool) -> Result<Pa
     }
 }
 
-/// The path that a decoded reference names, before links: `..` takes back a name, as in every URI.
+/// Returns the path that a decoded reference names, before links. `..` removes a name, as in every URI.
 ///
-/// Refused without a look at the disk, so that no error tells what is there.
+/// Rejects without looking at the disk, so that errors do not reveal its contents.
 fn named(root: &Path, decoded: &str, reference: &str, may_leave: bool) -> Result<PathBuf, String> {
     let is_absolute = |path: &str| path.starts_with('/') || path.as_bytes().get(1) == Some(&b':');
     let path = match decoded.split_once("://") {
@@ -178,7 +179,7 @@ fn named(root: &Path, decoded: &str, reference: &str, may_leave: bool) -> Result
         None => decoded,
     };
     if path.is_empty() || path.contains('\0') {
-        return Err(format!("refers to '{reference}', which is no file name"));
+        return Err(format!("refers to '{reference}', which is not a file name"));
     }
     let is_absolute = is_absolute(path);
     if is_absolute && may_leave {
@@ -209,7 +210,7 @@ fn outside(reference: &str, how: &str) -> String {
     )
 }
 
-/// MIME type by the first bytes.
+/// Detects the MIME type of a picture from its first bytes.
 pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
     const KTX2: &[u8] = b"\xABKTX 20\xBB";
     Some(match bytes {

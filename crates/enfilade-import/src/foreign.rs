@@ -1,15 +1,15 @@
-//! Formats that are not read: which one a file is, and the command that makes of it what is read.
+//! Unsupported formats: detection, and the command that converts each to a supported one.
 
 use std::path::Path;
 
 use crate::ImportError;
 
-/// A format by its first bytes or, where they say little, by the ending of its name.
+/// A format, detected by its first bytes or, where they are ambiguous, by the ending of its name.
 struct Foreign {
     name: &'static str,
     magic: &'static [&'static [u8]],
     endings: &'static [&'static str],
-    /// What to do; `{in}` stands for the file, `{out}` for it without its ending.
+    /// The remedy; `{in}` stands for the file, `{out}` for its path without the ending.
     advice: &'static str,
 }
 
@@ -77,14 +77,14 @@ const FOREIGN: [Foreign; 10] = [
     },
 ];
 
-/// The error for a format that is known and not read.
+/// Returns the error for a known format that is not supported.
 pub(crate) fn unsupported(bytes: &[u8], path: &Path) -> Option<ImportError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let is_of = |f: &&Foreign| {
         f.magic.iter().any(|m| bytes.starts_with(m))
             || f.endings.iter().any(|e| ending.eq_ignore_ascii_case(e))
     };
-    // Bytes that say what they are count more than a name.
+    // Unambiguous bytes take precedence over the name.
     let by_magic = |f: &&Foreign| f.magic.iter().any(|m| bytes.starts_with(m));
     let found = FOREIGN.iter().find(by_magic);
     let found = found.or_else(|| FOREIGN.iter().find(is_of))?;

@@ -1,10 +1,10 @@
-//! Patterns of names: `*` stands for any letters, `?` for any one, letters of either case are the same.
+//! Patterns of names: `*` matches any text, `?` any one letter; case is ignored.
 
 use std::collections::BTreeMap;
 
-/// Tells if a pattern fits the whole text. Time: product of the lengths.
+/// Returns `true` if a pattern matches the whole text. Time: product of the lengths.
 ///
-/// Many texts that begin alike are better asked by a [`Glob`].
+/// A [`Glob`] is faster for many texts that begin alike.
 #[must_use]
 pub fn is_match(glob: &str, text: &str) -> bool {
     let (glob, text): (Vec<char>, Vec<char>) = (folded(glob).collect(), folded(text).collect());
@@ -37,28 +37,29 @@ fn folded(text: &str) -> impl Iterator<Item = char> {
     text.chars().flat_map(char::to_lowercase)
 }
 
-/// A pattern that reads texts letter by letter, so that what many texts begin with is read once: the paths of a tree of names.
+/// A pattern matched letter by letter, so that a common beginning of many texts is read once: the paths of a tree of
+/// names.
 ///
-/// All places of the pattern that a text may have come to are bits of a number, moved on together (Baeza-Yates & Gonnet, "A new
-/// approach to text searching", 1992). Time: letters of the text, times those of the pattern over 64.
+/// All positions that a text may have reached in the pattern are bits of a number, shifted together (Baeza-Yates &
+/// Gonnet, "A new approach to text searching", 1992). Time: letters of the text, times those of the pattern over 64.
 #[derive(Clone, Debug)]
 pub struct Glob {
-    /// Places of each letter in the pattern; a `?` stands for each.
+    /// Positions of each letter in the pattern; each `?` counts as every letter.
     places: BTreeMap<char, Vec<u64>>,
-    /// Where any one letter does.
+    /// Positions of `?`.
     any: Vec<u64>,
-    /// Where a `*` stands before: places that any letters may be read at.
+    /// Positions after a `*`, at which any letters may be read.
     stays: Vec<u64>,
-    /// Letters, but for `*`.
+    /// Letters of the pattern without `*`.
     n: usize,
 }
 
-/// Places of a [`Glob`] that a text has come to.
+/// Positions of a [`Glob`] that a text has reached.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GlobState(Vec<u64>);
 
 impl Glob {
-    /// Reads a pattern.
+    /// Compiles a pattern.
     #[must_use]
     pub fn new(pattern: &str) -> Self {
         let letters: Vec<char> = folded(pattern).collect();
@@ -87,7 +88,7 @@ impl Glob {
         }
     }
 
-    /// Before any letter.
+    /// Returns the state before the first letter.
     #[must_use]
     pub fn start(&self) -> GlobState {
         let mut bits = vec![0; self.any.len()];
@@ -95,7 +96,7 @@ impl Glob {
         GlobState(bits)
     }
 
-    /// Reads on.
+    /// Reads the next part of a text.
     pub fn read(&self, state: &mut GlobState, text: &str) {
         for c in folded(text) {
             let places = self.places.get(&c).unwrap_or(&self.any);
@@ -108,7 +109,7 @@ impl Glob {
         }
     }
 
-    /// Tells if the pattern fits all that was read.
+    /// Returns `true` if the pattern matches all that was read.
     #[must_use]
     pub fn fits(&self, state: &GlobState) -> bool {
         state.0[self.n / 64] >> (self.n % 64) & 1 == 1
@@ -146,7 +147,7 @@ mod tests {
         fn letters_read_one_by_one_fit_as_whole_texts_do(
             pattern in "[abÄ?*]{0,12}", long in 0_usize..3, text in "[abÄä/]{0,12}", cut in 0_usize..12,
         ) {
-            // Longer than the bits of a word, too.
+            // Longer than a word's bits, too.
             let ahead = "a?".repeat(long * 33);
             let (pattern, text) = (format!("{ahead}{pattern}"), format!("{}{text}", "ab".repeat(long * 33)));
             let glob = Glob::new(&pattern);

@@ -1,7 +1,7 @@
-//! IFC, through the converter of IfcOpenShell.
+//! IFC, by means of IfcOpenShell's converter.
 //!
-//! IfcConvert makes a GLB whose nodes have the products' global ids as names; the classes are read from the IFC file itself, so
-//! that objects are called `IfcWall/0iEHWY1$XA8eQeeULq4jE6` and roles go by class.
+//! IfcConvert writes a GLB whose nodes are named by the products' global ids. The classes are read from the IFC file
+//! itself, so that objects are called `IfcWall/0iEHWY1$XA8eQeeULq4jE6` and classes decide the roles.
 
 use std::collections::HashMap;
 use std::fs::{self, File};
@@ -15,27 +15,27 @@ use crate::{ImportError, files, gltf};
 
 /// Characters of a global id.
 const GUID_LENGTH: usize = 22;
-/// Most of what the converter says that goes into an error.
+/// Most of the converter's output that goes into an error. [Units: bytes]
 const SAID_BYTES: u64 = 2000;
-/// Most that it may say.
+/// Most output that the converter may write. [Units: bytes]
 const MAX_SAID: u64 = 1 << 26;
-/// Between two looks at it.
+/// Time between two checks of the converter.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Whether it is a STEP file of some IFC schema.
+/// Returns `true` for a STEP file of some IFC schema.
 pub(crate) fn is_ifc(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(1 << 16)];
     let head = String::from_utf8_lossy(head).to_ascii_uppercase();
     head.trim_start().starts_with("ISO-10303-21") && head.contains("IFC")
 }
 
-/// Converts the file and reads what came out.
+/// Converts the file and reads the result.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     let Some(converter) = &builder.options.ifc else {
         return Err(ImportError::Unsupported {
             path: builder.path.clone(),
             feature: "IFC without its converter".into(),
-            advice: "install IfcConvert of IfcOpenShell (https://ifcopenshell.org) on the PATH, or give it by --ifc-convert PATH"
+            advice: "install IfcConvert of IfcOpenShell (https://ifcopenshell.org) on the PATH, or name it with --ifc-convert PATH"
                 .into(),
         });
     };
@@ -51,7 +51,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     builder.add_read_bytes(glb.len() as u64);
     let classes = classes(bytes);
     gltf::read_renamed(&glb, builder, &|name| {
-        // Some versions put a word before and behind it: `product-GUID-body`.
+        // Some versions write `product-GUID-body`.
         let guid = name.strip_prefix("product-").unwrap_or(name);
         let guid = guid.get(..GUID_LENGTH)?;
         Some(format!("{}/{guid}", classes.get(guid)?))
@@ -60,7 +60,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     Ok(())
 }
 
-/// The GLB that the converter made, or what it said.
+/// Returns the converter's GLB, or its messages as an error.
 fn convert(
     converter: &IfcConverter,
     input: &Path,
@@ -70,7 +70,7 @@ fn convert(
     let (output, said) = (folder.join("out.glb"), folder.join("said.txt"));
     let text = |e: std::io::Error| e.to_string();
     let stderr = File::create(&said).map_err(text)?;
-    // Where it lies, so that a name that begins with a dash is no option.
+    // An absolute path, so that a name that begins with a dash is not an option.
     let input = fs::canonicalize(input).map_err(text)?;
     let mut child = Command::new(&converter.program)
         .args(["--use-element-guids", "--yes"])
@@ -79,24 +79,24 @@ fn convert(
         .stdout(stderr.try_clone().map_err(text)?)
         .stderr(stderr)
         .spawn()
-        .map_err(|e| format!("cannot be run: {e}; give IfcConvert by --ifc-convert PATH"))?;
+        .map_err(|e| format!("cannot be run: {e}; name IfcConvert with --ifc-convert PATH"))?;
     let sizes = [(output.as_path(), most), (said.as_path(), MAX_SAID)];
     let status = match wait(&mut child, converter, sizes) {
         Ok(status) => status,
         Err(why) => {
-            // It may have ended by itself meanwhile.
+            // It may have ended meanwhile.
             let _ = child.kill();
             let _ = child.wait();
             return Err(why);
         }
     };
-    // A link would name any file of the disk.
+    // A link could name any file of the disk.
     let is_file = fs::symlink_metadata(&output).is_ok_and(|m| m.is_file());
     if status.success() && is_file {
         return Ok(output);
     }
     let said = tail(&said).unwrap_or_default();
-    // Lines of its own would be lines of ours.
+    // One line, as errors are one line each.
     let said: Vec<&str> = said
         .lines()
         .map(str::trim)
@@ -105,7 +105,7 @@ fn convert(
     Err(format!("made no GLB ({status}): {}", said.join(" | ")))
 }
 
-/// Waits for the converter while it keeps within its bounds, and the files that it writes within theirs.
+/// Waits for the converter as long as it stays within its limits, and its files within theirs.
 fn wait(
     child: &mut Child,
     converter: &IfcConverter,
@@ -118,20 +118,20 @@ fn wait(
         }
         if start.elapsed() >= converter.max_time {
             return Err(format!(
-                "was not done within {} s and was ended; give it more by --max-time",
+                "did not finish within {} s and was stopped; allow more with --max-time",
                 converter.max_time.as_secs_f64()
             ));
         }
         let most = converter.max_memory.unwrap_or(u64::MAX);
         if most < u64::MAX && memory(child.id()).is_some_and(|taken| taken > most) {
             return Err(format!(
-                "took more than {most} bytes of memory and was ended; give it more by --max-memory"
+                "took more than {most} bytes of memory and was stopped; allow more with --max-memory"
             ));
         }
         for (path, most) in sizes {
             if fs::symlink_metadata(path).is_ok_and(|m| m.len() > most) {
                 return Err(format!(
-                    "wrote more than {most} bytes to {} and was ended",
+                    "wrote more than {most} bytes to {} and was stopped",
                     path.display()
                 ));
             }
@@ -140,7 +140,7 @@ fn wait(
     }
 }
 
-/// Resident memory of a process, where the system has it as text. [Units: bytes]
+/// Returns the resident memory of a process, on systems with `/proc`. [Units: bytes]
 fn memory(process: u32) -> Option<u64> {
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;
@@ -148,7 +148,7 @@ fn memory(process: u32) -> Option<u64> {
     Some(kilobytes * 1024)
 }
 
-/// The last bytes of a file, as text.
+/// Returns the last bytes of a file as text.
 fn tail(path: &Path) -> std::io::Result<String> {
     use std::io::{Read, Seek, SeekFrom};
     let mut file = File::open(path)?;
@@ -159,7 +159,7 @@ fn tail(path: &Path) -> std::io::Result<String> {
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// By global id the class of each instance that has one, as `IFCWALL`: `#12=IFCWALL('...',`. Linear.
+/// Returns the class, as `IFCWALL`, of each instance by global id: `#12=IFCWALL('...',`. Linear.
 fn classes(bytes: &[u8]) -> HashMap<String, String> {
     let text = String::from_utf8_lossy(bytes);
     let mut classes = HashMap::new();
@@ -182,7 +182,7 @@ fn classes(bytes: &[u8]) -> HashMap<String, String> {
     classes
 }
 
-/// Words of the classes that have a shape.
+/// Words in the names of classes that have a shape.
 const WORDS: [&str; 59] = [
     "Air",
     "Annotation",
@@ -245,7 +245,7 @@ const WORDS: [&str; 59] = [
     "Window",
 ];
 
-/// `WALLSTANDARDCASE` as the schema writes it: STEP files have capitals only. What is no known word stays one.
+/// Returns `WALLSTANDARDCASE` in the schema's spelling; STEP files have capitals only. Unknown words stay one word.
 fn capitalized(kind: &str) -> String {
     let mut out = String::new();
     let mut rest = kind;
@@ -264,16 +264,16 @@ fn capitalized(kind: &str) -> String {
     out
 }
 
-/// A folder of our own that goes with all that is in it.
+/// A temporary folder, removed with its contents.
 ///
-/// A file in it is locked as long as we live: the folder of a run that was killed is known by a lock that nobody holds.
+/// A file in it stays locked while this process lives; the folder of a killed run has a lock without an owner.
 struct Folder {
     path: PathBuf,
-    /// `None` once it was let go.
+    /// `None` once released.
     lock: Option<File>,
 }
 
-/// Beginning of the names of such folders.
+/// Prefix of the names of such folders.
 const PREFIX: &str = "enfilade-ifc-";
 const LOCK: &str = "lock";
 
@@ -292,9 +292,9 @@ impl Folder {
                 Err(e) => return Err(e),
             }
             let lock = File::create(path.join(LOCK))?;
-            // A disk that has no locks does without; there, nothing is taken for left either.
+            // File systems without locks get none; there, no folder counts as left behind either.
             let is_taken = matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock));
-            // Before it was locked, someone may have taken it for one that was left.
+            // Before it was locked, another run may have removed it as left behind.
             if !is_taken && path.join(LOCK).exists() {
                 let lock = Some(lock);
                 return Ok(Self { path, lock });
@@ -306,14 +306,14 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // Some systems remove no file that is open.
+        // Some systems cannot remove an open file.
         drop(self.lock.take());
-        // What cannot be removed is the system's to remove.
+        // A folder that cannot be removed is left to the system.
         let _ = fs::remove_dir_all(&self.path);
     }
 }
 
-/// Removes the folders of runs that were killed. Linear in the folder that they are in.
+/// Removes the folders of killed runs. Linear in the parent folder.
 fn remove_left(parent: &Path) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let is_ours = entry
@@ -323,7 +323,7 @@ fn remove_left(parent: &Path) {
         if !is_ours || !entry.file_type().is_ok_and(|t| t.is_dir()) {
             continue;
         }
-        // One that has no lock yet is being made.
+        // A folder without a lock is just being made.
         if let Ok(lock) = File::open(entry.path().join(LOCK))
             && lock.try_lock().is_ok()
         {

@@ -1,12 +1,11 @@
-//! Reads glTF, GLB, OBJ, PLY, STL and Quake maps into one [`Scene`].
+//! Reads glTF, GLB, OBJ, PLY, STL, IFC and Quake maps into one [`Scene`].
 //!
-//! [`import`] takes any number of files and gives one scene, in meters and +Y up, with a role for
-//! each object and a report of everything skipped or repaired. Input is not trusted: each count,
-//! offset and index is checked before use, memory is bounded by [`Limits`], and bad input ends in
-//! an [`ImportError`] that says where and what to do.
+//! [`import`] reads any number of files into one scene, in meters and +Y up, with a role for each object and a report
+//! of everything skipped or repaired. Input is not trusted: each count, offset and index is checked before use,
+//! [`Limits`] bound the memory, and bad input ends in an [`ImportError`] with place and remedy.
 //!
-//! Each object's transform has a determinant of at least 0: a mirrored placement gets a mirrored
-//! mesh, so front faces are counter-clockwise in world space without further thought.
+//! Each object's transform has a determinant of at least 0: a mirrored placement gets a mirrored mesh, so front faces
+//! are always counter-clockwise in world space.
 //!
 //! ```
 //! use enfilade_import::{ImportOptions, decode_obj};
@@ -18,8 +17,7 @@
 //! # Ok::<(), enfilade_import::ImportError>(())
 //! ```
 //!
-//! Not promised: animation, skins, cameras, lights, curves, points and lines; they
-//! are left out with a note.
+//! Not supported: animation, skins, curves, points and lines; they are left out with a note.
 
 mod auto_roles;
 mod builder;
@@ -69,24 +67,23 @@ use enfilade_geom::scene::Scene;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// A scene and what was noticed while reading it.
+/// A scene and the report of its import.
 #[derive(Clone, Debug, Default)]
 pub struct Imported {
-    /// What was read.
+    /// The scene.
     pub scene: Scene,
-    /// What was noticed.
+    /// Everything skipped, assumed or repaired.
     pub report: ImportReport,
 }
 
-/// Reads all files into one scene; those of `detail_paths` are detail as a whole.
+/// Reads all files into one scene; all objects of `detail_paths` are detail.
 ///
-/// The format is told by content, or by the name's ending for OBJ. Time and memory grow linearly
-/// with the input.
+/// Detects the format by content, or for OBJ by the name's ending. Linear time and memory.
 ///
 /// # Errors
 ///
-/// When a file cannot be read, is malformed or unsupported, when a limit is passed, when there is
-/// no triangle, or when the scene's size speaks of a wrong unit.
+/// When a file cannot be read, is malformed or unsupported, when a limit is exceeded, when there are no triangles, or
+/// when the scene's size indicates a wrong unit.
 pub fn import(
     paths: &[PathBuf],
     detail_paths: &[PathBuf],
@@ -102,18 +99,19 @@ pub fn import(
     import_sources(all.chain(detail_paths.iter().map(file(true))), options)
 }
 
-/// A scene on its way in: a file, or a stream such as standard input.
+/// An input: a file, or a stream such as standard input.
 pub struct SceneSource<'a> {
-    /// The file, or what the stream is called in messages; a name's ending tells the format where content leaves a doubt.
+    /// The file, or the stream's name in messages. The name's ending decides the format where the content is
+    /// ambiguous.
     pub path: PathBuf,
-    /// Read instead of the file, up to [`Limits::max_file_bytes`]. What comes so has no folder, and refers to no files.
+    /// Replaces the file, up to [`Limits::max_file_bytes`]. A stream has no folder, and may not refer to files.
     pub stream: Option<Box<dyn Read + 'a>>,
-    /// Whether all its objects are detail.
+    /// All its objects are detail.
     pub is_detail: bool,
 }
 
 impl SceneSource<'_> {
-    /// A file whose objects have the roles that they seem to have.
+    /// A file, with roles decided for each object.
     #[must_use]
     pub fn file(path: &Path) -> Self {
         Self {
@@ -124,7 +122,7 @@ impl SceneSource<'_> {
     }
 }
 
-/// [`import`], from files and streams; the stream of each is read to its end before the next source is begun.
+/// Works as [`import`] on files and streams. Reads each stream to its end before the next source.
 ///
 /// # Errors
 ///
@@ -163,7 +161,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
     }
 }
 
-/// What is read here.
+/// The supported formats.
 #[derive(Clone, Copy)]
 enum Format {
     Gltf,
@@ -175,10 +173,10 @@ enum Format {
 }
 
 impl Format {
-    /// How many bytes the head says that there are, where it does.
+    /// Returns the length of an input according to its head; an upper bound where the head does not have it.
     fn length(self, head: &[u8], limits: &Limits) -> u64 {
         match self {
-            // One byte more than is allowed tells that it is too much.
+            // One byte more than allowed shows that the input is too large.
             Self::Gltf => gltf::length(head).unwrap_or(limits.max_json_bytes.saturating_add(1)),
             Self::Stl => stl::length(head).unwrap_or(u64::MAX),
             Self::Ply | Self::Obj | Self::Map | Self::Ifc => u64::MAX,
@@ -186,14 +184,14 @@ impl Format {
     }
 }
 
-/// The format of a file that begins with these bytes and may go on up to so many, or is them.
+/// Returns the format of a file that begins with `bytes` and has at most `most`.
 fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError> {
     let ending = path
         .extension()
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
-    // Content first, where it leaves no doubt; then the name; then a guess.
+    // Unambiguous content first, then the name, then a guess.
     Ok(if bytes.starts_with(b"glTF") {
         Format::Gltf
     } else if ply::is_ply(bytes) {
@@ -223,7 +221,7 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
     })
 }
 
-/// Reads a glTF or GLB file from memory; it may refer to no other file.
+/// Reads a glTF or GLB file from memory. It may not refer to other files.
 ///
 /// # Errors
 ///

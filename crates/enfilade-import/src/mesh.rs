@@ -1,8 +1,8 @@
-//! What is done to meshes as a whole.
+//! Operations on whole meshes.
 
 use enfilade_geom::scene::{Mesh, Primitive};
 
-/// Bytes that a mesh's lists hold.
+/// Returns the bytes that a mesh's lists hold.
 pub(crate) fn bytes_of(mesh: &Mesh) -> u64 {
     let bytes = |p: &Primitive| {
         size_of_val(&*p.positions)
@@ -15,7 +15,7 @@ pub(crate) fn bytes_of(mesh: &Mesh) -> u64 {
     mesh.primitives.iter().map(bytes).sum::<usize>() as u64
 }
 
-/// Mirrors at the plane `x = 0` and turns the winding round. Exact.
+/// Mirrors at the plane `x = 0` and reverses the winding. Exact.
 pub(crate) fn mirror(primitive: &mut Primitive) {
     for p in &mut primitive.positions {
         p[0] = -p[0];
@@ -24,7 +24,7 @@ pub(crate) fn mirror(primitive: &mut Primitive) {
         n[0] = -n[0];
     }
     for t in &mut primitive.tangents {
-        // The bitangent is `cross(normal, tangent) * w`; a mirror turns the cross product round.
+        // The bitangent is `cross(normal, tangent) * w`; a mirror negates the cross product.
         t[0] = -t[0];
         t[3] = -t[3];
     }

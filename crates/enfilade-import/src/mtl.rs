@@ -1,7 +1,7 @@
-//! OBJ's material libraries, turned into glTF materials.
+//! OBJ's material libraries, converted to glTF materials.
 //!
-//! MTL describes 1990s shading; what has a counterpart in glTF's metallic-roughness model is
-//! carried over: diffuse and emissive color, opacity, pictures, and the `Pr`/`Pm` extension.
+//! MTL describes the shading of the 1990s. Properties with a counterpart in glTF's metallic-roughness model are kept:
+//! diffuse and emissive color, opacity, pictures, and the `Pr`/`Pm` extension.
 
 use crate::builder::Builder;
 use crate::gltf::read_picture_file;
@@ -11,7 +11,7 @@ use enfilade_geom::scene::{Image, Material, Texture};
 use serde_json::{Map, Value, json};
 use std::collections::HashMap;
 
-/// A material of which only the name is known.
+/// Returns a material with nothing but a name.
 pub(crate) fn plain(name: &str) -> Material {
     MaterialDraft {
         name: name.to_owned(),
@@ -68,7 +68,7 @@ impl MaterialDraft {
         if transparent {
             fields.insert("alphaMode".into(), json!("BLEND"));
         }
-        // OBJ knows no back faces: its surfaces are seen from both sides.
+        // OBJ does not define back faces: its surfaces are seen from both sides.
         fields.insert("doubleSided".into(), json!(true));
         Material {
             name: self.name,
@@ -80,7 +80,7 @@ impl MaterialDraft {
     }
 }
 
-/// Reads a library into `library`; one that cannot be had is noted.
+/// Reads a library into `library`; notes one that cannot be read.
 pub(crate) fn read_library(
     reference: &str,
     number: usize,
@@ -95,10 +95,7 @@ pub(crate) fn read_library(
     match builder.read_reference(reference, limit) {
         Ok(bytes) => read_materials(&bytes, reference, builder, library),
         Err(problem) => {
-            builder.note(
-                place,
-                format!("material library: {problem}; going on without"),
-            );
+            builder.note(place, format!("material library: {problem}; left out"));
             Ok(())
         }
     }
@@ -147,7 +144,7 @@ pub(crate) fn read_materials(
         let color = || {
             let mut values = numbers().map(|c| soup::srgb_to_linear(c.clamp(0.0, 1.0)));
             let r = values.next().filter(|c| c.is_finite())?;
-            // One number alone is a gray.
+            // A single number is a gray.
             let g = values.next().unwrap_or(r);
             Some([r, g, values.next().unwrap_or(r)]).filter(|c| c.iter().all(|c| c.is_finite()))
         };
@@ -155,7 +152,7 @@ pub(crate) fn read_materials(
             "Kd" => draft.color = color(),
             "Ke" => draft.emissive = color(),
             "d" => {
-                // `d -halo x` fades towards the rim; the number is what it fades from.
+                // `d -halo x` fades towards the rim; `x` is the opacity that it fades from.
                 let rest = rest.strip_prefix("-halo").unwrap_or(rest).trim();
                 draft.opacity = rest.parse().ok().filter(|x: &f32| x.is_finite());
             }
@@ -169,7 +166,7 @@ pub(crate) fn read_materials(
                 draft.opacity_texture = true;
                 builder.note(
                     place(),
-                    "an opacity picture; taken as see-through, not carried over",
+                    "an opacity picture; the material counts as see-through, the picture is left out",
                 );
             }
             "map_Bump" | "map_bump" | "bump" => {
@@ -185,7 +182,7 @@ pub(crate) fn read_materials(
     Ok(())
 }
 
-/// The texture of a `map_` line; `None`, with a note, where its picture cannot be had.
+/// Returns the texture of a `map_` line; `None`, with a note, if its picture cannot be read.
 fn read_texture(
     rest: &str,
     place: &str,
@@ -198,7 +195,7 @@ fn read_texture(
     }
     let plain = || file.rsplit(['/', '\\']).next().unwrap_or(file);
     let bytes = read_picture_file(file, builder).or_else(|problem| {
-        // Exporters like to write the path on the author's disk.
+        // Exporters often write the path on the author's disk.
         read_picture_file(plain(), builder).map_err(|_| problem)
     });
     let texture = match bytes {
@@ -216,7 +213,7 @@ fn read_texture(
             }))
         }
         Err(problem) => {
-            builder.note(place, format!("{problem}; going on without"));
+            builder.note(place, format!("{problem}; left out"));
             None
         }
     };
@@ -224,7 +221,7 @@ fn read_texture(
     Ok(texture)
 }
 
-/// The file name behind options such as `-s 1 1 1` or `-bm 0.5`; it may hold blanks.
+/// Returns the file name behind options such as `-s 1 1 1` or `-bm 0.5`; it may contain blanks.
 fn without_options(rest: &str) -> &str {
     let mut rest = rest.trim();
     while rest.starts_with('-') {

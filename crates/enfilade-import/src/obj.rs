@@ -1,8 +1,8 @@
 //! Wavefront OBJ (Wavefront, *Advanced Visualizer Manual*, appendix B1): polygons, groups,
 //! materials.
 //!
-//! A reader of our own: `tobj` joins no lines that end in `\`, makes a new object of a group that is named again, and
-//! its errors have no line numbers (`docs/dependencies.md`).
+//! This reader replaces `tobj`, which does not join lines that end in `\`, makes a new object of a group that is
+//! named again, and reports errors without line numbers (`docs/dependencies.md`).
 
 use crate::ImportError;
 use crate::builder::Builder;
@@ -13,7 +13,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};
 use std::collections::HashMap;
 
-/// Whether the text looks like OBJ: its first directive is one of OBJ's.
+/// Returns `true` if the text looks like OBJ: its first directive is one of OBJ's.
 pub(crate) fn is_obj(bytes: &[u8]) -> bool {
     const DIRECTIVES: [&[u8]; 10] = [
         b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"mtllib", b"s", b"vp",
@@ -65,7 +65,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     reader.finish()
 }
 
-/// A corner: position, texture coordinate and normal, counted from 0.
+/// A vertex of a face: indices of position, texture coordinate and normal, from 0.
 type Corner = (u32, Option<u32>, Option<u32>);
 
 struct ObjFace {
@@ -83,14 +83,14 @@ struct ObjPart {
 
 struct MeshDraft {
     names: [String; 2],
-    /// Into [`ObjReader::parts`].
+    /// Indices into [`ObjReader::parts`].
     parts: Vec<usize>,
 }
 
 struct ObjReader<'r, 'a> {
     builder: &'r mut Builder<'a>,
     positions: Vec<[f64; 3]>,
-    /// Of the first positions; empty if the file has none.
+    /// Colors of the first positions; empty if the file has none.
     colors: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
@@ -102,7 +102,7 @@ struct ObjReader<'r, 'a> {
     parts: Vec<ObjPart>,
     meshes: Vec<MeshDraft>,
     by_name: HashMap<[String; 2], usize>,
-    /// Part that the next face joins, until a name or material changes.
+    /// The part that the next face joins, until a name or material changes.
     current: Option<usize>,
 }
 
@@ -118,7 +118,7 @@ impl ObjReader<'_, '_> {
                 self.positions
                     .push([numbers.0[0], numbers.0[1], numbers.0[2]]);
                 if numbers.1 >= 6 {
-                    // White where the vertices before this one had none.
+                    // White for earlier vertices without a color.
                     self.colors.resize(self.positions.len() - 1, [1.0; 3]);
                     let first = numbers.1 - 3;
                     self.colors.push([0, 1, 2].map(|k| {
@@ -128,7 +128,7 @@ impl ObjReader<'_, '_> {
             }
             "vt" => {
                 let numbers = self.numbers::<3>(rest, number, 1)?.0;
-                // OBJ counts up from the picture's foot, glTF down from its head.
+                // OBJ counts from the bottom of the picture, glTF from the top.
                 self.uvs
                     .push([finite(numbers[0]), finite(1.0 - numbers[1])]);
             }
@@ -144,7 +144,7 @@ impl ObjReader<'_, '_> {
                 self.current = None;
             }
             "g" => {
-                // `default` and `off` are what some exporters write for no group.
+                // Some exporters write `default` or `off` for no group.
                 let name = if matches!(rest, "default" | "off" | "(null)") {
                     ""
                 } else {
@@ -174,7 +174,7 @@ impl ObjReader<'_, '_> {
         Ok(())
     }
 
-    /// Up to `N` numbers, at least `n_min` of them, and how many there were.
+    /// Returns up to `N` numbers, at least `n_min`, and their count.
     fn numbers<const N: usize>(
         &self,
         rest: &str,
@@ -187,7 +187,7 @@ impl ObjReader<'_, '_> {
             *slot = word.parse().map_err(|_| {
                 self.builder.malformed(
                     format!("line {number}"),
-                    format!("'{}' is no number", shortened(word)),
+                    format!("'{}' is not a number", shortened(word)),
                 )
             })?;
             n += 1;
@@ -263,7 +263,7 @@ impl ObjReader<'_, '_> {
             self.parts[part].corners.truncate(first);
             self.builder.note(
                 format!("line {number}"),
-                "a face with fewer than three corners; left out",
+                "a face with fewer than three vertices; left out",
             );
             return Ok(());
         }
@@ -362,7 +362,7 @@ impl ObjReader<'_, '_> {
         let faces = std::mem::take(&mut self.parts[part].faces);
         let n_triangles: usize = faces.iter().map(|f| f.n - 2).sum();
         self.builder.check_triangles(place, n_triangles as u64)?;
-        // A picture without coordinates would be no valid glTF; it then shows its corner's color.
+        // glTF forbids a picture without coordinates; missing ones are 0 and show a single color.
         let material = self.parts[part]
             .material
             .and_then(|m| self.builder.material(m));
@@ -371,7 +371,7 @@ impl ObjReader<'_, '_> {
         let has_normals = corners.iter().all(|c| c.2.is_some());
         if !has_normals && corners.iter().any(|c| c.2.is_some()) {
             self.builder
-                .note(place, "normals at some corners only; left out");
+                .note(place, "normals at some vertices only; left out");
         }
         let mut primitive = Primitive {
             material: self.parts[part].material,
@@ -412,7 +412,7 @@ impl ObjReader<'_, '_> {
                 continue;
             }
             let line = face.line;
-            // The reported position misses the offset otherwise.
+            // The offset would be missing from the reported position otherwise.
             if offset != DVec3::ZERO {
                 shape.iter_mut().for_each(|p| *p += offset);
             }
@@ -428,7 +428,7 @@ impl ObjReader<'_, '_> {
     }
 }
 
-/// A normal of length 1, as the scene promises; `+Y` for one without a direction.
+/// Returns a normal of length 1, as the scene requires; `+Y` for a zero vector.
 fn unit_normal(n: [f32; 3]) -> [f32; 3] {
     let n = DVec3::from_array(n.map(f64::from))
         .try_normalize()
@@ -441,7 +441,7 @@ fn finite(c: f64) -> f32 {
     if c.is_finite() { c } else { 0.0 }
 }
 
-/// An index from 1, or from the end if negative, as one from 0.
+/// Returns an index from 0 for one from 1, or from the end if negative.
 fn resolve(field: &str, n: usize) -> Option<u32> {
     let index: i64 = field.parse().ok()?;
     let index = match index {

@@ -1,4 +1,4 @@
-//! What the caller can choose.
+//! Options of the import.
 
 use crate::roles::RoleRules;
 use crate::{ImportError, RepairOptions};
@@ -15,47 +15,47 @@ pub enum Up {
     Z,
 }
 
-/// How to read.
+/// Settings of an import.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
-    /// Meters per input unit; `None` is 1, and it must be from 1e-9 to 1e9.
+    /// Meters per input unit, from 1e-9 to 1e9; `None` is 1.
     pub unit: Option<f64>,
     /// The input's up axis; `None` is [`Up::Y`] for every format.
     pub up: Option<Up>,
     /// Point of the scaled, Y-up scene that becomes the origin. [Units: wu]
     ///
-    /// Maps and surveys sit millions of meters from their origin, where the `f32` that files hold
-    /// is no longer exact to a millimeter.
+    /// Maps and surveys lie millions of meters from their origin, where the `f32` numbers of a file are no longer
+    /// exact to a millimeter.
     pub origin: DVec3,
-    /// What to refuse.
+    /// Limits beyond which input is rejected.
     pub limits: Limits,
-    /// What is structural and what is detail.
+    /// Rules that decide between structure and detail.
     pub roles: RoleRules,
-    /// Whether a scene may refer to files outside its own folder, as `../textures/wall.png`.
+    /// Allows references to files outside the scene's own folder, such as `../textures/wall.png`.
     ///
-    /// Off, a scene from elsewhere cannot bring a file of the reader's disk into the output.
+    /// Without it, a scene from elsewhere cannot bring a file of the reader's disk into the output.
     pub allow_outside: bool,
-    /// What makes IFC readable; without it such files are refused.
+    /// Converter for IFC; without one such files are rejected.
     pub ifc: Option<IfcConverter>,
-    /// What to put right in structural triangles; nothing if not given.
+    /// Repairs of structural triangles; `None` repairs nothing.
     pub repair: Option<RepairOptions>,
 }
 
 /// The command `IfcConvert` of IfcOpenShell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IfcConverter {
-    /// The program, by path or by a name that the system finds.
+    /// The program, by path or by a name on the `PATH`.
     pub program: PathBuf,
-    /// Where a folder for what it makes may be; it is removed at the end, or by the next import where this one was killed.
+    /// Folder for a temporary folder, which is removed at the end, or by the next import if this one is killed.
     pub folder: PathBuf,
-    /// How long it may take.
+    /// Longest time it may take.
     pub max_time: Duration,
-    /// How much memory it may take, where the system tells (Linux). [Units: bytes]
+    /// Most memory it may take, on systems that report it (Linux). [Units: bytes]
     pub max_memory: Option<u64>,
 }
 
 impl IfcConverter {
-    /// This program, for an hour at most.
+    /// Returns a converter that may take an hour.
     #[must_use]
     pub fn new(program: impl Into<PathBuf>, folder: impl Into<PathBuf>) -> Self {
         Self {
@@ -67,9 +67,9 @@ impl IfcConverter {
     }
 }
 
-/// What to refuse, so that hostile input ends in an error in bounded memory and time.
+/// Limits on the input, so that hostile input ends in an error in bounded memory and time.
 ///
-/// All limits but `max_file_bytes` and `max_json_bytes` count over all files of one import.
+/// All limits but `max_file_bytes` and `max_json_bytes` apply to the sum over all files of one import.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Largest file. [Units: bytes]
@@ -84,14 +84,14 @@ pub struct Limits {
     pub max_objects: u64,
     /// Most bytes of encoded pictures.
     pub max_image_bytes: u64,
-    /// Most bytes that meshes, objects and placed structural triangles may ask for.
+    /// Most memory that meshes, objects and placed structural triangles may take. [Units: bytes]
     ///
-    /// The larger of this and [`Limits::max_expansion`] times the bytes read counts, so that a small
-    /// file that names the same numbers over and over, or numbers that it does not hold, ends early.
+    /// The limit is the larger of this and [`Limits::max_expansion`] times the bytes read, so that a small file that
+    /// repeats the same accessors, or declares data that it does not contain, ends early.
     pub max_bytes_of_small: u64,
-    /// Most such bytes for each byte read.
+    /// Most memory per byte read.
     pub max_expansion: u64,
-    /// Deepest node below a scene.
+    /// Largest depth of a node below its scene.
     pub max_node_depth: u32,
     /// Largest edge of the structural objects' box. [Units: wu]
     pub max_extent: f64,
@@ -99,7 +99,7 @@ pub struct Limits {
     pub min_extent: f64,
     /// Largest coordinate of the structural objects' box. [Units: wu]
     ///
-    /// At 100 km, `f32` coordinates are 8 mm apart; past that, walls tear.
+    /// At 100 km, `f32` coordinates are 8 mm apart; beyond, walls tear.
     pub max_coordinate: f64,
 }
 
@@ -123,7 +123,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Limits small enough to fuzz with: nothing above some megabytes is ever held.
+    /// Returns limits small enough for fuzzing: never more than a few megabytes of memory.
     #[must_use]
     pub fn tiny() -> Self {
         Self {
@@ -141,7 +141,7 @@ impl Limits {
 }
 
 impl ImportOptions {
-    /// Input space to world space.
+    /// Returns the transform from input space to world space.
     pub(crate) fn base_transform(&self) -> Result<DMat4, ImportError> {
         let unit = self.unit.unwrap_or(1.0);
         if !(unit.is_finite() && (1e-9..=1e9).contains(&unit)) {
@@ -167,7 +167,7 @@ impl ImportOptions {
                 [0.0, 0.0, 0.0, 1.0],
             ]),
         };
-        // A product with an identity would turn 0 into -0 here and there; keep plain input plain.
+        // A product with an identity would turn some 0 into -0; keep plain input unchanged.
         Ok(DMat4::from_translation(-self.origin) * DMat4::from_scale(DVec3::splat(unit)) * axes)
     }
 }

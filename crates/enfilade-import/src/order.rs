@@ -1,9 +1,9 @@
-//! One order for one scene, whatever order its files, nodes, triangles and vertices came in.
+//! A canonical order of a scene, whatever the order of its files, nodes, triangles and vertices.
 //!
-//! Everything after it may then choose by number, add up and break ties as it likes: what is the same scene is the same list. The
-//! order is one of content alone: names, bits of coordinates, bits of transforms. What is equal in all of that is interchangeable.
-//! Vertices, pictures, textures, materials and meshes that are equal become one, as two of a kind would have to be told apart by
-//! who refers to which.
+//! All later stages may then choose by index, sum and break ties freely: equal scenes are equal lists. The order
+//! depends on content alone: names, bits of coordinates, bits of transforms. Items equal in all of that are
+//! interchangeable. Equal vertices, pictures, textures, materials and meshes become one; otherwise only the
+//! references to them could tell them apart.
 
 use std::cmp::Ordering;
 use std::mem::take;
@@ -17,12 +17,12 @@ use serde_json::Value;
 use crate::gltf::map_textures;
 use crate::repair::GridSteps;
 
-/// Puts a scene in an order of its own.
+/// Puts a scene into its canonical order.
 ///
-/// Scenes that hold the same objects, of the same triangles, under the same names, become the same scene to the bit, in whatever
-/// order they list files, nodes, meshes, primitives, triangles and vertices, and at whichever vertex a triangle begins.
-/// [`import`](crate::import) does it with all that it reads; a scene put together otherwise needs it for the same world to come
-/// out. Vertices that no triangle uses are left out. `n log n` in all that it lists.
+/// Scenes with the same objects, of the same triangles, under the same names, become bitwise equal, whatever the
+/// order of files, nodes, meshes, primitives, triangles and vertices, and the first vertex of each triangle.
+/// [`import`](crate::import) calls it; scenes from other sources need it to give the same world. Drops unused
+/// vertices. `n log n` in the number of all items.
 ///
 /// # Panics
 ///
@@ -31,7 +31,7 @@ pub fn sort_scene(scene: &mut Scene) {
     sort(scene, &mut GridSteps::new());
 }
 
-/// [`sort_scene`], of meshes that have been rounded to a grid.
+/// Works as [`sort_scene`] on meshes that may have been rounded to a grid.
 pub(crate) fn sort(scene: &mut Scene, steps: &mut GridSteps) {
     sort_looks(scene);
     sort_meshes(scene, steps);
@@ -41,7 +41,7 @@ pub(crate) fn sort(scene: &mut Scene, steps: &mut GridSteps) {
     scene.fixtures.sort_by(fixtures);
 }
 
-/// Pictures, textures, materials, each once.
+/// Makes pictures, textures and materials unique, and sorts them.
 fn sort_looks(scene: &mut Scene) {
     let image_of = make_unique(&mut scene.images, images);
     for texture in &mut scene.textures {
@@ -75,9 +75,9 @@ fn renumber_textures(material: &mut Material, texture_of: &[u32]) {
     }
 }
 
-/// Meshes, each once, and what is in them.
+/// Makes meshes unique, and sorts them and their contents.
 fn sort_meshes(scene: &mut Scene, steps: &mut GridSteps) {
-    /// A mesh with the width of each primitive's grid, 0 for none.
+    /// A mesh with the grid width of each primitive, 0 for none.
     type Stepped = (Mesh, Vec<f32>);
     let stepped = |(i, mut mesh): (usize, Mesh)| -> Stepped {
         let of = steps.get(&(i as u32)).map_or(&[][..], Vec::as_slice);
@@ -117,8 +117,8 @@ fn sort_meshes(scene: &mut Scene, steps: &mut GridSteps) {
     }
 }
 
-/// Vertices that are equal become one, each triangle begins at its least vertex, triangles are sorted by their vertices, and
-/// vertices numbered as triangles come to them.
+/// Joins equal vertices, starts each triangle at its least vertex, sorts triangles by their vertices, and numbers
+/// vertices by their first use.
 fn sort_primitive(p: &mut Primitive) {
     let mut is_used = vec![false; p.positions.len()];
     p.indices.iter().for_each(|&i| is_used[i as usize] = true);
@@ -130,7 +130,7 @@ fn sort_primitive(p: &mut Primitive) {
         a.cmp(b).then_with(|| looks(p, *v as usize, *w as usize))
     };
     vertices.sort_unstable_by(order);
-    // By vertex its place among those that differ, and by place one of the vertices there.
+    // Rank of each vertex among the distinct ones, and one vertex of each rank.
     let mut place = vec![0; p.positions.len()];
     let mut first: Vec<u32> = Vec::new();
     for equal in vertices.chunk_by(|a, b| order(a, b).is_eq()) {
@@ -170,7 +170,7 @@ fn sort_primitive(p: &mut Primitive) {
     p.uvs.iter_mut().for_each(|set| pick(set, &kept));
 }
 
-/// Nodes, as a tree is listed from its top, those beside each other by name; and objects by node.
+/// Sorts nodes depth first, siblings by name, and objects by node.
 fn sort_objects(scene: &mut Scene) {
     let rank = ranks(scene.objects.len(), |i, j| {
         objects(&scene.objects[i], &scene.objects[j])
@@ -198,15 +198,15 @@ fn sort_objects(scene: &mut Scene) {
     }
 }
 
-/// By node its new number; `rank` is that of each object.
+/// Returns the new number of each node; `rank` is that of each object.
 ///
-/// From the leaves up, nodes are told apart by what is at and below them, as trees without order are (Aho, Hopcroft & Ullman, "The
-/// Design and Analysis of Computer Algorithms", 1974, example 3.2).
+/// Classifies nodes from the leaves up by their contents and children, as in the isomorphism of unordered trees (Aho,
+/// Hopcroft & Ullman, "The Design and Analysis of Computer Algorithms", 1974, example 3.2).
 fn node_numbers(nodes: &[SourceNode], objects: &[Object], rank: &[u32]) -> Vec<u32> {
     let n = nodes.len();
     let mut height = vec![0_u32; n];
     let mut below: Vec<Vec<u32>> = vec![Vec::new(); n];
-    // A node comes after the one above it.
+    // Nodes follow their parents.
     for i in (0..n).rev() {
         if let Some(parent) = nodes[i].parent {
             let parent = parent as usize;
@@ -246,7 +246,7 @@ fn node_numbers(nodes: &[SourceNode], objects: &[Object], rank: &[u32]) -> Vec<u
         }
         n_kinds += level.len() as u32;
     }
-    // Reversed, as the last of a stack comes first.
+    // Reversed, as the stack returns the last first.
     let reversed = |list: &mut Vec<u32>| {
         list.sort_by_key(|&i| std::cmp::Reverse((&nodes[i as usize].name, kind[i as usize])));
     };
@@ -265,7 +265,7 @@ fn node_numbers(nodes: &[SourceNode], objects: &[Object], rank: &[u32]) -> Vec<u
     number
 }
 
-/// Sorts a list, keeps one of those that are equal, and returns by old number the new one.
+/// Sorts a list, keeps one of each set of equal items, and returns the new number for each old one.
 fn make_unique<T>(list: &mut Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Vec<u32> {
     let mut items: Vec<(u32, T)> = (0..).zip(take(list)).collect();
     items.sort_by(|a, b| order(&a.1, &b.1));
@@ -279,7 +279,7 @@ fn make_unique<T>(list: &mut Vec<T>, order: impl Fn(&T, &T) -> Ordering) -> Vec<
     number
 }
 
-/// By item its rank, the same for equal ones.
+/// Returns the rank of each item; equal items have equal ranks.
 fn ranks(n: usize, order: impl Fn(usize, usize) -> Ordering) -> Vec<u32> {
     let mut items: Vec<usize> = (0..n).collect();
     items.sort_by(|&a, &b| order(a, b));
@@ -290,14 +290,14 @@ fn ranks(n: usize, order: impl Fn(usize, usize) -> Ordering) -> Vec<u32> {
     rank
 }
 
-/// A number that is ordered as [`f32::total_cmp`] orders.
+/// Returns a number that orders as [`f32::total_cmp`] does.
 fn ordered(x: f32) -> u32 {
     let bits = x.to_bits();
     let sign = 1 << 31;
     if bits & sign == 0 { bits | sign } else { !bits }
 }
 
-/// Shorter lists first, then by the first that differ.
+/// Orders shorter lists first, then by the first items that differ.
 pub(crate) fn all<T>(a: &[T], b: &[T], order: impl Fn(&T, &T) -> Ordering) -> Ordering {
     let unequal = || {
         let mut pairs = a.iter().zip(b).map(|(a, b)| order(a, b));
@@ -345,7 +345,7 @@ fn primitives(a: &Primitive, b: &Primitive) -> Ordering {
         .then_with(|| vectors(&a.colors, &b.colors))
 }
 
-/// Two vertices of a primitive by all but their positions.
+/// Compares two vertices of a primitive by everything but their positions.
 fn looks(p: &Primitive, v: usize, w: usize) -> Ordering {
     fn by<const N: usize>(list: &[[f32; N]], v: usize, w: usize) -> Ordering {
         if list.is_empty() {
@@ -362,7 +362,7 @@ fn looks(p: &Primitive, v: usize, w: usize) -> Ordering {
         .then_with(|| by(&p.colors, v, w))
 }
 
-/// By all but their nodes.
+/// Compares by everything but the nodes.
 fn objects(a: &Object, b: &Object) -> Ordering {
     (&a.name, a.mesh)
         .cmp(&(&b.name, b.mesh))

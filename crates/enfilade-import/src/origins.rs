@@ -1,22 +1,22 @@
-//! What an input calls its things: the tree of its names, its lights, cameras and markers, its terms of use.
+//! Names and metadata of the input: tree of names, lights, cameras, markers, copyright.
 
 use enfilade_geom::scene::{About, Entity, Fixture, FixtureKind, Scene, SourceNode};
 use enfilade_geom::{DMat3, DMat4, DVec3};
 use serde_json::{Map, Value};
 use std::collections::{BTreeSet, HashMap};
 
-/// Most levels of brackets in what is carried along for applications: worlds nest it a few levels deeper, and readers of JSON
+/// Deepest nesting of brackets in data kept for applications: worlds nest it a few levels deeper, and JSON readers
 /// stop at 128.
 const MAX_NESTING: usize = 100;
 
-/// Names under construction.
+/// Names and metadata under construction.
 #[derive(Default)]
 pub(crate) struct Origins {
     nodes: Vec<SourceNode>,
     fixtures: Vec<Fixture>,
-    /// Of each file that has one, each once.
+    /// Copyrights of the files, each once.
     copyrights: BTreeSet<String>,
-    /// Of the scene as a whole.
+    /// Extras of the scene as a whole.
     extras: String,
 }
 
@@ -38,8 +38,8 @@ impl Origins {
         self.fixtures.push(fixture);
     }
 
-    /// Adds the copyright of one more file and the extras of its scene. Of extras the least text stays, whichever file came first; returns
-    /// whether others were left out.
+    /// Adds the copyright of one more file and the extras of its scene. Only the least extras, as text, are kept,
+    /// whatever the order of files; returns `true` if others were left out.
     pub(crate) fn add_about(&mut self, copyright: &str, extras: &str) -> bool {
         if !copyright.is_empty() {
             self.copyrights.insert(copyright.to_owned());
@@ -54,8 +54,8 @@ impl Origins {
         !is_first
     }
 
-    /// Hands everything to the scene. Objects without a node get one of their own name, and nodes with no object at or below them
-    /// are removed.
+    /// Moves everything into the scene. Objects without a node get one with their own name; nodes without an object
+    /// at or below them are removed.
     pub(crate) fn move_into(mut self, scene: &mut Scene) {
         let entities = scene.entities.iter();
         let entity_of: HashMap<u32, &Entity> =
@@ -110,7 +110,7 @@ impl Origins {
     }
 }
 
-/// What an entity says, as a JSON object.
+/// Returns an entity's properties as a JSON object.
 fn extras_of(entity: &Entity) -> String {
     let properties = entity.properties.iter();
     let all: Map<String, Value> = properties
@@ -119,7 +119,7 @@ fn extras_of(entity: &Entity) -> String {
     Value::Object(all).to_string()
 }
 
-/// Whether JSON text nests no deeper than a world can hold.
+/// Returns `true` if JSON text nests no deeper than a world allows.
 pub(crate) fn is_shallow(json: &str) -> bool {
     let (mut depth, mut in_text, mut is_escaped) = (0_usize, false, false);
     for byte in json.bytes() {
@@ -138,7 +138,8 @@ pub(crate) fn is_shallow(json: &str) -> bool {
     true
 }
 
-/// The rotation and translation nearest to a transform, as files hold them: what looks along -z still does, with y still up.
+/// Returns the rotation and translation nearest to a transform, as files store them: the direction -z and y-up are
+/// kept.
 pub(crate) fn rigid(transform: &DMat4) -> DMat4 {
     let [up, back] = [transform.y_axis, transform.z_axis].map(|a| a.truncate().try_normalize());
     let (up, back) = (up.unwrap_or(DVec3::Y), back.unwrap_or(DVec3::Z));

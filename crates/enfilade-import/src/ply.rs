@@ -1,7 +1,7 @@
 //! PLY (Turk, *The PLY Polygon File Format*, 1994), ASCII and binary of either byte order.
 //!
-//! A reader of our own: `ply-rs-bw` wants each ASCII element on a line of its own, and of two elements with one name it
-//! drops the first in silence (`docs/dependencies.md`).
+//! This reader replaces `ply-rs-bw`, which requires each ASCII element on a line of its own and silently drops the
+//! first of two elements with one name (`docs/dependencies.md`).
 
 use crate::builder::Builder;
 use crate::polygon::Splitter;
@@ -10,7 +10,7 @@ use crate::{ImportError, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};
 
-/// Whether the bytes look like PLY.
+/// Returns `true` if the bytes look like PLY.
 pub(crate) fn is_ply(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
 }
@@ -74,7 +74,7 @@ impl Scalar {
         }
     }
 
-    /// What a color of this type counts to.
+    /// Returns the number that stands for full intensity in a color of this type.
     fn most(self) -> f64 {
         match self {
             Self::I8 | Self::U8 => 255.0,
@@ -84,7 +84,7 @@ impl Scalar {
         }
     }
 
-    /// The value from its bytes, least first.
+    /// Returns the value from its bytes, least significant first.
     fn read(self, b: [u8; 8]) -> f64 {
         match self {
             Self::I8 => f64::from(b[0] as i8),
@@ -102,7 +102,7 @@ impl Scalar {
 struct Property {
     name: String,
     kind: Scalar,
-    /// Type of the length, if it is a list.
+    /// Type of the length of a list; `None` for a single value.
     length: Option<Scalar>,
 }
 
@@ -117,7 +117,7 @@ struct Header {
     elements: Vec<Element>,
 }
 
-/// The header, and where the body starts.
+/// Returns the header, and the offset of the body.
 fn read_header(bytes: &[u8], builder: &Builder<'_>) -> Result<(Header, usize), ImportError> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
@@ -126,7 +126,7 @@ fn read_header(bytes: &[u8], builder: &Builder<'_>) -> Result<(Header, usize), I
     while at < bytes.len() {
         number += 1;
         let bad = |problem: String| builder.malformed(format!("line {number}"), problem);
-        // The line ends at \n, \r\n, or \r alone; a binary body may start with \n.
+        // A line ends at \n, \r\n, or \r alone; a binary body may start with \n.
         let n = bytes[at..].iter().position(|&b| b == b'\n' || b == b'\r');
         let Some(n) = n else { break };
         let line = String::from_utf8_lossy(&bytes[at..at + n]);
@@ -164,7 +164,7 @@ fn read_header(bytes: &[u8], builder: &Builder<'_>) -> Result<(Header, usize), I
                 push_property(&mut elements, kind, name, None).map_err(bad)?;
             }
             [] | ["ply" | "comment" | "obj_info", ..] => {}
-            _ => return Err(bad(format!("'{}' is no header line", shortened(&line)))),
+            _ => return Err(bad(format!("'{}' is not a header line", shortened(&line)))),
         }
     }
     Err(builder.malformed("header", "the file is cut off"))
@@ -194,7 +194,7 @@ struct Source<'b> {
 }
 
 impl Source<'_> {
-    /// The next value; `None` at the end or where no number is.
+    /// Returns the next value; `None` at the end or without a number.
     fn next(&mut self, kind: Scalar) -> Option<f64> {
         if self.encoding == Encoding::Ascii {
             let rest = &self.bytes[self.at..];
@@ -215,7 +215,7 @@ impl Source<'_> {
         Some(kind.read(value))
     }
 
-    /// Most elements of this kind that the rest of the body can hold.
+    /// Returns the most elements of this kind that the rest of the body can hold.
     fn most_elements(&self, element: &Element) -> u64 {
         let least: usize = element
             .properties
@@ -231,21 +231,21 @@ impl Source<'_> {
     }
 }
 
-/// What vertices and faces give.
+/// Vertices and faces read so far.
 #[derive(Default)]
 struct Cloud {
     positions: Vec<[f64; 3]>,
     normals: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     colors: Vec<[f32; 4]>,
-    /// Corners of all polygons, one after the other.
+    /// Vertices of all polygons, one after the other.
     corners: Vec<u32>,
     /// End of each polygon in `corners`, and its number in the file.
     ends: Vec<(usize, u64)>,
     strips: Vec<Vec<i64>>,
 }
 
-/// What a vertex property means.
+/// Meaning of a vertex property.
 #[derive(Clone, Copy)]
 enum Slot {
     Position(usize),
@@ -314,7 +314,7 @@ fn read_element(
     }
 }
 
-/// Reads a property's one value, or each of a list's, and gives the number of values.
+/// Reads a property's one value, or each value of a list, and returns their number.
 fn read_property(
     property: &Property,
     source: &mut Source<'_>,
@@ -350,9 +350,9 @@ fn read_vertices(
     cloud: &mut Cloud,
     builder: &mut Builder<'_>,
 ) -> Result<(), ImportError> {
-    // Colors of some of the vertices would be too few for all.
+    // Colors of only some vertices would not do for all.
     if !cloud.positions.is_empty() {
-        return Err(builder.malformed("element vertex", "is there twice"));
+        return Err(builder.malformed("element vertex", "appears twice"));
     }
     builder.charge_vertices("element vertex", element.count)?;
     let slots: Vec<Slot> = element.properties.iter().map(slot).collect();
@@ -396,7 +396,7 @@ fn read_vertices(
             cloud.normals.push(n.to_array().map(|c| c as f32));
         }
         if has_uvs {
-            // As in OBJ, counted from the picture's foot.
+            // As in OBJ, from the bottom of the picture.
             cloud.uvs.push([uv[0], 1.0 - uv[1]]);
         }
         if has_colors {
@@ -433,7 +433,7 @@ fn read_faces(
         let place = || format!("face {i}");
         for property in &element.properties {
             if is_outline(property) {
-                // A list repeated in one face would be two outlines; the last one counts.
+                // The last list counts if a face has two.
                 outline.clear();
                 read_property(property, source, builder, &place, |v| {
                     outline.push(v as i64);
@@ -451,11 +451,11 @@ fn read_faces(
             continue;
         }
         if outline.len() < 3 {
-            builder.note(place(), "a face with fewer than three corners; left out");
+            builder.note(place(), "a face with fewer than three vertices; left out");
             continue;
         }
         for index in outline {
-            // Checked against the vertices once all are read; they may come after the faces.
+            // Checked against the vertices at the end, as they may follow the faces.
             let index = u32::try_from(index).map_err(|_| bad_index(builder, i, index))?;
             cloud.corners.push(index);
         }

@@ -1,26 +1,25 @@
-//! Polygons with more than three corners: planarity, and ear clipping in their own plane.
+//! Polygons with more than three vertices: planarity, and ear clipping in their own plane.
 //!
-//! Ears are clipped by the `earcut` crate. It keeps corners that lie in the middle of a straight
-//! edge, as long as the outline does not cross itself; dropping one would tear the surface from
-//! its neighbor.
+//! The `earcut` crate clips ears. It keeps vertices in the middle of a straight edge, as long as the outline does not
+//! cross itself; dropping one would tear the surface from its neighbor.
 
 use crate::ImportError;
 use crate::builder::Builder;
 use earcut::Earcut;
 use enfilade_geom::DVec3;
 
-/// Most corners of one polygon. Ear clipping can take time in the square of it.
+/// Most vertices of one polygon. Ear clipping can take quadratic time.
 pub(crate) const MAX_CORNERS: usize = 4096;
 
-/// Corners may be this far from their polygon's plane. [Units: wu]
+/// Largest distance of a vertex from its polygon's plane. [Units: wu]
 const PLANAR: f64 = 1e-3;
 
-/// A corner this far inside the line through its neighbors makes a polygon concave. [Units: wu]
+/// A vertex this far inside the line through its neighbors makes a polygon concave. [Units: wu]
 const NOTCH: f64 = 1e-5;
 
 const CROSSES: &str = "a polygon that crosses or touches itself; look at the result";
 
-/// Splits polygons; keeps its buffers.
+/// Splits polygons into triangles; reuses its buffers.
 pub(crate) struct Splitter {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
@@ -36,9 +35,9 @@ impl Splitter {
         }
     }
 
-    /// Triangles of a polygon as triples of corner numbers, wound as the polygon is.
+    /// Returns the triangles of a polygon as triples of vertex numbers, with the polygon's winding.
     ///
-    /// `unit` is meters per unit of the corners.
+    /// `unit` is meters per unit of the vertices.
     pub(crate) fn split(
         &mut self,
         corners: &[DVec3],
@@ -52,7 +51,7 @@ impl Splitter {
             return Err(ImportError::TooMuch {
                 path: builder.path.clone(),
                 place: place(),
-                what: "corners of one polygon",
+                what: "vertices of one polygon",
                 n: n as u64,
                 limit: MAX_CORNERS as u64,
             });
@@ -67,7 +66,7 @@ impl Splitter {
         let center = corners.iter().sum::<DVec3>() / n as f64;
         let normal = newell_normal(corners, center).normalize_or_zero();
         if normal == DVec3::ZERO || !center.is_finite() {
-            // No plane: any triangles do, and the cleaning report shows them as degenerate.
+            // Without a plane any triangles do; the cleaning report shows them as degenerate.
             self.fan(n);
             return Ok(&self.triangles);
         }
@@ -106,7 +105,7 @@ impl Splitter {
             &[] as &[u32],
             &mut self.triangles,
         );
-        // All seen are counter-clockwise, but the crate does not promise it.
+        // All results so far are counter-clockwise, but the crate does not promise it.
         let mut triangles = std::mem::take(&mut self.triangles);
         for t in triangles.chunks_exact_mut(3) {
             if self.area([t[0], t[1], t[2]].map(|i| i as usize)) < 0.0 {
@@ -123,11 +122,11 @@ impl Splitter {
         Ok(&self.triangles)
     }
 
-    /// Cuts a quad along the diagonal that leaves both halves turned as the quad is, the one from
-    /// corner 0 if both do; `false` if neither does.
+    /// Cuts a quad along the diagonal that gives both halves the quad's winding, from vertex 0 if both diagonals do;
+    /// `false` if neither does.
     ///
-    /// A bent quad, seen along its mean normal, may touch itself. Two triangles are right even
-    /// then, and `earcut` gives one.
+    /// A bent quad, seen along its mean normal, may touch itself. Two triangles are correct even then, but `earcut`
+    /// returns one.
     fn split_quad(&mut self) -> bool {
         let cuts = [[0, 1, 2, 0, 2, 3], [1, 2, 3, 1, 3, 0]];
         let [first, second] = cuts.map(|c| {
@@ -143,7 +142,7 @@ impl Splitter {
         first.max(second) > 0.0
     }
 
-    /// Whether a corner lies more than `depth` inside the line through its neighbors.
+    /// Returns `true` if a vertex lies more than `depth` inside the line through its neighbors.
     fn is_notched(&self, depth: f64) -> bool {
         let n = self.flat.len();
         (0..n).any(|i| {
@@ -154,7 +153,7 @@ impl Splitter {
         })
     }
 
-    /// Whether no corner turns inwards and the outline goes round once: then it cannot cross itself.
+    /// Returns `true` without reflex vertices and with a single turn: the outline then cannot cross itself.
     fn is_convex(&self, depth: f64) -> bool {
         let n = self.flat.len();
         let turns = (0..n).map(|i| {
@@ -162,12 +161,12 @@ impl Splitter {
             let (p, q) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
             (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1])
         });
-        // Once round is a full turn, twice two.
+        // A single turn is `TAU`, two are twice that.
         !self.is_notched(depth) && turns.sum::<f64>() < 1.5 * std::f64::consts::TAU
     }
 
-    /// Whether two edges without a common corner cross. Time: `n log n`, and the pairs of edges that lie side by side in
-    /// the first direction.
+    /// Returns `true` if two edges without a common vertex cross. Time: `n log n`, plus the pairs of edges that
+    /// overlap along the first axis.
     fn crosses_itself(&self) -> bool {
         let n = self.flat.len();
         let ends = |i: usize| [self.flat[i], self.flat[(i + 1) % n]];
@@ -192,14 +191,14 @@ impl Splitter {
             .extend((1..n as u32 - 1).flat_map(|i| [0, i, i + 1]));
     }
 
-    /// Twice the signed area.
+    /// Returns twice the signed area.
     fn area(&self, t: [usize; 3]) -> f64 {
         let [a, b, c] = t.map(|i| self.flat[i]);
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     }
 }
 
-/// Twice the area vector (Newell's method), about `center` to keep digits.
+/// Returns twice the area vector (Newell's method), about `center` for precision.
 fn newell_normal(corners: &[DVec3], center: DVec3) -> DVec3 {
     let n = corners.len();
     (0..n)
@@ -225,7 +224,7 @@ mod tests {
         (triangles, report.non_planar_polygons.n, report.notes.len())
     }
 
-    /// Area vector of the triangles and the sum of their areas, both doubled.
+    /// Returns the area vector of the triangles and the sum of their areas, both doubled.
     fn areas(corners: &[DVec3], triangles: &[u32]) -> (DVec3, f64) {
         triangles
             .chunks_exact(3)
@@ -245,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_concave_polygon_with_a_corner_mid_edge_is_covered_exactly_once() {
-        // An L of area 3 with one corner in the middle of its longest edge.
+        // An L of area 3 with one vertex in the middle of its longest edge.
         let outline = [
             [0., 0.],
             [1., 0.],
@@ -274,12 +273,12 @@ mod tests {
 
     #[test]
     fn quads_give_two_triangles_whatever_their_shape() {
-        // Concave at corner 1: only the cut from there stays inside.
+        // Concave at vertex 1: only the cut from there stays inside.
         let arrow = on_plane(&[[0., 0.], [1., 0.5], [2., 0.], [1., 3.]]);
         let (triangles, _, n_notes) = split(&arrow);
         let (vector, sum) = areas(&arrow, &triangles);
         assert_eq!((vector.length(), sum, n_notes), (5.0, 5.0, 0));
-        // Found by `obj_and_ply_agree`: bent so far that it touches itself, seen from above.
+        // Found by `obj_and_ply_agree`: bent so much that it touches itself, seen from above.
         for height in 0..9 {
             let bent = [(0, 0, 0), (0, height, 1), (1, 0, 1), (1, 4, 0)];
             let bent = bent.map(|(x, y, z)| DVec3::new(x.into(), y.into(), z.into()));
@@ -303,10 +302,10 @@ mod tests {
         assert_eq!(count(&square), (0, 0));
         assert_eq!(count(&[[0., 0.], [1., 0.5], [2., 0.], [1., 3.]]), (1, 0));
         assert_eq!(count(&[[0., 0.], [2., 2.], [2., 0.], [0., 3.]]), (0, 1));
-        // A corner in the middle of an edge, but for rounding.
+        // A vertex in the middle of an edge, up to rounding.
         let straight = [[0., 0.], [0.5, 1e-7], [1., 0.], [1., 1.], [0., 1.]];
         assert_eq!(count(&straight), (0, 0));
-        // A star of five points, drawn without lifting the pen: every corner turns the same way.
+        // A five-pointed star, drawn without lifting the pen: every vertex turns the same way.
         let star: Vec<[f64; 2]> = (0..5)
             .map(|i| f64::from(i) * 0.4 * std::f64::consts::TAU)
             .map(|a| [a.cos(), a.sin()])
@@ -325,7 +324,7 @@ mod tests {
     }
 
     proptest! {
-        /// Star-shaped outlines are simple; the triangles then cover them once, all turned alike.
+        /// Star-shaped outlines are simple, so the triangles cover them once, all with the same winding.
         #[test]
         fn star_outlines_are_covered_once(
             radii in prop::collection::vec(0.1f64..10.0, 4..40),

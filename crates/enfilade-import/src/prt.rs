@@ -1,33 +1,33 @@
 //! Quake portal files: `PRT1` (Quake, Quake 2, Quake 3), `PRT2` and `PRT1-AM`.
 //!
-//! Text: a header, then a portal a line, `<points> <c0> <c1> (x y z ) …`, whose right-hand normal leads
-//! from cluster `c0` to `c1`. Leaves, which the vis data of a game is about, belong to clusters, which
-//! visibility is about; the variants differ in how they say so. Input is not trusted: every count is
-//! held against the bytes that are there before memory is taken for it.
+//! The text is a header, then one portal per line, `<points> <c0> <c1> (x y z ) …`, whose right-hand normal points
+//! from cluster `c0` to `c1`. A game's vis data is about leaves; visibility is about clusters, to which leaves
+//! belong; the variants differ in how they record that. Input is not trusted: every count is checked against the
+//! bytes present before memory is allocated for it.
 
 use std::fmt::Write;
 
-/// Which program's flavor a portal file is.
+/// Variants of portal files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PrtFormat {
     /// Quake and Quake 2: a leaf is a cluster.
     Prt1,
-    /// ericw-tools and tyrutils: a list of leaves a cluster.
+    /// ericw-tools and tyrutils: a list of leaves per cluster.
     Prt2,
     /// bjptools: the cluster of each leaf.
     Prt1Am,
-    /// Quake 3: flags a portal, solid faces at the end.
+    /// Quake 3: flags per portal, solid faces at the end.
     Quake3,
 }
 
 /// A portal, or a solid face of a Quake 3 file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrtPortal {
-    /// The clusters it joins; the right-hand normal of the points leads from the first to the second.
+    /// The clusters it joins; the right-hand normal of the points points from the first to the second.
     pub clusters: [u32; 2],
     /// Quake 3's flags: 1 hint, 2 sky. 0 elsewhere.
     pub flags: u32,
-    /// Corners, convex and planar up to rounding. [Units: those of the map]
+    /// Vertices, convex and planar up to rounding. [Units: those of the map]
     pub points: Vec<[f64; 3]>,
 }
 
@@ -36,14 +36,14 @@ pub struct PrtPortal {
 pub struct PrtFace {
     /// The cluster that sees it.
     pub cluster: u32,
-    /// Corners. [Units: those of the map]
+    /// Vertices. [Units: those of the map]
     pub points: Vec<[f64; 3]>,
 }
 
-/// What a portal file holds.
+/// Contents of a portal file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrtFile {
-    /// Its flavor.
+    /// Its variant.
     pub format: PrtFormat,
     /// Number of clusters.
     pub n_clusters: u32,
@@ -55,32 +55,30 @@ pub struct PrtFile {
     pub leaf_cluster: Vec<u32>,
 }
 
-/// Why text is no portal file or no PVS: the line, the word on it, and what is wrong.
+/// The reason why a text is not a portal file or PVS, with its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}, word {word}: {}", enfilade_geom::shown(problem))]
 pub struct PrtError {
     /// Line, from 1.
     pub line: usize,
-    /// Word on that line, from 1; brackets are words.
+    /// Word on that line, from 1; brackets count as words.
     pub word: usize,
-    /// What is wrong.
+    /// The problem.
     pub problem: String,
 }
 
-/// Most clusters or leaves that a file may speak of. Its bytes bound the portals, but clusters without
-/// portals take none.
+/// Most clusters or leaves in a file. The file's size bounds the portals, but clusters without portals take no bytes.
 const MAX_CLUSTERS: u32 = 1 << 20;
-/// Coordinates beyond this are taken for damage.
+/// Larger coordinates are rejected as damage.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// Reads a portal file of any flavor.
+/// Reads a portal file of any variant.
 ///
-/// Portals with fewer than three points are kept as they are: who uses them decides. Time and memory are
-/// linear in the text.
+/// Keeps portals with fewer than three points; the caller decides about them. Linear time and memory.
 ///
 /// # Errors
 ///
-/// The first word that does not fit, with its place.
+/// The first unexpected word, with its place.
 pub fn read_prt(text: &str) -> Result<PrtFile, PrtError> {
     let mut words = PrtWords::new(text);
     let magic = words.next("the magic word `PRT1`, `PRT2` or `PRT1-AM`")?;
@@ -91,7 +89,7 @@ pub fn read_prt(text: &str) -> Result<PrtFile, PrtError> {
         other => {
             let shown: String = other.chars().take(20).collect();
             return Err(words.error(format!(
-                "'{shown}' is no portal file's magic word; PRT1, PRT2 and PRT1-AM are read"
+                "'{shown}' is not the magic word of a portal file: PRT1, PRT2 or PRT1-AM"
             )));
         }
     };
@@ -101,8 +99,8 @@ pub fn read_prt(text: &str) -> Result<PrtFile, PrtError> {
     }
     let mut n_faces = 0;
     if format == PrtFormat::Prt1 && words.starts_number_line() {
-        // Quake 3 has one more count in its header, on a line of its own; portals begin with three
-        // numbers and a bracket, so a line with a single number is no portal.
+        // Quake 3's header has one more count, on a line of its own. A portal begins with three numbers and a
+        // bracket, so a line with a single number is not a portal.
         n_faces = words.number("the number of solid faces")?;
         format = PrtFormat::Quake3;
     }
@@ -187,14 +185,14 @@ fn read_leaves(
 }
 
 impl PrtFile {
-    /// The file with clusters as parts of others: cluster `c` becomes `cluster_of[c]` of `n_clusters`.
+    /// Returns the file with clusters merged: cluster `c` becomes `cluster_of[c]` of `n_clusters`.
     ///
-    /// Portals inside a cluster go. `PRT1`, in which a leaf is a cluster, becomes `PRT2`, whose leaves are the
-    /// clusters that were: what is about leaves stays right. Quake 3's files know clusters only. Linear.
+    /// Drops portals inside a merged cluster. `PRT1`, in which a leaf is a cluster, becomes `PRT2`, whose leaves are
+    /// the old clusters: data about leaves stays valid. Quake 3's files have clusters only. Linear.
     ///
     /// # Panics
     ///
-    /// When `cluster_of` does not tell of every cluster.
+    /// When `cluster_of` lacks a cluster.
     #[must_use]
     pub fn merged(&self, cluster_of: &[u32], n_clusters: u32) -> Self {
         let of = |c: u32| cluster_of[c as usize];
@@ -223,7 +221,7 @@ impl PrtFile {
     }
 }
 
-/// Writes a portal file; numbers are the shortest that read back the same.
+/// Writes a portal file, with the shortest numbers that read back the same.
 ///
 /// `read_prt(write_prt(file)) == file`.
 #[must_use]
@@ -285,7 +283,7 @@ fn write_points(out: &mut String, points: &[[f64; 3]]) {
     out.push('\n');
 }
 
-/// The words of a text; brackets are words of their own.
+/// Splits a text into words; brackets are words of their own.
 struct PrtWords<'a> {
     text: &'a str,
     at: usize,
@@ -325,7 +323,7 @@ impl<'a> PrtWords<'a> {
         }
     }
 
-    /// Length in bytes of the word that starts at `at`.
+    /// Returns the length in bytes of the word that starts at `at`.
     fn word_len(&self) -> usize {
         let rest = &self.text.as_bytes()[self.at..];
         match rest.first() {
@@ -341,7 +339,7 @@ impl<'a> PrtWords<'a> {
         self.skip_space();
         self.word += 1;
         if self.at >= self.text.len() {
-            return Err(self.error(format!("the file ends where {wanted} should stand")));
+            return Err(self.error(format!("the file ends before {wanted}")));
         }
         let start = self.at;
         self.at += self.word_len();
@@ -362,7 +360,7 @@ impl<'a> PrtWords<'a> {
         Ok(n)
     }
 
-    /// The next leaf of a list, `None` at its end.
+    /// Returns the next leaf of a list, `None` at its end.
     fn leaf(&mut self, n_leaves: u32) -> Result<Option<u32>, PrtError> {
         self.skip_space();
         let len = self.word_len();
@@ -374,7 +372,7 @@ impl<'a> PrtWords<'a> {
     }
 
     fn points(&mut self, n: u32) -> Result<Vec<[f64; 3]>, PrtError> {
-        // Nine bytes are the least for a point: "(0 0 0)" and two spaces less one.
+        // A point takes at least seven bytes: "(0 0 0)".
         let mut points = Vec::with_capacity((n as usize).min((self.text.len() - self.at) / 7));
         for _ in 0..n {
             self.bracket("(")?;
@@ -388,7 +386,7 @@ impl<'a> PrtWords<'a> {
     fn bracket(&mut self, wanted: &'static str) -> Result<(), PrtError> {
         let word = self.next(wanted)?;
         if word != wanted {
-            return Err(self.error(format!("'{}' where '{wanted}' should stand", shown(word))));
+            return Err(self.error(format!("expected '{wanted}', found '{}'", shown(word))));
         }
         Ok(())
     }
@@ -397,11 +395,11 @@ impl<'a> PrtWords<'a> {
         let word = self.next("a coordinate")?;
         match word.parse::<f64>() {
             Ok(x) if x.abs() <= MAX_COORDINATE => Ok(x),
-            _ => Err(self.error(format!("'{}' is no usable coordinate", shown(word)))),
+            _ => Err(self.error(format!("'{}' is not a valid coordinate", shown(word)))),
         }
     }
 
-    /// Whether the next line that is not empty holds a single number.
+    /// Returns `true` if the next line that is not empty holds a single number.
     fn starts_number_line(&self) -> bool {
         let line = self.text[self.at..].trim_start().lines().next();
         line.is_some_and(|l| l.trim().parse::<u32>().is_ok())

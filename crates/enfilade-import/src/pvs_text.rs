@@ -1,29 +1,29 @@
 //! Potentially visible sets as text, `PVS1`.
 //!
-//! `PVS1 <clusters>`, lines `# …` of metadata, then a line a cluster: `4: 0-7 12 30-41`, ascending, both
-//! ends inclusive. `all` stands for every cluster. A cluster sees itself.
+//! The first line is `PVS1 <clusters>`, followed by metadata lines `# …`, then one line per cluster:
+//! `4: 0-7 12 30-41`, ascending, both ends inclusive. `all` stands for every cluster. A cluster sees itself.
 
 use std::fmt::Write;
 
 use crate::PrtError;
 
-/// A set for each cluster, as ascending ranges, the end not included.
+/// One set per cluster, as ascending half-open ranges.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PvsText {
-    /// `# …` lines without the mark.
+    /// Metadata: the `# …` lines without the mark.
     pub notes: Vec<String>,
-    /// By cluster.
+    /// Visible clusters of each cluster.
     pub rows: Vec<Vec<(u32, u32)>>,
 }
 
-/// Most clusters; a row without a range takes a few bytes only, so the text bounds the rest.
+/// Most clusters. A row without ranges takes only a few bytes; the text's size bounds the rest.
 const MAX_CLUSTERS: usize = 1 << 20;
 
 /// Reads a text PVS. Time and memory are linear in the text.
 ///
 /// # Errors
 ///
-/// The first line that does not fit, with its place: also a cluster with no line or two.
+/// The first invalid line, with its place; also a cluster with no line or with two.
 pub fn read_pvs_text(text: &str) -> Result<PvsText, PrtError> {
     let fail = |line: usize, word: usize, problem: String| {
         Err(PrtError {
@@ -42,7 +42,7 @@ pub fn read_pvs_text(text: &str) -> Result<PvsText, PrtError> {
         return fail(
             1,
             1,
-            "`PVS1 <clusters>` is missing: this is no text PVS".into(),
+            "`PVS1 <clusters>` is missing: this is not a text PVS".into(),
         );
     };
     if n > MAX_CLUSTERS || n > text.len() {
@@ -100,7 +100,7 @@ fn read_ranges(text: &str, n: usize) -> Result<Vec<(u32, u32)>, (usize, String)>
         }
         let (a, b) = part.split_once('-').unwrap_or((part, part));
         let (Ok(a), Ok(b)) = (a.parse::<u32>(), b.parse::<u32>()) else {
-            return Err((i + 1, "this is no number or range".into()));
+            return Err((i + 1, "this is not a number or range".into()));
         };
         if a > b || b as usize >= n || row.last().is_some_and(|&(_, end)| a < end) {
             return Err((i + 1, format!("ranges must ascend and stay below {n}")));

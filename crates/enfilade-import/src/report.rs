@@ -1,41 +1,42 @@
-//! What the importer noticed and did. Nothing is changed without a line here.
+//! The report of an import. Every change is recorded here.
 
 use enfilade_geom::{DVec3, shown};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Distinct notes kept; past it, new ones are only counted.
+/// Most distinct notes kept; further ones are only counted.
 const MAX_NOTES: usize = 500;
 
-/// Example positions kept per finding.
+/// Most example positions kept per finding.
 pub(crate) const MAX_EXAMPLES: usize = 5;
 
-/// What the importer noticed and did.
+/// Observations and changes of an import.
 #[derive(Clone, Debug, Default)]
 pub struct ImportReport {
-    /// One entry a file, in the order given.
+    /// One entry per file, in the order given.
     pub files: Vec<FileReport>,
-    /// What was skipped, assumed or repaired, equal texts of one file merged.
+    /// Everything skipped, assumed or repaired; equal texts of one file are merged.
     pub notes: Vec<Note>,
     /// Notes left out because there were too many distinct ones.
     pub n_notes_dropped: u64,
-    /// Vertices with a coordinate that is no finite number; their triangles are dropped.
+    /// Vertices with a coordinate that is not finite; their triangles are dropped.
     pub nonfinite_vertices: Finding,
-    /// Triangles dropped for the vertices above.
+    /// Triangles dropped for such vertices.
     pub n_nonfinite_triangles: u64,
-    /// Polygons with more than three corners, one of them more than 1 mm off their plane.
+    /// Polygons with more than three vertices, one of them more than 1 mm off their plane.
     pub non_planar_polygons: Finding,
-    /// Polygons with a corner that turns inwards by more than 0.01 mm, outlines that cross themselves aside.
+    /// Polygons with a vertex more than 0.01 mm inside the line through its neighbors, except those that cross
+    /// themselves.
     pub concave_polygons: Finding,
     /// Polygons whose outline crosses itself, seen along their normal.
     pub crossing_polygons: Finding,
     /// Polygons split into triangles.
     pub n_polygons: u64,
-    /// Files that the scene refers to and that were read: buffers, pictures, materials. Each once.
+    /// Files read because the scene refers to them: buffers, pictures, materials. Each once.
     pub references: Vec<PathBuf>,
-    /// Why the numbers are probably no meters, and what to give; `None` if nothing speaks for it.
+    /// The reason why the numbers are probably not meters, and the remedy; `None` without evidence.
     pub unit_doubt: Option<String>,
-    /// What was put right, if that was asked for.
+    /// Changes of the repair, if one was requested.
     pub repair: Option<crate::RepairReport>,
 }
 
@@ -46,29 +47,29 @@ pub struct FileReport {
     pub path: PathBuf,
     /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC` or `Quake map`.
     pub format: &'static str,
-    /// Objects it gave.
+    /// Objects read from it.
     pub n_objects: u64,
     /// Triangles of these objects.
     pub n_triangles: u64,
 }
 
-/// One thing noticed.
+/// One observation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// The file.
     pub path: PathBuf,
-    /// Where it was first noticed.
+    /// The first place of it.
     pub place: String,
-    /// What was noticed and what was done.
+    /// The observation and its consequence.
     pub text: String,
-    /// How often.
+    /// Number of times.
     pub n: u64,
 }
 
-/// A count with a few places to look at.
+/// A count with a few example places.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Finding {
-    /// How many.
+    /// Number of occurrences.
     pub n: u64,
     /// The first few, at most five.
     pub examples: Vec<Example>,
@@ -79,7 +80,7 @@ pub struct Finding {
 pub struct Example {
     /// The object or element.
     pub name: String,
-    /// Where; in world space unless the finding says otherwise. [Units: wu]
+    /// Position; in world space unless the finding says otherwise. [Units: wu]
     pub position: DVec3,
 }
 

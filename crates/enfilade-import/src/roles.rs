@@ -1,24 +1,24 @@
-//! What is structural and what is detail, by file, name and material.
+//! Decides between structure and detail by file, name and material.
 //!
-//! A wrong "detail" opens a hole in a wall, a wrong "structural" makes a chair a wall; both cost
-//! quality, neither correctness. Only see-through surfaces *must* be detail: a cell seen through
-//! glass may not be called hidden. The first rule that fits decides; `docs/import.md` lists them.
+//! A wrong "detail" opens a hole in a wall, a wrong "structural" makes a wall of a chair; both cost quality, not
+//! correctness. Only see-through surfaces *must* be detail: a cell seen through glass may not count as hidden. The
+//! first rule that matches decides; `docs/import.md` lists them.
 
 use crate::auto_roles::DEFAULT;
 use crate::glob::is_match;
 use enfilade_geom::scene::Role;
 
-/// The user's own rules, before all others.
+/// The user's own rules, which come before all others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoleRules {
-    /// Globs (`*`, `?`, case-insensitive) of object, mesh or material names that are structural;
-    /// these win over `detail`. A material counts if all of an object's materials fit.
+    /// Globs (`*`, `?`, case-insensitive) of object, mesh or material names that are structural; these win over
+    /// `detail`. A material name matches only if all of an object's materials match.
     pub structural: Vec<String>,
     /// Globs of object, mesh or material names that are detail.
     pub detail: Vec<String>,
-    /// Judge by the user's rules and detail files only; see-through surfaces stay detail.
+    /// Use only the user's rules and detail files; see-through surfaces stay detail.
     pub is_manual: bool,
-    /// Judge what no rule fits by its size and by what it hides, unless `is_manual`.
+    /// Decide by size and occlusion where no rule matches, unless `is_manual`.
     pub is_automatic: bool,
 }
 
@@ -33,42 +33,42 @@ impl Default for RoleRules {
     }
 }
 
-/// What is known of an object.
+/// Properties of an object that decide its role.
 pub(crate) struct Facts<'n> {
-    /// Node's and mesh's name.
+    /// Names of the node and of the mesh.
     pub(crate) names: [&'n str; 2],
-    /// Names above, nearest first.
+    /// Names of ancestors, nearest first.
     pub(crate) ancestors: &'n [&'n str],
     /// Name of each primitive's material.
     pub(crate) materials: &'n [&'n str],
-    /// All of it lets light through.
+    /// All of it is see-through.
     pub(crate) is_see_through: bool,
-    /// Why it moves.
+    /// The reason why it moves.
     pub(crate) moves: Option<&'static str>,
     pub(crate) is_detail_file: bool,
 }
 
-/// What becomes of an object.
+/// The role of an object, or its removal.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Verdict {
     Keep(Role, String),
-    /// Not to be seen: a helper of some engine.
+    /// Left out, as a helper of some engine; with the reason.
     Ignore(String),
 }
 
-/// What a name's ending means, after Godot's "Node type customization using name suffixes".
+/// Meaning of a name's ending, after Godot's "Node type customization using name suffixes".
 enum Suffix {
     /// Helper geometry that is never drawn.
     Helper,
     /// Moves on its own.
     Moves,
-    /// Blocks sight, says its author.
+    /// Blocks sight, according to its author.
     Occluder,
-    /// Says nothing about the role.
+    /// Irrelevant to the role.
     Neutral,
 }
 
-/// Longer endings first where one is the end of another.
+/// Longer endings come first where one ends with another.
 const SUFFIXES: [(&str, Suffix); 15] = [
     ("noimp", Suffix::Helper),
     ("convcolonly", Suffix::Helper),
@@ -87,10 +87,10 @@ const SUFFIXES: [(&str, Suffix); 15] = [
     ("alpha", Suffix::Neutral),
 ];
 
-/// Collision hulls as Unreal Engine's importer names them.
+/// Prefixes of collision hulls for Unreal Engine's importer.
 const HULL_PREFIXES: [&str; 4] = ["UCX_", "UBX_", "USP_", "UCP_"];
 
-/// IFC classes of things that stand in rooms, or that fill openings.
+/// IFC classes of things that stand in rooms or fill openings.
 #[rustfmt::skip]
 const IFC_DETAIL: [&str; 21] = [
     "IfcAnnotation", "IfcDistribution", "IfcDoor", "IfcElectric",
@@ -100,7 +100,7 @@ const IFC_DETAIL: [&str; 21] = [
     "IfcTransportElement", "IfcOutlet", "IfcWindow", "IfcSwitchingDevice",
 ];
 
-/// IFC classes that are no matter at all.
+/// IFC classes without physical matter.
 const IFC_VOID: [&str; 4] = [
     "IfcOpeningElement",
     "IfcOpeningStandardCase",
@@ -108,13 +108,13 @@ const IFC_VOID: [&str; 4] = [
     "IfcVirtualElement",
 ];
 
-/// The classes that decide a role; for the tests of who writes them.
+/// The classes that decide a role, for the tests of their writers.
 #[cfg(test)]
 pub(crate) fn ifc_classes() -> impl Iterator<Item = &'static str> {
     IFC_DETAIL.into_iter().chain(IFC_VOID)
 }
 
-/// Words for what bounds rooms.
+/// Words for bounds of rooms.
 #[rustfmt::skip]
 const STRUCTURAL_WORDS: [&str; 19] = [
     "wall", "floor", "ceiling", "roof", "slab", "column", "pillar", "beam", "foundation",
@@ -122,13 +122,13 @@ const STRUCTURAL_WORDS: [&str; 19] = [
     "corridor", "chimney",
 ];
 
-/// Words for what fills an opening. Any structural word beside them wins: kits call a wall with
-/// a hole in it `wall_door`.
+/// Words for things that fill an opening. Any structural word beside them wins: kits name a wall with a hole in it
+/// `wall_door`.
 const OPENING_WORDS: [&str; 8] = [
     "door", "window", "gate", "shutter", "glass", "glazing", "pane", "leaf",
 ];
 
-/// Words for what stands in rooms.
+/// Words for things that stand in rooms.
 #[rustfmt::skip]
 const DETAIL_WORDS: [&str; 106] = [
     "appliance", "armchair", "banister", "barrel", "basin", "basket", "bathtub", "bed", "bench",
@@ -145,7 +145,7 @@ const DETAIL_WORDS: [&str; 106] = [
     "vegetation", "wardrobe", "washbasin", "washer", "whiteboard", "wreath",
 ];
 
-/// Words of a material's name for what light passes, or what is full of holes.
+/// Words in names of materials that let light through or are full of holes.
 const CLEAR_MATERIAL_WORDS: [&str; 8] = [
     "glass",
     "glazing",
@@ -157,7 +157,7 @@ const CLEAR_MATERIAL_WORDS: [&str; 8] = [
     "grille",
 ];
 
-/// Why a node is dropped with all below it, if its name says so.
+/// Returns the reason why a node is dropped with its descendants, if its name implies it.
 pub(crate) fn drops_subtree(name: &str) -> Option<String> {
     if ifc_class(name).is_some() {
         return None;
@@ -166,7 +166,7 @@ pub(crate) fn drops_subtree(name: &str) -> Option<String> {
 }
 
 impl RoleRules {
-    /// Whether a material of this name lets light through, whatever its settings say.
+    /// Returns `true` if a material of this name lets light through, whatever its settings.
     pub(crate) fn is_clear_material(&self, name: &str) -> bool {
         !self.is_manual
             && words(name)
@@ -174,7 +174,7 @@ impl RoleRules {
                 .any(|w| has_word(&CLEAR_MATERIAL_WORDS, w))
     }
 
-    /// The role that the caller's rules give an object of this name, whatever its format tells.
+    /// Returns the role that the caller's rules give an object of this name, before the format's own.
     pub(crate) fn forced(&self, name: &str) -> Option<(Role, String)> {
         let fits = |globs: &[String]| globs.iter().find(|g| is_match(g, name)).cloned();
         let structural =
@@ -183,7 +183,7 @@ impl RoleRules {
             .or_else(|| fits(&self.detail).map(|g| (Role::Detail, format!("rule: detail '{g}'"))))
     }
 
-    /// The object's role; the first rule that fits decides.
+    /// Returns the object's role; the first rule that matches decides.
     pub(crate) fn judge(&self, facts: &Facts<'_>) -> Verdict {
         let structural = |reason: String| Verdict::Keep(Role::Structural, reason);
         let detail = |reason: String| Verdict::Keep(Role::Detail, reason);
@@ -231,7 +231,7 @@ fn judge_ifc(name: &str) -> Option<Verdict> {
     let class = ifc_class(name)?;
     let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
     Some(if starts(&IFC_VOID) {
-        Verdict::Ignore(format!("{class} is no matter"))
+        Verdict::Ignore(format!("{class} has no physical matter"))
     } else if starts(&IFC_DETAIL) {
         Verdict::Keep(Role::Detail, format!("IFC class {class}"))
     } else {
@@ -239,8 +239,7 @@ fn judge_ifc(name: &str) -> Option<Verdict> {
     })
 }
 
-/// `IfcWall` of `IfcWall/0aBc$`: asked before endings are looked at, as an IFC id may end in
-/// anything.
+/// Returns `IfcWall` for `IfcWall/0aBc$`. Comes before the endings, as an IFC id may end in anything.
 fn ifc_class(name: &str) -> Option<&str> {
     let n = name.bytes().take_while(u8::is_ascii_alphabetic).count();
     let class = &name[..n];
@@ -269,7 +268,7 @@ fn judge_suffix(name: &str) -> Option<Verdict> {
     }
 }
 
-/// The ending of a name, behind `-`, `$` or `_` and before the `.001` that modelers append.
+/// Returns the ending of a name, behind `-`, `$` or `_` and before the `.001` that modelers append.
 fn suffix(name: &str) -> Option<(&'static str, &'static Suffix)> {
     let name = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.' || c == ' ');
     let at = name.rfind(['-', '$', '_'])?;
@@ -280,8 +279,8 @@ fn suffix(name: &str) -> Option<(&'static str, &'static Suffix)> {
         .map(|(word, meaning)| (*word, meaning))
 }
 
-/// Furniture against structure: the last word of either kind is what the thing is (a floor lamp
-/// is a lamp, the plant room's wall a wall).
+/// Decides between furniture and structure: the last word of either kind names the thing (a floor lamp is a lamp, the
+/// plant room's wall a wall).
 fn judge_words(name: &str) -> Option<(Role, String)> {
     let words = words(name);
     let mut opening = None;
@@ -298,8 +297,8 @@ fn judge_words(name: &str) -> Option<(Role, String)> {
     found.or(opening)
 }
 
-/// A group's name counts only if every word of it says detail: `Furniture`, not
-/// `House with furniture`.
+/// Returns the first word of a group's name if every word of it means detail: `Furniture`,
+/// not `House with furniture`.
 fn group_word(name: &str) -> Option<String> {
     let words = words(name);
     let all = words
@@ -318,7 +317,7 @@ fn has_word(list: &[&str], word: &str) -> bool {
             .is_some_and(|one| list.contains(&one))
 }
 
-/// Lower-case words: cut at what is no letter, and where a small letter meets a capital.
+/// Returns lower-case words, split at characters other than letters and between a small letter and a capital.
 fn words(name: &str) -> Vec<String> {
     let mut words = Vec::new();
     let mut word = String::new();
@@ -339,7 +338,7 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// The first glob that fits the object's names, its groups' names or all of its materials.
+/// Returns the first glob that matches the object's names, its groups' names or all of its materials.
 fn matching<'g>(globs: &'g [String], facts: &Facts<'_>) -> Option<&'g str> {
     globs.iter().map(String::as_str).find(|glob| {
         facts

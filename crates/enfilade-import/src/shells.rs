@@ -1,15 +1,15 @@
-//! Shells: triangles that hang together over edges with exactly two of them.
+//! Shells: triangles connected over edges with exactly two of them.
 
-/// Triangles joined edge by edge, by union-find with path halving (Tarjan & van Leeuwen 1984); each
-/// knows whether it is turned against its parent.
+/// Triangles joined edge by edge, by union-find with path halving (Tarjan & van Leeuwen 1984). Each records whether
+/// its orientation is opposite to its parent's.
 ///
-/// Time: nearly constant for each call, whatever the number of triangles.
+/// Time: nearly constant per call, whatever the number of triangles.
 pub(crate) struct Shells {
     parent: Vec<u32>,
     is_turned: Vec<bool>,
     /// Triangles with an edge that not exactly two triangles of their object use.
     pub(crate) is_unclosed: Vec<bool>,
-    /// Triangles at which a surface was found to have one side only.
+    /// Triangles at which a surface turned out to have one side only.
     pub(crate) is_one_sided: Vec<bool>,
 }
 
@@ -23,14 +23,14 @@ impl Shells {
         }
     }
 
-    /// Root of `t`, and whether `t` is turned against it.
+    /// Returns the root of `t`, and `true` if `t` is oriented against it.
     pub(crate) fn root(&mut self, t: u32) -> (u32, bool) {
         let mut at = t;
         let mut turned = false;
         while self.parent[at as usize] != at {
             let up = self.parent[at as usize];
             let above = self.parent[up as usize];
-            // Path halving: link to the grandparent, with the turns of both steps.
+            // Path halving: link to the grandparent, with both orientations combined.
             let turn = self.is_turned[at as usize] ^ (up != above && self.is_turned[up as usize]);
             self.parent[at as usize] = above;
             self.is_turned[at as usize] = turn;
@@ -40,7 +40,7 @@ impl Shells {
         (at, turned)
     }
 
-    /// Joins two triangles that walk their edge the same way (then one is turned) or not.
+    /// Joins two triangles; `is_turned` if they traverse their edge in the same direction, so that one is turned.
     pub(crate) fn join(&mut self, a: u32, b: u32, is_turned: bool) {
         let ((ra, ta), (rb, tb)) = (self.root(a), self.root(b));
         if ra != rb {
@@ -48,7 +48,7 @@ impl Shells {
             self.parent[high as usize] = low;
             self.is_turned[high as usize] = ta ^ tb ^ is_turned;
         } else if ta ^ tb != is_turned {
-            // A surface with one side only, such as a Moebius strip.
+            // A surface with one side only, such as a Möbius strip.
             self.is_one_sided[a as usize] = true;
         }
     }

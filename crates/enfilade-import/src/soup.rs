@@ -1,14 +1,14 @@
-//! What OBJ, PLY and STL share: text numbers, far-off coordinates, placing.
+//! Shared code of OBJ, PLY and STL: numbers in text, coordinates far from the origin, placing.
 
 use crate::ImportError;
 use crate::builder::{Builder, Placement};
 use enfilade_geom::scene::Mesh;
 use enfilade_geom::{DMat4, DVec3};
 
-/// Moves far-off coordinates near the origin and says by how much.
+/// Moves coordinates that are far off near the origin, and returns the offset.
 ///
-/// A mesh holds `f32`; where coordinates are many times larger than the mesh itself, as in map
-/// coordinates, rounding them would cost the mesh its shape. The placement adds the offset again.
+/// A mesh holds `f32`. Where coordinates are many times larger than the mesh itself, as in map coordinates, rounding
+/// them would destroy its shape. The placement adds the offset again.
 pub(crate) fn recenter(positions: &mut [[f64; 3]]) -> DVec3 {
     let finite = positions.iter().filter(|p| p.iter().all(|c| c.is_finite()));
     let (min, max) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), &p| {
@@ -17,7 +17,7 @@ pub(crate) fn recenter(positions: &mut [[f64; 3]]) -> DVec3 {
     });
     let size = (max - min).max_element();
     let reach = min.abs().max(max.abs()).max_element();
-    // 16: up to there, at most 4 of the 24 bits are lost, which plain files have lost already.
+    // 16: up to there, at most 4 of the 24 bits are lost, which such files usually lack already.
     if !reach.is_finite() || size <= 0.0 || reach <= 16.0 * size {
         return DVec3::ZERO;
     }
@@ -54,7 +54,7 @@ pub(crate) fn place(
     })
 }
 
-/// One color channel, 0 to 1, as displays take it, made linear (IEC 61966-2-1).
+/// Converts a color channel, 0 to 1, from display values to linear ones (IEC 61966-2-1).
 pub(crate) fn srgb_to_linear(c: f32) -> f32 {
     if c <= 0.040_45 {
         c / 12.92
@@ -63,7 +63,7 @@ pub(crate) fn srgb_to_linear(c: f32) -> f32 {
     }
 }
 
-/// The file's name without its ending.
+/// Returns the file's name without its ending.
 pub(crate) fn stem(builder: &Builder<'_>) -> String {
     builder
         .path
@@ -72,12 +72,12 @@ pub(crate) fn stem(builder: &Builder<'_>) -> String {
         .unwrap_or_default()
 }
 
-/// Meters per input unit.
+/// Returns meters per input unit.
 pub(crate) fn unit(builder: &Builder<'_>) -> f64 {
     builder.options.unit.unwrap_or(1.0)
 }
 
-/// A word short enough for a message.
+/// Returns a word short enough for a message.
 pub(crate) fn shortened(word: &str) -> String {
     if word.chars().count() <= 60 {
         word.to_owned()

@@ -1,8 +1,8 @@
 //! STL (3D Systems, *StereoLithography Interface Specification*, 1989), ASCII and binary.
 //!
-//! A reader of our own: `stl_io` loses the names of solids, the lines of errors and the shape of far-off ASCII files
-//! (`docs/dependencies.md`). Vertices with equal bits become one; facet normals follow from the vertices and are
-//! dropped.
+//! This reader replaces `stl_io`, which loses the names of solids, the lines of errors and the shape of ASCII files
+//! far from the origin (`docs/dependencies.md`). Vertices with equal bits become one; facet normals follow from the
+//! vertices and are dropped.
 
 use crate::builder::Builder;
 use crate::soup::shortened;
@@ -19,7 +19,7 @@ fn n_facets(bytes: &[u8]) -> Option<u64> {
     Some(u32::from_le_bytes([count[0], count[1], count[2], count[3]]).into())
 }
 
-/// The length that a binary file says it has.
+/// Returns the length of a binary file according to its header.
 fn binary_length(bytes: &[u8]) -> Option<u64> {
     Some(HEADER as u64 + n_facets(bytes)? * FACET as u64)
 }
@@ -36,17 +36,17 @@ fn is_ascii(bytes: &[u8]) -> bool {
         .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
-/// Whether the bytes look like STL.
+/// Returns `true` if the bytes look like STL.
 pub(crate) fn is_stl(bytes: &[u8]) -> bool {
     is_ascii(bytes) || is_binary(bytes)
 }
 
-/// Whether the bytes may be the beginning of a binary file of at most so many.
+/// Returns `true` if the bytes may begin a binary file of at most `most` bytes.
 pub(crate) fn may_go_on(head: &[u8], most: u64) -> bool {
     binary_length(head).is_some_and(|length| length > head.len() as u64 && length <= most)
 }
 
-/// The length that the head says a file has; none of ASCII.
+/// Returns the length of a file according to its head; `None` for ASCII.
 pub(crate) fn length(head: &[u8]) -> Option<u64> {
     binary_length(head).filter(|_| !is_ascii(head))
 }
@@ -85,7 +85,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     solid.finish(String::new(), DVec3::ZERO, builder)
 }
 
-/// One solid; equal corners become one vertex.
+/// One solid; equal vertices become one.
 #[derive(Default)]
 struct Solid {
     primitive: Primitive,
@@ -99,7 +99,7 @@ impl Solid {
         place: &str,
         builder: &mut Builder<'_>,
     ) -> Result<(), ImportError> {
-        // Adding zero turns -0 into 0, which is the same place.
+        // Turns -0 into 0, which is the same place.
         let key = p.map(|c| (c + 0.0).to_bits());
         let next = self.primitive.positions.len() as u32;
         let vertex = *self.numbers.entry(key).or_insert(next);
@@ -182,13 +182,13 @@ fn read_ascii(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError
             "endloop" if n_in_loop != 3 => {
                 return Err(builder.malformed(
                     place(),
-                    format!("a facet with {n_in_loop} corners; STL facets have three"),
+                    format!("a facet with {n_in_loop} vertices; STL facets have three"),
                 ));
             }
             "endsolid" => is_open = false,
             "facet" | "endfacet" | "endloop" => {}
             _ => {
-                let problem = format!("'{}' is no word of STL", shortened(&word));
+                let problem = format!("'{}' is not a word of STL", shortened(&word));
                 return Err(builder.malformed(place(), problem));
             }
         }

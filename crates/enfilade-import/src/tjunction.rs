@@ -1,15 +1,15 @@
 //! T-junctions: ends of open edges in the middle of other open edges.
 //!
-//! A crack in a surface leaves every edge on its rim with one triangle only. So both the edges
-//! and the points to look at are those of open edges, and a closed mesh costs nothing.
+//! A crack in a surface leaves every edge on its rim with one triangle only. So both the edges and the points to
+//! examine are those of open edges, and a closed mesh costs nothing.
 
 use crate::report::MAX_EXAMPLES;
 use enfilade_geom::DVec3;
 use std::collections::{HashMap, HashSet};
 
-/// Most looks at a grid cell or a point; past it, the answer is a lower bound.
+/// Most lookups of a grid cell or a point; beyond it, the answer is a lower bound.
 ///
-/// About two seconds. A scene of a million open edges, evenly spread, needs a tenth of it.
+/// About two seconds. A scene of a million open edges, evenly spread, needs a tenth of that.
 const BUDGET: u64 = 100_000_000;
 
 pub(crate) struct Found {
@@ -38,8 +38,8 @@ pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found 
     found
 }
 
-/// Visits each pair of an edge and a point within `distance` of its inside: the edge's place in `open`, the point and
-/// how far along the edge it lies. `false` if the search was stopped before its end.
+/// Visits each pair of an edge and a point within `distance` of its inside: the edge's index in `open`, the point and
+/// its parameter along the edge. `false` if the search was stopped before its end.
 pub(crate) fn for_each(
     points: &[DVec3],
     open: &[[u32; 2]],
@@ -57,8 +57,7 @@ pub(crate) fn for_each(
     if ends.is_empty() || longest <= 0.0 {
         return true;
     }
-    // As wide as a typical edge, so that an edge meets few cells; wider where one very long edge
-    // would meet too many.
+    // As wide as a typical edge, so that an edge meets few cells; wider where a very long edge would meet too many.
     let mean = lengths().sum::<f64>() / open.len() as f64;
     let width = mean.max(longest / 4096.0).max(4.0 * distance);
     let cell = |p: DVec3| (p / width).floor().to_array().map(|c| c as i64);
@@ -95,7 +94,7 @@ pub(crate) fn for_each(
     true
 }
 
-/// Visits every grid cell within `distance` of the segment, each once, and a few around.
+/// Visits every grid cell within `distance` of the segment once, and a few around it.
 fn walk(from: DVec3, to: DVec3, distance: f64, width: f64, mut visit: impl FnMut([i64; 3])) {
     let along = to - from;
     let size = along.abs();
@@ -111,7 +110,7 @@ fn walk(from: DVec3, to: DVec3, distance: f64, width: f64, mut visit: impl FnMut
     let low = from[major].min(to[major]) - distance;
     let high = from[major].max(to[major]) + distance;
     for slab in number(low)..=number(high) {
-        // The part of the segment whose major coordinate lies in the slab, grown by the distance.
+        // The part of the segment with its major coordinate in the slab, extended by the distance.
         let at = |c: f64| ((c - from[major]) / along[major]).clamp(0.0, 1.0);
         let start = at(slab as f64 * width - distance);
         let end = at((slab + 1) as f64 * width + distance);
@@ -154,7 +153,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_grid_finds_what_brute_force_finds(
-            // On a coarse lattice, so that points do lie on edges.
+            // On a coarse lattice, so that some points lie on edges.
             coordinates in prop::collection::vec(prop::array::uniform3(-4i32..4), 4..60),
             scale in 0.01f64..100.0,
         ) {
@@ -167,7 +166,7 @@ mod tests {
                 .collect();
             let n = points.len() as u32;
             let open: Vec<[u32; 2]> = (1..n).map(|i| [i / 2, i]).collect();
-            // Not near any distance that the lattice makes.
+            // Differs from all distances in the lattice.
             let distance = 1e-4 * scale;
             let found = find(&points, &open, distance);
             prop_assert!(found.is_complete);

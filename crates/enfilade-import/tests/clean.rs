@@ -1,4 +1,4 @@
-//! The cleaning report against surfaces whose faults are known. Covers S5.
+//! The cleaning report on surfaces with known defects. Covers S5.
 
 mod common;
 
@@ -32,7 +32,7 @@ fn cube() -> Primitive {
 #[test]
 fn a_closed_box_is_clean_also_with_a_vertex_a_face() {
     assert_eq!(counts(&of(cube())), []);
-    // Each triangle with its own corners: welding closes it again.
+    // Each triangle has its own vertices: welding closes the box again.
     let shared = cube();
     let mut apart = Primitive::default();
     for &i in &shared.indices {
@@ -99,7 +99,7 @@ fn faults_are_told_apart() {
 
 #[test]
 fn an_open_surface_has_no_inside() {
-    // Turned inwards and without its top: no shell, whatever its signed volume.
+    // Turned inwards and without its top: not a shell, whatever its signed volume.
     let mut open = cube();
     open.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
     open.indices.drain(18..24);
@@ -167,7 +167,7 @@ fn what_the_import_found_is_in_the_report_and_the_table() {
         table.contains("non-planar polygons            1  0.500 0.500 0.025"),
         "{table}"
     );
-    // What is nowhere has no row.
+    // Findings that do not occur have no row.
     assert!(
         !table.contains("duplicate") && !table.contains("rooms"),
         "{table}"
@@ -213,7 +213,7 @@ fn torus(n: u32) -> Primitive {
 fn a_large_mesh_takes_linear_time() {
     let report = of(torus(300));
     assert_eq!((report.n_triangles, counts(&report)), (180_000, vec![]));
-    // Every triangle on its own and moved a little: all edges open, nothing to weld.
+    // Every triangle alone and slightly moved: all edges open, nothing to weld.
     let whole = torus(300);
     let mut burst = Primitive::default();
     for (t, corners) in whole.indices.chunks_exact(3).enumerate() {
@@ -229,7 +229,7 @@ fn a_large_mesh_takes_linear_time() {
 }
 
 proptest! {
-    /// Turning some triangles of a closed surface round is counted to the triangle.
+    /// The number of turned triangles of a closed surface is exact.
     #[test]
     fn flipped_triangles_are_counted(turned in prop::collection::btree_set(0usize..128, 0..64)) {
         let mut mesh = torus(8);
@@ -239,7 +239,7 @@ proptest! {
         let report = of(mesh);
         prop_assert_eq!(report.flipped_triangles.n, turned.len().min(128 - turned.len()) as u64);
         prop_assert_eq!(report.open_edges.n + report.non_manifold_edges.n, 0);
-        // At half and half, either side may be called the turned one.
+        // At half and half, either side may count as turned.
         prop_assert!(turned.len() == 64 || report.inverted_shells.n == 0);
     }
 
@@ -261,14 +261,14 @@ proptest! {
         prop_assert_eq!(of(mesh).open_edges.n, expected);
     }
 
-    /// Corners nearer than the welding distance are one, wherever they lie; farther ones are two.
+    /// Vertices nearer than the welding distance are one, wherever they lie; farther ones are two.
     #[test]
     fn welding_knows_no_borders(
         at in prop::array::uniform3(-2e-4f32..2e-4),
         off in prop::array::uniform3(-1.0f64..1.0),
     ) {
         let off = DVec3::from_array(off).try_normalize().unwrap_or(DVec3::X);
-        // Two triangles with a common edge, whose second one is moved by `step`.
+        // Two triangles with a common edge, the second one moved by `step`.
         let n_open = |step: f64| {
             let p = |q: DVec3| q.to_array().map(|c| c as f32);
             let a = v(at[0].into(), at[1].into(), at[2].into());
@@ -300,7 +300,7 @@ fn missing_triangles_are_holes_and_rims_of_sheets_are_none() {
         .map(|&i| DVec3::from(open.positions[i as usize].map(f64::from)));
     let middle = missing.sum::<DVec3>() / 3.0;
     assert!(report.holes.examples[0].position.distance(middle) < 1e-6);
-    // A box without a face may be meant so, and a single face has a rim and no hole.
+    // A box without a face may be intended, and a single face has a rim but no hole.
     let mut faceless = cube();
     faceless.indices.drain(0..6);
     assert_eq!(of(faceless).holes.n, 0);
@@ -326,7 +326,7 @@ fn shells_are_solids_rooms_or_open() {
     let mut open = cube();
     open.indices.truncate(30);
     assert_eq!(shells(open), [0, 0, 1]);
-    // One triangle turned: most of them decide.
+    // One triangle is turned: the majority decides.
     let mut flipped = cube();
     flipped.indices.swap(0, 1);
     assert_eq!(shells(flipped), [1, 0, 0]);
@@ -334,7 +334,7 @@ fn shells_are_solids_rooms_or_open() {
 
 #[test]
 fn triangles_that_run_through_each_other_are_counted_within_an_object() {
-    // Two boxes of one object, one through the other's corner; as two objects they may.
+    // Two boxes that run through each other: crossing within one object, allowed between two objects.
     let mut both = cube();
     let other = cube();
     let moved = other.positions.iter();
@@ -353,7 +353,11 @@ fn triangles_that_run_through_each_other_are_counted_within_an_object() {
     let scene = scene_of(both, &[DMat4::IDENTITY]);
     let stopped = cleaning_report(&scene, None, &options).unwrap();
     assert!(!stopped.is_crossing_complete);
-    assert!(stopped.to_string().contains("crossing triangles: at least"));
+    assert!(
+        stopped
+            .to_string()
+            .contains("crossing triangles: lower bound")
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! glTF with compressed geometry, made here with the reference encoders: it reads as what it was made of. Covers S1.
+//! glTF with compressed geometry, made by the reference encoders, reads as the original. Covers S1.
 
 mod common;
 
@@ -22,8 +22,8 @@ fn words(primitive: &Primitive) -> Vec<[u16; 4]> {
     primitive.positions.iter().map(word).collect()
 }
 
-/// A document with a box whose positions and indices are compressed, and its binary chunk. The buffer behind its views is
-/// one without data.
+/// A document with a box whose positions and indices are compressed, and its binary chunk. The views' own buffer has
+/// no data.
 fn meshopt_box(name: &str, normalized: bool) -> (String, Vec<u8>) {
     let primitive = box_primitive([2.0, 3.0, 4.0]);
     let version = if name.starts_with("KHR") { 1 } else { 0 };
@@ -53,7 +53,7 @@ fn meshopt_box(name: &str, normalized: bool) -> (String, Vec<u8>) {
     (json, bin)
 }
 
-/// Triangles in an order of their own: encoders turn them and put them elsewhere.
+/// Triangles in canonical order: encoders rotate and reorder them.
 fn sorted(mut triangles: Vec<Triangle>) -> Vec<Triangle> {
     let key = |p: &DVec3| p.to_array().map(f64::to_bits);
     for t in &mut triangles {
@@ -111,7 +111,7 @@ fn the_first_buffer_may_be_the_fallback() {
                 bin.len()
             ),
         );
-    // What the binary chunk holds is no matter: it is not the fallback's data.
+    // The binary chunk's content does not matter: it is not the fallback's data.
     let scene = read(&json, &[0; 8]).unwrap().scene;
     let plain = box_primitive([2.0, 3.0, 4.0]);
     assert_eq!(sorted(world(&scene)), corners_of(&plain, 1.0));
@@ -134,7 +134,7 @@ fn compressed_views_that_do_not_fit_are_errors_with_their_place() {
         (
             r#""count":8,"mode""#,
             r#""count":100000000,"mode""#,
-            "asks for 800000000 bytes",
+            "needs 800000000 bytes",
         ),
         (
             r#""count":8,"mode""#,
@@ -181,7 +181,7 @@ fn compressed_views_that_do_not_fit_are_errors_with_their_place() {
         (
             r#"{"buffer":0,"byteOffset":"#,
             r#"{"buffer":0,"byteOffset":9"#,
-            "wants bytes",
+            "needs bytes",
         ),
     ] {
         let changed = json.replacen(from, to, 1);
@@ -194,7 +194,7 @@ fn compressed_views_that_do_not_fit_are_errors_with_their_place() {
     }
 }
 
-/// A Draco bitstream of a primitive; its positions have the number 0, a color a vertex 1.
+/// A Draco bitstream of a primitive: positions have the id 0, one color per vertex the id 1.
 fn draco(primitive: &Primitive, speed: i32, bits: i32) -> Vec<u8> {
     let mut mesh = Mesh::new();
     let n = primitive.positions.len();
@@ -238,7 +238,7 @@ fn draco(primitive: &Primitive, speed: i32, bits: i32) -> Vec<u8> {
     out.data().to_vec()
 }
 
-/// A document whose one primitive is a Draco bitstream.
+/// A document with a single primitive, a Draco bitstream.
 fn draco_json(n_bytes: usize) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":["KHR_draco_mesh_compression"],
@@ -361,8 +361,8 @@ fn morph_targets_rest_at_the_weights_of_the_node_or_else_of_the_mesh() {
     );
     // Two shapes for three placements.
     assert_eq!(imported.scene.meshes.len(), 2);
-    assert!(imported.report.to_string().contains("morph targets; taken"));
-    // Without weights they rest where they are.
+    assert!(imported.report.to_string().contains("morph targets; fixed"));
+    // Without weights they have no effect.
     let (json, bin) = morph_json("", r#""nodes":[{"mesh":0}]"#);
     assert_eq!(
         common::world(&read(&json, &bin).unwrap().scene)[0][2],
@@ -380,7 +380,7 @@ fn morph_targets_rest_at_the_weights_of_the_node_or_else_of_the_mesh() {
     );
 }
 
-/// Two boxes side by side, each in whole numbers of a grid of its own: 1 mm from `[0, 0, 0]`, 1.3 mm from `[2.0002, 0, 0]`.
+/// Two boxes side by side, each on a grid of its own: 1 mm from `[0, 0, 0]`, 1.3 mm from `[2.0002, 0, 0]`.
 fn quantized_boxes(scale: f64) -> (String, Vec<u8>) {
     let positions = |size: [f32; 3]| -> Vec<u8> {
         let positions = box_primitive(size).positions;
@@ -419,7 +419,7 @@ fn quantized_boxes(scale: f64) -> (String, Vec<u8>) {
     (json, bin)
 }
 
-/// Corners of both objects that lie in the plane between two boxes.
+/// Vertices of both objects in the plane between two boxes.
 fn shared_corners(scene: &enfilade_geom::scene::Scene, x: f64) -> usize {
     let mut corners: Vec<[u64; 3]> = world(scene)
         .concat()
@@ -436,24 +436,24 @@ fn shared_corners(scene: &enfilade_geom::scene::Scene, x: f64) -> usize {
 fn corners_that_quantization_parted_are_one_again() {
     let (json, bin) = quantized_boxes(1.0);
     let imported = read(&json, &bin).unwrap();
-    // Eight where they are 0.2 mm, and along the edges up to half a millimeter, apart.
+    // There were eight: 0.2 mm apart, and up to half a millimeter along the edges.
     assert_eq!(shared_corners(&imported.scene, 2.0), 4);
     assert!(
-        imported.report.to_string().contains("4 corners"),
+        imported.report.to_string().contains("4 vertices"),
         "{}",
         imported.report
     );
-    // The finer grid says where.
+    // The finer grid decides.
     let farthest = world(&imported.scene)
         .concat()
         .iter()
         .filter(|p| p.x < 2.1)
         .fold(0.0, |m: f64, p| m.max(p.z));
     assert_eq!(farthest, f64::from(4.0_f32));
-    // A grid of 6 cm is no rounding, and its corners are meant.
+    // A grid of 6 cm does not come from rounding, and its vertices stay.
     let (json, bin) = quantized_boxes(60.0);
     assert_eq!(shared_corners(&read(&json, &bin).unwrap().scene, 120.0), 8);
-    // Numbers that were not rounded stay apart, as near as they are.
+    // Unrounded numbers stay apart, however near.
     let (json, bin) = quantized_boxes(1.0);
     let floats: Vec<f32> = bin[..96]
         .as_chunks::<2>()
@@ -479,7 +479,7 @@ fn corners_that_quantization_parted_are_one_again() {
 
 #[test]
 fn corners_of_one_mesh_never_become_one() {
-    // A sheet as thin as a step of its grid, in the middle of it the corners of a finer mesh.
+    // A sheet as thin as a step of its grid, with the vertices of a finer mesh in the middle.
     let (json, _) = quantized_boxes(1.0);
     let mut bin = Vec::new();
     for size in [[2000.0, 3000.0, 4000.0], [1.0, 2308.0, 3077.0]] {

@@ -66,14 +66,14 @@ fn obj_errors_name_the_line() {
         ),
         (format!("{SQUARE}f /1 2 3"), "points at nothing"),
         ("v 1 2\n".into(), "line 1: 2 numbers where 3 are needed"),
-        ("v 1 2 x\n".into(), "line 1: 'x' is no number"),
-        ("v 1 2 99999999999999999999x\n".into(), "is no number"),
+        ("v 1 2 x\n".into(), "line 1: 'x' is not a number"),
+        ("v 1 2 99999999999999999999x\n".into(), "is not a number"),
         (SQUARE.into(), "no triangles"),
         (String::new(), "no triangles"),
-        (format!("{SQUARE}f 1 2"), "fewer than three corners"),
+        (format!("{SQUARE}f 1 2"), "fewer than three vertices"),
         (
             format!("{SQUARE}f {}", "1 ".repeat(5000)),
-            "corners of one polygon",
+            "vertices of one polygon",
         ),
     ] {
         let error = error(decode_obj, text.as_bytes());
@@ -93,7 +93,7 @@ fn obj_corners_that_are_no_numbers_lose_their_triangles_only() {
 
 #[test]
 fn far_off_obj_keeps_its_shape() {
-    // At four million, f32 knows no thirds of a meter.
+    // At four million, f32 cannot represent thirds of a meter.
     let text = "v 4000000.1 0 0\nv 4000001.4 0 0\nv 4000000.1 1.3 0\nf 1 2 3";
     let options = ImportOptions {
         origin: v(4e6, 0.0, 0.0),
@@ -294,7 +294,7 @@ fn stl_errors_say_where() {
         ),
         (
             "solid a\nouter loop\nvertex 1 2 3\nendloop",
-            "line 4: a facet with 1 corners",
+            "line 4: a facet with 1 vertices",
         ),
         ("solid a\nbogus", "line 2: 'bogus'"),
         ("solid a\n", "cut off"),
@@ -306,7 +306,7 @@ fn stl_errors_say_where() {
     }
 }
 
-/// Every prefix and some thousands of changed bytes: an answer, never a panic, in little time.
+/// Every prefix and some thousands of changed bytes give an answer, never a panic, in little time.
 fn is_hardened(decode: Decode, bytes: &[u8]) {
     let options = ImportOptions {
         limits: enfilade_import::Limits::tiny(),
@@ -323,7 +323,7 @@ fn is_hardened(decode: Decode, bytes: &[u8]) {
             changed[i] ^= 1 << bit;
             if let Ok(imported) = decode(&changed, &options) {
                 n_read += 1;
-                // What is read keeps the scene's promises.
+                // The result keeps the scene's promises.
                 assert!(
                     world(&imported.scene)
                         .iter()
@@ -368,7 +368,7 @@ fn broken_files_end_in_errors() {
 }
 
 proptest! {
-    /// Any text of OBJ's words is read or refused.
+    /// Any text of OBJ's words is read or rejected.
     #[test]
     fn obj_soup_never_panics(words in prop::collection::vec(
         prop::sample::select(vec!["v", "vt", "vn", "f", "o", "g", "usemtl", "\n", "\\\n", "1", "-1",
@@ -378,7 +378,7 @@ proptest! {
         let _ = decode_obj(text.as_bytes(), &ImportOptions::default());
     }
 
-    /// Grids of quads come back as they were, whatever writes them.
+    /// Grids of quads come back unchanged, whichever writer made them.
     #[test]
     fn obj_and_ply_agree(heights in prop::collection::vec(0i8..5, 16)) {
         let mut obj = String::new();
@@ -418,7 +418,7 @@ fn a_ply_with_vertices_twice_is_refused() {
 
 #[test]
 fn numbers_that_are_no_meters_are_doubted_before_the_work() {
-    // A room of 10 x 3 x 8 m with the given number of units a meter.
+    // A room of 10 x 3 x 8 m with the given number of units per meter.
     let room = |a_meter: f64| {
         let (x, y, z) = (10.0 * a_meter, 3.0 * a_meter, 8.0 * a_meter);
         format!("v 0 0 0\nv {x} 0 0\nv 0 {y} {z}\nf 1 2 3\n")
@@ -444,7 +444,7 @@ fn numbers_that_are_no_meters_are_doubted_before_the_work() {
         None,
         "whoever says meters means them"
     );
-    // Millimeters are beyond the limit, and refused.
+    // Millimeters exceed the limit and are rejected.
     let error = decode_obj(room(1000.0).as_bytes(), &ImportOptions::default()).unwrap_err();
     assert!(error.to_string().contains("--unit 0.001"), "{error}");
 }

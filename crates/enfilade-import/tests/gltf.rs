@@ -33,7 +33,7 @@ fn nested_nodes_are_flattened() {
     )
     .scene;
     let [a, b, c] = world(&scene)[0];
-    // A quarter turn about z takes x to y; rounding to f32 leaves no trace of the sine's last bit.
+    // A quarter turn about z takes x to y; rounding to f32 hides the sine's last bit.
     assert_eq!(a, v(1.0, 2.0, 3.0));
     assert!(b.distance(v(1.0, 10.0, 3.0)) < 1e-6, "{b}");
     assert!(c.distance(v(-5.0, 2.0, 3.0)) < 1e-6, "{c}");
@@ -48,7 +48,7 @@ fn a_mirrored_placement_keeps_its_corners_and_faces_front() {
         first,
         [v(-4.0, 0.0, 0.0), v(0.0, 0.0, 0.0), v(0.0, 3.0, 0.0)]
     );
-    // glTF 2.0, 3.7.4: a negative determinant turns the winding; the front then faces +z still.
+    // glTF 2.0, 3.7.4: a negative determinant reverses the winding, so the front still faces +z.
     assert!(triangle_area_normal(&first).z > 0.0 && triangle_area_normal(&second).z > 0.0);
     assert!(
         mirrored
@@ -216,16 +216,16 @@ fn counts_beyond_the_data_are_refused() {
             "index 2 is out of range",
         ),
         ("\"bufferView\":0,", "", "smaller than"),
-        ("\"byteLength\":36", "\"byteLength\":99999", "wants bytes"),
+        ("\"byteLength\":36", "\"byteLength\":99999", "needs bytes"),
         (
             "\"byteLength\":36",
             "\"byteLength\":18446744073709551615",
-            "wants bytes",
+            "needs bytes",
         ),
         (
             "\"byteOffset\":36",
             "\"byteOffset\":18446744073709551615",
-            "wants bytes",
+            "needs bytes",
         ),
         (
             "\"componentType\":5123",
@@ -262,7 +262,7 @@ fn counts_beyond_the_data_are_refused() {
 
 #[test]
 fn a_small_file_cannot_ask_for_much_memory() {
-    // No bytes behind the accessor: zeros by definition, as many as it likes.
+    // No bytes behind the accessor: any number of zeros by definition.
     let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
         "accessors":[{"componentType":5126,"count":4000000000,"type":"VEC3"}]}"#;
@@ -536,7 +536,7 @@ fn a_scene_survives_export_and_import() {
         &[
             DMat4::IDENTITY,
             DMat4::from_translation(v(7.0, 0.1, 0.0)),
-            // A shear, which no node can hold.
+            // A shear, which a node cannot hold.
             DMat4::from_scale(v(1.0, 3.0, 1.0)) * DMat4::from_rotation_z(0.3),
         ],
     );
@@ -587,7 +587,7 @@ fn a_scene_survives_export_and_import() {
 }
 
 proptest! {
-    /// What any mix of placements makes of a mesh is kept to the last bit.
+    /// Any mix of placements of a mesh survives to the last bit.
     #[test]
     fn placements_survive_export_and_import(
         columns in prop::collection::vec(prop::array::uniform12(-2.0f64..2.0), 1..5),
@@ -610,10 +610,10 @@ proptest! {
         }).collect();
         let scene = scene_of(common::box_primitive([1.0, 2.0, 3.0]), &transforms);
         let mut again = decode_gltf(&export_glb(&scene), &ImportOptions::default()).unwrap().scene;
-        // A box may be told from walls by its shape. `world` lists details last, and this is about placements.
+        // Ignores roles, which a box may lose by its shape: `world` lists details last, and this is about placements.
         again.objects.iter_mut().for_each(|o| o.role = Role::Structural);
         prop_assert!(again.objects.iter().all(|o| o.transform.determinant() > 0.0));
-        // A mirrored placement faces front again: its corners come in the other order.
+        // A mirrored placement faces front again: its vertices come in the other order.
         let before = world(&scene).into_iter().enumerate().map(|(i, [a, b, c])| {
             let is_mirrored = transforms[i / 12].determinant() < 0.0;
             if is_mirrored { [a, c, b] } else { [a, b, c] }

@@ -1,4 +1,4 @@
-//! IFC through a converter: one of our own makes, that hands out a GLB made here. Covers S1.
+//! IFC through a converter of this test, which returns a GLB made here. Covers S1.
 #![cfg(unix)]
 
 mod common;
@@ -15,7 +15,7 @@ const IFC: &str = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA
     #7=IFCWALLSTANDARDCASE('0iEHWY1$XA8eQeeULq4jE6',#2,'north',$);\n\
     #8=IFCDOOR('1iEHWY1$XA8eQeeULq4jE6',#2,'leaf',$);\nENDSEC;\nEND-ISO-10303-21;\n";
 
-/// A folder of one test, with an IFC file and a converter that is this script.
+/// A folder for one test, with an IFC file and this script as converter.
 fn house(name: &str, script: &str) -> (PathBuf, IfcConverter) {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);

@@ -1,4 +1,4 @@
-//! Quake maps: what their brushes become, and where what is wrong with them is said to be. Covers S2.
+//! Quake maps: results of brushes, and places of errors. Covers S2.
 
 use enfilade_geom::scene::Role;
 use enfilade_import::{ImportOptions, decode_map};
@@ -12,7 +12,7 @@ fn boxed(min: [i32; 3], max: [i32; 3], texture: &str) -> String {
         for high in [false, true] {
             let base = if high { max } else { min };
             let (mut a, mut c) = (base, base);
-            // The cross product of a - b and c - b looks outwards.
+            // The cross product of a - b and c - b points outwards.
             a[if high { u } else { v }] += 16;
             c[if high { v } else { u }] += 16;
             for p in [a, base, c] {
@@ -48,7 +48,7 @@ fn a_box_has_twelve_triangles_in_meters_with_y_up() {
         ([0.0, 0.0, -1.0], [2.0, 3.0, 0.0])
     );
     assert!((scene.solids[0].volume() - 6.0).abs() < 1e-9);
-    // Outward, and where the faces are.
+    // Outward, and in the right places.
     for s in scene.triangle_sources(Role::Structural) {
         let t = scene.world_triangle(s);
         let outward = (t[0] + t[1] + t[2]) / 3.0 - b.center();
@@ -76,7 +76,7 @@ fn both_formats_give_the_same_solid() {
         read(&map(&standard, "")).scene.solids,
         read(&map(&valve, "")).scene.solids
     );
-    // Quake 2's three numbers more.
+    // Quake 2 adds three numbers.
     let quake2 = standard.replace("0 0 0 1 1", "0 0 0 1 1 1 2 0");
     assert_eq!(
         read(&map(&standard, "")).scene.solids,
@@ -144,7 +144,7 @@ fn what_other_brushes_hide_is_left_out_once() {
         boxed([32, 0, 0], [64, 32, 32], "b"),
     );
     let n = |text: &str| read(text).scene.triangle_sources(Role::Structural).count();
-    // Two boxes side by side: the two faces between them are gone.
+    // Two boxes side by side: the two faces between them are left out.
     assert_eq!(n(&map(&(a.clone() + &b), "")), 20);
     // The same box twice shows once.
     assert_eq!(n(&map(&(a.clone() + &a), "")), 12);
@@ -214,7 +214,7 @@ fn what_is_wrong_is_said_with_line_and_column() {
     says(&map(&line, ""), "line 5:1", "line");
 }
 
-/// A quarter of a pipe of 64 units, 96 long, with the line of its numbers given.
+/// A quarter of a pipe of 64 units, 96 long, with this line of numbers.
 fn patch(numbers: &str) -> String {
     let row =
         |x: i32, y: i32| format!("( ( {x} {y} 0 0 0 ) ( {x} {y} 48 0 0.5 ) ( {x} {y} 96 0 1 ) )\n");
@@ -238,7 +238,7 @@ fn patches_are_curved_details() {
     );
     let primitive = &scene.meshes[object.mesh as usize].primitives[0];
     assert!(scene.materials[primitive.material.unwrap() as usize].double_sided);
-    // 64 - 128 + 0 is 90 off a line at most: five segments around, one along.
+    // 64 - 128 + 0 is at most 90 off a line: five segments around, one along.
     assert_eq!(
         (primitive.positions.len(), primitive.indices.len()),
         (12, 30)
@@ -254,7 +254,7 @@ fn patches_are_curved_details() {
             "{n:?}"
         );
     }
-    // Doom 3 says how many.
+    // Doom 3 gives the numbers of segments.
     let scene = read(&map(&(wall + &patch("( 3 3 7 2 0 0 0 )")), "")).scene;
     let primitive = &scene.meshes[scene.objects[1].mesh as usize].primitives[0];
     assert_eq!(primitive.positions.len(), 8 * 3);
@@ -322,7 +322,7 @@ fn a_box_of_sky_kilometers_away_is_no_reason_to_refuse_a_map() {
     let wall = boxed([0, 0, 0], [64, 32, 96], "stone");
     let text = map(&(wall + &sky), "");
     assert!(read(&text).scene.object_aabb(0).size().x > 6000.0);
-    // With a unit of the caller's it may be wrong, and the error says so.
+    // With a unit from the caller it may be wrong, and is an error.
     let options = ImportOptions {
         unit: Some(1.0),
         ..ImportOptions::default()

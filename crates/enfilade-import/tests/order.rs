@@ -1,4 +1,4 @@
-//! The order in which files list things says nothing about the scene: what is read is the same list.
+//! The order of items in files does not matter: the scene is the same list.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 mod common;
 use common::{f32_bytes, glb};
 
-/// All of the scene that an import gives, as text.
+/// Returns the whole imported scene as text.
 fn read(glb: &[u8]) -> String {
     let read = decode_gltf(glb, &ImportOptions::default()).expect("a scene");
     format!("{:?}", read.scene)
@@ -45,7 +45,7 @@ fn panel() -> (Vec<Value>, Vec<f32>) {
     (vec![primitive(0), primitive(1)], [positions, uvs].concat())
 }
 
-/// Storeys of the same names with walls of the same names: some are the same in all but what is below them, some in everything.
+/// Storeys with equal names and walls with equal names: some differ only in their descendants, some not at all.
 fn twins() -> Vec<u8> {
     let (primitives, floats) = panel();
     let wall =
@@ -86,7 +86,7 @@ fn what_has_one_name_is_told_apart_by_what_is_below_it() {
     let options = ImportOptions::default();
     let glb = twins();
     let scene = decode_gltf(&glb, &options).expect("a scene").scene;
-    // Six walls under three storeys stay, and two of a kind share what they are made of.
+    // Six walls under three storeys stay, and equal ones share their mesh.
     assert_eq!(scene.objects.len(), 6);
     assert_eq!(scene.nodes.len(), 9);
     assert_eq!(scene.meshes.len(), 1);
@@ -157,7 +157,7 @@ fn files_may_come_in_any_order() {
     std::fs::remove_dir_all(&dir).expect("the folder");
 }
 
-/// The planes of a box as a brush.
+/// Returns the planes of a box as a brush.
 fn brush(min: [i32; 3], max: [i32; 3], texture: &str) -> String {
     let sides = (0..6).map(|side| {
         let (axis, high) = (side / 2, side % 2 == 1);
@@ -179,7 +179,7 @@ fn brush(min: [i32; 3], max: [i32; 3], texture: &str) -> String {
 
 #[test]
 fn brushes_sides_and_entities_may_come_in_any_order() {
-    // Two brushes overlap, one is there twice, and a brush is cut at a slant.
+    // Two brushes overlap, one occurs twice, and one has a slanted cut.
     let slanted = "{\n( 0 0 64 ) ( 0 64 0 ) ( 64 0 0 ) steel 0 0 0 1 1\n( 0 0 0 ) ( 0 16 0 ) ( 0 0 16 ) steel 0 0 0 1 1\n( 0 0 0 ) ( 0 0 16 ) ( 16 0 0 ) steel 0 0 0 1 1\n( 0 0 0 ) ( 16 0 0 ) ( 0 16 0 ) steel 0 0 0 1 1\n}\n";
     let boxes = [
         brush([0, 0, 0], [128, 128, 16], "brick"),

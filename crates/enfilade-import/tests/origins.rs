@@ -1,4 +1,4 @@
-//! What an input calls its things comes along: names, extras, lights, cameras, marked places, terms of use.
+//! Names and metadata of the input are kept: names, extras, lights, cameras, markers, copyright.
 
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{FixtureKind, Scene};

@@ -1,4 +1,4 @@
-//! Files that a scene refers to: only those in its own folder are read, unless more is asked for.
+//! References to other files: only files in the scene's own folder are read, unless the caller allows more.
 
 mod common;
 
@@ -10,7 +10,7 @@ use enfilade_import::{ImportError, ImportOptions, Imported, import};
 
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// A folder `secret` beside a folder `scene`, removed in the end.
+/// A folder `secret` beside a folder `scene`, removed at the end.
 struct Disk(PathBuf);
 
 impl Disk {
@@ -46,7 +46,7 @@ impl Disk {
         import(&[self.write(name, text.as_bytes())], &[], &options)
     }
 
-    /// Ways to a file of the folder `secret` from the folder `scene`.
+    /// Paths to a file of the folder `secret` from the folder `scene`.
     fn ways_out(&self, name: &str) -> Vec<String> {
         let root = self.0.to_str().unwrap();
         let mut ways = vec![
@@ -78,7 +78,7 @@ impl Drop for Disk {
     }
 }
 
-/// A triangle whose buffer is in a file, with a picture in one.
+/// A triangle with its buffer and a picture in files.
 fn document(buffer: &str, picture: &str) -> String {
     let members = format!(
         r#""scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"images":[{{"uri":"{picture}"}}],
@@ -144,8 +144,8 @@ fn a_material_library_and_its_pictures_stay_in_the_folder() {
         let all = read(&text, true);
         assert_eq!(all.scene.images.len(), 1, "{way}: {}", all.report);
     }
-    // A library in the folder that names a picture outside: exporters write the author's disk, so one of that name in the
-    // folder is taken instead, where there is one.
+    // A library in the folder that names a picture outside. Exporters write paths of the author's disk, so a picture
+    // of the same name in the folder is used, if there is one.
     disk.write("secret/only.png", PNG);
     disk.write("scene/m.mtl", b"newmtl secret\nmap_Kd ../secret/only.png\n");
     let text = format!("mtllib m.mtl\n{face}");
@@ -169,7 +169,7 @@ fn what_lies_in_the_folder_is_read_however_it_is_named() {
         let read = read.unwrap_or_else(|e| panic!("{buffer}: {e}"));
         assert_eq!(read.scene.images.len(), 1, "{picture}: {}", read.report);
     }
-    // Whether a file outside exists cannot be told from the error.
+    // The error does not reveal whether a file outside exists.
     let said = |way: &str| {
         let error = disk.read("scene/a.gltf", &document(way, "s.png"), false);
         error.unwrap_err().to_string().replace(way, "")

@@ -1,4 +1,4 @@
-//! Repairs against surfaces whose faults are known. Covers S5.
+//! Repairs of surfaces with known defects. Covers S5.
 
 mod common;
 
@@ -46,7 +46,7 @@ fn fine_box(n: u32) -> Primitive {
         let [a, b, c] =
             [0, 1, 2].map(|k| DVec3::from_array(coarse.positions[t[k] as usize].map(f64::from)));
         let mut at = |i: u32, j: u32| {
-            // Each corner by whole numbers of steps, so that neighbors agree to the bit.
+            // Each vertex in whole numbers of steps, so that neighbors agree to the bit.
             let p = (a * f64::from(n - i - j) + b * f64::from(i) + c * f64::from(j)) / f64::from(n);
             let p = p.as_vec3().to_array();
             *number.entry(p.map(f32::to_bits)).or_insert_with(|| {
@@ -80,7 +80,7 @@ fn what_is_whole_keeps_its_bits() {
     let (out, report) = repaired(&house, &RepairOptions::default());
     assert_eq!(changes(&report), []);
     assert_eq!(export_glb(&out), export_glb(&house));
-    // Fine detail that is closed is left alone, however small its triangles are.
+    // Fine detail that is closed stays unchanged, however small its triangles are.
     let mut tiny = fine_box(8);
     tiny.positions.iter_mut().flatten().for_each(|x| *x *= 1e-3);
     is_unchanged_by(&alone(tiny), &RepairOptions::default());
@@ -125,7 +125,7 @@ fn a_jittered_building_is_closed_again() {
 
 #[test]
 fn t_junctions_of_a_subdivided_cube_are_split() {
-    // One side in eight triangles, its neighbors in two.
+    // One side has eight triangles, its neighbors two.
     let fine = fine_box(2);
     let coarse = box_primitive([2.0, 3.0, 4.0]);
     let mut mixed = coarse.clone();
@@ -198,7 +198,7 @@ fn what_is_there_twice_or_has_no_area_goes() {
     assert_eq!((out.objects.len(), world(&out).len()), (1, 12));
     assert_eq!(n_open_edges(&world(&out)), 0);
 
-    // A copy turned the other way, on a closed shell.
+    // A copy with reversed winding, on a closed shell.
     let mut cube = box_primitive([1.0; 3]);
     cube.indices.extend_from_within(3..6);
     flip(&mut cube, [12]);
@@ -206,7 +206,7 @@ fn what_is_there_twice_or_has_no_area_goes() {
     assert_eq!(report.duplicate_triangles, 1);
     assert_eq!(n_open_edges(&world(&out)), 0);
 
-    // Both sides of a sheet, and sides of boxes that touch, are no duplicates.
+    // Both sides of a sheet, and touching sides of boxes, are not duplicates.
     let mut sheet = box_primitive([1.0; 3]);
     sheet.indices.truncate(6);
     let n = sheet.indices.len() / 3;
@@ -220,7 +220,7 @@ fn what_is_there_twice_or_has_no_area_goes() {
 
 #[test]
 fn a_cap_goes_and_what_lay_behind_it_is_cut() {
-    // The side 0 1 of one triangle and the corner 3 of two others, with a triangle of no height between.
+    // Edge 0 1 of one triangle and vertex 3 of two others, with a triangle without height between them.
     let primitive = Primitive {
         positions: vec![
             [0., 0., 0.],
@@ -304,7 +304,7 @@ fn a_hole_takes_material_and_texture_from_its_rim() {
 
 #[test]
 fn a_wall_without_a_triangle_is_filled_among_the_sheets_of_a_room() {
-    // Six sheets, each an object of its own; one lost a triangle.
+    // Six sheets, each an object of its own; one lacks a triangle.
     let cube = box_primitive([4.0, 3.0, 4.0]);
     let mut scene = alone(cube.clone());
     scene.objects.clear();
@@ -335,13 +335,13 @@ fn a_wall_without_a_triangle_is_filled_among_the_sheets_of_a_room() {
 #[test]
 fn solids_face_outwards_and_rooms_inwards() {
     let all = |p: &mut Primitive| flip(p, 0..12);
-    // A wall turned inside out, all of it.
+    // A wall that is inside out.
     let mut wall = box_primitive([4.0, 3.0, 0.2]);
     all(&mut wall);
     let (out, report) = repaired(&alone(wall), &RepairOptions::default());
     assert_eq!((report.turned_triangles, report.shells_outwards), (12, 1));
     assert!(signed_volume(&world(&out)) > 0.0);
-    // A room modeled from within, one triangle of which is turned.
+    // A room modeled from within, with one triangle turned.
     let mut room = box_primitive([4.0, 3.0, 5.0]);
     all(&mut room);
     flip(&mut room, [5]);
@@ -376,7 +376,7 @@ fn normals_of_turned_triangles_turn_along() {
         })
         .collect();
     flip(&mut cube, [4]);
-    // An exporter that computes normals from triangles gets them wrong for this one.
+    // An exporter that computes normals from triangles gets this one's wrong.
     for &i in &cube.indices[12..15] {
         cube.normals[i as usize] = cube.normals[i as usize].map(|x| -x);
     }
@@ -389,7 +389,7 @@ fn normals_of_turned_triangles_turn_along() {
         let at = DVec3::from_array(p.positions[i as usize].map(f64::from)) - center;
         assert!(at.dot(DVec3::from_array(p.normals[i as usize].map(f64::from))) > 0.0);
     }
-    // The vertices that others use stay as they were.
+    // Vertices that other triangles use stay unchanged.
     let at = cube.positions[wrong as usize];
     let kept = (0..p.positions.len()).filter(|&i| p.positions[i] == at);
     assert!(
@@ -414,7 +414,7 @@ fn placed_meshes_that_change_get_one_of_their_own() {
     assert_eq!((report.filled_holes, out.meshes.len()), (1, 2));
     assert_eq!(out.objects[1].transform, far);
     assert_eq!(object_triangles(&out, 1), object_triangles(&scene, 1));
-    // What nothing is wrong with still shares its mesh.
+    // Objects without defects still share their mesh.
     let whole = scene_of(box_primitive([1.0; 3]), &[DMat4::IDENTITY, far]);
     assert_eq!(repaired(&whole, &options).0.meshes.len(), 1);
 }
@@ -462,7 +462,7 @@ fn an_import_repairs_on_request_only() {
     assert_eq!(world(&better.scene).len(), 4);
 }
 
-/// Any fault of real models, spoilt some more.
+/// A fault of real models, with further disturbances.
 fn messy() -> impl Strategy<Value = (Fault, Disturbance)> {
     let jitter = prop_oneof![Just(0.0), 0.0_f64..4e-4];
     let by = (jitter, prop_oneof![Just(0.0), Just(0.02)], any::<u64>());
@@ -506,7 +506,7 @@ proptest! {
         let (out, report) = repaired(&spoilt, &options);
         prop_assert_eq!(n_open_edges(&world(&out)), 0);
         prop_assert!(report.filled_holes > 0);
-        // Holes within a side bring its area back; one around an edge is cut short.
+        // Holes within a side restore its area; one around an edge may cut it short.
         prop_assert!((signed_volume(&world(&out)) - 24.0).abs() < 4.0);
         let left = cleaning_report(&out, None, &CleaningOptions::default()).unwrap();
         prop_assert_eq!((left.open_edges.n, left.non_manifold_edges.n, left.flipped_triangles.n), (0, 0, 0));
@@ -520,7 +520,7 @@ proptest! {
         let all = shell.indices.len() / 3;
         let wrong: Vec<usize> = (0..all).filter(|t| turned[t % turned.len()]).collect();
         prop_assume!(2 * wrong.len() < all);
-        // Triangles of one side are equal; less than half of each means less than half of the area.
+        // Triangles of one side are equal: less than half of each side means less than half of the area.
         let area = |t: &usize| {
             let [a, b, c] = [0, 1, 2].map(|k| DVec3::from_array(
                 shell.positions[shell.indices[3 * t + k] as usize].map(f64::from)));

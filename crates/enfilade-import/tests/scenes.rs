@@ -1,4 +1,4 @@
-//! Reads the real scenes where they are at hand; passes, and says so, where they are not.
+//! Reads the real scenes where they are available; otherwise prints a message and passes.
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_import::{ImportOptions, decode_gltf, decode_map, decode_obj, export_glb, import};
@@ -57,7 +57,7 @@ fn every_real_scene_loads() {
     }
 }
 
-/// The scene that a file of this ending holds, plain and shuffled.
+/// Reads the scene of a file with this ending, unchanged and shuffled.
 fn plain_and_shuffled(ending: &str, bytes: &[u8], seed: u64) -> Option<[Scene; 2]> {
     let options = ImportOptions::default();
     let text = String::from_utf8_lossy(bytes);
@@ -74,7 +74,8 @@ fn plain_and_shuffled(ending: &str, bytes: &[u8], seed: u64) -> Option<[Scene; 2
 
 #[test]
 fn every_real_scene_is_the_same_in_another_order() {
-    /// Larger files take minutes as the gate is built, and are left to `cargo xtask bench trust --rows order`. [Units: bytes]
+    /// Larger files take minutes in the gate's build; `cargo xtask bench trust --rows order` reads them. [Units:
+    /// bytes]
     const LARGEST: u64 = 1 << 20;
     let folders = std::fs::read_dir(scenes_folder()).into_iter().flatten();
     let files = folders.flatten().filter_map(|f| f.path().read_dir().ok());

@@ -1,9 +1,9 @@
-//! Walls with holes, what fills them, and what only seems to.
+//! Walls with holes, their fillers, and things that only seem to fill them.
 
 use super::tests::Build;
 
-/// A boundary of 6 x 2.6 x 6 m, and a wall of 24 cm across it, at z 3 to 3.24, of one mesh with a
-/// hole for a door (x 1 to 2, up to 2.1) and one for a window (x 3.5 to 5, y 0.9 to 2.1).
+/// Six slabs around 6 x 2.6 x 6 m, and a wall of 24 cm across the space, at z 3 to 3.24: one mesh with a hole
+/// for a door (x 1 to 2, up to 2.1) and one for a window (x 3.5 to 5, y 0.9 to 2.1).
 fn two_rooms() -> Build {
     let mut b = shell();
     b.blocks(
@@ -93,7 +93,7 @@ fn a_door_and_the_light_above_it_fill_one_hole() {
     assert_eq!(b.details(), ["door", "light"]);
 }
 
-/// The other jamb is the wall that it stands at.
+/// The leaf ends at the wall, which replaces the other jamb.
 #[test]
 fn a_leaf_in_a_corner_fills_an_opening() {
     let mut b = shell();
@@ -121,7 +121,7 @@ fn casings_handles_and_the_windows_of_a_whole_wall_go_together() {
     assert_eq!(b.details(), ["door and window"]);
 }
 
-/// An object has one role: a wall with its pane stays.
+/// An object has one role: a wall with its pane stays structural.
 #[test]
 fn what_is_more_than_a_filler_stays() {
     let mut b = two_rooms();
@@ -154,7 +154,7 @@ fn pieces_of_walls_are_no_fillers() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// In a frame of columns and beams a partition is thinner than what is around it.
+/// In a frame of columns and beams a partition is thinner than its surroundings.
 #[test]
 fn a_partition_under_a_beam_is_no_filler() {
     let mut b = shell();
@@ -168,7 +168,7 @@ fn a_partition_under_a_beam_is_no_filler() {
 #[test]
 fn what_covers_a_niche_is_no_filler() {
     let mut b = shell();
-    // A niche of 10 cm in a wall of 30 cm, and a board in it: behind it is the wall.
+    // A niche of 10 cm in a wall of 30 cm, and a board in it, with the wall behind.
     b.blocks(
         "wall",
         &[
@@ -183,7 +183,7 @@ fn what_covers_a_niche_is_no_filler() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// The middle one might be a leaf, but for its neighbors.
+/// Without its neighbors the middle piece might be a leaf.
 #[test]
 fn a_thin_piece_among_thin_pieces_is_no_filler() {
     let mut b = shell();
@@ -194,7 +194,7 @@ fn a_thin_piece_among_thin_pieces_is_no_filler() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// Boxes that reach into each other share no corner and are one wall all the same.
+/// Boxes that overlap share no vertex and still make one wall.
 #[test]
 fn a_wall_of_pieces_that_overlap_goes_round_its_hole() {
     let mut b = shell();
@@ -229,7 +229,7 @@ fn a_screen_before_a_wall_is_no_filler() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// Between the two leaves of a cavity wall is air, not a thick wall.
+/// The gap between the two skins of a cavity wall is air, not a thick wall.
 #[test]
 fn a_thin_piece_of_a_cavity_wall_is_no_filler() {
     let mut b = shell();

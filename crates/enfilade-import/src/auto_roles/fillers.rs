@@ -1,45 +1,45 @@
-//! Door leaves and panes among objects that nothing is said about: what fills a hole in a wall.
+//! Door leaves and panes among objects that no rule decides: things that fill a hole in a wall.
 //!
-//! The question is the wall's, not the leaf's: *does the wall go on, in the plane of the thing, on
-//! three of its four sides, with air before and behind both of them?* A lintel has the wall on two
-//! sides, a wall between two others and two slabs on none or on two. What lies in such a hole is a
-//! filler if it is much thinner than the wall, or if a single connected surface goes round it: walls
-//! are built beside each other, and only openings are cut out of one.
+//! The test is about the wall, not the leaf: *does the wall continue, in the plane of the thing, on three of
+//! its four sides, with air before and behind both?* A lintel has the wall on two sides, a wall between two
+//! others and two slabs on none or on two. A thing in such a hole is a filler if it is much thinner than the
+//! wall, or if a single connected surface surrounds it: walls are built beside each other, and only openings
+//! are cut out of one.
 
 use super::units::Unit;
 use enfilade_geom::{Bvh, DVec3, Ray, Sets, Triangle, triangle_area_normal};
 
-/// How far before and behind it a wall may reach: no wall that people open is thicker. [Units: wu]
+/// Largest reach of a wall before and behind the thing: no wall with an opening is thicker. [Units: wu]
 const WALL: f64 = 0.6;
-/// How far beyond its rim the wall is looked for: as near as mullions are wide, and as far as joints
+/// Distances beyond the rim at which the wall is searched: as near as mullions are wide, and as far as joints
 /// are. [Units: wu]
 const STEPS: [f64; 2] = [0.015, 0.05];
-/// Where it is looked for along each side.
+/// Samples along each side.
 const SAMPLES: usize = 8;
-/// A side is held if so much of it is: the rest is a threshold, a shutter's box, a round corner.
+/// A side is held if this share of it is: the rest is a threshold, a shutter's box, a rounded end.
 const HELD: f64 = 0.7;
-/// The lintel and two jambs, or three sides of a window beside a pillar.
+/// Sides that must be held: the lintel and two jambs, or three sides of a window beside a pillar.
 const SIDES: usize = 3;
-/// What is thinner than this share of the wall around it, holes counted, is no piece of that wall,
+/// A thing thinner than this share of the wall around it, holes counted, is not a piece of that wall,
 const THIN: f64 = 0.5;
-/// nor another wall: the thinnest partitions, set between columns and under beams, are thicker than
-/// this, and leaves are 4 to 6 cm. [Units: wu]
+/// nor another wall if thinner than this: the thinnest partitions, set between columns and under beams, are
+/// thicker, and leaves are 4 to 6 cm. [Units: wu]
 const LEAF: f64 = 0.07;
-/// Rays along each edge of its face.
+/// Rays along each edge of the thing's face.
 const GRID: usize = 5;
-/// So far before and behind it is air: what hangs on a wall has none behind it. [Units: wu]
+/// Depth of the air before and behind it: a thing that hangs on a wall has none behind it. [Units: wu]
 const AIR: f64 = 0.2;
 /// … over this share of its face: furniture may stand before the rest.
 const OPEN: f64 = 0.5;
-/// Surfaces turned further from its face than 45° bound no wall in its plane.
+/// Surfaces turned more than 45° from its face do not bound a wall in its plane.
 const FACING: f64 = 0.7;
-/// What holds it lies beside it in depth over this share of the thinner of the two: a frame of a
-/// picture lies before the wall.
+/// The wall that holds it overlaps it in depth by this share of the thinner of the two: a picture frame lies
+/// before its wall.
 const OVERLAP: f64 = 0.25;
-/// Hits nearer than this along a line are one, of two triangles that share an edge. [Units: wu]
+/// Hits nearer than this along a line are one hit, on an edge that two triangles share. [Units: wu]
 const SAME: f64 = 1e-4;
 
-/// The scene as rays see it.
+/// The triangles of the scene, for ray queries.
 pub(super) struct Surroundings<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) triangles: &'a [Triangle],
@@ -47,11 +47,11 @@ pub(super) struct Surroundings<'a> {
     pub(super) unit_of: &'a [u32],
 }
 
-/// Matter that goes on in the plane of a thing beyond its rim.
+/// Matter of another unit in the plane of a thing, beyond its rim.
 #[derive(Clone, Copy)]
 struct Hold {
     unit: u32,
-    /// Along the thing's thin axis. [Units: wu]
+    /// Length along the thing's thin axis. [Units: wu]
     thickness: f64,
 }
 
@@ -60,18 +60,18 @@ struct Candidate {
     unit: u32,
     /// Matter along its thin axis, averaged over its face. [Units: wu]
     thickness: f64,
-    /// The same over the thinnest quarter of its face, holes not counted: a leaf or a pane, without
-    /// frame. 0 for what is a frame only. [Units: wu]
+    /// The same over the thinnest quarter of its face, holes not counted: a leaf or a pane without its frame. 0
+    /// for a mere frame. [Units: wu]
     leaf: f64,
-    /// What holds it at each sample of each side: left, right, below, above.
+    /// Matter that holds it at each sample of each side: left, right, below, above.
     sides: [Vec<Vec<Hold>>; 4],
-    /// Left and right, whether anything at all is there.
+    /// Anything at all is there, on the left and on the right.
     ends: [bool; 2],
     /// It does not lie flat.
     is_upright: bool,
 }
 
-/// Units that fill openings, each with the reason.
+/// Returns units that fill openings, each with the reason.
 pub(super) fn fillers(
     units: &[Unit],
     is_open: &dyn Fn(&Unit) -> bool,
@@ -85,7 +85,7 @@ pub(super) fn fillers(
     for (i, c) in (0u32..).zip(&candidates) {
         candidate_of[c.unit as usize] = Some(i);
     }
-    // A leaf and its frame, a door and the light above it fill one opening together.
+    // Parts of one filler: a leaf and its frame, a door and the light above it.
     let mut sets = Sets::new(candidates.len());
     for (i, c) in (0..).zip(&candidates) {
         for hold in c.sides.iter().flatten().flatten() {
@@ -117,19 +117,19 @@ pub(super) fn fillers(
     found
 }
 
-/// How what is around a group holds it.
+/// Sides on which its surroundings hold a group.
 struct Held {
     sides: [bool; 4],
-    /// A leaf in a corner: a lintel and one jamb hold it, and another wall is in the jamb's place.
+    /// A leaf where two walls meet: a lintel and one jamb hold it, and another wall replaces the other jamb.
     is_in_corner: bool,
-    /// The thinnest of those sides. [Units: wu]
+    /// Thickness of the thinnest of those sides. [Units: wu]
     wall: f64,
-    /// Sides that one connected surface holds.
+    /// Sides held by one connected surface.
     n_by_one: usize,
 }
 
 impl Held {
-    /// Samples that lie at another member or candidate are inside the group.
+    /// Returns the sides on which walls hold a group. Samples on another candidate are inside the group.
     fn of(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> Self {
         let mut held = Self {
             sides: [false; 4],
@@ -200,7 +200,7 @@ impl Held {
                 self.n_sides()
             ))
         } else if self.n_by_one >= SIDES && c.thickness <= self.wall + STEPS[1] {
-            // With a sill or a shutter it may stand out a little; a thing through a wall is none.
+            // With a sill or a shutter it may stand out a little; a thing through a wall is not a filler.
             Some(format!("one wall goes round it on {} sides", self.n_by_one))
         } else {
             None
@@ -215,7 +215,7 @@ fn add_one(counts: &mut Vec<(u32, usize)>, key: u32) {
     }
 }
 
-/// What is known of a unit, if it may be a filler.
+/// Returns the measures of a unit that may be a filler; `None` if it cannot be one.
 fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Candidate> {
     let unit = &units[index as usize];
     let half = unit.half;
@@ -233,13 +233,13 @@ fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Ca
         ends: [-1.0, 1.0].map(|sign| is_at_end(unit, index, sign, around)),
         is_upright,
     };
-    // Whatever holds it; what that is itself is asked when all candidates are known.
+    // Anything may hold it here; holders that are candidates themselves are left out once all are known.
     let held = Held::of(&[&candidate], &|_| false);
     let may_be = held.is_thin(&candidate) || held.n_by_one >= SIDES - 1;
     (held.has_opening(&candidate) && may_be).then_some(candidate)
 }
 
-/// What holds a side, at each of its samples.
+/// Returns the matter that holds a side, at each of its samples.
 fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec<Vec<Hold>> {
     let (k, other) = if side < 2 { (1, 2) } else { (2, 1) };
     let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -262,7 +262,7 @@ fn holds(unit: &Unit, index: u32, side: usize, around: &Surroundings<'_>) -> Vec
         .collect()
 }
 
-/// Whether anything is where it ends, left or right.
+/// Returns `true` if anything bounds the unit on the left (`sign` -1) or right (1).
 fn is_at_end(unit: &Unit, index: u32, sign: f64, around: &Surroundings<'_>) -> bool {
     let out = unit.axes[1] * sign;
     let end = unit.center + out * unit.half.y;
@@ -280,24 +280,24 @@ fn is_at_end(unit: &Unit, index: u32, sign: f64, around: &Surroundings<'_>) -> b
     n_met as f64 >= HELD * SAMPLES as f64
 }
 
-/// Where a line across a unit's plane meets something.
+/// A crossing of a surface and a line across a unit's plane.
 #[derive(Clone, Copy)]
 struct Crossing {
     unit: u32,
-    /// From the unit's middle plane. [Units: wu]
+    /// Distance from the unit's middle plane. [Units: wu]
     at: f64,
     /// The surface is nearly parallel to the unit's plane.
     is_facing: bool,
 }
 
-/// Others' matter along a line across.
+/// Matter of another unit along such a line.
 struct Matter {
     unit: u32,
     from: f64,
     to: f64,
 }
 
-/// All that the line through a point along the thin axis meets, by unit and in order.
+/// Returns all crossings of the line through a point along the thin axis, by unit and in order.
 fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> {
     let reach = unit.half.x + WALL;
     let across = unit.axes[0];
@@ -316,7 +316,7 @@ fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> 
     found
 }
 
-/// The matter of all but one unit, between surfaces that face along the line.
+/// Returns the matter of all units but one, between surfaces that face along the line.
 fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
     let facing: Vec<Crossing> = crossings
         .iter()
@@ -325,7 +325,7 @@ fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
         .collect();
     let mut found = Vec::new();
     for own in facing.chunk_by(|a, b| a.unit == b.unit) {
-        // However they are turned. What lies in the gap of two walls is not between air, either.
+        // Front or back faces alike: the gap between two walls does not count as air, either.
         for pair in own.windows(2) {
             found.push(Matter {
                 unit: own[0].unit,
@@ -337,13 +337,13 @@ fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
     found
 }
 
-/// Others' matter through a point, in the unit's plane and with air on both sides of it.
+/// Returns the matter of other units through a point that overlaps the unit's depth.
 fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
     let half = unit.half.x;
     matter(&crossings(unit, p, around), index)
         .into_iter()
         .map(|m| (m.to.min(half) - m.from.max(-half), m))
-        // A picture's frame only touches the wall.
+        // A picture frame only touches its wall.
         .filter(|(overlap, m)| *overlap > OVERLAP * (m.to - m.from).min(2.0 * half))
         .map(|(_, m)| Hold {
             unit: m.unit,
@@ -352,8 +352,8 @@ fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -
         .collect()
 }
 
-/// Matter of the unit itself along its thin axis, averaged over its face and where it is thin, if
-/// there is air before it and behind it.
+/// Returns the unit's own matter along its thin axis, averaged over its face and in the thinnest quarter.
+/// `None` without air before and behind it.
 fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> Option<(f64, f64)> {
     let mut own_matter = Vec::new();
     let mut n_free = [0, 0];
@@ -369,7 +369,7 @@ fn thickness_between_air(unit: &Unit, index: u32, around: &Surroundings<'_>) -> 
             let is_met = met
                 .iter()
                 .any(|c| c.unit != index && (near..far).contains(&(sign * c.at)));
-            // Inside a wall there is nothing to meet, either.
+            // Inside a wall there are no hits, either.
             let is_inside = others
                 .iter()
                 .any(|m| m.from < sign * near && sign * near < m.to);

@@ -1,34 +1,34 @@
-//! Furniture among objects that nothing is said about, also where it touches walls and other things.
+//! Furniture among objects that no rule decides, even where it touches walls and other things.
 //!
-//! It stands on a floor or hangs on a wall, one sees over it, and what bounds the room goes on
-//! around and above it. A parapet does all that, too, so what has air before and behind it and ends
-//! in other things, as walls do, stays.
+//! Furniture stands on a floor or hangs on a wall, one sees over it, and the bounds of the room continue around
+//! and above it. A parapet does all that, too; so objects with air before and behind them that end in other
+//! things, as walls do, stay.
 
 use super::units::Unit;
 use super::{GOES_ON, INTO, NEAR, SMALL, n_goes_on};
 use enfilade_geom::{Aabb, DVec3};
 
-/// Longer is no worktop and no corner sofa, but a parapet or a stage. [Units: wu]
+/// Longest furniture; a longer object is not a worktop or a sofa but a parapet or a stage. [Units: wu]
 const LONG: f64 = 5.0;
 /// The same as a share of the scene's diagonal: a bed may be as long as its room is wide.
 const ROOM_SHARE: f64 = 0.5;
-/// What has two thinner edges is a skirting, a sill or a mullion. [Units: wu]
+/// An object with two thinner edges is a skirting, a sill or a mullion. [Units: wu]
 const BAR: f64 = 0.2;
-/// So much air is above it: what reaches the ceiling may hold it. [Units: wu]
+/// Height of the air above it: an object that reaches the ceiling may carry it. [Units: wu]
 const HEAD: f64 = 0.3;
-/// A side is free or backed if so much of it is.
+/// A side is free or backed if this share of it is.
 const MOST_OF: f64 = 0.7;
-/// What hangs has its back, not its rim, at the wall: no side is more than twice as large.
+/// Hanging furniture has its back, not its rim, at the wall: no side is more than twice as large.
 const BACK: f64 = 0.5;
 /// Rays along each edge of a side.
 const GRID: usize = 5;
-/// Walls rise higher than it in more than half of eight directions.
+/// Directions, of eight, in which walls must rise higher than it.
 const AROUND: usize = 5;
 
-/// Answers whether others are met between two points.
+/// Returns `true` if other objects lie between two points.
 type Meets<'m> = dyn Fn(DVec3, DVec3) -> bool + 'm;
 
-/// Why an object, taken as one thing, is furniture, if it is.
+/// Returns the reason why an object, taken as one thing, is furniture; `None` if it is not.
 pub(super) fn reason(
     whole: &Unit,
     bounds: &Aabb,
@@ -41,7 +41,7 @@ pub(super) fn reason(
     let half = whole.half;
     let n_thin = half.to_array().iter().filter(|&&h| 2.0 * h < BAR).count();
     let is_bar = n_thin > 1;
-    // What lies on the floor so flat bounds nothing more than the floor.
+    // An object this flat on the floor bounds nothing that the floor does not.
     if is_bar
         || 2.0 * half[up] < NEAR
         || 2.0 * half[up] > SMALL
@@ -54,8 +54,8 @@ pub(super) fn reason(
         return None;
     }
     let touched = |k: usize, sign: f64| box_.met(k, sign, NEAR);
-    // What it stands on goes on beyond it; the next piece of a wall does not. A wall it hangs at does
-    // so on all sides, and the next piece of a floor does not.
+    // The floor below it continues beyond it; the next piece of a wall does not. The wall behind it does so on
+    // all sides; the next piece of a floor does not.
     let n_on = |k: usize, sign: f64| {
         let out = whole.axes[k] * sign;
         let axis = out.abs().max_position();
@@ -71,7 +71,7 @@ pub(super) fn reason(
                     .any(|&s| touched(k, s) >= MOST_OF && n_on(k, s) == 4)
         })
     };
-    // Legs and feet may stand out over an edge.
+    // Legs and feet may stand partly over an edge.
     let how = if touched(up, -1.0) > 1.0 - MOST_OF && n_on(up, -1.0) >= GOES_ON {
         "stands on others"
     } else if hangs() {
@@ -79,7 +79,7 @@ pub(super) fn reason(
     } else {
         return None;
     };
-    // A low wall: air before and behind it, and it ends in others.
+    // A low wall has air before and behind it, and ends in other objects.
     let is_end = |k: usize, sign: f64| touched(k, sign) > 1.0 - MOST_OF;
     let is_low_wall = |across: usize, along: usize| {
         half[across] < half[along]
@@ -105,7 +105,7 @@ struct Whole<'a> {
 }
 
 impl Whole<'_> {
-    /// The share of a side that others are before, nearer than `far`.
+    /// Returns the share of a side that has other objects before it, nearer than `far`.
     fn met(&self, k: usize, sign: f64, far: f64) -> f64 {
         let (u, v) = ((k + 1) % 3, (k + 2) % 3);
         let Unit {
@@ -126,7 +126,7 @@ impl Whole<'_> {
         n as f64 / (GRID * GRID) as f64
     }
 
-    /// In how many of eight directions others rise above it.
+    /// Returns the number of directions, of eight, in which other objects rise above it.
     fn n_higher(&self, up: usize, diagonal: f64) -> usize {
         let Unit {
             center, axes, half, ..

@@ -1,4 +1,4 @@
-//! What stands at walls, and what only seems to be furniture.
+//! Furniture at walls, and structure that only seems to be furniture.
 
 use super::tests::Build;
 
@@ -24,7 +24,7 @@ fn the_reason_is_told() {
     );
 }
 
-/// The lower one holds the upper one, which is furniture.
+/// The lower box holds the upper one, which is furniture.
 #[test]
 fn a_stack_is_furniture() {
     let mut b = Build::room();
@@ -46,7 +46,7 @@ fn what_reaches_the_ceiling_or_is_a_low_wall_stays() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// A gallery hangs by its rim, and a stage is larger than what is carried into a room.
+/// A gallery hangs by its rim, and a stage is too large for furniture.
 #[test]
 fn what_people_stand_on_stays() {
     let mut b = Build::room();
@@ -71,7 +71,7 @@ fn what_people_stand_on_stays() {
     assert_eq!(b.details(), ["table"]);
 }
 
-/// Floor plans pulled up: over every wall there is air.
+/// Extruded floor plans have air above every wall.
 #[test]
 fn walls_without_a_ceiling_stay() {
     let mut b = Build::default();

@@ -1,4 +1,4 @@
-//! Rooms of blocks, and what of them is taken for furniture.
+//! Rooms built of blocks, and the parts of them taken for furniture.
 
 use super::*;
 use enfilade_geom::DMat4;
@@ -13,7 +13,7 @@ impl Build {
         self.blocks(name, &[(min, max)])
     }
 
-    /// Boxes as one object that nothing is said about.
+    /// Adds boxes as one object that no rule decides.
     pub(super) fn blocks(&mut self, name: &str, boxes: &[([f64; 3], [f64; 3])]) -> &mut Self {
         let mut p = Primitive::default();
         for (min, max) in boxes {
@@ -49,7 +49,7 @@ impl Build {
         self
     }
 
-    /// A room of 5 x 4 x 2.6 m, its east wall with a doorway made of three pieces.
+    /// Builds a room of 5 x 4 x 2.6 m with a doorway in its east wall, which has three pieces.
     pub(super) fn room() -> Self {
         let mut b = Self::default();
         b.block("floor", [0.0, -0.2, 0.0], [5.0, 0.0, 4.0])
@@ -76,7 +76,7 @@ impl Build {
             .collect()
     }
 
-    /// Name and reason of what is detail.
+    /// Returns name and reason of each detail object.
     pub(super) fn reasons(mut self) -> Vec<String> {
         judge(&mut self.0);
         let details = self.0.objects.iter().filter(|o| o.role == Role::Detail);
@@ -108,7 +108,7 @@ fn what_stands_in_a_room_is_detail() {
     .block("picture", [0.0, 1.2, 1.0], [0.03, 1.8, 1.8])
     .block("rug", [0.8, 0.0, 2.2], [1.6, 0.01, 3.2])
     .block("ball", [4.0, 1.0, 1.0], [4.2, 1.2, 1.2])
-    // To the ceiling, between floor and ceiling: it may be a pier.
+    // As high as the room: it may be a pier.
     .block("wardrobe", [3.0, 0.0, 0.0], [4.2, 2.6, 0.6]);
     assert_eq!(b.details(), ["chair", "lamp", "picture", "rug", "ball"]);
 }
@@ -218,8 +218,8 @@ fn what_somebody_said_is_kept() {
     assert_eq!(b.details(), [""; 0]);
 }
 
-/// Cuts at least 0.5 m apart, and both ends. Sixty-fourths of a meter, so that all turns and moves
-/// are exact in `f32`.
+/// Cuts at least 0.5 m apart, and both ends, in sixty-fourths of a meter, so that all turns and moves are exact
+/// in `f32`.
 fn cuts(length: u32) -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(32..96_u32, 1..40).prop_map(move |steps| {
         let mut at = vec![0];
@@ -235,7 +235,7 @@ fn cuts(length: u32) -> impl Strategy<Value = Vec<f64>> {
     })
 }
 
-/// A closed room whose six slabs are cut into tiles at random, and blocks that stand in it.
+/// A closed room of six slabs cut into tiles at random, with blocks standing in it.
 fn tiled_room() -> impl Strategy<Value = Build> {
     let block = (0..192_u32, 0..192_u32, 8..64_u32, 8..96_u32, 8..64_u32);
     (192..512_u32, 128..208_u32, 192..512_u32)

@@ -1,48 +1,48 @@
-//! Objects as what hangs together in them: all windows of a facade may be one mesh.
+//! Objects divided into units, their separate things: all windows of a facade may be one mesh.
 
 use std::collections::HashMap;
 
 use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
 
-/// Parts nearer than this are one thing: a handle and its leaf, the triangles of a mesh that shares
-/// no corners. [Units: wu]
+/// Parts nearer than this are one unit: a handle and its leaf, the triangles of a mesh without shared vertices.
+/// [Units: wu]
 const TOGETHER: f64 = 0.01;
-/// Of more parts than this, all are one thing: parting them costs their number squared at worst.
+/// An object of more parts is one unit: comparing parts takes quadratic time at worst.
 const MOST_PARTS: usize = 2_000;
-/// Normals that differ by less than 11° are one direction.
+/// Normals that differ by less than 11° count as one direction.
 const ONE_DIRECTION: f64 = 0.98;
-/// … and by more than 45° when they are to give a box its second axis.
+/// A direction gives a box its second axis only if more than 45° from the first.
 const LEVEL: f64 = 0.7;
-/// Directions told apart, so that a sphere costs no more than a box.
+/// Most directions kept, so that a sphere costs no more than a box.
 const MOST_DIRECTIONS: usize = 64;
 
-/// Shorter than this is no door and no window. [Units: wu]
+/// Shortest edge of a door or window. [Units: wu]
 const LEAST_EDGE: f64 = 0.35;
 
-/// How far casings, sills and handles stand out from what they belong to: across a thick wall, and
-/// along it by the width of a board. [Units: wu]
+/// Reach of casings, sills and handles beyond their unit: across a thick wall, and along it by the width of a
+/// board. [Units: wu]
 const BESIDE: DVec3 = DVec3::new(0.6, 0.2, 0.2);
 
-/// A thing that hangs together, and its box along its own faces.
+/// A thing in one piece, and its box along its own faces.
 pub(super) struct Unit {
     pub(super) object: u32,
-    /// In the list of all.
+    /// Its triangles in the list of all.
     pub(super) triangles: Vec<u32>,
     pub(super) center: DVec3,
-    /// Right-handed: across the thing where it is thinnest, level along it, and up along it.
+    /// Right-handed: across the unit where it is thinnest, level along it, and up along it.
     pub(super) axes: [DVec3; 3],
-    /// Half its edges along the axes. [Units: wu]
+    /// Half the edges of its box along the axes. [Units: wu]
     pub(super) half: DVec3,
 }
 
 impl Unit {
-    /// Whether it is too small to be a door or a window.
+    /// Returns `true` if it is too small for a door or a window.
     pub(super) fn is_small(&self) -> bool {
         2.0 * self.half.y.min(self.half.z) < LEAST_EDGE
     }
 
-    /// Whether the other is a casing, a sill or a handle of this one: it lies before its face, in
-    /// the same wall.
+    /// Returns `true` if the other is a casing, a sill or a handle of this one: before its face, in the same
+    /// wall.
     pub(super) fn has_beside(&self, other: &Self) -> bool {
         let reach = self.half + BESIDE;
         (0..8).all(|corner| {
@@ -55,7 +55,7 @@ impl Unit {
     }
 }
 
-/// The things that an object's triangles make; `first` is the object's first triangle among all.
+/// Returns the units of an object's triangles; `first` is the object's first triangle among all.
 pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<Unit> {
     let (set_of, boxes) = parts(triangles);
     let mut sets = Sets::new(boxes.len());
@@ -92,7 +92,7 @@ pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<U
         .collect()
 }
 
-/// The connected parts of an object; without their triangles.
+/// Returns the connected parts of an object, without their triangles.
 pub(super) fn parts_of(triangles: &[Triangle]) -> Vec<Unit> {
     let (part_of, boxes) = parts(triangles);
     let mut members: Vec<Vec<Triangle>> = vec![Vec::new(); boxes.len()];
@@ -102,7 +102,7 @@ pub(super) fn parts_of(triangles: &[Triangle]) -> Vec<Unit> {
     members.iter().map(|own| whole(0, own)).collect()
 }
 
-/// An object taken as one thing; without its triangles.
+/// Returns an object as one unit, without its triangles.
 pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
     let (center, axes, half) = own_box(&triangles.iter());
     Unit {
@@ -114,7 +114,7 @@ pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
     }
 }
 
-/// An object taken as one thing, its box upright: the third axis is up.
+/// Returns an object as one unit with an upright box: the third axis is up.
 pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
     let side = directions(triangles.iter())
         .into_iter()
@@ -149,7 +149,7 @@ fn join_near(boxes: &[Aabb], sets: &mut Sets) {
     }
 }
 
-/// Directions that the surface faces, up to sign, those of most surface first.
+/// Returns the directions that the surface faces, up to sign, largest area first.
 fn directions<'t>(triangles: impl Iterator<Item = &'t Triangle>) -> Vec<(DVec3, f64)> {
     let mut found: Vec<(DVec3, f64)> = Vec::new();
     for t in triangles {
@@ -173,7 +173,7 @@ fn extent<'t>(d: DVec3, triangles: impl Iterator<Item = &'t Triangle>) -> (f64, 
         .fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)))
 }
 
-/// Center of the box along three axes, and half its edges.
+/// Returns the center of the box along three axes, and half its edges.
 fn box_along<'t>(
     axes: [DVec3; 3],
     triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
@@ -187,12 +187,12 @@ fn box_along<'t>(
     (center, DVec3::from_array(half))
 }
 
-/// The box along the directions that most of the surface faces.
+/// Returns center, axes and half edges of the box along the directions that most of the surface faces.
 fn own_box<'t>(
     triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
 ) -> (DVec3, [DVec3; 3], DVec3) {
     let directions = directions(triangles.clone());
-    // Of the three that most of the surface faces, the one along which it is thinnest.
+    // The thinnest of the three directions with the largest area.
     let width = |d: &DVec3| {
         let (lo, hi) = extent(*d, triangles.clone());
         hi - lo
@@ -205,7 +205,7 @@ fn own_box<'t>(
         .unwrap_or(DVec3::Y);
     let across = canonical(across);
     let level = if across.y.abs() > ONE_DIRECTION {
-        // What lies flat is turned as its sides are.
+        // A flat thing turns with its sides.
         directions
             .iter()
             .filter(|d| d.0.dot(across).abs() < LEVEL)
@@ -219,9 +219,9 @@ fn own_box<'t>(
     (center, axes, half)
 }
 
-/// Of a direction and its reverse, always the same one.
+/// Returns a direction or its reverse, the same for both.
 fn canonical(d: DVec3) -> DVec3 {
-    /// What rounding makes of zero.
+    /// Largest component that rounding makes of zero.
     const NONE: f64 = 1e-6;
     let first = [d.x, d.z, d.y].into_iter().find(|c| c.abs() > NONE);
     if first.is_some_and(|c| c < 0.0) {
@@ -231,14 +231,14 @@ fn canonical(d: DVec3) -> DVec3 {
     }
 }
 
-/// A corner as what can be compared.
+/// Returns the position of a vertex as a hash key.
 pub(super) fn key(p: DVec3) -> [u64; 3] {
-    // + 0.0 makes one zero of two.
+    // Turns -0 into 0.
     (p + 0.0).to_array().map(f64::to_bits)
 }
 
-/// The connected part of each triangle, and the parts' boxes: triangles that share a corner hang
-/// together.
+/// Returns the connected part of each triangle, and the box of each part. Triangles that share a vertex are
+/// connected.
 fn parts(triangles: &[Triangle]) -> (Vec<u32>, Vec<Aabb>) {
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
     let mut sets = Sets::new(triangles.len());

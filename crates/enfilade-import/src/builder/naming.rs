@@ -1,4 +1,4 @@
-//! What the input calls its things, counted and checked as it comes in.
+//! Names and extras of the input, counted and checked as they are read.
 
 use enfilade_geom::scene::{Fixture, SourceNode};
 
@@ -7,7 +7,8 @@ use crate::ImportError;
 use crate::origins::is_shallow;
 
 impl Builder<'_> {
-    /// Adds a node to the tree of names, below `parent`; its number there, or that of `parent` where it says nothing.
+    /// Adds a node to the tree of names below `parent`. Returns its number, or `parent` if it has no name and no
+    /// extras.
     pub(crate) fn add_source(
         &mut self,
         place: &str,
@@ -21,7 +22,7 @@ impl Builder<'_> {
         Ok(self.origins.add(parent, name, extras))
     }
 
-    /// Keeps a light, a camera or a marked place.
+    /// Adds a light, a camera or a marked place.
     pub(crate) fn add_fixture(
         &mut self,
         place: &str,
@@ -35,24 +36,24 @@ impl Builder<'_> {
         } else {
             self.note(
                 place,
-                "a light or camera nowhere, or nested too deep; left out",
+                "a light or camera without a finite transform, or nested too deep; left out",
             );
         }
         Ok(())
     }
 
-    /// Keeps what the file says of itself as a whole.
+    /// Adds the copyright and extras of the file as a whole.
     pub(crate) fn add_about(&mut self, copyright: &str, extras: &str) {
         let extras = self.kept_extras("scene", extras);
         if self.origins.add_about(copyright, extras) {
             self.note(
                 "scene",
-                "extras of several scenes; those are kept that come first as text",
+                "extras of several scenes; only the first in alphabetical order are kept",
             );
         }
     }
 
-    /// Extras as a world can hold them.
+    /// Returns the extras, or nothing if they nest too deep for a world.
     fn kept_extras<'t>(&mut self, place: &str, extras: &'t str) -> &'t str {
         if is_shallow(extras) {
             return extras;
@@ -61,7 +62,7 @@ impl Builder<'_> {
         ""
     }
 
-    /// The input's unit, as far as it was given. [Units: m]
+    /// Returns the input's unit, 1 if none was given. [Units: m]
     pub(crate) fn unit(&self) -> f64 {
         self.options.unit.unwrap_or(1.0)
     }

@@ -3,15 +3,15 @@
 use super::json::{Accessor, BufferView, Root};
 use std::borrow::Cow;
 
-/// A glTF document with its buffers. A buffer that could not be had is `None`.
+/// A glTF document with its buffers; missing buffers are `None`.
 pub(super) struct Document<'a> {
     pub(super) root: Root,
     pub(super) buffers: Vec<Option<Cow<'a, [u8]>>>,
-    /// By buffer view its bytes, where the buffer holds them compressed.
+    /// Decompressed bytes of each compressed buffer view.
     pub(super) plain_views: Vec<Option<Vec<u8>>>,
 }
 
-/// How a component is stored.
+/// Storage type of a component.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Component {
     I8,
@@ -43,7 +43,7 @@ impl Component {
         }
     }
 
-    /// One component, integers as glTF 2.0 §3.6.2.2 (accessor data types) maps them.
+    /// Reads one component, mapping integers as glTF 2.0 §3.6.2.2 (accessor data types).
     fn read(self, bytes: &[u8], normalized: bool) -> f32 {
         let (value, most) = match self {
             Self::I8 => (f32::from(bytes[0] as i8), 127.0),
@@ -60,7 +60,8 @@ impl Component {
         }
     }
 
-    /// Distance of two neighboring values; 0 for floats, which are rounded by their value alone, so that what was one stays one.
+    /// Returns the distance of neighboring values; 0 for floats: rounding each by its own value keeps equal ones
+    /// equal.
     fn step(self, normalized: bool) -> f32 {
         match self {
             Self::F32 => 0.0,
@@ -88,7 +89,7 @@ fn read_u32(bytes: &[u8]) -> u32 {
 
 /// A checked accessor: all of its elements lie inside its bytes.
 pub(super) struct Elements<'d> {
-    /// How many; never more than the bytes hold, except where no bytes are given (then all zero).
+    /// Number of elements; never more than the bytes hold, unless there are no bytes (then all are zero).
     pub(super) count: u64,
     pub(super) component: Component,
     n_components: usize,
@@ -97,12 +98,12 @@ pub(super) struct Elements<'d> {
     /// Strictly increasing, each below `count`.
     sparse_indices: Vec<u32>,
     sparse_values: &'d [u8],
-    /// Width of the grid that the values were rounded to; 0 if they were not.
+    /// Width of the grid that the values were rounded to; 0 if they were not rounded.
     pub(super) step: f32,
 }
 
 impl<'a> Document<'a> {
-    /// The bytes of a buffer view.
+    /// Returns the bytes and the definition of a buffer view.
     pub(super) fn view(&self, index: u32) -> Result<(&[u8], &BufferView), String> {
         let view = self
             .root
@@ -125,7 +126,7 @@ impl<'a> Document<'a> {
         .map(|bytes| (bytes, view))
         .ok_or_else(|| {
             format!(
-                "buffer view {index} wants bytes {}+{} of buffer {}, which has {}",
+                "buffer view {index} needs bytes {}+{} of buffer {}, which has {}",
                 view.byte_offset,
                 view.byte_length,
                 view.buffer,
@@ -134,7 +135,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Checks an accessor of one of the `shapes`.
+    /// Checks an accessor, which must have one of the `shapes`.
     pub(super) fn elements(&self, index: u32, shapes: &[&str]) -> Result<Elements<'_>, String> {
         let at = |problem: String| format!("accessor {index}: {problem}");
         let accessor = self
@@ -234,7 +235,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// `count` elements from `offset`, `stride` apart, the last one `size` long.
+/// Returns the bytes of `count` elements from `offset`, `stride` apart, the last one `size` long.
 fn span(bytes: &[u8], offset: u64, count: u64, stride: u64, size: u64) -> Result<&[u8], String> {
     if count == 0 {
         return Ok(&[]);
@@ -254,7 +255,7 @@ fn span(bytes: &[u8], offset: u64, count: u64, stride: u64, size: u64) -> Result
 }
 
 impl<'d> Elements<'d> {
-    /// Elements without gaps.
+    /// Returns elements without gaps.
     pub(super) fn of_bytes(
         bytes: &'d [u8],
         component: Component,
@@ -275,7 +276,7 @@ impl<'d> Elements<'d> {
         }
     }
 
-    /// Bytes of element `i`, or none where it is zero by definition.
+    /// Returns the bytes of element `i`; `None` where it is zero by definition.
     fn element(&self, i: u32) -> Option<&[u8]> {
         let size = self.component.size() as usize * self.n_components;
         if let Ok(k) = self.sparse_indices.binary_search(&i) {
@@ -285,7 +286,7 @@ impl<'d> Elements<'d> {
         bytes.get(i as usize * stride..i as usize * stride + size)
     }
 
-    /// Element `i`, `fill` where the accessor has fewer components than asked for.
+    /// Returns element `i`, with `fill` for components that the accessor lacks.
     fn get<const N: usize>(&self, i: u32, fill: f32) -> [f32; N] {
         let mut value = [fill; N];
         let n = N.min(self.n_components);
@@ -300,7 +301,7 @@ impl<'d> Elements<'d> {
         value
     }
 
-    /// All elements, or those picked; picked numbers must be below `count`.
+    /// Returns all elements, or those picked; picked numbers must be below `count`.
     pub(super) fn read<const N: usize>(&self, pick: Option<&[u32]>, fill: f32) -> Vec<[f32; N]> {
         match pick {
             Some(pick) => pick.iter().map(|&i| self.get(i, fill)).collect(),
@@ -308,7 +309,7 @@ impl<'d> Elements<'d> {
         }
     }
 
-    /// All elements as indices.
+    /// Returns all elements as indices.
     pub(super) fn read_indices(&self) -> Result<Vec<u32>, String> {
         if !matches!(
             self.component,

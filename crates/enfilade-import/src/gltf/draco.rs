@@ -11,25 +11,25 @@ use std::collections::BTreeMap;
 
 /// A decoded primitive.
 pub(super) struct DracoMesh {
-    /// Three a triangle.
+    /// Three per triangle.
     pub(super) indices: Vec<u32>,
-    /// By name of glTF, those that the bitstream holds.
+    /// Attributes in the bitstream, by glTF name.
     pub(super) attributes: BTreeMap<String, DracoAttribute>,
 }
 
-/// One value a vertex, without gaps.
+/// One value per vertex, without gaps.
 pub(super) struct DracoAttribute {
     pub(super) component: Component,
     pub(super) n_components: usize,
     pub(super) bytes: Vec<u8>,
-    /// Width of the grid that its floats were rounded to; 0 if none is found.
+    /// Width of the grid that its floats were rounded to; 0 if none was detected.
     pub(super) step: f32,
 }
 
-/// Bytes that a face takes while it is decoded, at least.
+/// Least memory of a face during decoding. [Units: bytes]
 const FACE_BYTES: u64 = 24;
 
-/// Decodes a primitive, within the memory and the counts that are left.
+/// Decodes a primitive, within the remaining memory and counts.
 pub(super) fn decode(
     document: &Document<'_>,
     def: &DracoDef,
@@ -72,7 +72,7 @@ pub(super) fn decode(
     })
 }
 
-/// A value a vertex; Draco stores equal ones once.
+/// Returns one value per vertex; Draco stores equal ones once.
 fn unpacked(attribute: &PointAttribute, n_vertices: usize) -> Result<DracoAttribute, String> {
     let component = match attribute.data_type() {
         DataType::Int8 => Component::I8,
@@ -81,7 +81,7 @@ fn unpacked(attribute: &PointAttribute, n_vertices: usize) -> Result<DracoAttrib
         DataType::Uint16 => Component::U16,
         DataType::Uint32 => Component::U32,
         DataType::Float32 => Component::F32,
-        other => return Err(format!("is {other:?}, which glTF does not know")),
+        other => return Err(format!("is {other:?}, which glTF does not support")),
     };
     let n_components = usize::from(attribute.num_components());
     let size = component.size() as usize * n_components;
@@ -108,13 +108,14 @@ fn unpacked(attribute: &PointAttribute, n_vertices: usize) -> Result<DracoAttrib
     })
 }
 
-/// Bits that encoders round positions to: 11 and 14 are usual.
+/// Usual numbers of bits that encoders round positions to: 11 and 14 are common.
 const BITS: std::ops::RangeInclusive<u32> = 8..=20;
 
-/// Width of the coarsest grid that all values lie on; 0 if there is none.
+/// Returns the width of the coarsest grid that contains all values; 0 if there is none.
 ///
-/// Draco divides the longest edge of the box by `2^bits - 1` and counts from the least corner, and the decoder does not tell
-/// how many bits it found. Values on a grid of fewer bits than anyone uses were not rounded to it: they are just so.
+/// Draco divides the longest edge of the box by `2^bits - 1` and counts from the minimum vertex, and the decoder does
+/// not report the number of bits. Values on a grid of fewer bits than in [`BITS`] were not rounded to it: they happen
+/// to lie there.
 fn step_of(bytes: &[u8], n_components: usize) -> f32 {
     let value = |b: &[u8; 4]| f64::from(f32::from_le_bytes(*b));
     let values: Vec<f64> = bytes.as_chunks::<4>().0.iter().map(value).collect();
@@ -134,7 +135,7 @@ fn step_of(bytes: &[u8], n_components: usize) -> f32 {
         .fold(0.0, f64::max);
     let most = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let is_grid = |step: f64| {
-        // Four roundings to f32 on the way.
+        // Four roundings to f32 precede.
         let noise = 4.0 * most * f64::from(f32::EPSILON) / step;
         let place = |(i, v): (usize, &f64)| (v - low[i % n_components]) / step;
         noise < 0.1
@@ -170,7 +171,7 @@ mod tests {
         ) {
             let most = ((1_u32 << bits) - 1) as f32;
             let step = range / most;
-            // The ends of the longest edge are on the grid, and so is the least corner.
+            // The ends of the longest edge are on the grid, and so is the minimum vertex.
             let mut values = vec![low; 3];
             values.extend([low + range, low, low]);
             values.extend(places.iter().flatten().map(|x| low + (x * most).round() * step));

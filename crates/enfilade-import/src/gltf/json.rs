@@ -1,8 +1,8 @@
-//! The parts of a glTF 2.0 document that are read here.
+//! The supported parts of a glTF 2.0 document.
 //!
-//! Own types instead of the `gltf` crate: its reader of documents with unknown required extensions
-//! skips validation, and its accessors then panic on the first bad index; it also knows neither
-//! instancing nor quantized positions. Materials stay plain JSON so that every extension survives.
+//! These types replace the `gltf` crate: it skips validation of documents with unknown required extensions, and its
+//! accessors then panic on the first bad index; it also supports neither instancing nor quantized positions.
+//! Materials stay plain JSON so that every extension survives.
 
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
-/// Longest array read. `{}` is 2 bytes of JSON and a hundred in memory; this bounds the sum.
+/// Longest array read. `{}` takes 2 bytes of JSON and a hundred in memory; this bounds the sum.
 const MAX_ITEMS: usize = 1 << 22;
 
 /// A list with a bounded length.
@@ -130,7 +130,7 @@ pub(super) struct Node {
     pub(super) mesh: Option<u32>,
     pub(super) skin: Option<u32>,
     pub(super) camera: Option<u32>,
-    /// In place of the mesh's, where given.
+    /// Replaces the weights of the mesh.
     pub(super) weights: Option<Box<List<f64>>>,
     #[serde(default)]
     pub(super) children: List<u32>,
@@ -173,12 +173,12 @@ pub(super) struct MeshDef {
     pub(super) name: Option<String>,
     #[serde(default)]
     pub(super) primitives: List<PrimitiveDef>,
-    /// Of the primitives' morph targets.
+    /// Weights of the primitives' morph targets.
     #[serde(default)]
     pub(super) weights: List<f64>,
 }
 
-/// Accessors by what they hold.
+/// Accessors by attribute name.
 pub(super) type AccessorOf = BTreeMap<String, u32>;
 
 #[derive(serde::Deserialize)]
@@ -203,7 +203,7 @@ pub(super) struct PrimitiveExtensions {
 #[serde(rename_all = "camelCase")]
 pub(super) struct DracoDef {
     pub(super) buffer_view: u32,
-    /// Unique ids in the bitstream, by what they hold.
+    /// Unique ids in the bitstream, by attribute name.
     #[serde(default)]
     pub(super) attributes: BTreeMap<String, u32>,
 }
@@ -259,7 +259,7 @@ pub(super) struct BufferView {
 }
 
 impl BufferView {
-    /// How it is compressed, if it is.
+    /// Returns the compression of the view, if it has one.
     pub(super) fn meshopt(&self) -> Option<&MeshoptDef> {
         let extensions = self.extensions.as_ref()?;
         extensions.khr.as_ref().or(extensions.ext.as_ref())
@@ -296,7 +296,7 @@ pub(super) struct BufferDef {
 }
 
 impl BufferDef {
-    /// Whether it only stands for what compressed buffer views hold, so that readers without the codec find something.
+    /// Returns `true` for a placeholder that readers without the codec find in place of compressed buffer views.
     pub(super) fn is_fallback(&self) -> bool {
         let extensions = self.extensions.as_ref();
         let either = extensions.map(|e| [&e.ext, &e.khr]);

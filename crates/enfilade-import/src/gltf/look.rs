@@ -1,4 +1,4 @@
-//! Materials, textures, samplers and pictures, carried over as they are.
+//! Materials, textures, samplers and pictures, kept unchanged.
 
 use super::accessor::Document;
 use super::json::TextureDef;
@@ -15,7 +15,7 @@ const TEXTURE_EXTENSIONS: [&str; 4] = [
     "MSFT_texture_dds",
 ];
 
-/// Reads materials with their textures; gives scene materials by document material.
+/// Reads materials and textures. Returns the scene material of each document material.
 pub(super) fn read_materials(
     document: &Document<'_>,
     builder: &mut Builder<'_>,
@@ -57,7 +57,7 @@ pub(super) fn read_materials(
     for (i, value) in root.materials.iter().enumerate() {
         let mut value = value.clone();
         if !value.is_object() {
-            return Err(builder.malformed(format!("material {i}"), "is no object"));
+            return Err(builder.malformed(format!("material {i}"), "is not an object"));
         }
         let mut number = |key: &str, index: &Value| {
             let known = index.as_u64().filter(|&t| t < root.textures.len() as u64);
@@ -103,7 +103,7 @@ pub(super) fn read_materials(
     Ok(materials)
 }
 
-/// The picture of a texture; the plain one if it has both.
+/// Returns the picture of a texture; the plain one if there are two.
 fn source_of(def: &TextureDef) -> Option<u32> {
     let extended = || {
         let extensions = def.extensions.as_ref()?;
@@ -115,13 +115,13 @@ fn source_of(def: &TextureDef) -> Option<u32> {
     def.source.or_else(extended)
 }
 
-/// Changes the index of every texture reference: an object under a key that ends in `Texture`, anywhere in the material but its
-/// `extras`. `number` gives the new one by key and old one.
+/// Changes the index of every texture reference: an object under a key that ends in `Texture`, anywhere in the
+/// material except its `extras`. `number` returns the new index for a key and an old index.
 pub(crate) fn map_textures(
     value: &mut Value,
     number: &mut dyn FnMut(&str, &Value) -> Result<Value, String>,
 ) -> Result<(), String> {
-    // serde_json bounds the nesting of what it reads, and so this recursion.
+    // serde_json bounds the nesting of its output, and so this recursion.
     match value {
         Value::Array(items) => items
             .iter_mut()
@@ -141,7 +141,7 @@ pub(crate) fn map_textures(
     }
 }
 
-/// Reads a picture's bytes; `None`, with a note, where a file cannot be had.
+/// Reads a picture's bytes; `None`, with a note, for a missing file.
 fn read_image(
     document: &Document<'_>,
     index: u32,
@@ -183,18 +183,18 @@ fn read_image(
     builder.charge_image(&place, bytes.len() as u64)?;
     match files::sniff_image(&bytes) {
         Some(found) => mime = found.to_owned(),
-        None => builder.note(place, "a picture of no known format; carried over as it is"),
+        None => builder.note(place, "a picture of unknown format; kept unchanged"),
     }
     Ok(Some(builder.push_image(Image { name, mime, bytes })))
 }
 
-/// Reads a picture beside the scene, if it is one.
+/// Reads a file beside the scene that must be a picture.
 pub(crate) fn read_picture_file(uri: &str, builder: &mut Builder<'_>) -> Result<Vec<u8>, String> {
     let limit = builder.limits().max_image_bytes;
     let bytes = builder.read_reference(uri, limit)?;
-    // A scene may not carry any file of the reader's disk into its output, only pictures.
+    // A scene may carry only pictures, not any file of the reader's disk, into its output.
     match files::sniff_image(&bytes) {
         Some(_) => Ok(bytes),
-        None => Err(format!("'{uri}' is no picture of a known format")),
+        None => Err(format!("'{uri}' is not a picture of a known format")),
     }
 }

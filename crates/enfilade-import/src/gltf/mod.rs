@@ -1,8 +1,8 @@
 //! glTF 2.0 and GLB (Khronos, *glTF 2.0 Specification*, version 2.0.1), read from untrusted bytes.
 //!
-//! Kept: triangles (strips and fans made lists), normals, tangents, texture coordinates, the first
-//! color set, materials with all their extensions, textures, samplers, pictures. Node transforms
-//! are flattened; a mesh placed several times stays one mesh. Everything else is noted.
+//! Keeps triangles (strips and fans become lists), normals, tangents, texture coordinates, the first color set,
+//! materials with all their extensions, textures, samplers, pictures, lights, cameras, names and extras. Node
+//! transforms are flattened; a mesh placed several times stays one mesh. Notes everything else.
 
 mod accessor;
 mod draco;
@@ -23,7 +23,7 @@ pub(crate) use look::{map_textures, read_picture_file};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// Required extensions that are read, or that change nothing that is read.
+/// Required extensions that are supported, or that do not affect the supported parts.
 const KNOWN_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -42,15 +42,14 @@ const KNOWN_EXTENSIONS: [&str; 15] = [
     "MSFT_texture_dds",
 ];
 
-/// Nodes above an object whose names count for its role; also ends the walk up a cycle that lies
-/// above the scene's own roots.
+/// Most ancestors whose names count for an object's role; also ends the walk up a cycle above the scene's own roots.
 const MAX_NAMED_ANCESTORS: usize = 32;
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const CHUNK_JSON: u32 = u32::from_le_bytes(*b"JSON");
 const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// Whether the bytes look like GLB or a glTF document.
+/// Returns `true` if the bytes look like GLB or a glTF document.
 pub(crate) fn is_gltf(bytes: &[u8]) -> bool {
     bytes.starts_with(GLB_MAGIC)
         || bytes
@@ -59,7 +58,7 @@ pub(crate) fn is_gltf(bytes: &[u8]) -> bool {
             == Some(&b'{')
 }
 
-/// The length that a GLB says it has.
+/// Returns the length in the header of a GLB.
 pub(crate) fn length(head: &[u8]) -> Option<u64> {
     let length = head.strip_prefix(GLB_MAGIC)?.get(4..8)?;
     Some(u32::from_le_bytes(length.try_into().ok()?).into())
@@ -70,7 +69,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     read_renamed(bytes, builder, &|_| None)
 }
 
-/// As [`read`], with other names for nodes and meshes where `rename` gives one.
+/// Works as [`read`], with other names for nodes and meshes where `rename` returns one.
 pub(crate) fn read_renamed(
     bytes: &[u8],
     builder: &mut Builder<'_>,
@@ -117,7 +116,7 @@ pub(crate) fn read_renamed(
     .read_scene()
 }
 
-/// JSON and binary chunk of a GLB; the whole of a `.gltf`.
+/// Splits a GLB into JSON and binary chunk; a `.gltf` is all JSON.
 fn split_container<'b>(
     bytes: &'b [u8],
     builder: &mut Builder<'_>,
@@ -240,20 +239,20 @@ fn read_buffers<'b>(
 
 struct GltfReader<'r, 'a, 'b> {
     document: &'r Document<'b>,
-    /// Scene materials by document material.
+    /// Scene material of each document material.
     materials: Vec<u32>,
     /// Scene meshes by document mesh and the bits of its weights, as far as used.
     meshes: HashMap<(u32, Vec<u64>), u32>,
     builder: &'r mut Builder<'a>,
 }
 
-/// A node on the way down.
+/// A node still to be visited.
 struct Visit {
     node: u32,
     parent: DMat4,
     depth: u32,
     moves: Option<&'static str>,
-    /// The parent in the tree of names.
+    /// Its parent in the tree of names.
     source: Option<u32>,
 }
 
@@ -315,7 +314,7 @@ impl GltfReader<'_, '_, '_> {
         Ok(())
     }
 
-    /// By node its parent, or `u32::MAX`.
+    /// Returns the parent of each node, or `u32::MAX`.
     fn parents(&self) -> Result<Vec<u32>, ImportError> {
         let nodes = &self.document.root.nodes;
         let mut parents = vec![u32::MAX; nodes.len()];
@@ -339,7 +338,7 @@ impl GltfReader<'_, '_, '_> {
         Ok(parents)
     }
 
-    /// The nodes at the top of the scene that is read.
+    /// Returns the root nodes of the scene.
     fn starts(&mut self, parents: &[u32]) -> Result<Vec<usize>, ImportError> {
         let root = &self.document.root;
         if root.scenes.is_empty() {
@@ -359,10 +358,10 @@ impl GltfReader<'_, '_, '_> {
         Ok(scene.nodes.to_vec())
     }
 
-    /// Marks the node as visited; fails at a cycle, and too far down.
+    /// Marks the node as visited; an error at a cycle, and at too great a depth.
     fn check_visit(&self, visit: &Visit, is_visited: &mut [bool]) -> Result<(), ImportError> {
         let place = || format!("node {}", visit.node);
-        // With one parent a node, a second visit means a cycle or a root listed twice.
+        // With one parent per node, a second visit means a cycle or a root listed twice.
         if std::mem::replace(&mut is_visited[visit.node as usize], true) {
             return Err(self
                 .builder
@@ -381,7 +380,7 @@ impl GltfReader<'_, '_, '_> {
         Ok(())
     }
 
-    /// Which nodes an animation moves.
+    /// Returns `true` for each node that an animation moves.
     fn animated_nodes(&self) -> Vec<bool> {
         let mut animated = vec![false; self.document.root.nodes.len()];
         for channel in self
@@ -446,7 +445,7 @@ impl GltfReader<'_, '_, '_> {
         let moves = if node.skin.is_some() {
             self.builder.note(
                 place.clone(),
-                "a skinned mesh; taken in its unposed shape, as detail",
+                "a skinned mesh; read in its unposed shape, as detail",
             );
             Some("skinned")
         } else {
@@ -498,7 +497,7 @@ impl GltfReader<'_, '_, '_> {
     }
 }
 
-/// Why a node is left out with all below it, if it is.
+/// Returns the reason why a node and its descendants are left out, if they are.
 fn why_dropped(node: &Node) -> Option<String> {
     let extensions = node.extensions.as_ref();
     let visibility = extensions.and_then(|e| e.visibility.as_ref());
@@ -529,7 +528,7 @@ fn local_transform(node: &Node) -> Result<DMat4, String> {
     Ok(compose(translation, rotation, scale))
 }
 
-/// Translation times rotation (quaternion `x y z w`, normalized here) times scale.
+/// Returns translation times rotation (quaternion `x y z w`, normalized here) times scale.
 fn compose(translation: DVec3, q: [f64; 4], scale: DVec3) -> DMat4 {
     let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
     let [x, y, z, w] = if length > 0.0 {

@@ -1,6 +1,6 @@
-//! Morph targets at rest: what the weights of a mesh or node move, before any animation.
+//! Morph targets at rest: the shape that the weights of a mesh or node give before any animation.
 //!
-//! glTF 2.0 §3.7.2.2 (morph targets): a vertex is its own value and the sum of the targets' values, each times its weight.
+//! glTF 2.0 §3.7.2.2 (morph targets): a vertex is its own value plus the weighted sum of the targets' values.
 
 use super::accessor::Document;
 use super::json::AccessorOf;
@@ -8,19 +8,19 @@ use crate::ImportError;
 use crate::builder::Builder;
 use enfilade_geom::scene::Primitive;
 
-/// The shape that a mesh is placed in.
+/// The shape in which a mesh is placed.
 #[derive(Clone, Copy)]
 pub(super) struct Rest<'w> {
-    /// By target; targets without a weight rest.
+    /// Weight of each target; targets without one have no effect.
     pub(super) weights: &'w [f64],
-    /// The vertices that `primitive` has, of `n_vertices`; all if not given.
+    /// The vertices of the file that `primitive` has, of `n_vertices`; `None` if it has all.
     pub(super) used: Option<&'w [u32]>,
     pub(super) n_vertices: u64,
 }
 
-/// Moves positions, normals and tangents of a primitive.
+/// Displaces positions, normals and tangents of a primitive.
 ///
-/// Memory is charged for each target with a weight: targets may share numbers, and the time goes with their sum.
+/// Charges memory for each target with a weight: targets may share accessors, and time grows with their sum.
 pub(super) fn apply(
     document: &Document<'_>,
     targets: &[AccessorOf],
@@ -64,13 +64,13 @@ pub(super) fn apply(
         if n_applied == 0 {
             "morph targets without weight; left out"
         } else {
-            "morph targets; taken as the weights of mesh and node rest"
+            "morph targets; fixed at the weights of the mesh or node"
         },
     );
     Ok(())
 }
 
-/// The first three components; a tangent's fourth is its side.
+/// Displaces the first three components; a tangent's fourth is its handedness.
 fn displace<const N: usize>(values: &mut [[f32; N]], by: &[[f32; 3]], weight: f64) {
     for (value, by) in values.iter_mut().zip(by) {
         for (v, d) in value.iter_mut().zip(by) {

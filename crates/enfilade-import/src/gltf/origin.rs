@@ -1,4 +1,4 @@
-//! What a glTF document calls its things: names and extras of nodes, lights, cameras, markers.
+//! Names and extras of glTF documents: nodes, lights, cameras, markers.
 
 use enfilade_geom::DMat4;
 use enfilade_geom::scene::{Fixture, FixtureKind};
@@ -10,7 +10,7 @@ use crate::ImportError;
 use crate::builder::Builder;
 use crate::origins::rigid;
 
-/// Adds a node to the tree of names; its number there.
+/// Adds a node to the tree of names and returns its number there.
 pub(super) fn add_node(
     root: &Root,
     i: usize,
@@ -25,8 +25,8 @@ pub(super) fn add_node(
     builder.add_source(&place, parent, name, text(node.extras.as_deref()))
 }
 
-/// Adds the light, the camera and the marker that a node places: a node with a name or extras and
-/// nothing on or below it marks a place.
+/// Adds the light, the camera and the marker of a node. A marker is a node with a name or extras and nothing on or
+/// below it.
 pub(super) fn add_fixtures(
     root: &Root,
     i: usize,
@@ -55,10 +55,7 @@ pub(super) fn add_fixtures(
         let name = node.name.as_deref().unwrap_or("");
         let place = format!("node {i} '{name}'");
         let Some(gltf) = def.and_then(|d| in_meters(d, builder.unit())) else {
-            builder.note(
-                place,
-                "a light or camera that the file does not hold; left out",
-            );
+            builder.note(place, "a light or camera that is not in the file; left out");
             continue;
         };
         let fixture = Fixture {
@@ -73,10 +70,10 @@ pub(super) fn add_fixtures(
     Ok(())
 }
 
-/// Lengths of lights and cameras; all else is angles, intensities, colors and names.
+/// Lengths in lights and cameras; all else is angles, intensities, colors and names.
 const LENGTHS: [&str; 5] = ["range", "znear", "zfar", "xmag", "ymag"];
 
-/// A light or camera with its lengths in meters, nothing for null; `None` where it is something else.
+/// Returns a light or camera with its lengths in meters, empty for null; `None` for another value.
 fn in_meters(def: &Value, unit: f64) -> Option<String> {
     let mut def = match def {
         Value::Null => return Some(String::new()),
@@ -103,7 +100,7 @@ fn in_meters(def: &Value, unit: f64) -> Option<String> {
     Some(Value::Object(def).to_string())
 }
 
-/// By node, whether it is a bone.
+/// Returns `true` for each node that is a bone.
 pub(super) fn joints(root: &Root) -> Vec<bool> {
     let mut is_joint = vec![false; root.nodes.len()];
     for &joint in root.skins.iter().flat_map(|s| s.joints.iter()) {
@@ -118,7 +115,7 @@ pub(super) fn text(extras: Option<&RawValue>) -> &str {
     extras.map_or("", RawValue::get)
 }
 
-/// What the document says of itself as a whole.
+/// Adds the copyright and the extras of the document as a whole.
 pub(super) fn add_about(root: &Root, builder: &mut Builder<'_>) {
     let copyright = root.asset.copyright.as_deref().unwrap_or("");
     let scene = root.scenes.get(root.scene.unwrap_or(0));

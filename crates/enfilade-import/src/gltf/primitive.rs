@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 /// Most texture coordinate sets kept.
 const MAX_UV_SETS: usize = 8;
 
-/// Reads one primitive with its morph targets as `weights` have them, and the width of the grid that its positions were
-/// rounded to, 0 if they were not; `None` where it holds no triangles.
+/// Reads one primitive, with morph targets fixed at `weights`, and returns it with the width of the grid that its
+/// positions were rounded to (0 if not); `None` if it has no triangles.
 pub(super) fn read_primitive(
     document: &Document<'_>,
     def: &PrimitiveDef,
@@ -72,7 +72,7 @@ pub(super) fn read_primitive(
     Ok(Some((primitive, positions.step)))
 }
 
-/// How a list of indices makes triangles.
+/// Layout of triangles in a list of indices.
 #[derive(Clone, Copy, PartialEq)]
 enum Mode {
     List,
@@ -84,14 +84,14 @@ enum Mode {
 struct PrimitiveReader<'r, 'a, 'b> {
     document: &'r Document<'b>,
     def: &'r PrimitiveDef,
-    /// Where its geometry is compressed as a whole.
+    /// The decoded geometry, if it is compressed as a whole.
     draco: Option<&'r DracoMesh>,
     place: &'r str,
     builder: &'r mut Builder<'a>,
 }
 
 impl<'r> PrimitiveReader<'r, '_, '_> {
-    /// `None` where it holds no triangles.
+    /// Returns the layout; `None` if the primitive has no triangles.
     fn mode(&mut self) -> Result<Option<Mode>, ImportError> {
         match self.def.mode.unwrap_or(4) {
             4 => Ok(Some(Mode::List)),
@@ -118,7 +118,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
         Ok(Some(positions))
     }
 
-    /// Index triples, of a strip or fan as well; none that is out of range.
+    /// Returns index triples, from strips and fans, too; an index out of range is an error.
     fn triangles(&mut self, mode: Mode, n_vertices: u64) -> Result<Vec<u32>, ImportError> {
         let indices = self.indices(mode, n_vertices)?;
         if let Some(&bad) = indices.iter().find(|&&i| u64::from(i) >= n_vertices) {
@@ -143,7 +143,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
         Ok(indices)
     }
 
-    /// An attribute of the compressed mesh, or of an accessor.
+    /// Returns an attribute of the compressed mesh, or of an accessor.
     fn elements(&self, name: &str, index: u32, shapes: &[&str]) -> Result<Elements<'r>, String> {
         let Some(attribute) = self.draco.and_then(|d| d.attributes.get(name)) else {
             return self.document.elements(index, shapes);
@@ -188,10 +188,10 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
             .map_err(|problem| self.builder.malformed(self.place, problem))
     }
 
-    /// The vertices in use, increasing, by which `indices` then count; `None` where all are.
+    /// Returns the used vertices, increasing, and renumbers `indices` to match; `None` if all are used.
     ///
-    /// Exporters let many primitives share one long vertex list. Take the used ones only, or a
-    /// small file could ask for (primitives x vertices) of memory.
+    /// Exporters let many primitives share one long vertex list. Unless only the used vertices are kept, a small file
+    /// could require memory for (primitives x vertices).
     fn take_used(
         &mut self,
         indices: &mut [u32],
@@ -207,7 +207,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
             return Ok(None);
         }
         for i in indices {
-            // Found: `distinct` holds every index.
+            // Always found, as `distinct` holds every index.
             *i = distinct.binary_search(i).unwrap_or(0) as u32;
         }
         Ok(Some(distinct))
@@ -249,7 +249,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
         Ok(Some(elements))
     }
 
-    /// Normals, tangents, colors and texture coordinates of the vertices in use.
+    /// Reads normals, tangents, colors and texture coordinates of the used vertices.
     fn read_attributes(
         &mut self,
         primitive: &mut Primitive,
@@ -287,7 +287,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
         if n_repaired > 0 {
             self.builder.note(
                 self.place,
-                "normals, tangents, colors or texture coordinates that are no finite numbers; set to 0",
+                "normals, tangents, colors or texture coordinates that are not finite; set to 0",
             );
         }
         Ok(())
@@ -299,7 +299,7 @@ impl<'r> PrimitiveReader<'r, '_, '_> {
     }
 }
 
-/// Bytes that the attributes of a vertex take here.
+/// Returns the bytes per vertex that the attributes take here.
 fn bytes_a_vertex(attributes: &BTreeMap<String, u32>) -> u64 {
     let bytes = |name: &String| match name.as_str() {
         "POSITION" | "NORMAL" => 12,
@@ -310,9 +310,9 @@ fn bytes_a_vertex(attributes: &BTreeMap<String, u32>) -> u64 {
     attributes.keys().map(bytes).sum()
 }
 
-/// The indices in use, increasing.
+/// Returns the used indices, increasing.
 fn distinct(indices: &[u32], n_vertices: u64) -> Vec<u32> {
-    // Marking is several times faster, but its time goes with all vertices, used or not.
+    // Marking is several times faster, but its time grows with all vertices, used or not.
     if n_vertices <= 16 * indices.len() as u64 {
         let mut is_used = vec![false; n_vertices as usize];
         indices.iter().for_each(|&i| is_used[i as usize] = true);
@@ -326,7 +326,7 @@ fn distinct(indices: &[u32], n_vertices: u64) -> Vec<u32> {
     sorted
 }
 
-/// The values, each that is no finite number replaced by zero.
+/// Returns the values with zero for each that is not finite.
 fn cleaned<const N: usize>(values: Option<Vec<[f32; N]>>, n_repaired: &mut u64) -> Vec<[f32; N]> {
     let mut values = values.unwrap_or_default();
     for c in values.iter_mut().flatten() {
@@ -338,7 +338,7 @@ fn cleaned<const N: usize>(values: Option<Vec<[f32; N]>>, n_repaired: &mut u64) 
     values
 }
 
-/// Triangles of a strip; those with two equal indices only join its pieces.
+/// Returns the triangles of a strip; those with two equal indices only join its pieces.
 fn unroll_strip(strip: &[u32]) -> Vec<u32> {
     strip
         .windows(3)
@@ -363,7 +363,7 @@ fn unroll_fan(fan: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-/// Transforms of `EXT_mesh_gpu_instancing`.
+/// Returns the transforms of `EXT_mesh_gpu_instancing`.
 pub(super) fn read_instances(
     document: &Document<'_>,
     instancing: &Instancing,
@@ -388,7 +388,7 @@ pub(super) fn read_instances(
     let rotations = attribute("ROTATION", "VEC4")?;
     let scales = attribute("SCALE", "VEC3")?;
     let Some(n) = count else {
-        // Nothing placed by attributes that are known: one instance, where the node is.
+        // Without any known placing attribute: one instance, at the node.
         return Ok(vec![DMat4::IDENTITY]);
     };
     builder.check_objects(place, n)?;

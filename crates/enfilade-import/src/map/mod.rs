@@ -1,16 +1,15 @@
-//! Quake `.map` files, Standard and Valve 220, of Quake 3 (brush primitives, patches) and Doom 3: brushes become solids and their
-//! faces, entities are kept.
+//! Reads Quake `.map` files: Standard and Valve 220, Quake 3 (brush primitives, patches) and Doom 3. Brushes become
+//! solids and their faces; entities are kept.
 //!
-//! A brush is the space behind all of its planes, so no brush is ever not convex; what cannot be right
-//! (planes that face inwards or leave a way to infinity) ends in an error with line and column. World
-//! and `func_group` brushes are structural; `func_detail*` and all other brush entities are detail;
-//! so are brushes with the detail flag of Quake 2 and 3, and patches, which close nothing for their compilers either;
-//! sky is structural also where it is detail; liquids are detail that one sees through; triggers, clips and hints are no matter. A structural face
-//! that other structural brushes hide altogether is left out.
+//! A brush is the space behind all of its planes, so it is always convex; an impossible brush (planes that face
+//! inwards, or that leave a way to infinity) is an error with line and column. World and `func_group` brushes are
+//! structural. Detail are `func_detail*` and all other brush entities, brushes with the detail flag of Quake 2 and 3,
+//! and patches, which close nothing for their compilers either. Sky is structural even as detail; liquids are
+//! see-through detail; triggers, clips and hints are left out, and so are structural faces that other structural
+//! brushes hide altogether.
 //!
-//! A unit is 1/32 m if nothing else is said: a player of 56 units is 1.75 m tall, and coordinates stay
-//! exact. Up is z. Sizes of textures are in WAD files, which are not read, so no texture coordinates
-//! come out of a map.
+//! A unit is 1/32 m by default: a player of 56 units is 1.75 m tall, and coordinates stay exact. Up is z. Texture
+//! sizes are in WAD files, which are not read, so maps have no texture coordinates.
 
 mod order;
 mod parse;
@@ -29,14 +28,14 @@ use parse::Place;
 use parse::{Brush, MAX_COORDINATE, RawEntity};
 use patch::Tessellation;
 
-/// Meters in a unit of a map, if nothing else is said.
+/// Default length of a map's unit. [Units: m]
 const UNIT: f64 = 1.0 / 32.0;
-/// Corners nearer than this are one. [Units: those of the map]
+/// Vertices nearer than this are one. [Units: those of the map]
 const WELD: f64 = 1e-3;
-/// Most sides of a brush; clipping is quadratic in them. Editors make up to some dozens.
+/// Most sides of a brush; clipping takes quadratic time. Editors make a few dozen at most.
 const MAX_SIDES: usize = 256;
 
-/// Whether the text looks like a map: it begins, comments aside, with a brace and a quote.
+/// Returns `true` if the text looks like a map: it begins, comments aside, with a brace and a quote.
 pub(crate) fn is_map(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(1 << 16)];
     let mut lines = head
@@ -50,7 +49,7 @@ pub(crate) fn is_map(bytes: &[u8]) -> bool {
     }
 }
 
-/// What a brush entity is to the decomposition.
+/// Role of a brush entity in the decomposition.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Structural,
@@ -66,19 +65,19 @@ fn kind_of_class(class: &str) -> Kind {
     }
 }
 
-/// What a brush is by its sides' textures, whatever entity it is of.
+/// Matter of a brush by its sides' textures, in whatever entity.
 #[derive(Clone, Copy, PartialEq)]
 enum BrushMatter {
     Solid,
-    /// Closes the world wherever it is, as compilers have it: also as a detail brush.
+    /// Closes the world everywhere, even as a detail brush, as for the compilers.
     Sky,
     Liquid,
-    /// Steers games and compilers and is no matter.
+    /// Controls games and compilers; has no matter.
     Tool,
 }
 
 fn matter_of(brush: &Brush<'_>) -> BrushMatter {
-    // What ends in "clip" is one, too: Quake 3 has them for players, monsters, weapons.
+    // All names that end in "clip" count, too: Quake 3 has them for players, monsters, weapons.
     const TOOLS: [&str; 8] = [
         "hint",
         "hintskip",
@@ -112,7 +111,7 @@ fn matter_of(brush: &Brush<'_>) -> BrushMatter {
     }
 }
 
-/// What of an entity is one object.
+/// The parts of an entity that become one object each.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum EntityPart {
     Own,
@@ -123,7 +122,7 @@ enum EntityPart {
     Patch,
 }
 
-/// A brush that has a shape.
+/// A brush and its shape.
 struct Shaped<'t> {
     solid: ConvexSolid,
     textures: Vec<&'t str>,
@@ -136,7 +135,7 @@ struct Shaped<'t> {
 /// Reads one file into the builder.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     builder.set_format("Quake map");
-    // Maps are Latin-1 or UTF-8; only names and texts can hold either.
+    // Maps are Latin-1 or UTF-8; only names and texts depend on it.
     let text = String::from_utf8_lossy(bytes);
     let failed =
         |builder: &Builder<'_>, p: parse::Problem| builder.malformed(p.place.to_string(), p.text);
@@ -155,7 +154,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         ));
     }
     let n_brushes: usize = entities.iter().map(|e| e.brushes.len()).sum();
-    // A box brush has 6 faces of 4 corners and 2 triangles; what has more is charged when it is placed.
+    // A box brush has 6 faces of 4 vertices and 2 triangles; larger ones are charged when placed.
     builder.charge_memory("brushes", n_brushes as u64, 1024)?;
     let mut shaped: Vec<Shaped<'_>> = Vec::new();
     for (i, entity) in entities.iter().enumerate() {
@@ -173,7 +172,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
             if solid.planes.len() < brush.sides.len() {
                 builder.note(
                     brush.place.to_string(),
-                    "sides that bound nothing of their brush; left out",
+                    "sides that do not bound their brush; left out",
                 );
             }
             let textures = solid
@@ -193,7 +192,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     build(&entities, &shaped, builder)
 }
 
-/// The brush as a solid.
+/// Returns the brush as a solid.
 fn solid_of(brush: &Brush<'_>) -> Result<ConvexSolid, parse::Problem> {
     let problem = |place: Place, text: String| parse::Problem { place, text };
     if brush.sides.len() < 4 || brush.sides.len() > MAX_SIDES {
@@ -201,7 +200,7 @@ fn solid_of(brush: &Brush<'_>) -> Result<ConvexSolid, parse::Problem> {
         return Err(problem(
             brush.place,
             format!(
-                "a brush with {n} sides; it takes 4 to enclose anything, and at most {MAX_SIDES} are read"
+                "a brush with {n} sides; at least 4 are needed, and at most {MAX_SIDES} allowed"
             ),
         ));
     }
@@ -212,7 +211,7 @@ fn solid_of(brush: &Brush<'_>) -> Result<ConvexSolid, parse::Problem> {
         let Some(normal) = normal.filter(|_| (a - b).cross(c - b).length() > 1e-6) else {
             return Err(problem(
                 side.place,
-                "the three points of this side lie on a line and make no plane; move one of them"
+                "the three points of this side lie on a line and do not define a plane; move one of them"
                     .into(),
             ));
         };
@@ -241,7 +240,7 @@ fn solid_of(brush: &Brush<'_>) -> Result<ConvexSolid, parse::Problem> {
     })
 }
 
-/// Axis-aligned normals without the dust of normalizing.
+/// Returns the normal, exact if it is axis-aligned up to rounding.
 fn exact(normal: DVec3) -> DVec3 {
     let axis = [DVec3::X, DVec3::Y, DVec3::Z]
         .into_iter()
@@ -249,7 +248,7 @@ fn exact(normal: DVec3) -> DVec3 {
     axis.map_or(normal, |a| a * normal.dot(a).signum())
 }
 
-/// Corners that are whole numbers but for the dust of solving are whole numbers.
+/// Rounds vertices that are whole numbers up to numerical error.
 fn snapped(mut solid: ConvexSolid) -> ConvexSolid {
     for c in solid.faces.iter_mut().flat_map(|f| &mut f.points) {
         let whole = c.round();
@@ -258,7 +257,7 @@ fn snapped(mut solid: ConvexSolid) -> ConvexSolid {
     solid
 }
 
-/// By entity and part, and then by texture: what becomes one object each, so that each keeps its identity.
+/// Faces by entity and part, then by texture. Each entity and part becomes one object, to keep its identity.
 type Faces<'t> = BTreeMap<(usize, EntityPart), BTreeMap<&'t str, Primitive>>;
 
 fn build(
@@ -313,7 +312,7 @@ fn class_of<'t>(entity: &RawEntity<'t>) -> &'t str {
     entity.get("classname").unwrap_or("brushes")
 }
 
-/// By entity: its role, and why.
+/// Returns the role of each entity, with the reason.
 fn roles_of(entities: &[RawEntity<'_>], builder: &Builder<'_>) -> Vec<(Role, String)> {
     let role = |(e, entity): (usize, &RawEntity<'_>)| {
         let class = class_of(entity);
@@ -328,16 +327,16 @@ fn roles_of(entities: &[RawEntity<'_>], builder: &Builder<'_>) -> Vec<(Role, Str
     entities.iter().enumerate().map(role).collect()
 }
 
-/// All brushes of a map that have a shape.
+/// All brushes of a map, with their shapes.
 struct Brushwork<'s, 't> {
     entities: &'s [RawEntity<'t>],
     shaped: &'s [Shaped<'t>],
-    /// By entity.
+    /// Role of each entity, with the reason.
     roles: Vec<(Role, String)>,
 }
 
 impl<'s, 't> Brushwork<'s, 't> {
-    /// Whether a brush is sky that closes the world, though it is detail.
+    /// Returns `true` if a brush is sky, which closes the world though it is detail.
     fn seals(&self, s: &Shaped<'_>) -> bool {
         let class = class_of(&self.entities[s.entity]);
         s.matter == BrushMatter::Sky && (class.starts_with("func_detail") || s.is_detail)
@@ -353,7 +352,7 @@ impl<'s, 't> Brushwork<'s, 't> {
         structural.map(|s| &s.solid).collect()
     }
 
-    /// The faces of all brushes, without those that other structural brushes hide altogether.
+    /// Returns the faces of all brushes, without those that other structural brushes hide altogether.
     fn visible_faces(
         &self,
         structural: &[&ConvexSolid],
@@ -396,7 +395,7 @@ impl<'s, 't> Brushwork<'s, 't> {
                 let place = patch.place.to_string();
                 let n = shape.n_vertices() as u64;
                 builder.charge_vertices(&place, n)?;
-                // A vertex with its normal, and the two triangles that it begins.
+                // A vertex with its normal, and the two triangles that begin at it.
                 builder.charge_memory(&place, n, 48)?;
                 let parts = faces.entry((e, EntityPart::Patch)).or_default();
                 shape.append(parts.entry(patch.texture).or_default());
@@ -456,20 +455,20 @@ impl<'s, 't> Brushwork<'s, 't> {
     }
 }
 
-/// What a material shows besides its texture's name.
+/// Properties of a material besides its texture's name.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Look {
     is_liquid: bool,
     is_double_sided: bool,
 }
 
-/// A plain material of a texture's name, in a color of its own.
+/// Returns a plain material with a texture's name, in a color of its own.
 fn material(texture: &str, look: Look) -> Material {
     let Look {
         is_liquid,
         is_double_sided,
     } = look;
-    // FNV-1a, for a color that is the same every time.
+    // FNV-1a, for a stable color.
     let hash = texture.bytes().fold(0x811c_9dc5_u32, |h, b| {
         (h ^ u32::from(b.to_ascii_lowercase())).wrapping_mul(0x0100_0193)
     });

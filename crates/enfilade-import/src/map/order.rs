@@ -1,5 +1,5 @@
-//! One order for the entities of a map, their brushes and sides, whatever order the file lists them in: brushes share corners and
-//! hide each other's faces by turns, and entities are numbered.
+//! A canonical order of the entities of a map, their brushes and sides, whatever their order in the file. Order
+//! matters because brushes share vertices, hide each other's faces in turn, and entities are numbered.
 
 use std::cmp::Ordering;
 
@@ -7,7 +7,7 @@ use crate::order::all;
 
 use super::parse::{Brush, Patch, RawEntity, Side};
 
-/// The world first, all others by what they say, then by what they are made of.
+/// Sorts the world first, other entities by their properties, then by their brushes and patches.
 pub(super) fn sort(entities: &mut [RawEntity<'_>]) {
     for entity in entities.iter_mut() {
         for brush in &mut entity.brushes {

@@ -4,10 +4,10 @@ use std::fmt;
 
 use enfilade_geom::DVec3;
 
-/// Numbers beyond this are taken for damage.
+/// Larger numbers are rejected as damage.
 pub(super) const MAX_COORDINATE: f64 = 1e6;
 
-/// A place in the text, both from 1.
+/// A place in the text; line and column count from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) line: u32,
@@ -31,12 +31,12 @@ pub(super) struct Problem {
 pub(super) struct Side<'t> {
     pub(super) points: [[f64; 3]; 3],
     pub(super) texture: &'t str,
-    /// Whether Quake 2 or 3 was told that it divides no space.
+    /// Marked as detail by Quake 2 or 3: it does not divide space.
     pub(super) is_detail: bool,
     pub(super) place: Place,
 }
 
-/// A convex solid, as the planes around it.
+/// A convex solid, given by the planes around it.
 pub(super) struct Brush<'t> {
     pub(super) sides: Vec<Side<'t>>,
     pub(super) place: Place,
@@ -47,14 +47,14 @@ pub(super) struct Patch<'t> {
     pub(super) texture: &'t str,
     /// Rows and columns, both odd and at least 3.
     pub(super) size: [usize; 2],
-    /// Row by row.
+    /// Control points, row by row.
     pub(super) controls: Vec<[f64; 3]>,
-    /// Segments a Bezier curve along columns and rows, where the file says how many.
+    /// Segments per Bezier curve along columns and rows, if the file gives them.
     pub(super) n_segments: Option<[usize; 2]>,
     pub(super) place: Place,
 }
 
-/// A thing of the map.
+/// An entity of the map.
 pub(super) struct RawEntity<'t> {
     pub(super) properties: Vec<(&'t str, &'t str)>,
     pub(super) brushes: Vec<Brush<'t>>,
@@ -63,7 +63,7 @@ pub(super) struct RawEntity<'t> {
 }
 
 impl<'t> RawEntity<'t> {
-    /// The last value of a property; what repeats overrides.
+    /// Returns the last value of a property; later ones override earlier ones.
     pub(super) fn get(&self, key: &str) -> Option<&'t str> {
         let found = self.properties.iter().rev().find(|p| p.0 == key);
         found.map(|p| p.1)
@@ -87,7 +87,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<RawEntity<'_>>, Problem> {
         if word != "{" {
             return Err(problem(
                 place,
-                format!("'{}' where an entity's '{{' is due", shown(word)),
+                format!("expected an entity's '{{', found '{}'", shown(word)),
             ));
         }
         entities.push(entity(&mut words, place)?);
@@ -137,7 +137,10 @@ fn entity<'t>(words: &mut Words<'t>, place: Place) -> Result<RawEntity<'t>, Prob
             _ => {
                 return Err(problem(
                     at,
-                    format!("'{}' where a property, a brush or '}}' is due", shown(word)),
+                    format!(
+                        "expected a property, a brush or '}}', found '{}'",
+                        shown(word)
+                    ),
                 ));
             }
         }
@@ -160,14 +163,14 @@ fn brush<'t>(words: &mut Words<'t>, place: Place) -> Result<Brush<'t>, Problem> 
                 return Err(problem(
                     at,
                     format!(
-                        "'{word}' is of another game; save the map in the format of Quake (Standard, Valve 220) or Quake 3"
+                        "'{word}' belongs to another game; save the map in the format of Quake (Standard, Valve 220) or Quake 3"
                     ),
                 ));
             }
             _ => {
                 return Err(problem(
                     at,
-                    format!("'{}' where a side's '(' or '}}' is due", shown(word)),
+                    format!("expected a side's '(' or '}}', found '{}'", shown(word)),
                 ));
             }
         }
@@ -184,7 +187,7 @@ fn side<'t>(words: &mut Words<'t>, place: Place) -> Result<Side<'t>, Problem> {
             *c = words.number("a coordinate")?;
         }
         if i == 0 && words.peek()? != Some(")") {
-            // Doom 3: the normal of the plane, outwards, and what is added to its product with a point.
+            // Doom 3: the plane's outward normal, and the offset added to its product with a point.
             let offset = words.number("a plane's offset")?;
             let normal = *point;
             points = points_of_plane(normal, offset).ok_or_else(|| {
@@ -212,8 +215,8 @@ fn side<'t>(words: &mut Words<'t>, place: Place) -> Result<Side<'t>, Problem> {
         words.expect(")", "a texture matrix'")?;
     }
     let texture = words.raw("a texture's name")?;
-    // Standard: two shifts, an angle, two scales. Valve 220: two axes in brackets, then the last three.
-    // Numbers that Quake 2 adds to either follow on the same line and say nothing of the shape.
+    // Standard: two shifts, an angle, two scales. Valve 220: two axes in brackets, then the last three. Quake 2's
+    // additional numbers follow on the same line and do not affect the shape.
     if has_matrix {
     } else if words.peek()? == Some("[") {
         for _ in 0..2 {
@@ -244,10 +247,10 @@ fn side<'t>(words: &mut Words<'t>, place: Place) -> Result<Side<'t>, Problem> {
     })
 }
 
-/// The flag of Quake 2 and 3 for what is seen but divides no space.
+/// Flag of Quake 2 and 3 for brushes that are visible but do not divide space.
 const CONTENTS_DETAIL: i64 = 0x0800_0000;
 
-/// Three points of a plane, in the order in which they make its normal.
+/// Returns three points of a plane, in the order that gives its normal.
 fn points_of_plane(normal: [f64; 3], offset: f64) -> Option<[[f64; 3]; 3]> {
     let normal = DVec3::from_array(normal);
     let length = normal.length();
@@ -262,11 +265,11 @@ fn points_of_plane(normal: [f64; 3], offset: f64) -> Option<[[f64; 3]; 3]> {
         (v, u)
     };
     let origin = normal * -offset;
-    // Far apart, as the points of an editor are.
+    // Far apart, as an editor's points are.
     Some([origin + u * 64.0, origin, origin + v * 64.0].map(|p| p.to_array()))
 }
 
-/// A patch, from the word behind its first brace to its last one.
+/// Reads a patch, from the word behind its first brace to its last one.
 fn patch<'t>(words: &mut Words<'t>, place: Place) -> Result<Patch<'t>, Problem> {
     let is_def3 = words.next()?.is_some_and(|(_, word)| word == "patchDef3");
     words.expect("{", "a patch's")?;
@@ -307,7 +310,7 @@ fn patch<'t>(words: &mut Words<'t>, place: Place) -> Result<Patch<'t>, Problem> 
                 *c = words.number("a coordinate")?;
             }
             controls.push(point);
-            // Where its texture is.
+            // Its texture coordinates.
             for _ in 0..2 {
                 words.number("a texture coordinate")?;
             }
@@ -334,12 +337,12 @@ fn problem(place: Place, text: String) -> Problem {
     Problem { place, text }
 }
 
-/// Some of a word, however long it is.
+/// Returns the beginning of a word, short enough for a message.
 fn shown(word: &str) -> String {
     word.trim_start_matches('"').chars().take(24).collect()
 }
 
-/// Words, brackets and quoted texts (with their first quote) of a text.
+/// Splits a text into words, brackets and quoted texts (with their opening quote).
 struct Words<'t> {
     text: &'t str,
     at: usize,
@@ -405,7 +408,7 @@ impl<'t> Words<'t> {
         Ok(Some((place, &rest[..end])))
     }
 
-    /// A word up to the next blank, whatever it is made of: names of textures may begin with a brace.
+    /// Reads up to the next blank, whatever the characters: names of textures may begin with a brace.
     fn raw(&mut self, what: &str) -> Result<&'t str, Problem> {
         self.skip();
         let rest = &self.text[self.at..];
@@ -421,7 +424,7 @@ impl<'t> Words<'t> {
         if end == 0 {
             return Err(problem(
                 self.place(),
-                format!("the file ends where {what} is due"),
+                format!("the file ends before {what}"),
             ));
         }
         self.at += end;
@@ -443,11 +446,11 @@ impl<'t> Words<'t> {
             Some((_, word)) if word == bracket => Ok(()),
             Some((place, word)) => Err(problem(
                 place,
-                format!("'{}' where {what} '{bracket}' is due", shown(word)),
+                format!("expected {what} '{bracket}', found '{}'", shown(word)),
             )),
             None => Err(problem(
                 end,
-                format!("the file ends where {what} '{bracket}' is due"),
+                format!("the file ends before {what} '{bracket}'"),
             )),
         }
     }
@@ -456,17 +459,14 @@ impl<'t> Words<'t> {
         self.skip();
         let end = self.place();
         let Some((place, word)) = self.next()? else {
-            return Err(problem(end, format!("the file ends where {what} is due")));
+            return Err(problem(end, format!("the file ends before {what}")));
         };
         match word.parse::<f64>() {
             Ok(v) if v.is_finite() && v.abs() <= MAX_COORDINATE => Ok(v),
-            Ok(v) => Err(problem(
-                place,
-                format!("{v} is no {} of a map", what.trim_start_matches("a ")),
-            )),
+            Ok(v) => Err(problem(place, format!("{v} is out of range for {what}"))),
             Err(_) => Err(problem(
                 place,
-                format!("'{}' where {what} is due", shown(word)),
+                format!("expected {what}, found '{}'", shown(word)),
             )),
         }
     }

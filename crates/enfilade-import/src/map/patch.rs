@@ -1,21 +1,22 @@
 //! Curved surfaces of Quake 3 and Doom 3 as triangles.
 //!
-//! A patch is a grid of control points; each three by three of them, sharing rims, make a biquadratic Bezier surface.
+//! A patch is a grid of control points; each three by three of them, with shared rims, make a biquadratic Bezier
+//! surface.
 
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::Primitive;
 
 use super::parse::Patch;
 
-/// Farthest that a triangle may be off the curve: 3 cm. [Units: those of the map]
+/// Largest distance of a triangle from the curve: 3 cm. [Units: those of the map]
 const TOLERANCE: f64 = 1.0;
-/// Most segments of a curve over three points.
+/// Most segments per curve over three points.
 const MAX_SEGMENTS: usize = 32;
 
-/// A patch that is cut into rectangles.
+/// A patch divided into rectangles.
 pub(super) struct Tessellation<'p> {
     patch: &'p Patch<'p>,
-    /// Segments of a curve over three points, along columns and along rows.
+    /// Segments per curve over three points, along columns and along rows.
     n_segments: [usize; 2],
 }
 
@@ -28,7 +29,7 @@ impl<'p> Tessellation<'p> {
         Self { patch, n_segments }
     }
 
-    /// Vertices along columns and along rows.
+    /// Returns the number of vertices along columns and along rows.
     fn size(&self) -> [usize; 2] {
         [0, 1].map(|axis| self.patch.size[axis] / 2 * self.n_segments[axis] + 1)
     }
@@ -52,7 +53,7 @@ impl<'p> Tessellation<'p> {
                 for t in [[a, b, d], [a, d, c]] {
                     let [p, q, r] = t.map(|v| vertices[v]);
                     let normal = (q - p).cross(r - p);
-                    // Rows that meet in a point make triangles without area.
+                    // Rows that meet in a point give triangles without area.
                     if normal.length() > 1e-6 {
                         t.iter().for_each(|&v| normals[v] += normal);
                         to.indices.extend(t.map(|v| first + v as u32));
@@ -68,7 +69,7 @@ impl<'p> Tessellation<'p> {
         to.normals.extend(normals);
     }
 
-    /// A vertex, by its row and column.
+    /// Returns a vertex by its row and column.
     fn point(&self, at: [usize; 2]) -> DVec3 {
         let mut first = [0; 2];
         let mut weights = [[0.0; 3]; 2];
@@ -94,8 +95,8 @@ fn control(patch: &Patch<'_>, [row, column]: [usize; 2]) -> DVec3 {
     DVec3::from_array(patch.controls[row * patch.size[1] + column])
 }
 
-/// As many segments as keep all curves along an axis within [`TOLERANCE`]: a quadratic one over points `p q r`, cut into `n`,
-/// is at most `|p - 2q + r| / 4n²` off.
+/// Returns the least number of segments that keeps all curves along an axis within [`TOLERANCE`]: a quadratic curve
+/// over points `p q r`, cut into `n`, is at most `|p - 2q + r| / 4n²` off.
 fn n_segments(patch: &Patch<'_>, axis: usize) -> usize {
     let mut most: f64 = 0.0;
     for along in (0..patch.size[axis] - 2).step_by(2) {

@@ -1,13 +1,13 @@
-//! Removing triangles: those without area, and those that are there twice.
+//! Removes triangles without area and duplicates.
 
 use std::collections::{HashMap, HashSet};
 
 use super::surface::{Face, Surface};
 use super::weld::ONE_POINT;
 
-/// Removes triangles of which two corners are one point; how many. Linear.
+/// Removes triangles of which two vertices are one point, and returns their number. Linear.
 ///
-/// Their edges go in pairs, so that nothing opens.
+/// Their edges pair up, so that nothing opens.
 pub(super) fn drop_collapsed(surface: &mut Surface) -> u64 {
     let is_gone: Vec<bool> = (0..surface.faces.len())
         .map(|f| {
@@ -18,10 +18,10 @@ pub(super) fn drop_collapsed(surface: &mut Surface) -> u64 {
     surface.remove(&is_gone)
 }
 
-/// Removes triangles lower than [`ONE_POINT`] whose corners are three points; how many.
+/// Removes triangles lower than [`ONE_POINT`] with three distinct points, and returns their number.
 ///
-/// The corner opposite of the longest edge lies on that edge: whatever else uses the edge is cut there, so that
-/// nothing opens (the cap of Botsch & Kobbelt 2001, taken away by a cut). `n log n`.
+/// The vertex opposite the longest edge lies on that edge. Other triangles at the edge are cut there, so that nothing
+/// opens (the cap of Botsch & Kobbelt 2001, removed by a cut). `n log n`.
 pub(super) fn drop_caps(surface: &mut Surface) -> u64 {
     let mut is_gone = vec![false; surface.faces.len()];
     let mut cuts: HashMap<[u32; 2], u32> = HashMap::new();
@@ -32,7 +32,7 @@ pub(super) fn drop_caps(surface: &mut Surface) -> u64 {
         }
         let ends = surface.ends(face);
         let (a, b) = (ends[(apex + 1) % 3], ends[(apex + 2) % 3]);
-        // One cap an edge at a time; the next pass takes the others.
+        // One cap per edge; the next pass takes the others.
         let cut = cuts.entry([a.min(b), a.max(b)]).or_insert(ends[apex]);
         *gone = *cut == ends[apex];
     }
@@ -59,7 +59,7 @@ pub(super) fn drop_caps(surface: &mut Surface) -> u64 {
     n as u64
 }
 
-/// The two parts of a face whose edge from corner `k` is cut at a point on it.
+/// Returns the two parts of a face whose edge from vertex `k` is cut at a point on it.
 pub(super) fn cut_face(surface: &mut Surface, face: Face, k: usize, point: u32) -> [Face; 2] {
     let [a, b, c] = [0, 1, 2].map(|i| face.corners[(k + i) % 3]);
     let part = &surface.parts[face.part as usize];
@@ -71,7 +71,7 @@ pub(super) fn cut_face(surface: &mut Surface, face: Face, k: usize, point: u32) 
     [[a, middle, c], [middle, b, c]].map(|corners| Face { part, corners })
 }
 
-/// Corners in ascending order, and whether the face walks them so.
+/// Returns the vertices in ascending order, and `true` if the face traverses them so.
 fn key([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
     let mut sorted = [a, b, c];
     sorted.sort_unstable();
@@ -80,11 +80,11 @@ fn key([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
     (sorted, is_forward)
 }
 
-/// Removes triangles that are there twice; how many. `n log n`.
+/// Removes duplicate triangles and returns their number. `n log n`.
 ///
-/// Which are: the same corners in the same turn in the same object; all triangles of an object that has the
-/// same ones as an earlier object; and of two with the same corners turned against each other the one that disagrees with
-/// its neighbors, if each of their edges has just one neighbor. So sheets with a triangle for either side keep both, and solids
+/// Duplicates are: triangles of one object with the same vertices and winding; all triangles of an object that equals
+/// an earlier one; and, of two with the same vertices and opposite windings, the one that disagrees with its
+/// neighbors, if each edge has just one neighbor. So sheets with a triangle for either side keep both, and solids
 /// that touch keep their sides.
 pub(super) fn drop_duplicates(surface: &mut Surface) -> u64 {
     let n = surface.faces.len();
@@ -113,7 +113,7 @@ pub(super) fn drop_duplicates(surface: &mut Surface) -> u64 {
     surface.remove(&is_gone)
 }
 
-/// Marks the worse of two triangles that lie against each other in an otherwise plain surface.
+/// Marks the worse of two triangles with opposite windings in an otherwise plain surface.
 fn drop_against(surface: &Surface, keys: &[(u32, [u32; 3], bool, u32)], is_gone: &mut [bool]) {
     let twins: Vec<[usize; 2]> = keys
         .windows(2)
@@ -128,7 +128,7 @@ fn drop_against(surface: &Surface, keys: &[(u32, [u32; 3], bool, u32)], is_gone:
     for [first, second] in twins {
         let object = surface.object(first);
         let ends = surface.ends(first);
-        // In favor of the first one: neighbors that walk their edge the other way.
+        // Votes for the first one: neighbors that traverse their edge the other way.
         let mut votes = 0_i32;
         let is_plain = (0..3).all(|k| {
             let (a, b) = (ends[k], ends[(k + 1) % 3]);

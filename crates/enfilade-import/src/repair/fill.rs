@@ -1,8 +1,9 @@
-//! Holes: closed loops of open edges get triangles.
+//! Fills holes: closed loops of open edges get triangles.
 //!
-//! The triangulation of least area of a loop in space, by dynamic programming (Barequet & Sharir 1995, §4;
-//! the first step of Liepa 2003). Triangles without area and edges that the surface has already are left out, so that
-//! what is filled is a 2-manifold; and a loop is the outer rim of a sheet, no hole, where its triangles would lie folded on it.
+//! Finds the triangulation of least area of a loop in space by dynamic programming (Barequet & Sharir 1995, §4; the
+//! first step of Liepa 2003). Excludes triangles without area and edges that the surface already has, so that the
+//! result is a 2-manifold. A loop whose triangles would lie folded on the surface is the outer rim of a sheet, not a
+//! hole.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,48 +12,48 @@ use enfilade_geom::{Aabb, DVec3, Sets, triangle_area_normal};
 use super::surface::{Face, Surface, Use, open_of, unit};
 use super::weld::ONE_POINT;
 
-/// Longest loop filled; the time grows with the cube of it.
+/// Longest loop filled; the time grows with its cube.
 const MAX_CORNERS: usize = 128;
 
-/// Triangles at an edge are folded on each other below 45 degrees: cosine of that.
+/// Cosine of 45 degrees, the angle below which triangles at an edge count as folded on each other.
 const FOLDED: f64 = 0.7;
 
-/// What was filled.
+/// Result of filling.
 #[derive(Default)]
 pub(super) struct Filled {
     pub(super) n_holes: u64,
     pub(super) n_triangles: u64,
-    /// Loops that stay open.
+    /// Number of loops that stay open.
     pub(super) n_left: u64,
-    /// What was filled, one by one.
+    /// The filled holes, one by one.
     pub(super) holes: Vec<Hole>,
-    /// There were steps left for all loops.
+    /// The steps sufficed for all loops.
     pub(super) is_complete: bool,
 }
 
-/// A loop of open edges that a surface could be continued across.
+/// A loop of open edges across which the surface could be continued.
 pub(crate) struct Hole {
-    /// The middle of its corners. [Units: wu]
+    /// The mean of its vertices. [Units: wu]
     pub(crate) position: DVec3,
-    /// Of the triangles that fill it. [Units: wu²]
+    /// Area of the triangles that fill it. [Units: wu²]
     pub(crate) area: f64,
-    /// The object of an edge of it.
+    /// The object of one of its edges.
     pub(crate) object: u32,
-    /// Across one edge at least the surface goes straight on, within 45 degrees: a part of a face is missing, not a whole face of
-    /// a box that was meant to be open.
+    /// The surface continues straight, within 45 degrees, across at least one edge: a part of a face is missing, not
+    /// a whole face of a box that was meant to be open.
     pub(crate) is_torn: bool,
 }
 
-/// One loop of open edges: corners, and the use of the edge from each to the next.
+/// A loop of open edges: vertices, and the use of the edge from each to the next.
 struct Loop {
     points: Vec<u32>,
     edges: Vec<Use>,
 }
 
-/// Fills each loop of open edges whose box has a diagonal of `size` at most [Units: wu], while there are `steps` left: a
-/// loop of n corners takes n³.
+/// Fills each loop of open edges whose box has a diagonal of at most `size` [Units: wu], as long as `steps` are left:
+/// a loop of n vertices takes n³.
 ///
-/// Time: `n log n` for all triangles, and the cube of a loop's corners, of which it may have 128.
+/// Time: `n log n` for all triangles, plus the cube of each loop's vertices, at most 128.
 pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Filled {
     let uses = surface.uses();
     let loops = loops(&uses, &open_of(&uses));
@@ -131,12 +132,12 @@ fn sorted(mut corners: [u32; 3]) -> [u32; 3] {
     corners
 }
 
-/// Whether a triangle at the other side walks this edge from its lesser end to its greater.
+/// Returns `true` if the triangle at an edge traverses it from its lesser end to its greater.
 fn is_forward(edge: &Use) -> bool {
     edge.is_reverse
 }
 
-/// Which fan of triangles around a point a triangle is in, where several meet in the point alone.
+/// The fan of each triangle around a point, where several fans meet in the point alone.
 struct Fans {
     /// Numbers of the pairs of point and face.
     numbers: HashMap<(u32, u32), u32>,
@@ -144,7 +145,7 @@ struct Fans {
 }
 
 impl Fans {
-    /// Fans around points that more than two open edges meet in.
+    /// Finds the fans around points with more than two open edges.
     fn new(uses: &[Use], at: &HashMap<u32, Vec<usize>>) -> Self {
         let mut numbers = HashMap::new();
         let is_shared = |p: &u32| at.get(p).is_some_and(|edges| edges.len() > 2);
@@ -171,11 +172,11 @@ impl Fans {
     }
 }
 
-/// Parts open edges into simple loops: a walk along unused edges gives one up whenever it meets itself.
+/// Divides open edges into simple loops: a walk along unused edges completes one whenever it meets itself.
 ///
-/// An even number of open edges meets in each point, so that every walk ends where it began. Where there is a
-/// choice, the next edge is one that its triangle walks as the last one, and across the gap from there: not the other
-/// rim of the same fan of triangles. Linear.
+/// An even number of open edges meets in each point, so that every walk ends where it began. If there is a choice,
+/// the next edge is one that its triangle traverses in the same direction, and across the gap: not the other rim of
+/// the same fan of triangles. Linear.
 fn loops(uses: &[Use], open: &[Use]) -> Vec<Loop> {
     let mut at: HashMap<u32, Vec<usize>> = HashMap::new();
     for (i, edge) in open.iter().enumerate() {
@@ -227,7 +228,7 @@ fn loops(uses: &[Use], open: &[Use]) -> Vec<Loop> {
     out
 }
 
-/// Turns a loop so that its triangles walk most of its length against those around it.
+/// Turns a loop so that its triangles agree in winding with most of their neighbors, by length.
 fn turn_against_faces(surface: &Surface, rim: &mut Loop) {
     let against: f64 = (rim.points.iter().zip(&rim.edges))
         .map(|(&p, e)| {
@@ -238,14 +239,14 @@ fn turn_against_faces(surface: &Surface, rim: &mut Loop) {
         .sum();
     if against < 0.0 {
         rim.points.reverse();
-        // Edge `i` leads from corner `i` to the next one, before and after.
+        // Edge `i` leads from vertex `i` to the next one, before and after.
         rim.edges.reverse();
         rim.edges.rotate_left(1);
     }
 }
 
-/// Triangles of least area over a loop, as triples of its corners' places; `None` if there are none without
-/// a triangle lower than [`ONE_POINT`] or an inner edge that is there already. Time: the cube of the corners.
+/// Returns the triangulation of least area of a loop, as triples of positions in it. `None` if each has a triangle
+/// lower than [`ONE_POINT`] or an inner edge that already exists. Time: the cube of the vertices.
 fn triangulated(
     surface: &Surface,
     points: &[u32],
@@ -269,7 +270,7 @@ fn triangulated(
         let is_rim = j - i == 1 || j - i == n - 1;
         is_rim || !edges.contains(&[a.min(b), a.max(b)])
     };
-    // Of the part of the loop from corner `i` to `j`: the least area, and the corner that makes a triangle with both.
+    // For the part of the loop from vertex `i` to `j`: the least area, and the apex of the triangle on both.
     let mut least = vec![0.0; n * n];
     let mut middle = vec![0; n * n];
     for length in 2..n {
@@ -306,7 +307,7 @@ fn triangulated(
     Some(out)
 }
 
-/// Whether most of the loop's length has its new triangle folded on the old one.
+/// Returns `true` if the new triangles lie folded on the old ones along most of the loop.
 fn is_folded(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> bool {
     let bends = bends(surface, rim, triangles);
     let all: f64 = bends.iter().map(|b| b.length).sum();
@@ -314,10 +315,10 @@ fn is_folded(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> bool {
     2.0 * folded.map(|b| b.length).sum::<f64>() > all
 }
 
-/// How the surface would go on across an edge of a loop.
+/// Continuation of the surface across an edge of a loop.
 struct Bend {
     length: f64,
-    /// 1 where the new triangle would lie folded on the old one, -1 where it goes straight on.
+    /// 1 where the new triangle would lie folded on the old one, -1 where it continues straight.
     cos: f64,
 }
 
@@ -351,8 +352,8 @@ fn bends(surface: &Surface, rim: &Loop, triangles: &[[usize; 3]]) -> Vec<Bend> {
     bends
 }
 
-/// Adds the triangles to the part that has most of the rim; corners take what its vertices have there, or nearest along
-/// the rim, and normals of their own.
+/// Adds the triangles to the part with most of the rim. Vertices take the attributes that the part has there or
+/// nearest along the rim, and normals of their own.
 fn add(surface: &mut Surface, rim: &Loop, triangles: &[[usize; 3]]) {
     let mut lengths: Vec<(u32, f64)> = Vec::new();
     for edge in &rim.edges {
@@ -385,7 +386,7 @@ fn add(surface: &mut Surface, rim: &Loop, triangles: &[[usize; 3]]) {
         let corners = t.map(|i| surface.points[rim.points[i] as usize]);
         let normal = triangle_area_normal(&corners).normalize_or_zero();
         let corners = t.map(|i| {
-            // Some edge of the rim is the part's, so that there is a vertex.
+            // Some edge of the rim belongs to the part, so there is a vertex.
             let from = nearest(i).unwrap_or_default();
             let v = surface.mix(part, [from, from], 0.0, rim.points[i]);
             let attributes = &mut surface.parts[part as usize].vertices;
@@ -413,7 +414,7 @@ mod tests {
     use enfilade_geom::DMat4;
     use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
 
-    /// A tetrahedron without its base: one loop of three corners.
+    /// A tetrahedron without its base: one loop of three vertices.
     fn open_tetrahedron() -> Surface {
         let primitive = Primitive {
             positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.3, 1.0, 0.3]],

@@ -1,12 +1,12 @@
-//! Repairs: what the cleaning report counts, put right on request.
+//! Repairs defects that the cleaning report counts, on request.
 //!
-//! The structural triangles are taken as one surface over shared points (`surface.rs`), and go through these steps
-//! again and again until none finds anything to do: corners that nearly meet are welded (`weld.rs`), triangles without area or
-//! there twice go (`drop.rs`), T-junctions are cut (`split.rs`), shells are turned (`orient.rs`), holes are
-//! filled (`fill.rs`). So a second repair changes nothing.
+//! The structural triangles are one surface over shared points (`surface.rs`). These steps are repeated until none
+//! changes anything: weld vertices that nearly meet (`weld.rs`), drop triangles without area and duplicates
+//! (`drop.rs`), cut T-junctions (`split.rs`), turn shells (`orient.rs`), fill holes (`fill.rs`). So a second repair
+//! changes nothing.
 //!
-//! The order is that of Guéziec, Taubin, Lazarus & Horn, "Cutting and Stitching: Converting Sets of Polygons to Manifold
-//! Surfaces" (2001): join what nearly meets, then look at what is left open.
+//! The order is that of Guéziec, Taubin, Lazarus & Horn, "Cutting and Stitching: Converting Sets of Polygons to
+//! Manifold Surfaces" (2001): first join edges that nearly meet, then examine those left open.
 
 mod drop;
 mod fill;
@@ -25,20 +25,20 @@ pub(crate) use fill::Hole;
 pub(crate) use quantized::{GridSteps, weld_quantized};
 use surface::Surface;
 
-/// Diagonal of the largest holes that can be asked to be filled. [Units: wu]
+/// Largest allowed diagonal of holes to fill. [Units: wu]
 const LARGEST_HOLE: f64 = 10.0;
 
-/// What is put right, and how far.
+/// Extent of a repair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RepairOptions {
-    /// Ends of open edges at most this far apart become one; ends this near to the inside of an open edge cut
-    /// it. [Units: wu] [Limit: 1e-6 to 0.1]
+    /// Ends of open edges at most this far apart become one; ends this near to the inside of an open edge cut it.
+    /// [Units: wu] [Limit: 1e-6 to 0.1]
     ///
-    /// The default, 1 mm, is a tenth of the smallest hole that a bake takes for meant, so that no opening goes.
+    /// The default, 1 mm, is a tenth of the smallest hole that a bake considers intended, so that no opening closes.
     pub weld: f64,
-    /// Loops of open edges are filled up to this diagonal of their box; 0 fills none. [Units: wu] [Limit: 0 to 10]
+    /// Fills loops of open edges up to this diagonal of their box; 0 fills none. [Units: wu] [Limit: 0 to 10]
     ///
-    /// The default, 0.1 m, is a sixth of the narrowest opening that a bake looks for.
+    /// The default, 0.1 m, is a sixth of the narrowest opening that a bake considers.
     pub hole: f64,
 }
 
@@ -51,45 +51,45 @@ impl Default for RepairOptions {
     }
 }
 
-/// What a repair changed.
+/// Changes of a repair.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RepairReport {
-    /// Distinct corners that became one with another.
+    /// Distinct vertices joined with another.
     pub welded_corners: u64,
-    /// Triangles removed because two corners are one point, or because they are lower than 0.01 mm.
+    /// Triangles removed because two vertices are one point, or because they are lower than 0.01 mm.
     pub degenerate_triangles: u64,
-    /// Triangles removed because they are there twice.
+    /// Duplicate triangles removed.
     pub duplicate_triangles: u64,
     /// Cuts of triangles at T-junctions.
     pub t_junctions: u64,
-    /// Triangles turned round.
+    /// Triangles turned over.
     pub turned_triangles: u64,
-    /// Closed shells of which triangles were turned so that all face outwards.
+    /// Closed shells with triangles turned so that all face outwards.
     pub shells_outwards: u64,
     /// Holes filled.
     pub filled_holes: u64,
-    /// Triangles that fill them.
+    /// Triangles added to fill them.
     pub filling_triangles: u64,
-    /// Objects whose triangles are not as they were; they have meshes of their own now.
+    /// Objects with changed triangles; they now have meshes of their own.
     pub changed_objects: u64,
-    /// Not changed: closed shells that face inwards, taken for rooms modeled from within.
+    /// Unchanged: closed shells that face inwards, taken for rooms modeled from within.
     pub shells_rooms: u64,
-    /// Not changed: shells with one side only.
+    /// Unchanged: shells with one side only.
     pub shells_one_sided: u64,
-    /// Not changed: loops of open edges too large to fill, rims of sheets, or without triangles that fit.
+    /// Unchanged: loops of open edges that are too large to fill, rims of sheets, or without fitting triangles.
     pub open_rims: u64,
-    /// Whether the last pass found nothing more to do.
+    /// The last pass changed nothing.
     pub is_settled: bool,
-    /// The structure is made of brushes, which are exact: nothing was looked at.
+    /// The structure consists of brushes, which are exact: nothing was examined.
     pub is_of_brushes: bool,
 }
 
 impl RepairReport {
-    /// The counts with what to call them, in the order shown: what was changed, then what was not.
+    /// Returns the counts with their names, in display order: changes first.
     #[must_use]
     pub fn counts(&self) -> [(&'static str, u64); 12] {
         [
-            ("corners welded", self.welded_corners),
+            ("vertices welded", self.welded_corners),
             ("degenerate triangles removed", self.degenerate_triangles),
             ("duplicate triangles removed", self.duplicate_triangles),
             ("T-junctions split", self.t_junctions),
@@ -133,15 +133,15 @@ impl fmt::Display for RepairReport {
 /// Passes after which a repair stops; two or three are usual.
 const MAX_PASSES: usize = 16;
 
-/// Repairs the structural triangles of a scene; detail stays as it is.
+/// Repairs the structural triangles of a scene; detail stays unchanged.
 ///
-/// Positions are those of corners that were there before; normals, tangents, texture coordinates and colors are
-/// kept, mixed along edges that are cut, and taken from the rim for holes. Objects that change get a mesh of their own, in
-/// world space, those that lose all their triangles go; the others keep their bits. Repairing again changes nothing, if
+/// Positions are those of existing vertices. Normals, tangents, texture coordinates and colors are kept, interpolated
+/// along cut edges, and taken from the rim for holes. Changed objects get a mesh of their own, in world space, and
+/// objects that lose all triangles are removed; the others keep their bits. Repairing again changes nothing if
 /// [`RepairReport::is_settled`].
 ///
-/// Time: `n log n` for `n` triangles in each pass, and the cube of the corners of a hole; memory: about 300 bytes a
-/// triangle.
+/// Time: `n log n` for `n` triangles in each pass, plus the cube of the vertices of a hole; memory: about 300 bytes
+/// per triangle.
 ///
 /// # Errors
 ///
@@ -180,11 +180,11 @@ pub fn repair(scene: &mut Scene, options: &RepairOptions) -> Result<RepairReport
     Ok(report)
 }
 
-/// Steps that are spent on a look at holes: about three seconds.
+/// Most steps of a search for holes without filling: about three seconds.
 const STEPS_TO_LOOK: u64 = 1_000_000_000;
 
-/// Loops of open edges that a repair could fill, the largest first, as large as any may be, and whether all were looked at.
-/// `n log n` for `n` triangles and a bounded number of steps, with about 300 bytes a triangle.
+/// Returns the loops of open edges that a repair could fill, of any size, largest first, and `true` if all were
+/// examined. `n log n` for `n` triangles plus a bounded number of steps; about 300 bytes per triangle.
 pub(crate) fn holes_of(scene: &Scene) -> (Vec<Hole>, bool) {
     if !scene.solids.is_empty() {
         return (Vec::new(), true);
@@ -202,7 +202,7 @@ fn pass(surface: &mut Surface, options: &RepairOptions, report: &mut RepairRepor
         report.duplicate_triangles += drop::drop_duplicates(surface);
         report.degenerate_triangles += drop::drop_caps(surface);
     };
-    // As they would be read again: the next repair sees what this pass sees.
+    // In the order of a new import, so that the next repair starts from the same state.
     surface.faces.sort_by_key(|f| f.part);
     report.welded_corners += weld::weld_all(surface, options.weld);
     tidy(surface, report);

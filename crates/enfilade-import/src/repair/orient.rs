@@ -1,7 +1,7 @@
-//! Orientation: all triangles of a shell turned alike, those of solids outwards.
+//! Orients all triangles of a shell alike, and those of solids outwards.
 //!
-//! Neighbors must walk their common edge in opposite ways (Gjørup 1999, §2.4.1); which side of a closed shell
-//! is out tells the sign of its volume, the sum of the signed tetrahedra over its triangles.
+//! Neighbors must traverse their common edge in opposite directions (Gjørup 1999, §2.4.1). The outer side of a closed
+//! shell follows from the sign of its volume, the sum of the signed tetrahedra over its triangles.
 
 use std::collections::HashMap;
 
@@ -10,31 +10,31 @@ use enfilade_geom::{Aabb, DVec3, triangle_area_normal};
 use super::surface::{Surface, unit};
 use crate::shells::Shells;
 
-/// Radius of the least room: the watershed's, too. [Units: wu]
+/// Radius of the smallest room, the same as the watershed's. [Units: wu]
 const ROOM: f64 = 0.3;
 
-/// Shells of one object looked at as enclosing others: those whose boxes are largest.
+/// Most shells per object tested as enclosing others: those with the largest boxes.
 const ENCLOSING: usize = 64;
 
-/// What was turned.
+/// Changes by orientation.
 #[derive(Default)]
 pub(super) struct Turned {
     pub(super) n_triangles: u64,
-    /// Closed shells that face outwards now and did not before, all of them.
+    /// Closed shells with all triangles outwards that had some inwards before.
     pub(super) n_outwards: u64,
-    /// Closed shells that face inwards and are rooms modeled from within.
+    /// Closed shells that face inwards: rooms modeled from within.
     pub(super) n_rooms: u64,
-    /// Shells with one side only: left as they are.
+    /// Shells with one side only, left unchanged.
     pub(super) n_one_sided: u64,
 }
 
 #[derive(Clone, Copy)]
 struct Shell {
     object: u32,
-    /// Area of the triangles turned as the root is, and of those turned against it.
+    /// Area of the triangles oriented as the root is, and of those oriented against it.
     area: [f64; 2],
     n: [u64; 2],
-    /// Six times the volume, were all turned as the root is.
+    /// Six times the volume, with all triangles oriented as the root is.
     volume: f64,
     bounds: Aabb,
     is_closed: bool,
@@ -43,10 +43,10 @@ struct Shell {
 
 /// Turns triangles until those of each shell agree; `n log n`.
 ///
-/// Open shells keep the side that most of their area faces. Closed ones face outwards, unless most of their area
-/// faces inwards and a ball of 0.3 m might fit into them (three times the volume over the area, which is at least its
-/// radius in any convex body), or they lie inside another shell of their object: those are rooms modeled from
-/// within, or the insides of hollow solids, and face inwards.
+/// Open shells keep the side with most area. Closed ones face outwards, with two exceptions that face inwards, as
+/// rooms modeled from within or insides of hollow solids: most of their area faces inwards, and either a ball of 0.3
+/// m might fit in (three times the volume over the area, at least the radius in any convex body) or they lie inside
+/// another shell of their object.
 pub(super) fn orient(surface: &mut Surface) -> Turned {
     let mut shells = joined(surface);
     let n = surface.faces.len();
@@ -61,7 +61,7 @@ pub(super) fn orient(surface: &mut Surface) -> Turned {
             turned.n_one_sided += 1;
             continue;
         }
-        // Which of the two turns stays: 0 as the root is.
+        // The orientation to keep; 0 is the root's.
         let stays = if shell.is_closed {
             let outwards = usize::from(shell.volume < 0.0);
             let size = 0.5 * shell.volume.abs() / (shell.area[0] + shell.area[1]);
@@ -102,7 +102,7 @@ fn joined(surface: &Surface) -> Shells {
     shells
 }
 
-/// What each shell measures, at its root.
+/// Returns the sums over each shell, at its root.
 fn sums(surface: &Surface, shells: &Shells, roots: &[(u32, bool)]) -> Vec<Option<Shell>> {
     let mut sums: Vec<Option<Shell>> = vec![None; roots.len()];
     for (face, &(root, is_turned)) in roots.iter().enumerate() {
@@ -116,7 +116,7 @@ fn sums(surface: &Surface, shells: &Shells, roots: &[(u32, bool)]) -> Vec<Option
             is_one_sided: false,
         });
         let corners = surface.corners(face);
-        // About a point of the shell, so that its digits are not lost to its place.
+        // Relative to a point of the shell, to keep precision far from the origin.
         let origin = surface.corners(root as usize)[0];
         let [a, b, c] = corners.map(|p| p - origin);
         let sign = if is_turned { -1.0 } else { 1.0 };
@@ -130,7 +130,7 @@ fn sums(surface: &Surface, shells: &Shells, roots: &[(u32, bool)]) -> Vec<Option
     sums
 }
 
-/// The boxes of the largest closed shells of each object.
+/// Returns the boxes of the largest closed shells of each object.
 fn boxes(sums: &[Option<Shell>]) -> HashMap<u32, Vec<Aabb>> {
     let mut boxes: HashMap<u32, Vec<Aabb>> = HashMap::new();
     for s in sums.iter().flatten().filter(|s| s.is_closed) {
@@ -143,14 +143,14 @@ fn boxes(sums: &[Option<Shell>]) -> HashMap<u32, Vec<Aabb>> {
     boxes
 }
 
-/// Whether the box of another closed shell of the same object, one of its 64 largest, holds all of this one's.
+/// Returns `true` if the box of another closed shell of its object, one of the 64 largest, contains the shell's box.
 fn is_enclosed(shell: &Shell, boxes: &HashMap<u32, Vec<Aabb>>) -> bool {
     let held =
         |b: &Aabb| b.min.cmplt(shell.bounds.min).all() && b.max.cmpgt(shell.bounds.max).all();
     boxes.get(&shell.object).is_some_and(|l| l.iter().any(held))
 }
 
-/// Turns a face round: its corners get vertices of their own, with normals that agree with it.
+/// Turns a face over: it gets vertices of its own, with normals that agree with it.
 fn turn(surface: &mut Surface, face: usize) {
     surface.change(face);
     let part = surface.faces[face].part;
@@ -166,7 +166,7 @@ fn turn(surface: &mut Surface, face: usize) {
             if old.dot(normal) < 0.0 {
                 *n = unit(-old);
                 if let Some(t) = vertices.tangents.last_mut() {
-                    // The bitangent, `cross(normal, tangent) * w`, stays where it was.
+                    // Keeps the bitangent, `cross(normal, tangent) * w`.
                     t[3] = -t[3];
                 }
             }

@@ -1,7 +1,7 @@
-//! Quantized meshes: corners that were one before they were rounded are one again.
+//! Joins vertices of quantized meshes that coincided before they were rounded.
 //!
-//! Compression rounds each mesh to a grid of its own, so that walls which met in a corner miss each other by up to half a step
-//! of either grid. This is the one place that knows of it: it runs before anything else looks at the triangles.
+//! Compression rounds each mesh to its own grid, so that walls which shared a vertex miss each other by up to half a
+//! step of either grid. Only this step knows about grids; it runs before all others.
 
 use std::collections::HashMap;
 
@@ -10,21 +10,22 @@ use enfilade_geom::{DMat3, DVec3};
 
 use super::surface::Surface;
 
-/// By mesh that has any, and by primitive: width of the grid that positions were rounded to, 0 if they were not.
-/// [Units: those of the mesh]
+/// Grid width that positions were rounded to, for each primitive of each quantized mesh; 0 if not rounded. [Units:
+/// those of the mesh]
 pub(crate) type GridSteps = HashMap<u32, Vec<f32>>;
 
-/// Wider grids are taken for meant: no tool rounds walls to what a bake takes for an opening. [Units: wu]
+/// Widest grid that counts as rounding: no tool rounds walls by the size of an opening. [Units: wu]
 const WIDEST_STEP: f64 = 0.05;
 
-/// Two corners of one grid are a whole step apart, less what `f32` loses.
+/// Two vertices of one grid are a whole step apart, less the rounding of `f32`.
 const ALMOST: f64 = 0.99;
 
-/// Welds structural corners of different primitives that are nearer, along each axis, than half a step of the one and half a
-/// step of the other; how many moved.
+/// Welds structural vertices of different primitives that are nearer, along each axis, than half a step of the one
+/// plus half a step of the other. Returns the number of moved vertices.
 ///
-/// Finer grids decide where a corner is, and corners of one primitive never become one: on their grid they differ. Objects
-/// that change get a mesh of their own in world space. `n log n` for `n` corners; nothing is done where no mesh is quantized.
+/// The finer grid decides the position; vertices of one primitive never become one, as they differ on their grid.
+/// Changed objects get a mesh of their own in world space. `n log n` for `n` vertices; does nothing without a
+/// quantized mesh.
 pub(crate) fn weld_quantized(scene: &mut Scene, steps: &GridSteps) -> u64 {
     if steps.is_empty() || !scene.solids.is_empty() {
         return 0;
@@ -50,11 +51,11 @@ pub(crate) fn weld_quantized(scene: &mut Scene, steps: &GridSteps) -> u64 {
     n_moved
 }
 
-/// What is known of each point of a surface.
+/// Grids and primitives of each point of a surface.
 struct Corners {
-    /// Half the step of the finest grid that it is on, along each axis. [Units: wu]
+    /// Half the step of the finest grid of each point, along each axis. [Units: wu]
     reach: Vec<DVec3>,
-    /// The primitives that it is a corner of.
+    /// The primitives with a vertex at each point.
     parts: Vec<Vec<u32>>,
     /// The longest reach.
     longest: f64,
@@ -86,10 +87,10 @@ impl Corners {
         corners
     }
 
-    /// By point the one that it becomes.
+    /// Returns the point that each point becomes.
     ///
-    /// The finest first, equal ones by place, as the points are numbered: each goes to the nearest head that it may be one
-    /// with, or becomes a head.
+    /// Finest first, equal ones in numerical order, which is by place: each point goes to the nearest head that it
+    /// may join, or becomes a head.
     fn heads(mut self, points: &[DVec3]) -> Vec<u32> {
         let mut into: Vec<u32> = (0..points.len() as u32).collect();
         if self.longest == 0.0 {
@@ -145,7 +146,7 @@ impl Corners {
     }
 }
 
-/// Half a step of a primitive's grid where it is placed; 0 where it is too wide to be one. [Units: wu]
+/// Returns half a step of a primitive's grid as placed; 0 for a grid too wide to be rounding. [Units: wu]
 fn reach(object: &Object, step: f32) -> DVec3 {
     let DMat3 {
         x_axis,

@@ -1,6 +1,6 @@
-//! T-junctions: an edge is cut where the corner of a neighbor lies in its middle.
+//! Cuts edges at T-junctions, where a vertex of a neighbor lies in their middle.
 //!
-//! Barequet & Kumar 1997 close cracks so, too: nothing moves and nothing is added but corners where others are.
+//! Barequet & Kumar 1997 close cracks in the same way: nothing moves, and new vertices lie only at existing ones.
 
 use std::collections::HashMap;
 
@@ -8,10 +8,10 @@ use super::drop::cut_face;
 use super::surface::{Face, Surface, open_of};
 use crate::tjunction;
 
-/// Cuts the triangles at open edges where an end of another open edge lies within `tolerance` of their
-/// inside; how many cuts. `n log n`, and a bounded search as in the cleaning report.
+/// Cuts triangles at open edges where an end of another open edge lies within `tolerance` of their inside, and
+/// returns the number of cuts. `n log n`, plus a bounded search as in the cleaning report.
 ///
-/// A corner of the same triangle cuts nothing: the triangle would be gone.
+/// A vertex of the same triangle does not cut it: nothing would be left.
 pub(super) fn split_t_junctions(surface: &mut Surface, tolerance: f64) -> u64 {
     let open: Vec<[u32; 2]> = open_of(&surface.uses()).iter().map(|u| u.ends).collect();
     let mut found: HashMap<[u32; 2], Vec<(f64, u32)>> = HashMap::new();
@@ -41,7 +41,7 @@ pub(super) fn split_t_junctions(surface: &mut Surface, tolerance: f64) -> u64 {
     n
 }
 
-/// The pieces of a face; itself where nothing cuts it.
+/// Returns the pieces of a face; the face itself if nothing cuts it.
 fn cut(
     surface: &mut Surface,
     whole: Face,

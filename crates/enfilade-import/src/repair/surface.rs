@@ -1,4 +1,4 @@
-//! The structural triangles as one surface: corners that share points, with what else they carry.
+//! The structural triangles as one surface: vertices with attributes over shared points.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -9,7 +9,7 @@ use enfilade_geom::{DMat3, DMat4, DVec3, triangle_area_normal};
 /// The vertices of one primitive of one object, in world space.
 pub(super) struct Part {
     pub(super) object: u32,
-    /// Attributes by vertex; the positions are those of the points, and there are no indices.
+    /// Attributes of each vertex, with the points as positions and without indices.
     pub(super) vertices: Primitive,
     /// Point of each vertex.
     pub(super) points: Vec<u32>,
@@ -31,22 +31,22 @@ pub(super) struct Use {
     pub(super) ends: [u32; 2],
     pub(super) object: u32,
     pub(super) face: u32,
-    /// Walked from the greater end to the lesser.
+    /// Traversed from the greater end to the lesser.
     pub(super) is_reverse: bool,
 }
 
 /// All structural triangles of a scene.
 pub(super) struct Surface {
-    /// Distinct corners, each a triple of `f32`. [Units: wu]
+    /// Distinct positions, each a triple of `f32`. [Units: wu]
     pub(super) points: Vec<DVec3>,
     pub(super) parts: Vec<Part>,
     pub(super) faces: Vec<Face>,
-    /// Whether anything of an object was changed, by object.
+    /// Objects with any change.
     pub(super) is_changed: Vec<bool>,
 }
 
 impl Surface {
-    /// Takes the structural triangles of a scene. Linear in vertices and triangles.
+    /// Collects the structural triangles of a scene. Linear in vertices and triangles.
     pub(super) fn of_scene(scene: &Scene) -> Self {
         let mut surface = Self {
             points: Vec::new(),
@@ -62,7 +62,7 @@ impl Surface {
             for primitive in &scene.meshes[object.mesh as usize].primitives {
                 let vertices = placed(primitive, &object.transform);
                 let mut point = |p: &[f32; 3]| {
-                    // Adding zero makes -0 and 0 one.
+                    // Turns -0 into 0.
                     let key = p.map(|c| (c + 0.0).to_bits());
                     *numbers.entry(key).or_insert_with(|| {
                         surface.points.push(DVec3::from_array(p.map(f64::from)));
@@ -87,7 +87,7 @@ impl Surface {
         surface
     }
 
-    /// Numbers the points by where they are, so that no choice between equals depends on the order of the input.
+    /// Numbers the points by position, so that no choice between equals depends on the order of the input.
     fn number_by_place(&mut self) {
         let mut order: Vec<u32> = (0..self.points.len() as u32).collect();
         let place = |p: u32| self.points[p as usize].to_array();
@@ -105,8 +105,8 @@ impl Surface {
         points.for_each(|p| *p = new[*p as usize]);
     }
 
-    /// Puts the triangles back: what was changed gets a mesh of its own in world space, all else stays as it
-    /// was, shared meshes included. Objects without triangles go.
+    /// Puts the triangles back: changed objects get a mesh of their own in world space, others stay unchanged, shared
+    /// meshes included. Objects without triangles are removed.
     pub(super) fn into_scene(self, scene: &mut Scene) {
         let mut faces_of: Vec<Vec<[u32; 3]>> = vec![Vec::new(); self.parts.len()];
         for face in &self.faces {
@@ -148,13 +148,13 @@ impl Surface {
         self.parts[self.faces[face].part as usize].object
     }
 
-    /// The points of a face.
+    /// Returns the points of a face.
     pub(super) fn ends(&self, face: usize) -> [u32; 3] {
         let Face { part, corners } = self.faces[face];
         corners.map(|c| self.parts[part as usize].points[c as usize])
     }
 
-    /// Where the corners of a face are.
+    /// Returns the positions of the vertices of a face.
     pub(super) fn corners(&self, face: usize) -> [DVec3; 3] {
         self.ends(face).map(|p| self.points[p as usize])
     }
@@ -164,7 +164,7 @@ impl Surface {
         self.is_changed[object as usize] = true;
     }
 
-    /// Keeps the faces that are not marked; how many went.
+    /// Keeps the faces that are not marked, and returns the number removed.
     pub(super) fn remove(&mut self, is_gone: &[bool]) -> u64 {
         for (face, _) in is_gone.iter().enumerate().filter(|(_, gone)| **gone) {
             self.change(face);
@@ -178,7 +178,7 @@ impl Surface {
         (before - self.faces.len()) as u64
     }
 
-    /// Every use of an edge, equal edges side by side, and of those the uses of one object. `n log n`.
+    /// Returns every use of an edge, sorted by edge and then by object. `n log n`.
     pub(super) fn uses(&self) -> Vec<Use> {
         let mut uses = Vec::with_capacity(3 * self.faces.len());
         for face in 0..self.faces.len() {
@@ -197,7 +197,8 @@ impl Surface {
         uses
     }
 
-    /// A new vertex at `point`, with what two others of its part have, mixed: `share` of the second.
+    /// Adds a vertex at `point` with the interpolated attributes of two of its part: `share` is the weight of the
+    /// second.
     pub(super) fn mix(&mut self, part: u32, [a, b]: [u32; 2], share: f64, point: u32) -> u32 {
         let part = &mut self.parts[part as usize];
         let (a, b, t) = (a as usize, b as usize, share as f32);
@@ -220,7 +221,7 @@ impl Surface {
         part.points.len() as u32 - 1
     }
 
-    /// Height of a face over its longest edge, and which corner lies opposite of that. [Units: wu]
+    /// Returns the height of a face over its longest edge, and the vertex opposite that edge. [Units: wu]
     pub(super) fn height(&self, face: usize) -> (f64, usize) {
         let corners = self.corners(face);
         let length = |k: usize| corners[(k + 1) % 3].distance(corners[(k + 2) % 3]);
@@ -230,10 +231,10 @@ impl Surface {
     }
 }
 
-/// The first use of each open edge: one of an odd number of triangles, over all objects.
+/// Returns the first use of each open edge: one of an odd number of triangles, over all objects.
 ///
-/// These are the boundary of all triangles as a chain modulo 2, so that an even number of them meets in
-/// each point, and closed loops can be made of them.
+/// Open edges are the boundary of all triangles as a chain modulo 2. So an even number of them meets in each point,
+/// and they form closed loops.
 pub(super) fn open_of(uses: &[Use]) -> Vec<Use> {
     uses.chunk_by(|a, b| a.ends == b.ends)
         .filter(|edge| edge.len() % 2 == 1 && edge[0].ends[0] != edge[0].ends[1])
@@ -248,15 +249,15 @@ fn mix_last<const N: usize>(values: &mut Vec<[f32; N]>, a: usize, b: usize, t: f
     }
 }
 
-/// Rounded to `f32`; +X where there is no direction.
+/// Returns a direction rounded to `f32`; +X for a zero vector.
 pub(super) fn unit(v: DVec3) -> [f32; 3] {
     v.try_normalize().unwrap_or(DVec3::X).as_vec3().to_array()
 }
 
-/// A primitive's vertices in world space, positions rounded as [`Scene::world_triangle`] rounds them.
+/// Returns a primitive's vertices in world space, with positions rounded as in [`Scene::world_triangle`].
 fn placed(primitive: &Primitive, transform: &DMat4) -> Primitive {
     let linear = DMat3::from_mat4(*transform);
-    // A flattened object has no inverse; its normals are then as good as any.
+    // A flattened object has no inverse; any normals do.
     let for_normals = if linear.determinant() == 0.0 {
         linear
     } else {
@@ -283,7 +284,7 @@ fn placed(primitive: &Primitive, transform: &DMat4) -> Primitive {
     vertices
 }
 
-/// The vertices that faces use, at their points.
+/// Returns the vertices that faces use, at their points.
 fn compacted(part: &Part, faces: &[[u32; 3]], points: &[DVec3]) -> Primitive {
     let mut new = vec![u32::MAX; part.points.len()];
     let mut kept: Vec<usize> = Vec::new();
@@ -315,7 +316,7 @@ fn compacted(part: &Part, faces: &[[u32; 3]], points: &[DVec3]) -> Primitive {
     }
 }
 
-/// Drops meshes that no object places any more.
+/// Drops unplaced meshes.
 fn drop_unplaced(scene: &mut Scene) {
     let mut new = vec![u32::MAX; scene.meshes.len()];
     let mut kept = Vec::new();

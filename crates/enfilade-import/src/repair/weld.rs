@@ -1,7 +1,7 @@
-//! Welding: points that lie close together become one.
+//! Welds points that lie close together.
 //!
-//! The first half of cutting and stitching (Guéziec, Taubin, Lazarus & Horn 2001): corners that only nearly
-//! meet are joined along the rims of the surface. What is closed already is left alone, however fine it is.
+//! The first half of cutting and stitching (Guéziec, Taubin, Lazarus & Horn 2001): joins vertices that nearly meet
+//! along the rims of the surface. Closed surfaces stay unchanged, however fine they are.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -10,13 +10,13 @@ use enfilade_geom::DVec3;
 
 use super::surface::{Surface, open_of};
 
-/// All points nearer than this are one, wherever they are: what the cleaning report takes for one. [Units: wu]
+/// Points nearer than this are one, even off the rims, as in the cleaning report. [Units: wu]
 pub(super) const ONE_POINT: f64 = 1e-5;
 
-/// Neighbors counted to tell how crowded a point's place is; more make no difference.
+/// Most neighbors counted to measure the crowd around a point; more make no difference.
 const CROWD: u32 = 256;
 
-/// Welds all points within [`ONE_POINT`], or `tolerance` if that is less; how many points moved.
+/// Welds all points within [`ONE_POINT`], or `tolerance` if that is less. Returns the number of moved points.
 pub(super) fn weld_all(surface: &mut Surface, tolerance: f64) -> u64 {
     let weights = weights(surface);
     let used: Vec<u32> = (0..weights.len() as u32)
@@ -25,7 +25,7 @@ pub(super) fn weld_all(surface: &mut Surface, tolerance: f64) -> u64 {
     weld(surface, &used, &weights, tolerance.min(ONE_POINT))
 }
 
-/// Welds the ends of open edges within `tolerance`; how many points moved.
+/// Welds the ends of open edges within `tolerance`. Returns the number of moved points.
 pub(super) fn weld_rims(surface: &mut Surface, tolerance: f64) -> u64 {
     let mut ends: Vec<u32> = open_of(&surface.uses())
         .iter()
@@ -37,7 +37,7 @@ pub(super) fn weld_rims(surface: &mut Surface, tolerance: f64) -> u64 {
     weld(surface, &ends, &weights, tolerance)
 }
 
-/// How many corners lie in each point.
+/// Returns the number of vertices at each point.
 fn weights(surface: &Surface) -> Vec<u32> {
     let mut weights = vec![0; surface.points.len()];
     for face in 0..surface.faces.len() {
@@ -67,12 +67,12 @@ fn weld(surface: &mut Surface, chosen: &[u32], weights: &[u32], tolerance: f64) 
     n as u64
 }
 
-/// The point that each point becomes: itself, unless it is chosen and a chosen head lies within `tolerance`.
+/// Returns the point that each point becomes: itself, unless it is chosen and a chosen head lies within `tolerance`.
 ///
-/// Heads are picked one by one, those with most corners around them first, equal ones by place; each other
-/// point goes to the nearest. Heads stay where they are and lie more than `tolerance` apart, so that welding again changes
-/// nothing, and no chain of points runs together into one. The order of the points makes no difference, unless 256 lie
-/// around one. Time: `n log n` for `n` points; each looks at so many neighbors at most, and at the heads around it.
+/// Picks heads one by one, those with most vertices around them first, equal ones by position; every other point goes
+/// to the nearest head. Heads stay in place and lie more than `tolerance` apart, so that welding again changes
+/// nothing, and no chain of points collapses into one. The order of the points makes no difference, unless 256 lie
+/// around one. Time: `n log n` for `n` points; each examines at most 256 neighbors, and the heads around it.
 pub(super) fn heads(points: &[DVec3], chosen: &[u32], weights: &[u32], tolerance: f64) -> Vec<u32> {
     let mut into: Vec<u32> = (0..points.len() as u32).collect();
     let at = |p: u32| points[p as usize];
@@ -122,7 +122,7 @@ pub(super) fn heads(points: &[DVec3], chosen: &[u32], weights: &[u32], tolerance
     into
 }
 
-/// Points by the grid cell they lie in.
+/// Points by their grid cell.
 struct Grid {
     reach: f64,
     cells: HashMap<[i64; 3], Vec<u32>>,
@@ -136,7 +136,7 @@ impl Grid {
         }
     }
 
-    /// Cells four distances wide: most points lie well inside and need one look.
+    /// Cells four distances wide: most points lie well inside and need one lookup.
     fn cell(&self, p: DVec3) -> [i64; 3] {
         let width = 4.0 * self.reach;
         (p / width).floor().to_array().map(|c| c as i64)
@@ -146,7 +146,7 @@ impl Grid {
         self.cells.entry(self.cell(p)).or_default().push(number);
     }
 
-    /// Points within reach and some more, until the visitor has enough.
+    /// Visits points within reach, and some beyond, until the visitor has enough.
     fn near(&self, p: DVec3, mut visit: impl FnMut(u32) -> bool) {
         let reach = DVec3::splat(self.reach);
         let (low, high) = (self.cell(p - reach), self.cell(p + reach));
@@ -189,7 +189,7 @@ mod tests {
                     prop_assert!(head == other || d > tolerance);
                 }
             }
-            // In another order the same points are the heads of the same places.
+            // In another order the same points are heads of the same points.
             let mut turned = points.clone();
             turned.rotate_left(turn % points.len());
             let again = heads(&turned, &chosen, &weights, tolerance);

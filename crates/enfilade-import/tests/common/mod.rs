@@ -1,4 +1,4 @@
-//! Hand-made files and scenes, none of them through the code under test.
+//! Hand-made files and scenes, independent of the code under test.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use enfilade_geom::DMat4;
@@ -58,7 +58,7 @@ pub(crate) fn world(scene: &Scene) -> Vec<Triangle> {
         .collect()
 }
 
-/// Triangles in an order of their own, each from its least corner on.
+/// Triangles in canonical order, each starting at its least vertex.
 pub(crate) fn sorted(triangles: impl IntoIterator<Item = Triangle>) -> Vec<Triangle> {
     let by = |a: &Triangle, b: &Triangle| {
         let numbers = |t: &Triangle| t.map(|p| p.to_array());

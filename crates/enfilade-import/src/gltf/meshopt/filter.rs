@@ -1,7 +1,7 @@
-//! What is done to attributes after decoding: unit vectors, rotations, floats and colors from fewer bits.
+//! Filters of decoded attributes: unit vectors, rotations, floats and colors from fewer bits.
 //!
-//! `EXT_meshopt_compression`, appendix B; the colors are of `KHR_meshopt_compression`. Division and square root are exact in
-//! IEEE 754, so the numbers are the same everywhere.
+//! `EXT_meshopt_compression`, appendix B; colors from `KHR_meshopt_compression`. Division and square root are exact
+//! in IEEE 754, so the results are the same everywhere.
 
 /// Applies a filter in place.
 pub(super) fn apply(filter: &str, stride: usize, bytes: &mut [u8]) -> Result<(), String> {
@@ -36,7 +36,7 @@ fn each<const N: usize>(bytes: &mut [u8], f: impl Fn([u8; N]) -> [u8; N]) {
     }
 }
 
-/// Four 16-bit words at a time.
+/// Applies `f` to four 16-bit words at a time.
 fn words(bytes: &mut [u8], f: impl Fn([u16; 4]) -> [u16; 4]) {
     each::<8>(bytes, |b| {
         let [x, y, z, w] =
@@ -45,12 +45,12 @@ fn words(bytes: &mut [u8], f: impl Fn([u16; 4]) -> [u16; 4]) {
     });
 }
 
-/// To the nearest, halves away from zero; what is no number is 0.
+/// Rounds to the nearest integer, halves away from zero; NaN gives 0.
 fn rounded(x: f32) -> i32 {
     (x + if x >= 0.0 { 0.5 } else { -0.5 }) as i32
 }
 
-/// A unit vector from its place on an octahedron; the third number says what 1 is, the fourth stays.
+/// Returns a unit vector from its point on an octahedron; the third number stands for 1, the fourth is kept.
 fn octahedral([x, y, one, w]: [i32; 4], most: f32) -> [i32; 4] {
     let (x, y) = (x as f32, y as f32);
     let z = one as f32 - x.abs() - y.abs();
@@ -66,8 +66,8 @@ fn octahedral([x, y, one, w]: [i32; 4], most: f32) -> [i32; 4] {
     ]
 }
 
-/// A rotation from its three least components; the lowest two bits of the fourth number say which is left out, the
-/// number with these bits set what `1/sqrt(2)` is.
+/// Returns a rotation from its three smallest components. The lowest two bits of the fourth number are the index of
+/// the omitted one; with both bits set, that number stands for `1/sqrt(2)`.
 fn quaternion([x, y, z, w]: [i16; 4]) -> [i16; 4] {
     let one = f32::from(w | 3);
     let scale = 32767.0 / 2.0_f32.sqrt() / one;
@@ -81,14 +81,14 @@ fn quaternion([x, y, z, w]: [i16; 4]) -> [i16; 4] {
     out
 }
 
-/// A float from an exponent of 8 bits and a mantissa of 24.
+/// Returns a float from an exponent of 8 bits and a mantissa of 24.
 fn exponential(v: u32) -> u32 {
     let mantissa = ((v << 8) as i32 >> 8) as f32;
     let exponent = (v as i32 >> 24) + 127;
     (f32::from_bits((exponent as u32) << 23) * mantissa).to_bits()
 }
 
-/// A color from luma and two differences; the highest bit of alpha says how many bits there are.
+/// Returns a color from luma and two differences; the highest set bit of alpha gives the number of bits.
 fn color([y, co, cg, alpha]: [i32; 4], most: f32) -> [i32; 4] {
     let mut all = alpha;
     for k in [1, 2, 4, 8] {
@@ -103,7 +103,7 @@ fn color([y, co, cg, alpha]: [i32; 4], most: f32) -> [i32; 4] {
 mod tests {
     use super::*;
 
-    /// Directions all over the sphere.
+    /// Directions spread over the sphere.
     fn directions() -> Vec<[f32; 4]> {
         (0..500)
             .map(|i| {
@@ -207,7 +207,7 @@ mod tests {
                 "{filter} {stride}"
             );
         }
-        // Nonsense stays within numbers.
+        // Nonsense gives numbers, too.
         let mut bytes = vec![0x80; 48];
         for (filter, stride) in [
             ("OCTAHEDRAL", 8),

@@ -1,10 +1,10 @@
-//! Indices: triangles by the edges and vertices used last, and plain sequences.
+//! Indices: triangles coded by recent edges and vertices, and plain sequences.
 //!
 //! `EXT_meshopt_compression`, appendix A, "Mode 1: triangles" and "Mode 2: indices".
 
 use super::{CUT_OFF, Input, unzigzag, version_of};
 
-/// The last sixteen of something; positions count back from the newest.
+/// The last sixteen items; positions count back from the newest.
 struct Fifo<T> {
     items: [T; 16],
     next: usize,
@@ -23,7 +23,7 @@ impl<T: Copy> Fifo<T> {
         self.next = (self.next + 1) % 16;
     }
 
-    /// The newest at 0.
+    /// Returns an item; 0 is the newest.
     fn get(&self, back: u8) -> T {
         self.items[(self.next + 15 - usize::from(back)) % 16]
     }
@@ -32,14 +32,14 @@ impl<T: Copy> Fifo<T> {
 struct Triangles<'b> {
     edges: Fifo<[u32; 2]>,
     vertices: Fifo<u32>,
-    /// The lowest index that was not used yet.
+    /// The lowest unused index.
     next: u32,
-    /// The last index that was stored as a difference.
+    /// The last index stored as a difference.
     last: u32,
     data: Input<'b>,
-    /// Pairs of vertex codes that one byte names.
+    /// Pairs of vertex codes for one-byte references.
     table: &'b [u8],
-    /// Edge triangles with a vertex code from here on store an index.
+    /// Edge triangles with a vertex code of at least this store an index.
     n_recent: u8,
 }
 
@@ -49,7 +49,7 @@ pub(super) fn decode_triangles(packed: &[u8], n: usize) -> Result<Vec<u32>, Stri
         return Err(format!("{n} indices do not make triangles"));
     }
     let (version, body) = version_of(packed, 0xE0)?;
-    // A byte for each triangle, then the data, then the table: the data bounds what is asked for.
+    // One byte per triangle, then the data, then the table: the input's size bounds the memory.
     let (codes, rest) = body.split_at_checked(n / 3).ok_or(CUT_OFF)?;
     let n_data = rest.len().checked_sub(16).ok_or(CUT_OFF)?;
     let (data, table) = rest.split_at(n_data);
@@ -87,7 +87,7 @@ impl Triangles<'_> {
         Ok(self.last)
     }
 
-    /// A triangle on an edge that was used lately, with a third vertex.
+    /// Decodes a triangle from a recent edge and a third vertex.
     fn at_edge(&mut self, code: u8) -> Result<[u32; 3], String> {
         let [a, b] = self.edges.get(code >> 4);
         let third = code & 15;
@@ -96,7 +96,7 @@ impl Triangles<'_> {
             self.vertices.push(c);
             c
         } else if third < self.n_recent {
-            // Counted with the one that comes next.
+            // Counts the vertex that comes next.
             self.vertices.get(third)
         } else {
             let c = match third {
@@ -113,7 +113,7 @@ impl Triangles<'_> {
         Ok([a, b, c])
     }
 
-    /// A triangle by its three vertices.
+    /// Decodes a triangle from its three vertices.
     fn alone(&mut self, code: u8) -> Result<[u32; 3], String> {
         let pair = match code {
             0xFE | 0xFF => self.data.byte()?,
@@ -124,7 +124,7 @@ impl Triangles<'_> {
             self.next = 0;
         }
         let codes = [if code == 0xFF { 15 } else { 0 }, pair >> 4, pair & 15];
-        // All new ones are numbered, and old ones looked up, before the first is pushed.
+        // Number all new vertices, and look up old ones, before pushing the first.
         let mut triangle = [0; 3];
         for (index, &code) in triangle.iter_mut().zip(&codes) {
             *index = match code {
@@ -176,7 +176,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Two triangles for each square of a grid `n` wide: what the edge codes are made for.
+    /// Two triangles for each square of a grid `n` wide, the best case for edge codes.
     fn grid(n: u32) -> Vec<u32> {
         let squares = (0..n * n).map(|i| (i / n * (n + 1)) + i % n);
         let corners = |a: u32| [a, a + 1, a + n + 1, a + n + 1, a + 1, a + n + 2];
@@ -186,7 +186,7 @@ mod tests {
     fn check(indices: &[u32]) {
         let n_vertices = indices.iter().max().map_or(0, |&m| m as usize + 1);
         let bytes = meshopt::encode_index_buffer(indices, n_vertices).unwrap();
-        // The encoder turns triangles round to begin elsewhere; its own decoder says what it meant.
+        // The encoder rotates triangles; its own decoder gives the expected result.
         let theirs: Vec<u32> = meshopt::decode_index_buffer(&bytes, indices.len()).unwrap();
         assert!(decode_triangles(&bytes, indices.len()).unwrap() == theirs);
         let bytes = meshopt::encode_index_sequence(indices, n_vertices).unwrap();
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn grids_and_far_jumps_come_back() {
         check(&grid(40));
-        // Strips of vertices that were never next: each third one is one off the last that was stored.
+        // Strips of vertices that were never next: each third one is one off the last stored.
         let strip = |step: i32| -> Vec<u32> {
             let at = |i: i32| (900 + step * i) as u32;
             let triangle = |i: i32| {

@@ -1,8 +1,8 @@
-//! `EXT_meshopt_compression` and `KHR_meshopt_compression`: buffer views in the codecs of meshoptimizer.
+//! `EXT_meshopt_compression` and `KHR_meshopt_compression`: buffer views compressed by meshoptimizer's codecs.
 //!
-//! Written from the bitstream chapters of the two extensions (Khronos, *glTF registry*) instead of using the C++ library:
-//! every read is of a slice, so hostile bytes end in an error, and the filters give the same bits on every processor (the
-//! library's take the reciprocal square root that the processor has). Tests compare with the library.
+//! Written from the bitstream chapters of the two extensions (Khronos, *glTF registry*) instead of binding the C++
+//! library: every read is from a slice, so hostile bytes end in an error, and the filters give the same bits on every
+//! processor (the library uses the processor's own reciprocal square root). Tests compare with the library.
 
 mod filter;
 mod index;
@@ -13,9 +13,9 @@ use crate::ImportError;
 use crate::builder::Builder;
 use std::borrow::Cow;
 
-/// By buffer view what it holds in plain, where it is compressed.
+/// Returns the decompressed bytes of each compressed buffer view.
 ///
-/// Memory is charged before it is taken; time goes with the plain bytes.
+/// Charges memory before allocating it; linear in the decompressed bytes.
 pub(super) fn decode_views(
     root: &Root,
     buffers: &[Option<Cow<'_, [u8]>>],
@@ -39,7 +39,7 @@ pub(super) fn decode_views(
     Ok(plain)
 }
 
-/// The compressed bytes, once all numbers of the extension fit each other.
+/// Returns the compressed bytes after checking that all numbers of the extension agree.
 fn packed_bytes<'b>(
     def: &MeshoptDef,
     view: &BufferView,
@@ -64,7 +64,7 @@ fn packed_bytes<'b>(
     })
     .ok_or_else(|| {
         format!(
-            "meshopt: wants bytes {}+{} of buffer {}, which has {}",
+            "meshopt: needs bytes {}+{} of buffer {}, which has {}",
             def.byte_offset,
             def.byte_length,
             def.buffer,
@@ -91,7 +91,7 @@ fn decode(def: &MeshoptDef, packed: &[u8]) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Indices as bytes of the stride asked for.
+/// Returns indices as bytes, `stride` for each.
 fn narrowed(indices: &[u32], stride: usize) -> Result<Vec<u8>, String> {
     match stride {
         2 => Ok(indices
@@ -103,11 +103,11 @@ fn narrowed(indices: &[u32], stride: usize) -> Result<Vec<u8>, String> {
     }
 }
 
-/// What all decoders say about too few or too many bytes.
+/// Errors of all decoders for too few or too many bytes.
 const CUT_OFF: &str = "the data is cut off";
 const TOO_LONG: &str = "bytes after the end of the data";
 
-/// Bytes that are taken from the front.
+/// The remaining input; bytes are taken from the front.
 struct Input<'b>(&'b [u8]);
 
 impl<'b> Input<'b> {
@@ -121,7 +121,7 @@ impl<'b> Input<'b> {
         Ok(self.take(1)?[0])
     }
 
-    /// An integer in up to five groups of seven bits, lowest first.
+    /// Reads an integer in up to five groups of seven bits, lowest first.
     fn var_int(&mut self) -> Result<u32, String> {
         let mut value = 0;
         for k in 0..5 {
@@ -143,7 +143,7 @@ impl<'b> Input<'b> {
     }
 }
 
-/// Splits the header byte off and gives the version, 0 or 1.
+/// Splits off the header byte and returns the version, 0 or 1.
 fn version_of(packed: &[u8], magic: u8) -> Result<(u8, &[u8]), String> {
     let (&head, rest) = packed.split_first().ok_or(CUT_OFF)?;
     if head & 0xF0 != magic {
@@ -155,7 +155,7 @@ fn version_of(packed: &[u8], magic: u8) -> Result<(u8, &[u8]), String> {
     }
 }
 
-/// `-1, 1, -2, ...` are stored as `1, 2, 3, ...`.
+/// Decodes `1, 2, 3, ...` as `-1, 1, -2, ...`.
 fn unzigzag(v: u32) -> u32 {
     (v >> 1) ^ (v & 1).wrapping_neg()
 }

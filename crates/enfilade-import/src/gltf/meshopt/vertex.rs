@@ -5,22 +5,22 @@
 
 use super::{Input, version_of};
 
-/// Bytes that share one width in bits.
+/// Bytes that share one bit width.
 const GROUP: usize = 16;
-/// Most vertices of a block.
+/// Most vertices in a block.
 const MAX_BLOCK: usize = 256;
-/// Bytes that a block holds at most in plain.
+/// Largest decompressed size of a block. [Units: bytes]
 const BLOCK_BYTES: usize = 8192;
 
 /// Decodes `n` vertices of `stride` bytes.
 pub(super) fn decode(packed: &[u8], n: usize, stride: usize) -> Result<Vec<u8>, String> {
     if stride == 0 || stride > 256 || !stride.is_multiple_of(4) {
         return Err(format!(
-            "vertices of {stride} bytes; it takes a multiple of 4 up to 256"
+            "vertices of {stride} bytes; the size must be a multiple of 4 up to 256"
         ));
     }
     let (version, body) = version_of(packed, 0xA0)?;
-    // The tail holds the vertex before the first and the kind of each channel; it is padded.
+    // The padded tail holds the vertex before the first and the kind of each channel.
     let n_channels = if version == 0 { 0 } else { stride / 4 };
     let n_tail = stride + n_channels;
     let n_padded = n_tail.max(if version == 0 { 32 } else { 24 });
@@ -28,7 +28,7 @@ pub(super) fn decode(packed: &[u8], n: usize, stride: usize) -> Result<Vec<u8>, 
     let (body, tail) = body.split_at(n_body);
     let tail = &tail[n_padded - n_tail..];
     let block = (BLOCK_BYTES / stride / GROUP * GROUP).min(MAX_BLOCK);
-    // Each block has a byte at least for every four of a vertex: the data bounds what is asked for.
+    // Each block takes at least one byte per four bytes of a vertex: the input's size bounds the memory.
     if n.div_ceil(block).saturating_mul(stride / 4) > body.len() {
         return Err(super::CUT_OFF.into());
     }
@@ -48,10 +48,10 @@ pub(super) fn decode(packed: &[u8], n: usize, stride: usize) -> Result<Vec<u8>, 
 
 struct Decoder<'b> {
     version: u8,
-    /// Kind of each four bytes of a vertex; none in version 0.
+    /// Kind of each four bytes of a vertex; empty in version 0.
     channels: &'b [u8],
     input: Input<'b>,
-    /// The last vertex of the block before.
+    /// The last vertex of the previous block.
     last: Vec<u8>,
 }
 
@@ -80,7 +80,7 @@ impl Decoder<'_> {
         Ok(())
     }
 
-    /// One byte of each of `n` vertices, as differences; `row` is as long in whole groups.
+    /// Decodes one byte of each of `n` vertices, as differences; `row` has room for whole groups.
     fn row(&mut self, row: &mut [u8], n: usize, control: u8) -> Result<(), String> {
         let widths = match (self.version, control) {
             (0, _) => [0, 2, 4, 8],
@@ -100,7 +100,7 @@ impl Decoder<'_> {
         Ok(())
     }
 
-    /// Sixteen bytes of `width` bits each; all ones stand for a whole byte that follows.
+    /// Decodes sixteen values of `width` bits each; all ones stand for a whole byte that follows.
     fn group(&mut self, group: &mut [u8], width: usize) -> Result<(), String> {
         match width {
             0 => {}
@@ -110,7 +110,7 @@ impl Decoder<'_> {
                 let escape = (1 << width) - 1;
                 let a_byte = 8 / width;
                 for (i, value) in group.iter_mut().enumerate() {
-                    // Single bits count from the lowest, pairs and fours from the highest.
+                    // Single bits are stored from the lowest, pairs and fours from the highest.
                     let slot = i % a_byte;
                     let slot = if width == 1 { slot } else { a_byte - 1 - slot };
                     *value = bits[i / a_byte] >> (slot * width) & escape;
@@ -124,7 +124,7 @@ impl Decoder<'_> {
     }
 }
 
-/// Adds the differences up: four bytes of each vertex.
+/// Sums the differences for four bytes of each vertex.
 fn add_up<'v>(
     rows: &[[u8; MAX_BLOCK]; 4],
     mut last: [u8; 4],
@@ -133,7 +133,7 @@ fn add_up<'v>(
 ) -> Result<(), String> {
     let unzigzag8 = |v: u8| (v >> 1) ^ (v & 1).wrapping_neg();
     let unzigzag16 = |v: u16| (v >> 1) ^ (v & 1).wrapping_neg();
-    // The rotation is stored as one to the left, which is taken back.
+    // The rotation is stored as one to the left; undo it.
     let turn = u32::from(channel >> 4);
     if channel & 3 == 3 {
         return Err(format!("unknown channel {channel:#04x}"));
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What the C++ library makes of vertices of `4 * N` bytes.
+    /// Encodes vertices of `4 * N` bytes with the C++ library.
     fn packed<const N: usize>(vertices: &[[u32; N]], version: i32) -> Vec<u8> {
         meshopt::encode_vertex_buffer_level(vertices, 3, Some(version)).unwrap()
     }
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn smooth_random_and_constant_vertices_come_back() {
-        // Smooth ones take all widths of groups and 16-bit channels, floats the rotated ones.
+        // Smooth vertices use all widths of groups and 16-bit channels, floats the rotated ones.
         let smooth: Vec<[u32; 3]> = (0..1000u32).map(|i| [i * 3, (i * i) & 0xFFFF, 7]).collect();
         check(&smooth);
         let floats: Vec<[u32; 4]> = (0..777u32)
