@@ -154,7 +154,7 @@ pub fn keep_bounds(world: &World, settings: &SimplifySettings) -> Bounded {
     };
     if settings.max_cost.is_some() {
         let counts = &mut out.world.graph.statistics.counts;
-        // Add to the cuts of earlier runs: they tell readers of the file that costs made portals.
+        // Add to the cuts of earlier runs: the count shows readers of the file that costs made portals.
         *counts.entry("cost_cuts".to_owned()).or_default() += out.n_cuts as f64;
         counts.insert("cells_over_cost".to_owned(), out.over.len() as f64);
     }
@@ -350,7 +350,7 @@ fn sides_of_box(b: &Aabb) -> Vec<Winding> {
     (0..6).map(side).collect()
 }
 
-/// Start of the sequence: 2⁶⁴ divided by the golden ratio; half of its bits are ones.
+/// Start of the sequence: 2⁶⁴ divided by the golden ratio.
 const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A fixed sequence of pseudo-random numbers (Marsaglia's xorshift).

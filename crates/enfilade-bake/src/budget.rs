@@ -8,8 +8,8 @@ use enfilade_geom::{Allowance, MemoryProbe};
 /// Limits on the resources of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
-    /// Memory. Voxels and points are as many as fit; a bake that needs more is refused before it begins. Default: 8
-    /// GiB, and less for few triangles: 2,000 of them get no more voxels or points than fit in 1 GiB. [Units: bytes]
+    /// Memory. Voxels and points are as many as fit; a bake that needs more is refused before it begins. Default:
+    /// 8 GiB, and less for few triangles: 2,000 of them get no more voxels or points than fit in 1 GiB. [Units: bytes]
     pub memory: Option<u64>,
     /// Time after which a bake is refused. Without it, a bake ends when its work is out of all proportion to its
     /// triangles and voxels, whatever the clock: the work of a minute for 2,000 triangles, and at least four times that

@@ -152,7 +152,7 @@ impl Lattice {
             }
         };
         if is_mixed {
-            // A single point is never mixed: its outermost points are one.
+            // A single point is never mixed: its outermost points coincide.
             let halves = if i1 - i0 >= j1 - j0 {
                 let m = (i0 + i1) / 2;
                 [[[i0, m], [j0, j1]], [[m + 1, i1], [j0, j1]]]

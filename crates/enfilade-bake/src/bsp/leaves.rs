@@ -62,7 +62,7 @@ impl Bsp<'_> {
         }
     }
 
-    /// Returns the way out from a point inside, if there are solids and it has one.
+    /// Returns the way out from a point inside, if there are solids and a leak.
     #[must_use]
     pub fn leak(&self) -> Option<&LeakPath> {
         self.leak.as_ref()

@@ -12,8 +12,8 @@ use super::standing::Standing;
 use crate::complex::Vote;
 use crate::structure::{Candidate, OUTDOORS, Opening, fit_candidate, is_inside};
 
-/// Tetrahedra this close to the border of two rooms do not vote: a candidate may lie on either side of them. [Units:
-/// wu]
+/// Tetrahedra this close to the border of two rooms do not vote: a candidate may lie on either side of them.
+/// [Units: wu]
 const UNSURE: f64 = 0.35;
 /// Tetrahedra with their middle this close to a wall do not vote: they may fill the space between two polygons that
 /// nearly touch. [Units: wu]

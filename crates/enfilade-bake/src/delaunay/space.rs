@@ -508,8 +508,8 @@ impl Space {
         link.n_vertices > 0 && width(&self.outline(link)) < self.crack
     }
 
-    /// Returns the area of an opening times its unit normal, which points from the first part to the second. [Units:
-    /// wu²]
+    /// Returns the area of an opening times its unit normal, which points from the first part to the second.
+    /// [Units: wu²]
     #[must_use]
     pub fn area_vector(&self, link: &Link) -> DVec3 {
         area_normal(&self.outline(link)) * 0.5

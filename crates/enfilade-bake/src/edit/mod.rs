@@ -167,7 +167,7 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         Uncut::Undivided(Undivided::Endless) => AddPortalError::Endless { at, cell },
         Uncut::TooNarrow => AddPortalError::TooNarrow { at },
     })?;
-    // The count tells readers of the file that no rule placed this portal.
+    // The count shows readers of the file that no rule placed its portals.
     let counts = &mut added.world.graph.statistics.counts;
     *counts.entry("edits".to_owned()).or_default() += 1.0;
     Ok(added)

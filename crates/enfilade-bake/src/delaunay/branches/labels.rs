@@ -65,7 +65,7 @@ impl Branches {
     }
 
     /// Returns the weight of an opening between two parts as a mouth, by their labels: the narrower branch ends there.
-    /// 0 within a branch, and if there is none.
+    /// 0 within a branch, and away from branches.
     pub(in super::super) fn weight(&self, [a, b]: [u32; 2]) -> f64 {
         if a == b {
             return 0.0;

@@ -96,8 +96,8 @@ impl<'a> TubeRegions<'a> {
         self.space.radii[t as usize].min(self.most)
     }
 
-    /// Returns the radius of the ball about the center of a part; 0 if it is infinite, and so has no center. [Units:
-    /// wu]
+    /// Returns the radius of the ball about the center of a part; 0 if it is infinite, and so has no center.
+    /// [Units: wu]
     pub(super) fn ball(&self, t: u32) -> f64 {
         let radius = self.space.radii[t as usize];
         if radius.is_finite() { radius } else { 0.0 }
