@@ -1,4 +1,4 @@
-//! The last stage: from the partition of space to a world that can be written.
+//! The last stage: builds a world from the partition of space.
 //!
 //! Structural triangles go to batches by the set of cells that see them and by material, so that
 //! each is stored, and drawn, once. Detail objects keep their identity and list the cells they touch.
@@ -21,7 +21,7 @@ use crate::complex::{Partition, PartitionPortal};
 use crate::layout::{Layout, layout_of};
 use crate::structure::Candidate;
 
-/// A scene in cells, whatever found them: what the last stage, which all builders share, is made from.
+/// A scene divided into cells: input of the last stage, which all builders share.
 pub(crate) struct Cut<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) sources: &'a [TriangleSource],
@@ -29,11 +29,11 @@ pub(crate) struct Cut<'a> {
     pub(crate) bvh: &'a Bvh,
     pub(crate) partition: Partition,
     pub(crate) candidates: &'a [Candidate],
-    /// Outlines are grown by this much, so that rounding never cuts into an opening. [Units: wu]
+    /// Distance by which outlines grow, so that rounding never cuts into an opening. [Units: wu]
     pub(crate) outward: f64,
     /// Share of an opening that a leaf or pane must fill to make a door of it.
     pub(crate) closed_share: f64,
-    /// What handing out spends from.
+    /// Allowance of work for this stage.
     pub(crate) allowance: &'a Allowance,
 }
 
@@ -113,10 +113,10 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     world
 }
 
-/// Pieces narrower than this are lost when their corners are rounded to `f32`. [Units: wu]
+/// Pieces narrower than this vanish when their vertices are rounded to `f32`. [Units: wu]
 const HAIR: f64 = 1e-5;
 
-/// The portal in its final form; `None` when nothing of it is wider than a rounding.
+/// Returns the portal in its final form; `None` if no piece is wider than the rounding.
 fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
     let p = &judged.portal;
     Some(Portal {
@@ -126,9 +126,9 @@ fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
     })
 }
 
-/// An open portal as a file holds it, its outline grown by `outward`; cells are for the caller to set.
+/// Returns an open portal as a file stores it, its outline grown by `outward`; the caller sets `cells`.
 ///
-/// `None` when nothing of it is wider than a rounding.
+/// `None` if no piece is wider than the rounding.
 pub(crate) fn rounded_portal(
     plane: &Plane,
     outline: &Winding,
@@ -175,12 +175,12 @@ pub(crate) fn rounded_portal(
     })
 }
 
-/// Corners nearer than this to the line between their neighbors are dropped from outlines, and
-/// outlines narrower than this become rectangles: rounding to `f32` turns short edges at will, and a
+/// Vertices nearer than this to the line between their neighbors are dropped from outlines, and
+/// narrower outlines become rectangles: rounding to `f32` turns short edges arbitrarily, and a
 /// turned edge makes a long outline concave. [Units: wu]
 const STRAIGHT: f64 = 2e-4;
 
-/// `outline` with its rim moved outward by at least `by`, still convex and in the plane, and with
+/// Returns `outline` with its rim moved outward by at least `by`: convex, in the plane, and with
 /// edges long enough to keep their directions in `f32`.
 fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
     let mut points = outline.points.clone();
@@ -204,8 +204,8 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
             i += 1;
         }
     }
-    // Each corner was near the edge that took its place when it went, but of a round outline one
-    // after the other goes, and the edges that are left pass the first ones further off.
+    // Each dropped vertex was near the edge that replaced it. But a round outline loses one vertex after
+    // another, and the remaining edges pass the first ones farther off.
     let n = points.len();
     let cut_off = (0..n)
         .filter_map(|i| {
@@ -230,14 +230,14 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
             })
     };
     let ((u0, u1), (v0, v1)) = (range(u), range(v));
-    // Each edge moves out along its own normal; corners go to where the moved edges meet.
+    // Each edge moves out along its own normal; vertices move to where the moved edges meet.
     let moved: Option<Vec<DVec3>> = (0..n)
         .map(|i| {
             let (a, p, b) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
             let (e, f) = ((p - a).try_normalize()?, (b - p).try_normalize()?);
             let (m, n) = (e.cross(plane.normal), f.cross(plane.normal));
             let cos_half_squared = (1.0 + m.dot(n)) * 0.5;
-            // Corners sharper than 20 degrees would run far off.
+            // Vertices sharper than 20 degrees would move too far.
             (cos_half_squared > 0.03).then(|| p + (m + n) * (by * 0.5 / cos_half_squared))
         })
         .collect();
@@ -256,17 +256,17 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
     }
 }
 
-/// What it costs to judge a portal and to find the cells of a triangle, in units of [`Allowance`].
+/// Costs of judging a portal and of finding the cells of a triangle, in units of [`Allowance`].
 const WORK_A_PORTAL: u64 = 50;
 const WORK_A_TRIANGLE: u64 = 10;
 
-/// Parapets higher than this make a window of an opening. [Units: wu]
+/// Least height of a parapet that makes an opening a window. [Units: wu]
 const PARAPET: f64 = 0.4;
 
-/// Least height of a door: a lower opening that a pane or leaf fills is a window. [Units: wu]
+/// Least height of a door: a lower opening with a pane or leaf is a window. [Units: wu]
 const LEAST_DOOR: f64 = 1.5;
 
-/// The kind of a portal, and whether its lower edge is at a floor.
+/// Returns the kind of a portal, and `true` if its lower edge is at a floor.
 fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
         return (PortalKind::Crack, false);
@@ -289,7 +289,8 @@ fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     (kind, is_upright && !has_sill)
 }
 
-/// Height of an upright opening's lower edge over the ground half a meter away, on the higher side. [Units: wu]
+/// Returns the height of an upright opening's lower edge over the ground half a meter away, on the higher side.
+/// [Units: wu]
 fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
     let n = p.plane.normal;
     let center = p.outline.centroid();
@@ -312,7 +313,7 @@ fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
 struct BatchBuilder {
     primitive: Primitive,
     vertices: HashMap<(u32, u32, u32), u32>,
-    /// Of those of its triangles that have one.
+    /// Sources of its triangles, where known.
     sources: SourceRuns,
 }
 
@@ -378,7 +379,7 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         .collect()
 }
 
-/// A direction moved by `by` and made unit length again; left as it was where that fails.
+/// Returns a direction moved by `by` and normalized; unchanged if that fails.
 fn turned(n: [f32; 3], by: impl Fn(DVec3) -> DVec3) -> [f32; 3] {
     let v = DVec3::new(n[0].into(), n[1].into(), n[2].into());
     by(v).try_normalize().map_or(n, |v| v.as_vec3().to_array())
@@ -423,7 +424,7 @@ fn details(
     (out, meshes)
 }
 
-/// The cells that an object's triangles touch; when all of it is buried in solid matter (a door
+/// Returns the cells that an object's triangles touch; for an object buried in solid matter (a door
 /// frame in its wall), the cells around it.
 fn cells_of_object(
     scene: &Scene,
@@ -473,7 +474,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Corners on an arc lie near the lines between their neighbors, all of them.
+        /// Vertices on an arc all lie near the lines between their neighbors.
         #[test]
         fn a_grown_outline_goes_around_the_outline(
             n in 3..200_usize,

@@ -1,7 +1,7 @@
 //! The main flow: scene → structure → proposal → world.
 //!
-//! Read this first. A method proposes where rooms and their openings are; [`realize`](crate::realize) makes that exact, in
-//! the same way for all of them, so that the promises hold whatever a method missed.
+//! Read this first. A method proposes rooms and openings; [`realize`](crate::realize) makes them exact, in the same way
+//! for all methods, so that the promises hold even where a method missed something.
 
 use enfilade_geom::scene::Scene;
 
@@ -13,12 +13,12 @@ use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, bsp, delauna
 
 /// Finds the rooms and doorways of a scene.
 ///
-/// Deterministic: equal input and settings give an equal world on any number of threads. For time and memory see the
-/// methods.
+/// Deterministic: equal input and settings give an equal world on any number of threads. Time and memory depend on the
+/// method; see its module.
 ///
 /// # Errors
-/// When there is nothing structural, a setting is out of limits, a cost is given for a material that the scene has not, the
-/// scene is too large for the budget of voxels, or the caller cancels.
+/// If nothing is structural, a setting is out of limits, a cost names a material that the scene does not have, the
+/// scene exceeds the voxel budget, or the caller cancels.
 pub fn bake(
     scene: &Scene,
     config: &BakeConfig,
@@ -32,26 +32,26 @@ pub fn bake(
     if config.method == Method::Auto && finds_little && is_vessel(scene) {
         let n = ["no cell", "one cell"][baked.n_indoors()];
         let reason = format!(
-            "the surface is curved and closed but for its ends, and the watershed finds {n} in it; tetrahedra find \
-             branches, too"
+            "the surface is curved and closed except at its ends, and the watershed finds {n} in it; the Delaunay \
+             builder also finds branches"
         );
         let other = bake_by(Method::Delaunay, &reason, scene, config, context)?;
         if other.n_indoors() > baked.n_indoors() {
             baked = other;
         } else {
-            let note = "tetrahedra find no more cells either: the watershed's are kept";
+            let note = "the Delaunay builder finds no more cells: those of the watershed are kept";
             baked.notes.push(note.to_owned());
         }
     }
     if baked.method != Method::Delaunay && config.delaunay.has_choices() {
-        let note = "the choices were not asked: they are about portals of the Delaunay builder";
+        let note = "`choices` ignored: they apply only to the Delaunay builder";
         baked.notes.push(note.to_owned());
     }
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
     Ok(baked)
 }
 
-/// Bakes by one method.
+/// Bakes with one method.
 fn bake_by(
     method: Method,
     reason: &str,

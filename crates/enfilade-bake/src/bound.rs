@@ -1,14 +1,13 @@
-//! Cells within bounds on what drawing them costs: those above are cut, those below merged.
+//! Keeps the drawing cost of cells within bounds: cuts cells above the bound, and merges cells below it.
 //!
-//! After Lefebvre & Hornus 2003, §2.1 step 4 and §3: cells above the bound are cut first, since merging never makes a
-//! cell cheaper, and by the same [`CostModel`]. A cut is a plane; of planes of the cell's own polygons, of the axes and
-//! of any direction the one counts whose dearer side is cheapest.
+//! After Lefebvre & Hornus 2003, §2.1 step 4 and §3, with the same [`CostModel`]: cells above the bound are cut first,
+//! since merging never makes a cell cheaper. A cut is a plane. The candidates are planes of the cell's own polygons,
+//! axis-aligned planes and planes of any direction; the one whose dearer side is cheapest is used.
 //!
-//! Where it departs from the paper: it is the finished world that is cut ([`crate::edit`]), so that the bound holds
-//! whatever built it, and what counts is what each part really sees. The planes of polygons take the place of portals
-//! of the tree that are in no separator: those lie in the same planes. The outdoors has no walls to be cut from to, and
-//! what lies beyond the scene's box is one; where asked, the air within the box is parted from the air beyond, and
-//! then cut like any cell.
+//! Departures from the paper: the finished world is cut ([`crate::edit`]), so that the bound holds for every builder,
+//! and each part's cost is that of what it really sees. Planes of polygons replace the tree's portals that belong to no
+//! separator: those lie in the same planes. The outdoors has no walls to cut along, and beyond the scene's box it is
+//! one piece; on request, the air within the box is separated from the air beyond, and then cut like any cell.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -23,28 +22,28 @@ use crate::simplify::{
     CostModel, SimplifySettings, Surface, cost_of_cell, costs, simplify, surfaces_of,
 };
 
-/// Planes tried of each kind for each cut.
+/// Planes of each kind tried for each cut.
 const TRIES: usize = 12;
-/// Of those, so many are tried on the world itself. What a plane is chosen by is a bound from above, so the first is
-/// mostly good.
+/// Planes tried on the world itself, best first. The order is by an upper bound on the cost, so the first usually
+/// works.
 const CUTS_TRIED: usize = 4;
-/// What both parts of a cut may cost, as a share of the whole: more is no gain, and cuts would not end.
+/// Greatest cost of each part of a cut, as a share of the whole: more gains nothing, and cuts would not end.
 const GAIN: f64 = 0.9;
-/// Cuts of one cell at most, times the parts that even cuts would make.
+/// Greatest number of cuts of one cell, as a multiple of the parts that even cuts would make.
 const CUTS_PER_PART: f64 = 4.0;
 
-/// A world, and which of its cells are within the bounds.
+/// A world, and how its cells meet the bounds.
 #[derive(Clone, Debug)]
 pub struct Bounded {
     /// The world.
     pub world: World,
-    /// How many cuts were made.
+    /// Number of cuts made.
     pub n_cuts: usize,
-    /// The upper bound that was asked for.
+    /// The requested upper bound.
     pub bound: Option<f64>,
     /// Least and greatest cost of a cell.
     pub costs: [f64; 2],
-    /// Cells above the bound, the dearest first.
+    /// Cells above the bound, dearest first.
     pub over: Vec<Over>,
 }
 
@@ -53,41 +52,41 @@ pub struct Bounded {
 pub struct Over {
     /// The cell.
     pub cell: CellId,
-    /// What it costs.
+    /// Its cost.
     pub cost: f64,
-    /// Why it was not cut.
+    /// The reason why it was not cut.
     pub reason: Reason,
 }
 
-/// Why a cell above the bound was not cut.
+/// The reason why a cell above the bound was not cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// It is the outdoors, and that was not asked for.
+    /// It is the outdoors, and cutting that was not requested.
     Outdoors,
-    /// One object in it costs more by itself, and no plane that was tried makes both parts cheaper by a tenth.
+    /// One object in it exceeds the bound by itself, and no plane tried makes both parts cheaper by a tenth.
     Object,
-    /// No plane that was tried makes both its parts cheaper by a tenth: what it sees is seen from all of it.
+    /// No plane tried makes both parts cheaper by a tenth: the same things are seen from all of it.
     Shared,
-    /// It was cut more often than a bound takes that can be met.
+    /// It needs more cuts than any attainable bound.
     ManyCuts,
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Outdoors => "it is the outdoors, which is cut only where asked (split_outdoors)",
+            Self::Outdoors => "it is the outdoors, which is cut only on request (split_outdoors)",
             Self::Object => "one object in it costs more by itself",
-            Self::Shared => "no plane that was tried leaves both parts cheaper by a tenth",
-            Self::ManyCuts => "it is in too many parts already",
+            Self::Shared => "no plane tried makes both parts cheaper by a tenth",
+            Self::ManyCuts => "it is cut into too many parts already",
         })
     }
 }
 
-/// Cells above the bound that a note tells of one by one.
+/// Cells above the bound that a note lists.
 const TOLD: usize = 5;
 
 impl Bounded {
-    /// What could not be met, in words; `None` where all was.
+    /// Returns a message about the bounds that are not met; `None` if all are.
     #[must_use]
     pub fn note(&self) -> Option<String> {
         let bound = self.bound?;
@@ -120,8 +119,8 @@ impl Bounded {
 
 /// Cuts the cells of a world that cost more than the upper bound, then merges cells as [`simplify`] does.
 ///
-/// Every promise is kept. Deterministic for any number of threads. Time: for each cut that of a bake of the one cell,
-/// a few times where cuts fail, and a look at the whole world.
+/// Keeps every promise. Deterministic for any number of threads. Time: for each cut, a bake of the one cell (several if
+/// cuts fail) and a pass over the whole world.
 #[must_use]
 pub fn keep_bounds(world: &World, settings: &SimplifySettings) -> Bounded {
     let mut cutting = Cutting {
@@ -155,14 +154,15 @@ pub fn keep_bounds(world: &World, settings: &SimplifySettings) -> Bounded {
     };
     if settings.max_cost.is_some() {
         let counts = &mut out.world.graph.statistics.counts;
-        // Of all times: whoever reads the file knows by it that portals were made by costs.
+        // Add to the cuts of earlier runs: the count shows readers of the file that costs made portals.
         *counts.entry("cost_cuts".to_owned()).or_default() += out.n_cuts as f64;
         counts.insert("cells_over_cost".to_owned(), out.over.len() as f64);
     }
     out
 }
 
-/// Keeps a baked world within bounds, where any are given, and says in the notes and in the file's provenance which.
+/// Keeps a baked world within bounds, if any are given. Adds unmet ones to the notes, and the settings to the
+/// provenance.
 pub(crate) fn keep_costs(world: &mut World, notes: &mut Vec<String>, asked: &SimplifySettings) {
     let nothing = SimplifySettings {
         cost: asked.cost.clone(),
@@ -188,7 +188,7 @@ struct Cutting<'a> {
 }
 
 impl Cutting<'_> {
-    /// Cuts a cell and its parts until none costs more than `bound`, as far as that helps.
+    /// Cuts a cell and its parts until none costs more than `bound`, as long as cuts help.
     fn cut(&mut self, cell: CellId, bound: f64, settings: &SimplifySettings) {
         let cost_of = |world: &World, cell| cost_of_cell(world, cell, &settings.cost);
         let parts = cost_of(&self.world, cell) / bound;
@@ -211,7 +211,7 @@ impl Cutting<'_> {
                     self.world = Cow::Owned(added.world);
                     self.n_cuts += 1;
                     n_left = n_left.saturating_sub(1);
-                    // What is beyond the scene's box is cut no further.
+                    // The part beyond the scene's box is not cut further.
                     if is_outdoor && cost_of(&self.world, cell) > bound {
                         self.over.insert(cell, Reason::Shared);
                     }
@@ -225,7 +225,7 @@ impl Cutting<'_> {
         }
     }
 
-    /// The world with a cell cut by the plane that leaves its dearer part cheapest, of those tried.
+    /// Returns the world with a cell cut by the plane, of those tried, that leaves its dearer part cheapest.
     fn halve(
         &mut self,
         cell: CellId,
@@ -237,7 +237,7 @@ impl Cutting<'_> {
         let boxed = &self.world.graph[cell].aabb;
         let [min, max] = boxed.map(|p| DVec3::from(p.map(f64::from)));
         let extent = min.abs().max(max.abs()).max_element();
-        // Beyond what corners are rounded by.
+        // Beyond the rounding of vertices.
         let around = Aabb::new(min, max).expanded((1e-5 * extent).max(1e-4));
         let mut planes: Vec<(f64, Plane)> = self
             .planes(&surfaces)
@@ -253,7 +253,7 @@ impl Cutting<'_> {
             let added = cut_cell(&self.world, cell, candidates, &distance).ok()?;
             let parts = [added.cell, added.new_cell];
             let is_gain = |&c: &CellId| cost_of_cell(&added.world, c, model) <= GAIN * cost;
-            // A plane that grazes a portal may leave of it less than rounding does.
+            // A plane that grazes a portal may leave a sliver of it that rounding removes.
             (parts.iter().all(is_gain) && added.world.validate().is_ok()).then_some(added)
         };
         let found = planes
@@ -277,7 +277,7 @@ impl Cutting<'_> {
                 let normal = (b - a).cross(c - a).try_normalize();
                 out.extend(normal.map(|n| Plane::through(a, n)));
             }
-            // Where there is more to draw there are more places to cut.
+            // More geometry offers more places to cut.
             let place = &surfaces[random.below(surfaces.len())].corners;
             let middle = place.iter().sum::<DVec3>() / place.len() as f64;
             let axis = [DVec3::X, DVec3::Y, DVec3::Z][random.below(3)];
@@ -289,7 +289,7 @@ impl Cutting<'_> {
     }
 }
 
-/// What the dearer side of a plane costs at most.
+/// Returns an upper bound on the cost of the dearer side of a plane.
 fn dearer_side(surfaces: &[Surface], plane: &Plane) -> f64 {
     let mut sides = [0.0; 2];
     for s in surfaces {
@@ -306,8 +306,8 @@ fn dearer_side(surfaces: &[Surface], plane: &Plane) -> f64 {
     sides[0].max(sides[1])
 }
 
-/// The world with the outdoors within the scene's box parted from what is beyond, by the sides of a box halfway between
-/// the scene and the border of what is known. The part beyond keeps the number; `None` where there is no room.
+/// Returns the world with the outdoors within the scene's box separated from the rest, by the sides of a box halfway
+/// between the scene and the border of the known space. The part beyond keeps the number. `None` if there is no room.
 fn cut_outdoors(world: &World, cell: CellId) -> Option<Added> {
     let points = world.batches.iter().flat_map(|b| &b.primitive.positions);
     let scene = points.fold(Aabb::EMPTY, |b, p| {
@@ -350,10 +350,10 @@ fn sides_of_box(b: &Aabb) -> Vec<Winding> {
     (0..6).map(side).collect()
 }
 
-/// Where the sequence begins: 2⁶⁴ by the golden ratio, as many ones as zeros.
+/// Start of the sequence: 2⁶⁴ divided by the golden ratio.
 const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A fixed sequence of numbers that look random (Marsaglia's xorshift).
+/// A fixed sequence of pseudo-random numbers (Marsaglia's xorshift).
 struct Sequence(u64);
 
 impl Sequence {

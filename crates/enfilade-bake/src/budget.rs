@@ -1,49 +1,51 @@
-//! What a bake may take, and how much work a scene is worth.
+//! Limits on the resources of a bake, and the work that a scene is worth.
 
 use std::time::{Duration, Instant};
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Allowance, MemoryProbe};
 
-/// What a bake may take.
+/// Limits on the resources of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
-    /// Memory. Voxels and points are as many as fit; a bake that cannot do with that is refused before it begins. If not
-    /// given, 8 GiB, and less for few triangles: those of 2,000 get no more voxels or points than fit 1 GiB. [Units: bytes]
+    /// Memory. Voxels and points are as many as fit; a bake that needs more is refused before it begins. Default:
+    /// 8 GiB, and less for few triangles: 2,000 of them get no more voxels or points than fit in 1 GiB. [Units: bytes]
     pub memory: Option<u64>,
-    /// Time, after which a bake is refused. Without it, a bake ends where its work is out of all proportion to its
-    /// triangles and voxels, which depends on no clock: what a minute does for 2,000 triangles, and four times or more what
-    /// ordinary scenes take.
+    /// Time after which a bake is refused. Without it, a bake ends when its work is out of all proportion to its
+    /// triangles and voxels, whatever the clock: the work of a minute for 2,000 triangles, and at least four times that
+    /// of ordinary scenes.
     pub time: Option<Duration>,
-    /// When that time began; with the bake if not given.
+    /// Start of that time; the start of the bake if not given.
     pub began: Option<Instant>,
-    /// Work, in units of about 100 ns: where a bake ends then depends on no clock. If neither this nor a time is given, it is
-    /// what the triangles and voxels are worth.
+    /// Work, in units of about 100 ns; the end of a bake then depends on no clock. Default, unless a time is given: the
+    /// work that the triangles and voxels are worth.
     pub work: Option<u64>,
 }
 
-/// Memory that a bake may take if nothing is said. [Units: bytes]
+/// Default limit of a bake's memory. [Units: bytes]
 const MEMORY: u64 = 8 << 30;
 
-/// Work that any scene is worth, and each triangle of it more, in units of [`Allowance`]. Of real scenes those that take most
-/// of it, a house by tetrahedra and a vessel by the partition, take a quarter; by the watershed none takes more than a tenth.
+/// Work that any scene is worth, and additional work for each triangle, in units of [`Allowance`]. The most expensive
+/// real scenes, a house by tetrahedra and a vessel by the partition, take a quarter of it; by the watershed, none takes
+/// more than a tenth.
 const WORK: u64 = 400_000_000;
 const WORK_A_TRIANGLE: u64 = 200_000;
 
-/// Work that each voxel is worth besides.
+/// Additional work for each voxel.
 const WORK_A_VOXEL: u64 = 5;
 
-/// Voxels that any scene is worth, and each triangle of it more: a few triangles far apart are not worth gigabytes.
+/// Voxels that any scene is worth, and additional ones for each triangle: a few triangles far apart are not worth
+/// gigabytes.
 const VOXELS: f64 = 120e6;
 const VOXELS_A_TRIANGLE: f64 = 50e3;
 
-/// Memory that points of any scene are worth, and those of each triangle more. Of six real buildings none takes more than four
-/// fifths of it. [Units: bytes]
+/// Memory that points of any scene are worth, and additional memory for each triangle. None of six real buildings takes
+/// more than four fifths of it. [Units: bytes]
 const POINT_BYTES: u64 = 800_000_000;
 const POINT_BYTES_A_TRIANGLE: u64 = 100_000;
 
 impl Budget {
-    /// What a bake of so many triangles may spend. Memory is watched where there is a probe.
+    /// Returns the allowance of a bake of so many triangles. Memory is watched if there is a probe.
     #[must_use]
     pub fn allowance(&self, n_triangles: usize, probe: Option<MemoryProbe>) -> Allowance {
         let work = match (self.work, self.time) {
@@ -51,7 +53,7 @@ impl Budget {
             (None, Some(_)) => u64::MAX,
             (None, None) => WORK + WORK_A_TRIANGLE * n_triangles as u64,
         };
-        // What is too long to be counted is no bound.
+        // A time too long to be represented is not a bound.
         let began = self.began.unwrap_or_else(Instant::now);
         let until = self.time.and_then(|t| began.checked_add(t));
         let allowance = Allowance::new(work, until);
@@ -61,12 +63,12 @@ impl Budget {
         }
     }
 
-    /// Work that so many voxels are worth besides.
+    /// Returns the additional work for so many voxels.
     pub(crate) fn work_of_voxels(&self, n_voxels: u64) -> u64 {
         self.work.map_or(WORK_A_VOXEL * n_voxels, |_| 0)
     }
 
-    /// Most voxels of `bytes_each` for so many triangles.
+    /// Returns the largest number of voxels of `bytes_each` for so many triangles.
     pub(crate) fn voxels(&self, n_triangles: usize, bytes_each: f64) -> f64 {
         let worth = VOXELS + VOXELS_A_TRIANGLE * n_triangles as f64;
         match self.memory {
@@ -75,14 +77,14 @@ impl Budget {
         }
     }
 
-    /// Most points of `bytes_each` on surfaces of so many triangles, but for corners.
+    /// Returns the largest number of points of `bytes_each` on surfaces of so many triangles, not counting vertices.
     pub(crate) fn points(&self, n_triangles: usize, bytes_each: u64) -> usize {
         let worth = POINT_BYTES + POINT_BYTES_A_TRIANGLE * n_triangles as u64;
         (self.memory.unwrap_or(worth.min(MEMORY)) / bytes_each) as usize
     }
 }
 
-/// Structural triangles of a scene.
+/// Returns the number of structural triangles of a scene.
 pub(crate) fn n_structural(scene: &Scene) -> usize {
     let structural = scene.objects.iter().filter(|o| o.role == Role::Structural);
     let of_object = |o: &enfilade_geom::scene::Object| {
@@ -154,7 +156,7 @@ mod tests {
     #[test]
     fn what_a_scene_is_worth_grows_with_its_triangles() {
         let budget = Budget::default();
-        // Those of 2,000 triangles fit a gibibyte.
+        // The voxels of 2,000 triangles fit in a gibibyte.
         assert!(budget.voxels(2000, 3.0) * 3.0 < f64::from(1 << 30));
         assert!(budget.voxels(50_000, 3.0) > 1.6e9);
         assert!(budget.points(50_000, 5000) >= 1_000_000);

@@ -1,4 +1,4 @@
-//! What can be chosen, and the resolved form that the stages work with.
+//! Settings of a bake, and the resolved form that the stages use.
 
 use std::collections::BTreeMap;
 
@@ -11,33 +11,32 @@ use crate::structure::MergeSettings;
 use crate::voxel::Grid;
 use crate::{BakeError, Budget, Method};
 
-/// Settings of a bake. The defaults are meant for everything; none is tuned to a scene.
+/// Settings of a bake. The defaults are meant for every scene; none is tuned to one.
 #[derive(Clone, Debug)]
 pub struct BakeConfig {
-    /// How cells are found.
+    /// The method that finds cells.
     pub method: Method,
     /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: above 0]
     pub min_opening: f64,
-    /// Narrower openings are closed by seals. [Units: wu]
+    /// Width below which openings are closed by seals. [Units: wu]
     pub smallest_hole: SmallestHole,
-    /// Where rooms end.
+    /// Settings that decide where rooms end.
     pub merge: MergeSettings,
-    /// Bounds on the cells, and what a cell costs; nothing is bounded if not given.
+    /// Bounds on the cost of cells, and the model of costs; no bounds by default.
     pub costs: SimplifySettings,
-    /// Watershed: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. One that does not fit
-    /// the budget is refused.
-    /// [Units: wu] [Limit: above 0]
+    /// Watershed: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. An edge
+    /// that does not fit the budget is refused. [Units: wu] [Limit: above 0]
     pub voxel: Option<f64>,
-    /// Watershed: most voxels; a larger scene gets larger voxels, up to the width of the narrowest opening, and
-    /// beyond that an error. About 3 bytes each. [Limit: at least 1,000]
+    /// Watershed: most voxels. A larger scene gets larger voxels, up to the width of the narrowest opening; beyond
+    /// that, the bake fails. About 3 bytes each. [Limit: at least 1,000]
     pub max_voxels: usize,
-    /// What a bake may take.
+    /// Limits on the resources of a bake.
     pub budget: Budget,
     /// Watershed: basins shallower than this are noise. [Units: wu]
     pub noise: f64,
-    /// What only the binary space partition asks.
+    /// BSP-only settings.
     pub bsp: BspConfig,
-    /// What only tetrahedra ask.
+    /// Delaunay-only settings.
     pub delaunay: DelaunayConfig,
 }
 
@@ -59,18 +58,19 @@ impl Default for BakeConfig {
     }
 }
 
-/// Openings through which no ball of this diameter passes are gaps, which join no rooms. [Units: wu]
+/// Diameter of balls that decides on gaps: an opening that no such ball passes is a gap and joins no rooms. [Units: wu]
 ///
-/// The default of 10 mm is wider than what exporters, scanners and hurried hands leave between surfaces that are meant to
-/// touch, and narrower than what anybody looks or shoots through.
+/// The default of 10 mm is wider than the gaps that exporters, scanners and hasty modeling leave between surfaces that
+/// are meant to touch, and narrower than any opening to look or shoot through.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SmallestHole {
-    /// Sealed gaps of 10 mm, or wider ones in a model whose triangles miss each other by more.
+    /// Seals gaps of 10 mm, or wider ones in a model whose triangles miss each other by more.
     #[default]
     Auto,
-    /// Gaps are closed by seals, polygons that are matter to every consumer of the world.
+    /// Closes gaps by seals, polygons that are matter to every consumer of the world.
     Sealed(f64),
-    /// Gaps stay open, as portals of kind crack. What is a gap is told by this, and which rooms there are, too.
+    /// Leaves gaps open, as portals of kind crack. The width still decides which openings are gaps, and so which rooms
+    /// there are.
     Open(f64),
 }
 
@@ -85,14 +85,14 @@ impl std::fmt::Display for SmallestHole {
 }
 
 impl SmallestHole {
-    /// What [`SmallestHole::Auto`] is in a model whose triangles fit. [Units: wu]
+    /// Width of [`SmallestHole::Auto`] in a model whose triangles fit. [Units: wu]
     pub const LEAST: f64 = 0.01;
-    /// Upper bound of the automatic width: through wider slits one sees. [Units: wu]
+    /// Upper bound of the automatic width: wider slits can be seen through. [Units: wu]
     const MOST: f64 = 0.05;
-    /// Ratio of the widest slits, which are where several triangles meet, to the width that nearly all stay below.
+    /// Ratio of the widest slits, where several triangles meet, to the width that nearly all stay below.
     const SPREAD: f64 = 3.0;
 
-    /// As users say it: 0 leaves gaps open.
+    /// Returns the setting for a width given by the user: 0 leaves gaps open.
     #[must_use]
     pub fn of_width(width: f64) -> Self {
         if width == 0.0 {
@@ -102,7 +102,7 @@ impl SmallestHole {
         }
     }
 
-    /// What it is for a model whose triangles miss each other by `misfit`, nearly all of them. [Units: wu]
+    /// Resolves `Auto` for a model in which nearly all triangles miss each other by at most `misfit`. [Units: wu]
     #[must_use]
     pub(crate) fn resolved(self, misfit: f64) -> Self {
         match self {
@@ -111,7 +111,7 @@ impl SmallestHole {
         }
     }
 
-    /// The widest gap. [Units: wu]
+    /// Returns the width of the widest gap. [Units: wu]
     #[must_use]
     pub fn gap(self) -> f64 {
         match self {
@@ -120,7 +120,7 @@ impl SmallestHole {
         }
     }
 
-    /// Whether gaps are closed.
+    /// Returns `true` if gaps are closed.
     #[must_use]
     pub fn has_seals(self) -> bool {
         !matches!(self, Self::Open(_))
@@ -143,7 +143,7 @@ impl SmallestHole {
 pub(crate) const PADDING: usize = 10;
 
 impl BakeConfig {
-    /// The defaults for one method.
+    /// Returns the defaults for one method.
     #[must_use]
     pub fn of(method: Method) -> Self {
         Self {
@@ -152,7 +152,7 @@ impl BakeConfig {
         }
     }
 
-    /// What the watershed goes by, each setting as text by its name, for the provenance of the file.
+    /// Returns the settings of the watershed as text, by name, for the provenance of the file.
     pub(crate) fn watershed_settings(&self) -> BTreeMap<String, String> {
         let m = &self.merge;
         [
@@ -183,10 +183,10 @@ impl BakeConfig {
         positive("min_opening", self.min_opening).map(|_| ())
     }
 
-    /// The grid for a scene of so many triangles within these bounds. All checks of settings live here.
+    /// Returns the grid for a scene of so many triangles within these bounds. All checks of settings are here.
     ///
     /// # Errors
-    /// When a setting is out of its limits, or the budget leaves voxels that no opening fits, or wider ones than were asked for.
+    /// If a setting is out of its limits, or the budget allows only voxels wider than openings or than requested.
     pub(crate) fn grid(&self, bounds: &Aabb, n_triangles: usize) -> Result<Grid, BakeError> {
         positive("min_opening", self.min_opening)?;
         self.smallest_hole.check()?;
@@ -201,14 +201,14 @@ impl BakeConfig {
         let mut voxel = wanted;
         let most = self.budget.voxels(n_triangles, BYTES_A_VOXEL);
         let most = most.min(self.max_voxels as f64);
-        // Growing by a tenth at a time ends close below the budget.
-        // Past the scene's size nothing but padding is left, which may still be too much.
+        // Growing by a tenth at a time ends close below the budget. Past the scene's size only padding is left, which
+        // may still be too much.
         let widest = wanted.max(bounds.size().max_element());
         while n_voxels(bounds, voxel) > most && voxel <= widest.max(self.min_opening) {
             voxel *= 1.1;
         }
         if self.voxel.is_some() {
-            // Finer than what corners are stored to, voxels tell nothing.
+            // Voxels finer than `f32` precision carry no information.
             let corners = bounds.min.abs().max(bounds.max.abs());
             let finest = voxel.max(corners.max_element() * f64::from(f32::EPSILON));
             if wanted < finest {
@@ -304,7 +304,7 @@ mod tests {
             memory: Some(u64::MAX / 2),
             ..Budget::default()
         };
-        // The last are beyond what any memory holds, and what `f32` tells apart.
+        // The last ones exceed any memory, and the precision of `f32`.
         for (voxel, budget) in [
             (1e-5, Budget::default()),
             (1e-7, rich),

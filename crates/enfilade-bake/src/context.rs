@@ -1,4 +1,4 @@
-//! What surrounds a bake: progress, stage times and the wish to stop.
+//! The context of a bake: progress, stage times and cancellation.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard};
@@ -8,38 +8,38 @@ use enfilade_geom::{Allowance, End, MemoryProbe};
 
 use crate::{BakeError, Budget, Method, Resolution, Stage};
 
-/// Memory of the complex for each structural triangle, more or less. [Units: bytes]
+/// Approximate memory of the complex for each structural triangle. [Units: bytes]
 const BYTES_A_TRIANGLE: f64 = 5e3;
 
-/// Hears of a bake's progress.
+/// Receives the progress of a bake.
 pub trait Progress: Sync {
-    /// A method begins; [`Method::Auto`] may ask for a second one after the first.
+    /// Called when a method begins; [`Method::Auto`] may use a second one after the first.
     fn method(&self, _method: Method, _reason: &str) {}
 
-    /// A stage begins.
+    /// Called when a stage begins.
     fn stage(&self, stage: Stage);
 
-    /// How fine the scene will be looked at, and the memory that this takes; told before it is taken. [Units: bytes]
+    /// Receives the resolution of a bake and the memory that it takes, before it is taken. [Units: bytes]
     fn resolution(&self, _resolution: Resolution, _memory: f64) {}
 }
 
-/// Nobody listens.
+/// Ignores all progress.
 pub struct Silent;
 
 impl Progress for Silent {
     fn stage(&self, _stage: Stage) {}
 }
 
-/// What the stages so far took.
+/// Time and work of the stages so far.
 #[derive(Default)]
 struct Stages {
     times: Vec<(Stage, Duration)>,
     work: Vec<(Stage, u64)>,
-    /// The stage under way, when it began, and what was spent before.
+    /// The current stage, its start, and the work spent before.
     running: Option<(Stage, Instant, u64)>,
 }
 
-/// Carried through a bake. Threads come from the rayon pool that the bake is called in.
+/// State carried through a bake. Threads come from the rayon pool in which the bake is called.
 pub struct BakeContext<'a> {
     progress: &'a dyn Progress,
     cancel: Option<&'a AtomicBool>,
@@ -50,7 +50,7 @@ pub struct BakeContext<'a> {
     n_triangles: usize,
 }
 
-/// Tells nobody, and is not stopped.
+/// Ignores progress, and cannot be canceled.
 impl Default for BakeContext<'_> {
     fn default() -> Self {
         Self::new(&Silent, None)
@@ -58,7 +58,7 @@ impl Default for BakeContext<'_> {
 }
 
 impl<'a> BakeContext<'a> {
-    /// A context that tells `progress` and stops when `cancel` becomes true.
+    /// Makes a context that reports to `progress` and stops when `cancel` becomes true.
     #[must_use]
     pub fn new(progress: &'a dyn Progress, cancel: Option<&'a AtomicBool>) -> Self {
         Self {
@@ -72,14 +72,14 @@ impl<'a> BakeContext<'a> {
         }
     }
 
-    /// Adds what tells the memory that the process holds: a bake ends then when it holds more than [`Budget::memory`].
+    /// Adds a probe of the process's memory: a bake then ends when that exceeds [`Budget::memory`].
     #[must_use]
     pub fn measured_by(mut self, probe: MemoryProbe) -> Self {
         self.probe = Some(probe);
         self
     }
 
-    /// A context of its own for a bake of so many triangles, within a budget.
+    /// Makes a context for a bake of so many triangles, within a budget.
     pub(crate) fn within(&self, budget: &Budget, n_triangles: usize) -> Self {
         Self {
             allowance: budget.allowance(n_triangles, self.probe),
@@ -90,15 +90,15 @@ impl<'a> BakeContext<'a> {
         }
     }
 
-    /// What long loops may spend; once it is over, the next stage does not begin.
+    /// Returns the allowance for long loops; once it is spent, the next stage does not begin.
     pub(crate) fn allowance(&self) -> &Allowance {
         &self.allowance
     }
 
-    /// Whether to go on with what is under way.
+    /// Checks if the bake may go on.
     ///
     /// # Errors
-    /// When the caller cancels, and when the budget is spent.
+    /// If the caller cancels, or the budget is spent.
     pub(crate) fn check(&self) -> Result<(), BakeError> {
         if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Err(BakeError::Cancelled);
@@ -135,13 +135,14 @@ impl<'a> BakeContext<'a> {
         self.begin(Stage::Structure)
     }
 
-    /// Tells how fine the scene will be looked at, and grants the work that its voxels are worth.
+    /// Reports the resolution, and grants the work that its voxels are worth.
     pub(crate) fn tell(&self, resolution: Resolution, memory: f64) {
-        // Memory bounds the voxels; what is open between them grows with their number, not with that of the triangles.
+        // Memory bounds the voxels; the open space between them grows with their number, not with that of the
+        // triangles.
         if let Resolution::Voxels { dims, .. } = resolution {
             self.grant_voxels(dims.iter().map(|&n| n as u64).product());
         }
-        // What is held by now, the scene above all, stays; leaves of the complex come when the voxels have gone.
+        // Memory held by now, above all for the scene, stays; leaves of the complex follow when the voxels are freed.
         let held = self.probe.and_then(|probe| probe()).unwrap_or(0) as f64;
         let of_complex = BYTES_A_TRIANGLE * self.n_triangles as f64;
         self.progress
@@ -153,7 +154,7 @@ impl<'a> BakeContext<'a> {
         self.allowance.grant(self.budget.work_of_voxels(n_voxels));
     }
 
-    /// Ends the stage under way and begins the next.
+    /// Ends the current stage and begins the next.
     pub(crate) fn begin(&self, stage: Stage) -> Result<(), BakeError> {
         self.check()?;
         self.end_stage();
@@ -171,12 +172,12 @@ impl<'a> BakeContext<'a> {
         }
     }
 
-    /// Wall time of each stage so far.
+    /// Returns the wall time of each stage so far.
     pub(crate) fn times(&self) -> Vec<(Stage, Duration)> {
         self.stages().times.clone()
     }
 
-    /// What each stage so far has spent, see [`Allowance`].
+    /// Returns the work that each stage so far has spent, see [`Allowance`].
     pub(crate) fn work(&self) -> Vec<(Stage, u64)> {
         self.stages().work.clone()
     }

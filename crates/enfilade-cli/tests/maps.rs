@@ -155,7 +155,7 @@ fn a_portal_is_put_in_and_what_parts_nothing_is_refused() {
         (
             "1,-1,1;1,-1,-5;1,2,-5;1,2,1",
             1,
-            "one gets around it at 1.00,2.",
+            "a way leads around it at 1.00,2.",
         ),
         (
             "2,-1,1;2,-1,-5;2.5,4,-5;2,4,1",
@@ -165,9 +165,9 @@ fn a_portal_is_put_in_and_what_parts_nothing_is_refused() {
         (
             "2,-1,1;2,-1,-5;2,1,-2;2,4,1",
             1,
-            "not convex at corner 2, 2.00,1.00,-2.00",
+            "not convex at vertex 2, 2.00,1.00,-2.00",
         ),
-        ("20,-1,1;20,-1,-5;20,4,-5;20,4,1", 1, "lies in no cell"),
+        ("20,-1,1;20,-1,-5;20,4,-5;20,4,1", 1, "lies in solid matter"),
         ("2,-1,1;2,-1", 2, "vertex 1: '2,-1' has 2 numbers"),
     ] {
         let out = edit(&["--add-portal", across, "--add-portal", polygon]);

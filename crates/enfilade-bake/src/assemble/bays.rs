@@ -1,8 +1,9 @@
 //! Merges the panes of a glazed bay into one window portal.
 //!
-//! In a glazed wall, vertical mullions separate the bays, and horizontal transoms divide each bay into panes. Panes that stand
-//! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay separate.
-//! **What can go wrong:** panes whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
+//! In a glazed wall, vertical mullions separate the bays, and horizontal transoms divide each bay into panes. Panes
+//! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay
+//! separate.
+//! **Limit:** panes whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
 //!
 //! Time `O(p log p)` in windows, as long as few lie in one column of one plane.
 
@@ -21,7 +22,7 @@ const ONE_PLANE: f64 = 1e-6;
 
 /// Where a window lies in its facade. [Units: wu]
 struct Extent {
-    /// From side to side, horizontally along the plane.
+    /// Horizontal range along the plane.
     across: [f64; 2],
     up: [f64; 2],
 }
@@ -39,7 +40,7 @@ impl Extent {
         }
     }
 
-    /// Whether another stands on it, with nothing but a transom between.
+    /// Returns `true` if `above` stands on it with only a transom between.
     fn carries(&self, above: &Self) -> bool {
         let is_flush = |k: usize| (self.across[k] - above.across[k]).abs() <= BAR;
         let gap = above.up[0] - self.up[1];
@@ -51,8 +52,8 @@ fn along(p: &PartitionPortal) -> DVec3 {
     DVec3::Y.cross(p.plane.normal).normalize_or_zero()
 }
 
-/// Joins windows between the same two cells that stand above each other in one upright plane, the lowest on a floor. Each bay
-/// has one portal with the pieces of all, in place of its first; the rest stay in order.
+/// Joins windows between the same two cells that stand above each other in one upright plane, the lowest on a floor.
+/// Each bay becomes one portal with all its pieces, in place of its first window; the order is kept.
 pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
     let mut sets = Sets::new(portals.len());
     let mut facades: BTreeMap<[u32; 2], Vec<(usize, Extent)>> = BTreeMap::new();

@@ -1,10 +1,10 @@
-//! What fills openings: which objects are leaves, frames and panes of which portal, and how leaves move.
+//! Finds the fittings of openings: which objects are leaves, frames and panes of which portal, and how leaves move.
 //!
-//! By shape and place alone, names are not asked. An object that is a leaf together with its frame is taken apart: the
-//! leaf becomes an object of its own, so that an engine can turn it.
+//! Decides by shape and place alone, not by name. An object that combines a leaf with its frame is split: the leaf
+//! becomes an object of its own, so that an engine can turn it.
 //!
-//! Pairs of portals and objects near them are looked at side by side; what several portals claim goes to the one that it
-//! fits best. `O(portals · objects)` comparisons of boxes, and `O(n log n)` in the triangles of objects near openings.
+//! Each pair of a portal and a nearby object is examined on its own; a leaf that several portals claim goes to the best
+//! fit. `O(portals · objects)` comparisons of boxes, and `O(n log n)` in the triangles of objects near openings.
 
 mod opening;
 mod parts;
@@ -23,39 +23,39 @@ use opening::Rectangle;
 use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
 use swing::Around;
 
-/// An open leaf has no room where something else is nearer to it. [Units: wu]
+/// Least distance from an open leaf to other objects. [Units: wu]
 const ROOM: f64 = 0.06;
 
 /// A detail object near an opening.
 struct Object {
     detail: u32,
     triangles: Vec<Triangle>,
-    /// By triangle, and how many there are.
+    /// Shell of each triangle.
     shells: Vec<u32>,
-    /// By shell.
+    /// Bounding box of each shell.
     bounds: Vec<Aabb>,
 }
 
-/// What an object is to a portal.
+/// Roles of an object at a portal.
 struct Role {
     portal: u32,
     object: u32,
     roles: Roles,
 }
 
-/// A leaf that was given to a portal.
+/// A leaf assigned to a portal.
 struct Hung {
     portal: u32,
     object: u32,
     leaf: Leaf,
-    /// All portals that it shuts, `portal` among them.
+    /// All portals that it shuts, including `portal`.
     portals: Vec<u32>,
 }
 
-/// What it costs to ask what an object is to an opening, in units of [`Allowance`].
+/// Cost of finding the roles of an object at an opening, in units of [`Allowance`].
 const WORK_A_ROLE: u64 = 200;
 
-/// Finds what fills each opening, and gives leaves that are one with their frames objects of their own.
+/// Finds the fittings of each opening, and splits leaves off the objects that include their frames.
 pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     let openings: Vec<Option<Aperture>> =
         (world.graph.portals.par_iter()).map(Aperture::of).collect();
@@ -117,7 +117,7 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     for ((leaf, number), motion) in hung.iter().zip(numbers).zip(&motions) {
         for &p in &leaf.portals {
             let portal = &mut world.graph.portals[p as usize];
-            // An opening with a leaf is a door, also where the leaf stands open.
+            // An opening with a leaf is a door, even if the leaf stands open.
             portal.kind = PortalKind::Door;
             portal.fittings.push(Fitting {
                 detail: number,
@@ -137,7 +137,7 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     }
     for (portal, detail, part) in still {
         let fittings = &mut world.graph.portals[portal as usize].fittings;
-        // What was its only leaf has nothing left to be a frame.
+        // An object that is only a leaf has nothing left to be a frame.
         if fittings.iter().all(|f| f.detail != detail) {
             fittings.push(Fitting {
                 detail,
@@ -179,7 +179,7 @@ impl Object {
     }
 }
 
-/// Gives each leaf to the portal that it fits best, and to others that it shuts as well.
+/// Assigns each leaf to the portal that it fits best, and to others that it shuts as well.
 fn hang(found: &[Role]) -> Vec<Hung> {
     let mut claims: Vec<(&Role, &Leaf)> = (found.iter())
         .flat_map(|r| r.roles.leaves.iter().map(move |l| (r, l)))
@@ -219,31 +219,31 @@ fn hang(found: &[Role]) -> Vec<Hung> {
     hung
 }
 
-/// All that was found, before it is written down.
+/// All findings, before they are written to the world.
 struct Fitted<'a> {
     world: &'a World,
     walls: &'a Bvh,
     openings: &'a [Option<Aperture>],
-    /// By portal: details about its opening.
+    /// For each portal, details near its opening.
     near: &'a [Vec<u32>],
     objects: &'a [Object],
-    /// By portal, ascending.
+    /// Sorted by portal.
     found: &'a [Role],
     hung: &'a [Hung],
-    /// Leaves by portal and by object, into `hung`.
+    /// Indices into `hung`, for each portal and each object.
     of_portal: Vec<Vec<usize>>,
     of_object: Vec<Vec<usize>>,
 }
 
 impl Fitted<'_> {
-    /// What was found of a portal.
+    /// Returns the roles found at a portal.
     fn found_at(&self, portal: u32) -> &[Role] {
         let first = self.found.partition_point(|r| r.portal < portal);
         let rest = &self.found[first..];
         &rest[..rest.partition_point(|r| r.portal == portal)]
     }
 
-    /// How a leaf moves.
+    /// Returns how a leaf moves.
     fn motion(&self, h: usize) -> Motion {
         let Hung { portal, leaf, .. } = &self.hung[h];
         let graph = &self.world.graph;
@@ -288,7 +288,7 @@ impl Fitted<'_> {
         .motion(leaf)
     }
 
-    /// The middle, along the opening's normal, of what runs around it.
+    /// Returns the middle, along the opening's normal, of the fixed parts around it. [Units: wu]
     fn frame(&self, portal: u32, around: &Rectangle) -> Option<f64> {
         let mut bounds = Aabb::EMPTY;
         for role in self.found_at(portal).iter().filter(|r| is_part(&r.roles)) {
@@ -306,7 +306,7 @@ impl Fitted<'_> {
         (!bounds.is_empty()).then_some((bounds.min.z + bounds.max.z) * 0.5)
     }
 
-    /// Frames and panes: portal, detail, which.
+    /// Returns frames and panes: portal, detail, part.
     fn still(&self) -> Vec<(u32, u32, FittingPart)> {
         let part = |r: &Role| {
             let claimed = !r.roles.leaves.is_empty();
@@ -323,7 +323,7 @@ impl Fitted<'_> {
             .collect()
     }
 
-    /// Objects that lie on a leaf and move with it, handles and the glass in it: detail, and which leaf.
+    /// Returns objects that lie on a leaf and move with it, such as handles and glass: detail, index of the leaf.
     fn carried(&self) -> Vec<(u32, usize)> {
         let mut out: BTreeMap<u32, usize> = BTreeMap::new();
         for role in self.found.iter().filter(|r| !is_part(&r.roles)) {
@@ -343,7 +343,7 @@ impl Fitted<'_> {
     }
 }
 
-/// Whether an object belongs to the opening.
+/// Returns `true` if an object is a fitting of the opening.
 fn is_part(roles: &Roles) -> bool {
     !roles.leaves.is_empty() || roles.is_frame || roles.is_pane
 }
@@ -368,7 +368,7 @@ fn corners_of(world: &World, detail: &DetailObject) -> Vec<DVec3> {
         .collect()
 }
 
-/// In world space, primitive after primitive.
+/// Returns the triangles in world space, primitive after primitive.
 fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
     let (mesh, transform) = placed(world, detail);
     let of = |p: &enfilade_geom::scene::Primitive| -> Vec<Triangle> {

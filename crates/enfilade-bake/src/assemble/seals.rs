@@ -1,4 +1,4 @@
-//! Seals as geometry: batches of their own, in the color of what they close.
+//! Geometry of seals: batches of their own, with the material of the nearest surface.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use enfilade_geom::{DVec3, Plane, Winding};
 use super::Cut;
 use crate::complex::Seal;
 
-/// The seals by the cells that see them and the material of the surface nearest to each.
+/// Returns the seals, one batch for each set of cells that see them and material of the nearest surface.
 ///
-/// A seal is grown, so that rounding leaves no slit at its rim. `O(log n)` a seal.
+/// Each seal is grown, so that rounding leaves no slit at its rim. `O(log n)` per seal.
 pub(super) fn batches(cut: &Cut<'_>) -> Vec<Batch> {
     let mut by_look: BTreeMap<(Vec<CellId>, Option<u32>), Primitive> = BTreeMap::new();
     for seal in &cut.partition.seals {
         let is_cell = |c: &&u32| (**c as usize) < cut.partition.volumes.len();
         let cells = seal.cells.iter().filter(is_cell).map(|&c| CellId(c));
         let mut cells: Vec<CellId> = cells.collect();
-        // Where a void became part of a room both sides may be one cell.
+        // Both sides may be the same cell if a void became part of a room.
         cells.sort_unstable();
         cells.dedup();
         let outline = grown(&seal.outline, &seal.plane, cut.outward);
@@ -47,10 +47,10 @@ fn material_near(cut: &Cut<'_>, seal: &Seal) -> Option<u32> {
     cut.scene.meshes[mesh as usize].primitives[source.primitive as usize].material
 }
 
-/// At sharp corners a seal grows by no more than so many times as much as elsewhere.
+/// Largest growth of a seal at a sharp vertex, as a multiple of its growth elsewhere.
 const MITER: f64 = 4.0;
 
-/// `outline` with its rim moved outward by about `by`.
+/// Returns `outline` with its rim moved outward by about `by`.
 fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
     let points = &outline.points;
     let n = points.len();

@@ -1,13 +1,13 @@
-//! Openings in the plane of a wall that the tree did not cut along that plane.
+//! Finds openings in the plane of a wall that the tree did not cut along that plane.
 //!
-//! A tree that has cut a doorway out by the planes of its jambs and lintel has no reason left to cut it by
-//! the plane of the wall's face, and the separator there is missed. Lefebvre & Hornus 2003 (§3.0.2) say
-//! that the arrangement of all planes would show them all, and that it is too large. It need not be made:
-//! the section of a surface's plane with the open leaves, around its surfaces, is tried for separators
-//! as if it were portals, and only the leaves under those that hold are cut.
+//! A tree that has cut out a doorway by the planes of its jambs and lintel has no reason left to cut it by
+//! the plane of the wall's face, and misses the separator there. Lefebvre & Hornus 2003 (§3.0.2) note
+//! that the arrangement of all planes would contain all separators, and that it is too large. It is not
+//! needed: the section of a surface's plane with the open leaves around its surfaces is searched for
+//! separators as if it were portals, and only the leaves under valid ones are cut.
 //!
-//! Time: each plane visits the leaves around its own surfaces, near-linear where they are spread out. Planes
-//! with most surface come first, and only so many sections are tried that it is near-linear anywhere.
+//! Time: each plane visits the leaves around its own surfaces, near-linear if they are spread out. Planes
+//! with most surface come first, and the number of sections is limited, so that it is near-linear for any scene.
 
 use enfilade_geom::Aabb;
 use rayon::prelude::*;
@@ -20,12 +20,12 @@ use super::portals::{LeafPortal, leaf_portals};
 use super::tree::{Node, Tree, leaf_index};
 use super::{rooms, separator};
 
-/// Sections tried for each portal and surface that is there; buildings have 1 to 5 in all.
+/// Sections tried for each portal and surface of the tree; buildings need 1 to 5.
 const TRIALS: usize = 8;
 /// Planes tried before their sections are counted.
 const AT_ONCE: usize = 64;
 
-/// Cuts the leaves where a surface's plane closes an opening that is narrower than what lies beside it.
+/// Cuts the leaves where a surface's plane closes an opening that is narrower than the space beside it.
 pub(super) fn refine(bsp: &mut Bsp<'_>, settings: &MergeSettings) {
     let mut around: Vec<(Aabb, f64)> = vec![(Aabb::EMPTY, 0.0); bsp.tree.planes.len()];
     for f in &bsp.surfaces {
@@ -33,8 +33,8 @@ pub(super) fn refine(bsp: &mut Bsp<'_>, settings: &MergeSettings) {
         *b = b.union(Aabb::of_points(&f.points));
         *area += poly::area(&f.points);
     }
-    // Planes with much surface first: they are walls. Sections of surfaces that lie close together grow
-    // with their square.
+    // Planes with much surface first: they are walls. The sections of surfaces that lie close together grow
+    // with the square of their number.
     let is_wall = bsp.wall_planes();
     let mut order: Vec<u32> = (0..around.len() as u32)
         .filter(|&p| is_wall[p as usize] && !around[p as usize].0.is_empty())
@@ -90,7 +90,7 @@ pub(super) fn refine(bsp: &mut Bsp<'_>, settings: &MergeSettings) {
     bsp.drop_closed_portals();
 }
 
-/// What of a polygon in `plane` lies within open leaves and in no node's plane.
+/// Collects the parts of a polygon in `plane` that lie within open leaves and in no node's plane.
 fn sections(
     bsp: &Bsp<'_>,
     child: i32,
@@ -114,7 +114,7 @@ fn sections(
     }
     let node = &bsp.tree.nodes[child as usize];
     if node.plane == plane {
-        // Its portals are there already.
+        // Its portals exist already.
         return;
     }
     match poly::split(
@@ -132,7 +132,7 @@ fn sections(
     }
 }
 
-/// Cuts the leaves that a polygon passes through by its plane; returns what `child` has become.
+/// Cuts the leaves that a polygon passes through by its plane; returns the replacement of `child`.
 fn cut(
     tree: &mut Tree,
     is_open: &mut Vec<bool>,

@@ -1,4 +1,4 @@
-//! From surfaces to leaves: gathers, cuts, settles what is matter, and drops what is not reached from inside.
+//! Builds leaves from surfaces: gathers, cuts, finds which leaves are matter, and drops those not reached from inside.
 
 use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Purse};
 use rayon::prelude::*;
@@ -10,10 +10,10 @@ use super::tolerance::Tolerance;
 use super::tree::{self, Content, Heuristic, Tree};
 use super::{inside, leak, portals, shape, surfaces};
 
-/// What it costs to find out whether a leaf is matter, in units of [`Allowance`](enfilade_geom::Allowance).
+/// Cost of finding if a leaf is matter, in units of [`Allowance`](enfilade_geom::Allowance).
 const WORK_A_LEAF: u64 = 10;
 
-/// How many different numbers there are; equal ones stand side by side.
+/// Returns the number of distinct values; equal ones are adjacent.
 fn n_distinct(numbers: &[u32]) -> usize {
     numbers.chunk_by(|a, b| a == b).count()
 }
@@ -21,14 +21,14 @@ fn n_distinct(numbers: &[u32]) -> usize {
 impl<'a> Bsp<'a> {
     /// Builds the tree and its portals.
     ///
-    /// With solids and points inside it is built twice: once to find out which surfaces are seen from
-    /// inside, and once of those. Time near-linear in surfaces that are spread out; deterministic.
+    /// With solids and points inside, it is built twice: first to find the surfaces seen from inside, then from
+    /// those alone. Time near-linear if surfaces are spread out; deterministic.
     #[must_use]
     pub fn build(input: &BspInput<'_>, heuristic: Heuristic, guide: &Guide) -> Self {
         Self::build_of(input, heuristic, guide, true, Purse::endless())
     }
 
-    /// The same; where triangles bound no matter there is air on both sides of them.
+    /// Like [`Bsp::build`]; unless `has_matter`, both sides of all triangles are air.
     pub(super) fn build_of(
         input: &BspInput<'_>,
         heuristic: Heuristic,
@@ -115,7 +115,7 @@ impl<'a> Bsp<'a> {
         let mut bsp = make(seen, heuristic, guide, false);
         bsp.n_faces = n_distinct(&faces_seen);
         let reached = leak::reach(&bsp, input.inside);
-        // What the points do not reach now is a sliver of the void that rounding left.
+        // The points no longer reach slivers of the void that rounding left.
         for (open, &reached) in bsp.is_open.iter_mut().zip(&reached.is_reached) {
             *open &= reached;
         }
@@ -124,9 +124,9 @@ impl<'a> Bsp<'a> {
     }
 }
 
-/// Says of each leaf whether it is matter by asking the solids about its middle: next to slivers, the
-/// surfaces around a leaf can mislead. Without the void's surfaces the void counts as matter, too, and
-/// only what is in a solid for sure is corrected.
+/// Decides if each leaf is matter by testing its middle against the solids: next to slivers, the surfaces
+/// around a leaf can mislead. Without the void's surfaces, the void counts as matter, too, and only leaves
+/// that are certainly in a solid are corrected.
 fn settle(
     tree: &mut Tree,
     tolerance: &Tolerance,

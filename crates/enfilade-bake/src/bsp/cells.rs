@@ -1,39 +1,39 @@
-//! Cells: leaves that no separator parts (Lefebvre & Hornus 2003, §2.1 step 3).
+//! Cells: sets of leaves that no separator divides (Lefebvre & Hornus 2003, §2.1 step 3).
 
 use enfilade_geom::Sets;
 
 use super::leaves::Bsp;
 use super::separator::Separator;
 
-/// No cell.
+/// Marks a leaf without a cell.
 pub(super) const NO_CELL: u32 = u32::MAX;
 
-/// Leaves by cell, and the separators that were kept.
+/// The cells of leaves, and the separators kept.
 pub(super) struct LeafCells {
     /// Cell of each leaf, or [`NO_CELL`].
     pub(super) of_leaf: Vec<u32>,
     pub(super) n_cells: usize,
     pub(super) separators: Vec<Separator>,
-    /// How many separators crossed others and were taken away for it.
+    /// Number of separators dropped because they crossed others.
     pub(super) n_crossing: usize,
-    /// How many had the same cell on both sides.
+    /// Number of separators dropped because the same cell was on both sides.
     pub(super) n_useless: usize,
 }
 
-/// Parts the leaves by the separators; of separators that cross, the ones that touch fewest cells go,
-/// largest first among equals, until none cross. Separators with one cell on both sides go, too.
+/// Divides the leaves by the separators. Of separators that cross, drops those that touch fewest cells,
+/// largest first among equals, until none cross. Drops separators with one cell on both sides, too.
 pub(super) fn part(bsp: &Bsp<'_>, separators: Vec<Separator>) -> LeafCells {
     let mut kept = separators;
     let (mut n_crossing, mut n_useless) = (0, 0);
     loop {
-        // All portals are joined anew, and all that are kept asked anew.
+        // Each round joins all portals and tests all kept separators anew.
         let may_go_on = bsp.purse.spend(bsp.portals.len() as u64);
         let (of_leaf, n_cells) = components(bsp, &kept);
         let sides: Vec<[Vec<u32>; 2]> = kept.iter().map(|s| sides_of(bsp, s, &of_leaf)).collect();
-        // One that parts nothing can go at once: no cell changes by it.
+        // A separator that divides nothing can go at once: it changes no cell.
         let is_useless = |i: usize| sides[i][0] == sides[i][1] && sides[i][0].len() == 1;
         let n = kept.len();
-        // All the crossing ones that share no cell with a worse one go together.
+        // All crossing separators that share no cell with a worse one go together.
         let mut crossing: Vec<usize> = (0..n)
             .filter(|&i| sides[i].iter().any(|s| s.len() > 1))
             .collect();
@@ -75,7 +75,7 @@ pub(super) fn part(bsp: &Bsp<'_>, separators: Vec<Separator>) -> LeafCells {
     }
 }
 
-/// Cells on the positive and on the negative side, ascending.
+/// Returns the cells on the positive and on the negative side, ascending.
 pub(super) fn sides_of(bsp: &Bsp<'_>, s: &Separator, of_leaf: &[u32]) -> [Vec<u32>; 2] {
     [0, 1].map(|side| {
         let mut cells: Vec<u32> = s
@@ -89,7 +89,7 @@ pub(super) fn sides_of(bsp: &Bsp<'_>, s: &Separator, of_leaf: &[u32]) -> [Vec<u3
     })
 }
 
-/// Connected components of the open leaves without the separators' portals, numbered by least leaf.
+/// Returns the connected components of the open leaves without the separators' portals, numbered by least leaf.
 pub(super) fn components(bsp: &Bsp<'_>, separators: &[Separator]) -> (Vec<u32>, usize) {
     let mut is_cut = vec![false; bsp.portals.len()];
     for &p in separators.iter().flat_map(|s| &s.portals) {

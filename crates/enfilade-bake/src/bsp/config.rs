@@ -1,28 +1,28 @@
-//! What only the binary space partition asks.
+//! BSP-only settings.
 
 use super::guide::Guide;
 use super::tree::Heuristic;
 
-/// What only the binary space partition asks.
+/// BSP-only settings.
 #[derive(Clone, Debug, Default)]
 pub struct BspConfig {
-    /// How planes are chosen.
+    /// The heuristic that chooses planes.
     pub heuristic: Heuristic,
     /// Planes to begin with.
     pub guide: Guide,
-    /// Whether cells become rooms by the shape of the openings between them.
+    /// Use of the shape of openings to decide which cells are rooms.
     pub rooms: Rooms,
 }
 
-/// Which separators are kept.
+/// Choice of the separators to keep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rooms {
-    /// Those of [`Rooms::Always`] where structure is triangles, those of [`Rooms::Never`] where it is
-    /// brushes: a level is a chain of passages as wide as what they join, and would be one room.
+    /// [`Rooms::Always`] for a structure of triangles, [`Rooms::Never`] for one of brushes: a level is a chain
+    /// of passages as wide as the spaces that they join, and would be one room.
     #[default]
     Auto,
-    /// Those that are narrower than what lies beside them.
+    /// Keeps separators that are narrower than the space beside them.
     Always,
-    /// All that cross no other (Lefebvre & Hornus 2003, §2.1 step 2).
+    /// Keeps all separators that cross no other (Lefebvre & Hornus 2003, §2.1 step 2).
     Never,
 }

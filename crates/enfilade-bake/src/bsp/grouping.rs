@@ -1,16 +1,16 @@
-//! Separators and the cells that they part, for tables.
+//! Counts of separators and of the cells that they divide, for tables.
 
 use super::leaves::Bsp;
 use super::{cells, separator};
 
-/// Numbers of separators and cells.
+/// Counts of separators and cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grouping {
     /// Valid separators.
     pub n_valid: usize,
-    /// Of those, taken away since they crossed others.
+    /// Valid separators dropped because they cross others.
     pub n_crossing: usize,
-    /// Of those, taken away since one cell lies on both sides.
+    /// Valid separators dropped because one cell lies on both sides.
     pub n_useless: usize,
     /// Separators kept.
     pub n_separators: usize,
@@ -19,7 +19,7 @@ pub struct Grouping {
 }
 
 impl Bsp<'_> {
-    /// Finds the separators and the cells that they part, for the numbers only.
+    /// Finds separators and cells, and returns their counts.
     #[must_use]
     pub fn grouping(&self) -> Grouping {
         let found = separator::find(self);
@@ -34,7 +34,7 @@ impl Bsp<'_> {
         }
     }
 
-    /// The separators that part cells once those that cross others are gone, each as places in
+    /// Returns the separators that divide cells once those that cross others are dropped, each as positions in
     /// [`Bsp::portals`].
     #[must_use]
     pub fn separators(&self) -> Vec<Vec<usize>> {

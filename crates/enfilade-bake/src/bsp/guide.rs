@@ -1,4 +1,4 @@
-//! Planes that a tree begins with: grids, and what the user gives.
+//! Planes with which a tree begins: grids, and planes that the user gives.
 
 use enfilade_geom::{Aabb, DVec3, Plane};
 
@@ -7,24 +7,24 @@ use enfilade_geom::{Aabb, DVec3, Plane};
 pub struct Guide {
     /// Edge of a regular grid. [Units: wu] [Limit: above 0]
     pub grid: Option<f64>,
-    /// Distance of the planes of a tetrahedral grid, four families of them. [Units: wu] [Limit: above 0]
+    /// Distance between planes of a tetrahedral grid, which has four families. [Units: wu] [Limit: above 0]
     pub tetrahedra: Option<f64>,
-    /// Planes as a point and a normal.
+    /// Single planes.
     pub planes: Vec<Plane>,
-    /// Boxes, for the planes of their sides. [Units: wu]
+    /// Boxes whose sides give planes. [Units: wu]
     pub boxes: Vec<Aabb>,
 }
 
-/// Most planes of one family of a grid; a finer grid than that is made as coarse as that.
+/// Most planes of one family of a grid; finer grids are coarsened to this.
 const MAX_FAMILY: f64 = 256.0;
 
 impl Guide {
-    /// Whether there is nothing in it.
+    /// Returns `true` if it contains nothing.
     pub(super) fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// All its planes within bounds.
+    /// Returns all its planes within bounds.
     pub(super) fn planes(&self, bounds: &Aabb) -> Vec<Plane> {
         let mut out = self.planes.clone();
         for b in &self.boxes {

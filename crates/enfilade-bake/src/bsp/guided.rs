@@ -1,10 +1,10 @@
 //! Cells that a guide makes where there are no walls: vessels, caves, tunnels (Lefebvre & Hornus 2003, §3.0.2).
 //!
-//! Where surfaces are curved, no plane of theirs closes a path, and the planes that the user gives are all there are. The
-//! shape of an opening tells nothing there either: a grid cuts a tube anywhere. So a separator in a guide's plane is kept
-//! where its rim is round; where walls stand, rooms are told by their shape (`rooms`), and a guide is but a beginning.
+//! Where surfaces are curved, none of their planes closes a path, and only the user's planes remain. The shape of an
+//! opening carries no information there either: a grid cuts a tube anywhere. So a separator in a guide's plane is kept
+//! if its rim is round. Where walls stand, shape decides on rooms (`rooms`), and a guide is only a start.
 //!
-//! Time: separators of guides times portals.
+//! Time: `O(separators of guides · portals)`.
 
 use std::collections::BTreeMap;
 
@@ -17,12 +17,12 @@ use super::leaves::Bsp;
 use super::separator::{self, Separator};
 use super::tree::Heuristic;
 
-/// Share of a rim that lies in the two planes with most of it, from which on they are walls: that of a hexagon. A
-/// rectangle has half and more, an octagon a quarter.
+/// Share of a rim in its two main planes from which on they count as walls: that of a hexagon. A rectangle has half or
+/// more, an octagon a quarter.
 const FLAT: f64 = 1.0 / 3.0;
 
-/// The tree of a scene. Where a guide is given and matter leaves no air but the outdoors, the scene is nothing but a shell,
-/// which somebody wants the inside of, whichever way it faces: then there is no matter.
+/// Builds the tree of a scene. If a guide is given and matter leaves no air but the outdoors, the scene is only a shell
+/// whose inside is wanted, whichever way it faces: then there is no matter.
 pub(super) fn build<'a>(
     input: &BspInput<'_>,
     heuristic: Heuristic,
@@ -38,7 +38,7 @@ pub(super) fn build<'a>(
     bsp
 }
 
-/// Parts rooms further by the separators in planes of guides with a round rim.
+/// Divides rooms further by separators with a round rim in planes of guides.
 pub(super) fn part(bsp: &Bsp<'_>, rooms: LeafCells) -> LeafCells {
     let found = separator::find_in_guides(bsp);
     if found.is_empty() {
@@ -89,13 +89,13 @@ pub(super) fn part(bsp: &Bsp<'_>, rooms: LeafCells) -> LeafCells {
     }
 }
 
-/// Of separators those that cross none of the others that are kept, the smallest first: they go across a tube and not
-/// along it. Those with one cell on both sides go, too.
+/// Returns separators that do not cross each other, chosen smallest first: those go across a tube and not along it.
+/// Drops those with one cell on both sides.
 fn uncrossed(bsp: &Bsp<'_>, mut found: Vec<Separator>) -> Vec<Separator> {
     found.sort_by(|a, b| a.area.total_cmp(&b.area));
     let mut kept: Vec<Separator> = Vec::new();
     for s in found {
-        // All portals are joined anew, and all that are kept asked anew.
+        // Each round joins all portals and tests all kept separators anew.
         if !bsp
             .purse
             .spend((bsp.portals.len() / 4 + 10 * kept.len()) as u64)

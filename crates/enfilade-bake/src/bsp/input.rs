@@ -1,23 +1,23 @@
-//! What a tree is built from.
+//! Input of a tree.
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{ConvexSolid, DVec3, Triangle};
 
-/// What a tree is built from.
+/// The input of a tree.
 #[derive(Clone, Copy, Debug)]
 pub struct BspInput<'a> {
-    /// Surfaces where there are no solids: triangles, solid behind, empty before. [Units: wu]
+    /// Surfaces if there are no solids: triangles, solid behind, empty in front. [Units: wu]
     pub triangles: &'a [Triangle],
-    /// The object of each triangle, to tell what is inside one; empty where all are one.
+    /// The object of each triangle, to find the matter within each; empty if all are one object.
     pub objects: &'a [u32],
-    /// Brushes; where there are some, they are the surfaces.
+    /// Brushes; if there are any, they are the surfaces.
     pub solids: &'a [ConvexSolid],
-    /// Points known to be inside, such as those of entities; with solids, what they cannot reach is
-    /// dropped unless they reach the border, too.
+    /// Points known to be inside, such as those of entities. With solids, space that they cannot reach is
+    /// dropped, unless they reach the border.
     pub inside: &'a [DVec3],
 }
 
-/// Brushes where the whole structure is made of them, its triangles where not.
+/// Returns brushes if the whole structure is made of them, else its triangles.
 pub(super) fn input_of<'a>(
     scene: &'a Scene,
     triangles: &'a [Triangle],

@@ -1,15 +1,15 @@
-//! Whether a point is in matter, where matter is no list of solids but triangles.
+//! Tests if a point is in matter, where matter is given by triangles, not by solids.
 //!
 //! Walls, slabs and columns are modeled as closed surfaces that overlap each other, so neither the
-//! surface next to a point nor the parity of crossings tells. The number of surfaces of one object that a
-//! ray leaves less those it enters is the object's winding number. Objects are asked one by one, so that a
-//! ceiling that is a mere sheet says nothing of the wall beside it; where an object has holes, rays
-//! disagree, and the majority of them decides.
+//! surface next to a point nor the parity of crossings decides. The number of surfaces of one object that a
+//! ray leaves minus those that it enters is the object's winding number. Each object is tested by itself, so
+//! that a ceiling that is a mere sheet does not affect the wall beside it. If an object has holes, rays
+//! disagree, and the majority decides.
 
 use enfilade_geom::{Bvh, DVec3, Purse, Ray, Triangle};
 use smallvec::SmallVec;
 
-/// Directions that no wall of a building runs along; an odd number, so that there is a majority.
+/// Directions along which no wall of a building runs; an odd number, so that there is a majority.
 const DIRECTIONS: [[f64; 3]; 7] = [
     [0.831, 0.417, 0.368],
     [-0.771, 0.213, 0.600],
@@ -20,10 +20,10 @@ const DIRECTIONS: [[f64; 3]; 7] = [
     [0.377, -0.353, 0.856],
 ];
 
-/// Triangles that are asked what lies within them.
+/// Triangles that enclose matter.
 pub(super) struct Soup<'a> {
     bvh: Bvh,
-    /// Which object each is part of; none says that all are of one.
+    /// Object of each triangle; empty if all are one object.
     objects: &'a [u32],
 }
 
@@ -35,8 +35,8 @@ impl<'a> Soup<'a> {
         }
     }
 
-    /// Whether there is an object of which most rays from `p` leave more surfaces than they enter. Spends a unit of work for each
-    /// surface that a ray crosses, and has no answer when nothing is left.
+    /// Returns `true` if most rays from `p` leave more surfaces of some object than they enter. Spends a unit of work
+    /// for each surface that a ray crosses; `false` if none is left.
     pub(super) fn is_inside(&self, p: DVec3, purse: Purse<'_>) -> bool {
         let mut n_inside: SmallVec<[(u32, usize); 8]> = SmallVec::new();
         for direction in DIRECTIONS {
@@ -99,7 +99,7 @@ mod tests {
         let objects: Vec<u32> = (0..all.len() as u32).map(|t| t / 12).collect();
         for soup in [Soup::of(&all, &objects), Soup::of(&all[1..], &objects[1..])] {
             for k in 0..1000 {
-                // A lattice off the walls' faces.
+                // A lattice that avoids the walls' faces.
                 let p = DVec3::new(
                     f64::from(k % 10) * 0.6 - 0.73,
                     f64::from(k / 10 % 10) * 0.6 - 0.77,
@@ -110,7 +110,7 @@ mod tests {
             }
             assert!(!soup.is_inside(DVec3::splat(7.0), any));
         }
-        // Seven rays that cross a surface each are more than ten units.
+        // Seven rays that each cross a surface cost more than ten units.
         let little = Allowance::new(10, None);
         assert!(!Soup::of(&all, &objects).is_inside(DVec3::splat(-0.5), (&little).into()));
         assert!(little.is_over());

@@ -1,4 +1,4 @@
-//! Sections of space beside a separator, as points of a lattice: how narrow its opening is.
+//! Measures how narrow the opening of a separator is, on sections of space beside it, sampled by lattices.
 
 use std::sync::OnceLock;
 
@@ -15,24 +15,24 @@ const POINTS: f64 = 40.0;
 const MIN_STEP: f64 = 0.1;
 /// Sections on each side of a separator.
 pub(super) const SLICES: usize = 6;
-/// No leaf, no portal.
+/// Marks the absence of a leaf or portal.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// What lies around a separator.
+/// The sampled space around a separator.
 pub(super) struct Lattice {
     pub(super) side: [usize; 2],
     pub(super) step: f64,
-    /// The portal of the separator under each point, by its place in the separator's list.
+    /// The portal of the separator at each point, as an index into the separator's list.
     pub(super) portal_at: Vec<u32>,
-    /// Leaves at each point of the sections; the first, third, … lie on the positive side, outwards.
+    /// Leaves at each point of the sections, outwards; the first, third, … lie on the positive side.
     slices: Vec<OnceLock<Vec<u32>>>,
     base: DVec3,
     across: [DVec3; 3],
 }
 
-/// How narrow an opening is.
+/// Narrowness of an opening.
 pub(super) struct Section {
-    /// Its area by the smaller of the two sections beside it.
+    /// Its area divided by that of the smaller of the two sections beside it.
     pub(super) ratio: f64,
     /// Share of its rim that is a wall with both cells beside it.
     pub(super) wall: f64,
@@ -83,7 +83,7 @@ impl Lattice {
                     }
                 }
             }
-            // The smallest has a point, too.
+            // Even the smallest portal has a point.
             let middle = points.iter().sum::<DVec3>() / points.len() as f64;
             let [i, j] = place(middle).map(|t| t.round() as usize);
             let slot = &mut portal_at[j * side[0] + i];
@@ -101,7 +101,7 @@ impl Lattice {
         }
     }
 
-    /// Leaves at the points of section `k`; looked up when first asked for, as most measures need few.
+    /// Returns the leaves at the points of section `k`. Looks them up on first use, as most measures need few.
     pub(super) fn slice(&self, bsp: &Bsp<'_>, k: usize, settings: &MergeSettings) -> &[u32] {
         self.slices[k].get_or_init(|| {
             let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
@@ -113,8 +113,8 @@ impl Lattice {
         })
     }
 
-    /// Looks up a block of points (first and last along each side) from a node of the tree on: where all
-    /// its corners are on one side of a plane, all its points are, so that large leaves cost little.
+    /// Looks up a block of points (first and last along each side), from a node of the tree on: if its outermost
+    /// points are on one side of a plane, all its points are, so that large leaves cost little.
     fn look_up(
         &self,
         bsp: &Bsp<'_>,
@@ -152,7 +152,7 @@ impl Lattice {
             }
         };
         if is_mixed {
-            // A single point is never mixed: its corners are one.
+            // A single point is never mixed: its outermost points coincide.
             let halves = if i1 - i0 >= j1 - j0 {
                 let m = (i0 + i1) / 2;
                 [[[i0, m], [j0, j1]], [[m + 1, i1], [j0, j1]]]
@@ -176,9 +176,9 @@ impl Lattice {
         }
     }
 
-    /// Measures the opening of the portals that `is_seed` names, of this area, between the two sides
-    /// whose leaves `in_side` tells (0 and 1; anything else is neither), given whether a leaf is met
-    /// before (0) or behind (1) the plane. One side may be without end.
+    /// Measures the opening, of this area, of the portals that satisfy `is_seed`, between two sides. `in_side`
+    /// returns the side of a leaf (0 or 1; anything else is neither), given its position before (0) or behind (1)
+    /// the plane. One side may be endless.
     pub(super) fn section(
         &self,
         bsp: &Bsp<'_>,
@@ -197,7 +197,7 @@ impl Lattice {
         let mut best = [0_usize; 2];
         let mut stack = Vec::new();
         let unit = self.step * self.step;
-        // Once both are this large, it is a pinch whatever else there is.
+        // Once both are this large, it is a pinch, whatever other sections show.
         let enough = area / (settings.threshold * unit);
         let smaller = |best: [usize; 2]| match endless {
             Some(side) => best[1 - side],
@@ -235,7 +235,7 @@ impl Lattice {
     }
 }
 
-/// Whether a point of the plane lies in a convex polygon that turns about `normal`.
+/// Returns `true` if a point of the plane lies in a convex polygon that turns about `normal`.
 fn contains(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
     let n = points.len();
     (0..n).all(|i| {

@@ -1,4 +1,4 @@
-//! Whether what is inside is closed, and the way out where it is not.
+//! Tests if the inside is closed, and finds the way out if it is not.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ pub(super) struct Reached {
     pub(super) path: Option<LeakPath>,
 }
 
-/// Floods from the points through the portals; a path where the border is reached.
+/// Floods from the points through the portals; finds a path if the flood reaches the border.
 pub(super) fn reach(bsp: &Bsp<'_>, inside: &[DVec3]) -> Reached {
     let n = bsp.is_open.len();
     let mut neighbors: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
@@ -26,7 +26,7 @@ pub(super) fn reach(bsp: &Bsp<'_>, inside: &[DVec3]) -> Reached {
             neighbors[p.leaves[side] as usize].push((p.leaves[1 - side], i as u32));
         }
     }
-    // Space beyond the surfaces has been left around them, so its corners are in the void.
+    // The tree leaves space around the surfaces, so the vertices of its box are in the void.
     let b = &bsp.tree.bounds;
     let mut is_void = vec![false; n];
     let margin = b.size() * 1e-4;
@@ -46,7 +46,7 @@ pub(super) fn reach(bsp: &Bsp<'_>, inside: &[DVec3]) -> Reached {
     let mut queue = VecDeque::new();
     for (i, &p) in inside.iter().enumerate() {
         let leaf = bsp.tree.leaf_of(p) as usize;
-        // Things that stand in matter, or in the void on their own, tell nothing.
+        // Points in matter, or alone in the void, carry no information.
         if bsp.tree.contents[leaf] == Content::Empty && bsp.is_open[leaf] && start[leaf].is_none() {
             start[leaf] = Some(i);
             queue.push_back(leaf as u32);
@@ -87,7 +87,7 @@ fn way_to(
     let from = start[at as usize].unwrap_or(0);
     points.push(inside[from]);
     points.reverse();
-    // Leaves are convex, so straight on to the nearest side of the box stays in the last one or the
+    // Leaves are convex, so a straight line to the nearest side of the box stays in the last one or the
     // void beyond.
     let last = points[points.len() - 1];
     let (axis, to) = (0..3)
@@ -100,7 +100,7 @@ fn way_to(
     LeakPath { from, points }
 }
 
-/// Where things of a scene are that are known to be inside: entities with a place and no shape.
+/// Returns positions known to be inside: those of entities that have no shape.
 pub(super) fn inside_of(scene: &Scene) -> Vec<DVec3> {
     scene
         .entities
@@ -110,7 +110,7 @@ pub(super) fn inside_of(scene: &Scene) -> Vec<DVec3> {
         .collect()
 }
 
-/// The way from an entity of the scene to the void; `None` where the solids close every way, and for
+/// Returns the path from an entity of the scene to the void; `None` if the solids close every path, and for
 /// scenes that are not made of solids or have no entities.
 #[must_use]
 pub fn find_leak(scene: &Scene, purse: Purse<'_>) -> Option<LeakPath> {

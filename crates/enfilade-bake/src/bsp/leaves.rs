@@ -1,4 +1,4 @@
-//! The leaves of a tree, and what is open between them.
+//! The leaves of a tree, and the portals between them.
 
 use enfilade_geom::{Purse, Winding};
 
@@ -7,39 +7,39 @@ use super::portals::LeafPortal;
 use super::tolerance::Tolerance;
 use super::tree::{self, Content, Tree};
 
-/// The leaves of a tree and what is open between them.
+/// The leaves of a tree and the portals between them.
 pub struct Bsp<'a> {
     pub(super) tree: Tree,
     pub(super) portals: Vec<LeafPortal>,
     pub(super) tolerance: Tolerance,
-    /// Every surface's polygon, as the tree was built from.
+    /// The polygons of all surfaces from which the tree was built.
     pub(super) surfaces: Vec<tree::Fragment>,
-    /// Planes from this number on are a guide's alone.
+    /// Planes from this number on belong to a guide alone.
     pub(super) n_own_planes: u32,
-    /// Faces of solids, or triangles, that those are of.
+    /// Number of the faces of solids, or of the triangles, that the polygons come from.
     pub(super) n_faces: usize,
-    /// Whether they are triangles, not faces of solids.
+    /// `true` if they are triangles, not faces of solids.
     pub(super) is_of_triangles: bool,
-    /// Whether each leaf counts: empty, and reached from inside if that is known.
+    /// `true` for each leaf that counts: empty, and reached from inside if that is known.
     pub(super) is_open: Vec<bool>,
-    /// A way from a point inside to the border of everything.
+    /// A path from a point inside to the border of the scene.
     pub(super) leak: Option<LeakPath>,
-    /// What those who go through it spend from.
+    /// The purse that pays for work on it.
     pub(super) purse: Purse<'a>,
 }
 
-/// Numbers of a tree.
+/// Counts of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BspCounts {
-    /// Faces of solids, or triangles, that something is seen of: what was modeled.
+    /// Faces of solids, or triangles, of which some part is seen: the modeled surfaces.
     pub n_faces: usize,
-    /// Polygons that the tree was built from: what is left of faces once all solids are one.
+    /// Polygons from which the tree was built: the rest of the faces once all solids are united.
     pub n_polygons: usize,
-    /// Triangles that those make: of each polygon, two fewer than it has corners.
+    /// Triangles that make up those: for each polygon, two fewer than its vertices.
     pub n_triangles: usize,
     /// Polygons in the tree.
     pub n_pieces: usize,
-    /// How often one was cut in two.
+    /// Number of cuts of a polygon in two.
     pub n_splits: usize,
     /// Leaves that are not solid, and reached from inside if that is known.
     pub n_leaves: usize,
@@ -48,7 +48,7 @@ pub struct BspCounts {
 }
 
 impl Bsp<'_> {
-    /// Its numbers.
+    /// Returns its counts.
     #[must_use]
     pub fn counts(&self) -> BspCounts {
         BspCounts {
@@ -62,20 +62,20 @@ impl Bsp<'_> {
         }
     }
 
-    /// The way out that a point inside has, if there are solids and it has one.
+    /// Returns the way out from a point inside, if there are solids and a leak.
     #[must_use]
     pub fn leak(&self) -> Option<&LeakPath> {
         self.leak.as_ref()
     }
 
-    /// Leaves and polygon of each portal, for tables and pictures.
+    /// Returns leaves and polygon of each portal, for tables and pictures.
     pub fn portals(&self) -> impl Iterator<Item = ([u32; 2], Winding)> + '_ {
         self.portals
             .iter()
             .map(|p| (p.leaves, Winding::new(p.points.to_vec())))
     }
 
-    /// Leaves of which no surface says what they are are what most of what opens to them is.
+    /// Classifies leaves that no surface bounds: empty if they have a portal, else solid.
     pub(super) fn resolve_unknown(&mut self) {
         let contents = &mut self.tree.contents;
         let mut neighbors: Vec<Vec<u32>> = vec![Vec::new(); contents.len()];
@@ -86,8 +86,8 @@ impl Bsp<'_> {
                 }
             }
         }
-        // Portals join no solid leaf, so what is open to anything is empty. What is open to nothing
-        // but its like has no surface at all: it is the air of an empty scene.
+        // No portal joins a solid leaf, so a leaf with a portal is empty. Unknown leaves that open only to each other
+        // have no surface at all: they are the air of an empty scene.
         for (content, n) in contents.iter_mut().zip(&neighbors) {
             if *content == Content::Unknown {
                 *content = if n.is_empty() {
@@ -106,14 +106,14 @@ impl Bsp<'_> {
         self.drop_closed_portals();
     }
 
-    /// A leaf of the air around everything, in a corner of the box.
+    /// Returns a leaf of the air around everything, at a vertex of the box.
     pub(super) fn outer_leaf(&self) -> u32 {
         let b = &self.tree.bounds;
         self.tree.leaf_of(b.min + b.size() * 1e-4)
     }
 
-    /// Whether each plane may be a wall's: of triangles, it holds two or more. Each triangle of a curved
-    /// surface has a plane of its own, which means nothing.
+    /// Returns, for each plane, `true` if it may be a wall's: with triangles, if it holds two or more. Each triangle
+    /// of a curved surface has a plane of its own, which carries no information.
     pub(super) fn wall_planes(&self) -> Vec<bool> {
         let mut n = vec![0_u32; self.tree.planes.len()];
         for f in &self.surfaces {

@@ -1,10 +1,10 @@
 //! Binary space partition: convex leaves and the portals between them, separators, cells.
 //!
 //! After Lefebvre & Hornus 2003, *Automatic Cell-and-portal Decomposition*, §2.1 and the notes after
-//! §3.0.2. Surfaces share one list of planes by id; the tree cuts space by them until no leaf holds
-//! any; what of a plane lies between two empty leaves is a portal. Portals of one plane that close a
-//! path together, their rim all on solid surfaces, are a *separator* ([`separator`](self)), and cells
-//! are what separators part.
+//! §3.0.2. Surfaces share one list of planes by id; the tree cuts space by them until no leaf contains
+//! any; the part of a plane between two empty leaves is a portal. Portals of one plane that together
+//! close a path, with their whole rim on solid surfaces, are a *separator* ([`separator`](self)), and
+//! separators divide the leaves into cells.
 //!
 //! | step of the paper | file |
 //! | --- | --- |
@@ -19,10 +19,10 @@
 //! | 4: cells above the bound | [`crate::bound`] |
 //! | leaks, as a path | `leak` |
 //!
-//! Where it departs from the paper: with brushes, the surface of their union is made first and what
-//! only the void sees is dropped, so that no leaf lies in it; and the world is not made from these
+//! Departures from the paper: with brushes, the surface of their union is made first and the parts seen
+//! only from the void are dropped, so that no leaf lies in it; and the world is not made from these
 //! leaves but from [`crate::complex`], which takes the separators as candidates and the cells as votes, so
-//! that a separator that rounding spoils costs a room and never a promise.
+//! that a separator spoiled by rounding costs a room but never a promise.
 
 mod arrange;
 mod build;

@@ -1,4 +1,4 @@
-//! The portals of the leaves: each node's plane, clipped to its region and cut by both subtrees
+//! Portals between leaves: each node's plane, clipped to its region and cut by both subtrees
 //! (Lefebvre & Hornus 2003, notes after §3.0.2).
 
 use enfilade_geom::{DVec3, Plane, Purse};
@@ -14,13 +14,13 @@ use super::tree::{Content, Fragment, Tree, leaf_index};
 pub(super) struct LeafPortal {
     /// Leaves on the positive and on the negative side of its plane.
     pub(super) leaves: [u32; 2],
-    /// Into [`Tree::planes`].
+    /// Index into [`Tree::planes`].
     pub(super) plane: u32,
-    /// Counter-clockwise about the plane's normal.
+    /// Vertices, counter-clockwise about the plane's normal.
     pub(super) points: Poly,
 }
 
-/// All openings between leaves that are not solid, with the surfaces in their planes taken out.
+/// Returns all openings between leaves that are not solid, without the surfaces in their planes.
 pub(super) fn leaf_portals(
     tree: &Tree,
     tolerance: &Tolerance,
@@ -78,7 +78,7 @@ impl Visitor<'_> {
         else {
             return;
         };
-        // Nearest cuts first: they leave least for the others.
+        // Nearest cuts first: they leave the least for the others.
         for cut in cuts.iter().rev() {
             match poly::clip(&points, cut, self.tolerance.cut) {
                 Some(p) => points = p,

@@ -1,4 +1,4 @@
-//! A bake whose portals are the separators of a tree.
+//! Proposes the separators of a tree as portals.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ use super::{arrange, guided, leak, separator, shape};
 /// Finds rooms by binary space partition and separators, for levels made of brushes and for clean architectural models.
 ///
 /// # Errors
-/// When the caller cancels.
+/// If the caller cancels.
 pub(crate) fn propose(
     structure: &Structure<'_>,
     config: &BakeConfig,
@@ -75,7 +75,7 @@ fn label_settings(scene: &Scene) -> LabelSettings {
     if scene.solids.is_empty() {
         return LabelSettings::default();
     }
-    // A cell of the tree is a cell whatever its size: what is too small is the simplifier's to say.
+    // A cell of the tree is a cell whatever its size; the simplifier decides which are too small.
     LabelSettings {
         min_volume: 0.0,
         min_room: 0.0,
@@ -85,12 +85,12 @@ fn label_settings(scene: &Scene) -> LabelSettings {
     }
 }
 
-/// The leaves by cell.
+/// Leaves divided into cells.
 struct Parted {
     cells: LeafCells,
     shapes: Vec<Option<Shape>>,
-    /// Whether each leaf is of what is too narrow for a room, where shape tells rooms; a guide's cells are as narrow as it
-    /// says.
+    /// `true` for each leaf of a cell too narrow for a room, if shape decides on rooms; a guide may make narrower
+    /// cells.
     is_narrow: Vec<bool>,
 }
 
@@ -134,10 +134,10 @@ impl Parted {
         }
     }
 
-    /// A vote of each leaf for its cell.
+    /// Returns a vote of each leaf for its cell.
     fn votes(&self, bsp: &Bsp<'_>) -> Vec<Vote> {
         let cells = &self.cells;
-        // With triangles the air around everything is a cell; its label says so.
+        // With triangles, the air around everything is a cell, and is labeled as such.
         let outer = cells.of_leaf[bsp.outer_leaf() as usize];
         let label = |cell: u32| {
             if cell == outer {
@@ -148,7 +148,7 @@ impl Parted {
         };
         let of_leaf = |(leaf, shape): (usize, &Option<Shape>)| {
             let (cell, shape) = (cells.of_leaf[leaf], (*shape)?);
-            // What leaks from a narrow one into a room is part of that room; the complex sees to it.
+            // A narrow cell that leaks into a room is part of that room; the complex sees to it.
             let counts = cell != NO_CELL && !self.is_narrow.get(leaf).is_some_and(|n| *n);
             counts.then(|| Vote {
                 point: shape.middle,
@@ -160,7 +160,7 @@ impl Parted {
     }
 }
 
-/// What the partition goes by, each setting as text by its name, for the provenance of the file.
+/// Returns the settings of the partition as text, by name, for the provenance of the file.
 fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
     let BspConfig {
         heuristic,
@@ -181,7 +181,7 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
     out
 }
 
-/// A candidate for each separator whose portals fill their hull, for each portal otherwise.
+/// Returns one candidate for each separator whose portals fill their hull, else one for each of its portals.
 fn candidates_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Candidate> {
     let mut out = Vec::new();
     for s in &cells.separators {
@@ -208,7 +208,7 @@ fn candidates_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Candidate> {
     out
 }
 
-/// The polygon with each corner moved out: a candidate must reach past the rim of its opening.
+/// Returns the polygon with each vertex moved out: a candidate must reach past the rim of its opening.
 fn grown(w: &Winding, plane: &Plane, by: f64) -> Winding {
     let n = w.points.len();
     let moved = (0..n).map(|i| {
@@ -219,7 +219,7 @@ fn grown(w: &Winding, plane: &Plane, by: f64) -> Winding {
         );
         let out = |e: DVec3| e.normalize_or_zero().cross(plane.normal);
         let (m, k) = (out(p - a), out(b - p));
-        // Sharp corners would run far off.
+        // Sharp vertices would move too far.
         p + (m + k) * (by / (1.0 + m.dot(k)).max(0.1))
     });
     Winding::new(moved.collect())

@@ -1,14 +1,14 @@
-//! From cells to rooms: cells are joined across separators that are no pinch.
+//! Merges cells into rooms across separators that are not a pinch.
 //!
-//! Separators of a building stand in every plane of it: at both faces of a wall, along every pier and
-//! beam. Lefebvre & Hornus 2003 (§3) let a cost bound choose among them; in a building that joins a toilet
-//! to its corridor before it joins the two halves of a hall, for a room has fewer triangles than a stair. So
-//! the watershed's measure is taken here, too (`structure/pinch.rs`): an opening parts two rooms when it
-//! is narrower than the sections of space beside it. It is the same rule with the same settings; sections
-//! are looked up in the tree. Crossing separators need no choosing: all are kept until one is no pinch.
+//! Separators of a building lie in each of its planes: at both faces of a wall, along every pier and
+//! beam. Lefebvre & Hornus 2003 (§3) choose among them by a cost bound; in a building, that joins a toilet
+//! to its corridor before it joins the two halves of a hall, since a room has fewer triangles than a stair.
+//! This module uses the watershed's measure instead (`structure/pinch.rs`): an opening separates two rooms if it
+//! is narrower than the sections of space beside it. Rule and settings are the same; sections are looked up
+//! in the tree. Crossing separators need no choice: each is kept until it stops being a pinch.
 //!
-//! Time: a look-up in the tree for each of some ten thousand points around a separator, once; each merge
-//! weighs the openings of the merged cell anew.
+//! Time: one look-up in the tree for each of some ten thousand points around a separator; each merge
+//! measures the openings of the merged cell again.
 
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
@@ -27,8 +27,8 @@ use super::shape;
 
 /// A door leaf this near to a separator's plane closes it. [Units: wu]
 const CLOSURE_REACH: f64 = 0.25;
-/// Whether a separator can be a pinch however space is parted around it: whether the larger of the two
-/// sections beside it is larger than it is, all open space taken together.
+/// Returns `true` if a separator can be a pinch for some division of the space around it: if the larger of the two
+/// sections beside it, with all open space taken together, is larger than the separator.
 pub(super) fn may_be_pinch(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSettings) -> bool {
     let lattice = Lattice::of(bsp, s, settings);
     let all = |_: usize, _: u32| 1;
@@ -36,20 +36,20 @@ pub(super) fn may_be_pinch(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSetting
     section.ratio < settings.wall_threshold
 }
 
-/// What rooms are told from besides the tree.
+/// Evidence of rooms besides the tree.
 pub(super) struct Evidence<'a> {
     pub(super) shapes: &'a [Option<Shape>],
-    /// Door leaves and panes.
+    /// Triangles of door leaves and panes.
     pub(super) closures: &'a Bvh,
     /// Heights at which storeys end, ascending. [Units: wu]
     pub(super) slabs: &'a [f64],
     pub(super) allowance: &'a Allowance,
 }
 
-/// What weighing an opening costs, in units of [`Allowance`].
+/// Cost of measuring an opening, in units of [`Allowance`].
 const WORK: u64 = 200;
 
-/// Part of a separator between two cells: the separator, and portals by their places in its list.
+/// Part of a separator between two cells: the separator, and indices into its list of portals.
 type SeparatorPart = (u32, Vec<u32>);
 
 struct LeafMerger<'a> {
@@ -58,9 +58,9 @@ struct LeafMerger<'a> {
     evidence: &'a Evidence<'a>,
     separators: &'a [Separator],
     lattices: Vec<Lattice>,
-    /// Share of each separator's portals that closures fill.
+    /// For each separator, the share of each of its portals that closures fill.
     closed: Vec<Vec<f64>>,
-    /// Areas of their portals.
+    /// Areas of those portals.
     areas: Vec<Vec<f64>>,
     of_leaf: &'a [u32],
     parent: Vec<u32>,
@@ -71,7 +71,7 @@ struct LeafMerger<'a> {
     storeys_apart: bool,
 }
 
-/// Parts the leaves by those separators that are a pinch, and joins what is too thin to be a room.
+/// Divides the leaves by the separators that are a pinch, and merges cells that are too thin to be rooms.
 pub(super) fn part(
     bsp: &Bsp<'_>,
     separators: Vec<Separator>,
@@ -123,7 +123,7 @@ pub(super) fn part(
     let cell_of: Vec<u32> = (0..n_cells as u32).map(|c| merger.find(c)).collect();
     let openings = std::mem::take(&mut merger.openings);
     drop(merger);
-    // Numbered anew in order.
+    // Renumber in order.
     let mut number = vec![NONE; n_cells];
     let mut n = 0;
     let of_leaf = of_leaf
@@ -165,14 +165,14 @@ pub(super) fn part(
     }
 }
 
-/// Directions along which cells are measured at most: walls of most buildings have two, and the height.
+/// Most directions along which cells are measured: walls of most buildings have two; the height is another.
 const MAX_DIRECTIONS: usize = 16;
 
-/// Which cells are too narrow for a ball of the least radius of a room: layers of floors and roofs, the
-/// insides of walls. The watershed has no region there either (`watershed/hollow.rs`).
+/// Returns `true` for each cell too narrow for a ball of the least radius of a room: layers of floors and roofs,
+/// interiors of walls. The watershed has no region there either (`watershed/hollow.rs`).
 ///
-/// Measured across the planes of the tree, those of the largest portals, so that it does not matter how the building is
-/// turned. Errs to a room: a cell is narrow only where it is so between two planes as a whole.
+/// Measured across the planes of the tree with the largest portals, so that the rotation of the building does not
+/// matter. Errs to a room: a cell is narrow only if all of it lies between two close planes.
 pub(super) fn narrow_cells(
     bsp: &Bsp<'_>,
     cells: &LeafCells,
@@ -206,7 +206,7 @@ pub(super) fn narrow_cells(
     widths.into_iter().map(|width| width < least).collect()
 }
 
-/// The share of each portal that a door leaf or a pane fills.
+/// Returns the share of each portal that a door leaf or a pane fills.
 fn closed_shares(
     bsp: &Bsp<'_>,
     s: &Separator,
@@ -261,7 +261,7 @@ impl LeafMerger<'_> {
         }
     }
 
-    /// The outdoors first, then the lesser number.
+    /// Returns the pair with the outdoors first, else the lesser number first.
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
         if b == self.outer || (a != self.outer && b < a) {
             (b, a)
@@ -328,7 +328,7 @@ impl LeafMerger<'_> {
         settings.openness(found.ratio, found.wall)
     }
 
-    /// Cells before and behind each portal of a separator that still parts two.
+    /// Returns the cells before and behind each portal of a separator that still divides two.
     fn sides(&self, separator: u32) -> Vec<(u32, [u32; 2])> {
         let portals = &self.separators[separator as usize].portals;
         let cells = |(k, &p): (usize, &u32)| {
@@ -338,8 +338,8 @@ impl LeafMerger<'_> {
         portals.iter().enumerate().filter_map(cells).collect()
     }
 
-    /// How little of a pinch a separator is as a whole, whatever cuts the space on either side of it;
-    /// and how old its cells are.
+    /// Returns the openness of a separator as a whole, however the space on either side of it is divided;
+    /// and the age of its cells.
     fn pinch_of_separator(&self, separator: u32) -> (f64, u64) {
         let sides = self.sides(separator);
         if sides.is_empty() {
@@ -371,8 +371,8 @@ impl LeafMerger<'_> {
         )
     }
 
-    /// Takes whole separators away, least pinched first: what crosses a separator cuts it in pieces
-    /// that are narrow by themselves, and would be a way through it.
+    /// Removes whole separators, least pinched first: separators that cross one cut it into pieces that are
+    /// narrow by themselves, and would open a way through it.
     fn run_separators(&mut self) {
         let weigh = |merger: &Self, s: u32| {
             if !merger.may_go_on() {
@@ -402,8 +402,8 @@ impl LeafMerger<'_> {
         }
     }
 
-    /// Openings that touch each other in an edge are one that bends: its area is the length of the
-    /// vector area. Each with the largest flat part of it.
+    /// Groups openings that share an edge: they are one opening that bends, whose area is the length of the
+    /// vector area. Returns the area of each group with its largest flat part.
     fn together<'a>(
         &self,
         pair: (u32, u32),
@@ -458,9 +458,9 @@ impl LeafMerger<'_> {
         out
     }
 
-    /// Joins cells that are but the depth of an opening (the way through a wall) to the neighbor that
-    /// is least shut off: they have less depth behind their largest opening than sections are looked
-    /// for, so no section could tell them from the opening itself.
+    /// Merges cells that are only the depth of an opening (the way through a wall) into the neighbor that is
+    /// least closed off: behind their largest opening they are less deep than sections reach, so no section
+    /// could distinguish them from the opening itself.
     fn absorb_passages(&mut self) {
         let mut volumes = vec![0.0; self.parent.len()];
         for (leaf, shape) in self.evidence.shapes.iter().enumerate() {
@@ -536,7 +536,7 @@ impl Mergeable for LeafMerger<'_> {
         let Some(openings) = self.openings.get(&pair) else {
             return 0.0;
         };
-        // Largest first; two are enough: a third between the same two is smaller still.
+        // Largest first. Two are enough: a third between the same two cells is smaller still.
         let mut groups = self.together(pair, openings);
         groups.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
         groups
@@ -577,7 +577,7 @@ impl Mergeable for LeafMerger<'_> {
             let pair = self.ordered(a, c);
             let all = self.openings.entry(pair).or_default();
             for (s, places) in moved {
-                // Parts of one separator are one opening again.
+                // Parts of one separator become one opening again.
                 if let Some(same) = all.iter_mut().find(|o| o.0 == s) {
                     same.1.extend(places);
                     same.1.sort_unstable();

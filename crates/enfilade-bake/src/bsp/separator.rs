@@ -1,11 +1,11 @@
-//! Separators: portals of one plane that close a path together (Lefebvre & Hornus 2003, §2.1 step 2).
+//! Separators: portals of one plane that together close a path (Lefebvre & Hornus 2003, §2.1 step 2).
 //!
-//! An edge of a portal is valid where each of its points is on a solid surface or on another portal of
-//! the separator. A portal with an edge that is not valid is taken away, which may make its neighbors'
-//! edges invalid in turn; what is left falls into connected sets. The paper checks edge by edge with an
-//! epsilon; here each edge carries the intervals of it that are covered, and by what.
+//! An edge of a portal is valid if each of its points is on a solid surface or on another portal of the
+//! separator. A portal with an invalid edge is removed, which may make its neighbors' edges invalid in
+//! turn; the remaining ones fall into connected sets. The paper checks edge by edge with an epsilon; here each
+//! edge records the intervals that are covered, and the portals that cover them.
 //!
-//! Time: near-linear in portals and surfaces that are spread out; each removal looks at the neighbors of
+//! Time: near-linear in portals and surfaces that are spread out; each removal visits the neighbors of
 //! one portal only.
 
 use std::collections::BTreeMap;
@@ -28,27 +28,27 @@ pub(super) struct Separator {
     pub(super) area: f64,
 }
 
-/// What counts as touching. [Units: tolerance of planes]
+/// Distance that counts as touching. [Units: tolerance of planes]
 const EPS: f64 = 4.0;
 
-/// All valid separators, ordered by plane and first portal.
+/// Returns all valid separators, ordered by plane and first portal.
 pub(super) fn find(bsp: &Bsp<'_>) -> Vec<Separator> {
     find_in(bsp, EPS, &|_| true)
 }
 
-/// The valid separators in planes that may be a wall's.
+/// Returns the valid separators in planes that may be a wall's.
 pub(super) fn find_in_walls(bsp: &Bsp<'_>) -> Vec<Separator> {
     let is_wall = bsp.wall_planes();
     find_in(bsp, EPS, &|plane| is_wall[plane as usize])
 }
 
-/// The valid separators in planes that only a guide gave.
+/// Returns the valid separators in planes that only a guide gave.
 pub(super) fn find_in_guides(bsp: &Bsp<'_>) -> Vec<Separator> {
-    // Of curved surfaces the tree makes many slivers, which are closed; portals beside one are as far apart as it was wide.
+    // Curved surfaces give the tree many slivers, which are closed; portals beside one are as far apart as it was wide.
     find_in(bsp, 2.0 * EPS, &|plane| plane >= bsp.n_own_planes)
 }
 
-/// How much of a separator's rim lies on surfaces of each plane. [Units: wu]
+/// Returns the length of a separator's rim that lies on surfaces of each plane. [Units: wu]
 pub(super) fn rim(bsp: &Bsp<'_>, s: &Separator, solids: &BoxTree) -> BTreeMap<u32, f64> {
     let eps = 2.0 * EPS * bsp.tolerance.plane;
     let mut lengths = BTreeMap::new();
@@ -94,9 +94,9 @@ type Interval = [f64; 2];
 
 /// One edge of a portal.
 struct Edge {
-    /// Covered by solid surfaces.
+    /// Intervals covered by solid surfaces.
     solid: SmallVec<[Interval; 4]>,
-    /// Covered by other portals of the plane: which of the group, from where to where.
+    /// Intervals covered by other portals of the plane, each with the portal's index in the group.
     others: SmallVec<[(u32, Interval); 2]>,
     /// Share of the edge that rounding may leave uncovered.
     slack: f64,
@@ -146,7 +146,7 @@ fn of_plane(bsp: &Bsp<'_>, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<S
                 .flat_map(|e| e.others.iter().map(|o| o.0)),
         );
     }
-    // Connected sets of what is left.
+    // Connected sets of the remaining portals.
     let mut sets = Sets::new(group.len());
     for k in (0..group.len()).filter(|&k| is_alive[k]) {
         for &(o, _) in edges[k].iter().flat_map(|e| &e.others) {
@@ -176,7 +176,7 @@ fn of_plane(bsp: &Bsp<'_>, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<S
 }
 
 impl Edge {
-    /// Whether all of it is on solids or on portals that are there.
+    /// Returns `true` if all of it is on solids or on portals still alive.
     fn is_covered(&self, is_alive: &[bool]) -> bool {
         let mut all: SmallVec<[Interval; 8]> = self.solid.iter().copied().collect();
         all.extend(
@@ -189,7 +189,7 @@ impl Edge {
     }
 }
 
-/// Whether the intervals cover 0 to 1 with no gap wider than `slack`.
+/// Returns `true` if the intervals cover 0 to 1 with no gap wider than `slack`.
 fn covers(intervals: &mut [Interval], slack: f64) -> bool {
     intervals.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     let mut to = 0.0;
@@ -217,7 +217,7 @@ fn edge(
         slack: (2.0 * eps / length).min(1.0),
     };
     if e.slack >= 0.5 {
-        // Shorter than what counts as touching.
+        // Shorter than the distance that counts as touching.
         e.solid.push([0.0, 1.0]);
         return e;
     }
@@ -234,7 +234,7 @@ fn edge(
     e
 }
 
-/// From where to where an edge lies on a surface.
+/// Returns the interval of an edge that lies on a surface.
 fn on_surface(a: DVec3, b: DVec3, f: &Fragment, bsp: &Bsp<'_>, eps: f64) -> Option<Interval> {
     let plane = &bsp.tree.planes[f.plane as usize];
     if plane.signed_distance(a).abs() > eps || plane.signed_distance(b).abs() > eps {
@@ -263,7 +263,7 @@ fn on_surface(a: DVec3, b: DVec3, f: &Fragment, bsp: &Bsp<'_>, eps: f64) -> Opti
     (i[0] < i[1]).then_some(i)
 }
 
-/// From where to where an edge runs along an edge of another polygon of its plane.
+/// Returns the interval of an edge that runs along an edge of another polygon in its plane.
 fn shared(a: DVec3, b: DVec3, other: &[DVec3], eps: f64) -> Option<Interval> {
     let along = b - a;
     let length = along.length();
@@ -282,7 +282,7 @@ fn shared(a: DVec3, b: DVec3, other: &[DVec3], eps: f64) -> Option<Interval> {
     })
 }
 
-/// Whether two polygons have a part of an edge in common, whichever way each turns.
+/// Returns `true` if two polygons share part of an edge, whatever their orientations.
 pub(super) fn touch(a: &[DVec3], b: &[DVec3], eps: f64) -> bool {
     let n = a.len();
     (0..n).any(|i| {

@@ -1,4 +1,4 @@
-//! Where each leaf is: its box, its volume and a point well inside.
+//! Measures each leaf: its volume and a point well inside.
 
 use enfilade_geom::{DVec3, Purse};
 
@@ -7,7 +7,7 @@ use crate::complex::region::{Region, Shape, halves, shape_of, whole};
 use super::tolerance::Tolerance;
 use super::tree::{Tree, leaf_index};
 
-/// Measures of all leaves; none for those that rounding has left without a volume.
+/// Returns measures of all leaves; `None` for those that rounding left without a volume.
 pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance, purse: Purse<'_>) -> Vec<Option<Shape>> {
     let mut out = vec![None; tree.contents.len()];
     visit(
@@ -22,9 +22,9 @@ pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance, purse: Purse<'_>) -> Ve
     out
 }
 
-/// The least width of each cell along any of `directions`, given the cell of each leaf. [Units: wu]
+/// Returns the least width of each cell along any of `directions`, given the cell of each leaf. [Units: wu]
 ///
-/// Infinite for a cell without a leaf that has a volume. Time: directions times corners of leaves.
+/// Infinite for a cell that has no leaf with a volume. Time: `O(directions · vertices of leaves)`.
 pub(super) fn widths(
     tree: &Tree,
     tolerance: &Tolerance,

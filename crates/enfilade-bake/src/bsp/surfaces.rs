@@ -11,17 +11,17 @@ use super::input::BspInput;
 use super::tolerance::Tolerance;
 use super::tree::Fragment;
 
-/// What a tree is built from.
+/// The polygons from which a tree is built, and their planes.
 pub(super) struct Gathered {
     pub(super) planes: Vec<Plane>,
     pub(super) fragments: Vec<Fragment>,
-    /// The face of a solid, or the triangle, that each fragment is of.
+    /// For each fragment, its triangle or its face of a solid.
     pub(super) faces: Vec<u32>,
     pub(super) bounds: Aabb,
     pub(super) tolerance: Tolerance,
 }
 
-/// Planes, polygons, the box around them and what counts as touching.
+/// Returns planes, polygons, the box around them and the tolerance.
 pub(super) fn gather(input: &BspInput<'_>, purse: Purse<'_>) -> Gathered {
     let points = input.triangles.iter().flatten().copied().chain(
         input

@@ -94,7 +94,7 @@ fn hall(rng: &mut Rng, n: usize) -> Vec<ConvexSolid> {
     out
 }
 
-/// The tree of a random hall, which other modules' tests look into.
+/// Returns the tree of a random hall, for tests of other modules.
 pub(super) fn random_hall(seed: u64) -> Bsp<'static> {
     let solids = hall(&mut Rng::new(seed), 9);
     bsp_of(&solids, &[], Heuristic::Default, &Guide::default())
@@ -117,7 +117,7 @@ fn leaves_fill_what_the_solids_leave_free() {
             Heuristic::MaxOrtho,
         ] {
             let bsp = bsp_of(&solids, &[], heuristic, &Guide::default());
-            // The oracle asks the solids themselves.
+            // The oracle is the solids themselves.
             for _ in 0..300 {
                 let p = DVec3::new(
                     rng.unit() * 18.0 - 1.0,
@@ -142,7 +142,7 @@ fn leaves_fill_what_the_solids_leave_free() {
     }
 }
 
-/// Whether `p` is on the surface of what is solid.
+/// Returns `true` if `p` is in or on a solid.
 fn is_on_solid(solids: &[ConvexSolid], p: DVec3, eps: f64) -> bool {
     solids.iter().any(|s| s.contains(p, -eps))
 }
@@ -173,7 +173,7 @@ fn rims_of_separators_are_on_solids_or_on_their_own_portals() {
         }
         let parted = cells::part(&bsp, found);
         n_found += parted.separators.len();
-        // Without any one of them, two cells are one.
+        // Without any one of them, two cells merge.
         for i in 0..parted.separators.len() {
             let mut others = parted.separators.clone();
             others.remove(i);
@@ -251,7 +251,7 @@ fn a_gap_is_a_leak_and_the_way_out_is_open() {
             );
         }
     }
-    // The tree is still good for a bake.
+    // The tree can still be baked.
     assert!(bsp.counts().n_leaves > 0);
 }
 
@@ -291,7 +291,7 @@ fn the_clinic_is_cut_as_much_as_that_of_the_paper() {
     assert!(c.n_faces < c.n_polygons && c.n_splits > 0);
 }
 
-/// The solids as a scene, as the importer of maps makes it.
+/// Returns the solids as a scene, like that of the map importer.
 fn scene_of(solids: &[ConvexSolid], inside: &[DVec3]) -> Scene {
     let mut primitive = Primitive::default();
     for w in solids.iter().flat_map(|s| &s.faces) {
@@ -354,7 +354,7 @@ fn worlds_keep_their_promises_whatever_the_settings() {
             for inside in [vec![], vec![INSIDE]] {
                 let mut scene = scene_of(&solids, &inside);
                 if i == 1 {
-                    // As triangles that nobody knows to be solids.
+                    // As triangles not known to be solids.
                     scene.solids.clear();
                 }
                 let world = baked(&scene, config);
@@ -376,9 +376,9 @@ fn rooms_of_a_row_are_found_and_large_ones_are_cut() {
         let g = baked(&scene, config).graph;
         (g.cells.len(), g.portals.len())
     };
-    // Every separator: both faces of each wall, the doorway between them a cell.
+    // Every separator: both faces of each wall, with the doorway between them as a cell.
     assert_eq!(count(&BakeConfig::of(Method::Bsp)), (5, 4));
-    // By their shape: a doorway is part of a room.
+    // With shape, a doorway is part of a room.
     let mut by_shape = BakeConfig::of(Method::Bsp);
     by_shape.bsp.rooms = Rooms::Always;
     assert_eq!(count(&by_shape), (3, 2));
@@ -390,7 +390,7 @@ fn rooms_of_a_row_are_found_and_large_ones_are_cut() {
 // Covers B8.
 #[test]
 fn a_building_of_overlapping_walls_has_a_cell_a_room_however_it_is_turned() {
-    // Walls that run into each other and into the slabs, as triangles that nobody knows to be solids.
+    // Walls that run into each other and into the slabs, as triangles not known to be solids.
     let mut solids = row(3);
     solids.push(boxed([-0.3, -0.3, -0.4], [13.4, 3.2, 0.0]));
     solids.push(boxed([4.1, -0.2, 3.0], [4.3, 3.3, 4.4]));
@@ -420,7 +420,7 @@ fn the_hollow_behind_a_lining_is_no_room_but_a_deeper_closet_is() {
     for (depth, n) in [(0.4, 2), (0.7, 3)] {
         for turn in [0.0, 0.3_f64] {
             let mut solids = row(2);
-            // A panel of 5 cm before a wall, with a hatch of half a meter.
+            // A panel of 5 cm in front of a wall, with a hatch of half a meter.
             let (a, b) = (4.0 - depth - 0.05, 4.0 - depth);
             solids.push(boxed([0.0, 0.0, a], [3.4, 3.0, b]));
             solids.push(boxed([3.9, 0.0, a], [4.0, 3.0, b]));
@@ -433,7 +433,7 @@ fn the_hollow_behind_a_lining_is_no_room_but_a_deeper_closet_is() {
             let rooms = g.cells.iter().filter(|c| !c.outdoor);
             let volumes: Vec<f32> = rooms.map(|c| c.volume).collect();
             assert_eq!(volumes.len(), n, "{depth} {turn}: {volumes:?}");
-            // The hollow is air all the same, and part of the room that it leaks into.
+            // The hollow is still air, and part of the room into which it leaks.
             let sum: f32 = volumes.iter().sum();
             assert!((95.0..97.5).contains(&sum), "{depth} {turn}: {volumes:?}");
         }

@@ -1,11 +1,11 @@
-//! What counts as touching in a tree.
+//! Distances that count as touching in a tree.
 
 use enfilade_geom::{Aabb, plane_tolerance};
 
-/// What counts as touching. [Units: wu]
+/// Distances that count as touching. [Units: wu]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolerance {
-    /// Corners this near to a plane lie in it.
+    /// Vertices this near to a plane lie in it.
     pub(super) plane: f64,
     /// The same when portals are cut by planes, which are exact.
     pub(super) cut: f64,
@@ -14,10 +14,10 @@ pub(super) struct Tolerance {
 }
 
 impl Tolerance {
-    /// For corners that are `f32` numbers of this size.
+    /// Returns tolerances for vertices that are `f32` numbers of this size.
     pub(super) fn for_bounds(bounds: &Aabb) -> Self {
         let extent = bounds.extent();
-        // Twice the measure of the cell complex, since a brush's exact plane and its rounded corners may stray to
+        // Twice the measure of the cell complex, since a brush's exact plane and its rounded vertices may deviate to
         // either side.
         let plane = 2.0 * plane_tolerance(extent);
         Self {

@@ -1,4 +1,4 @@
-//! The tree: space cut by the planes of its surfaces until no leaf holds any.
+//! The tree: space cut by the planes of its surfaces until no leaf contains any.
 
 use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use crate::complex::poly::{self, Poly, Sides};
 use super::guide::Guide;
 use super::tolerance::Tolerance;
 
-/// How the plane that cuts a region is chosen.
+/// The rule that chooses the plane to cut a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heuristic {
     /// Few cuts and a balanced tree, judged by a sample of surfaces: fewest cuts in all.
@@ -18,29 +18,29 @@ pub enum Heuristic {
     MinCut,
     /// The plane with most surface in it.
     MaxArea,
-    /// The plane most orthogonal to what it cuts; quadratic.
+    /// The plane most orthogonal to the surfaces that it cuts; quadratic.
     MaxOrtho,
 }
 
 /// A convex piece of a surface.
 #[derive(Clone, Debug)]
 pub(super) struct Fragment {
-    /// Corners, counter-clockwise about the plane's normal unless `is_flipped`.
+    /// Vertices, counter-clockwise about the plane's normal unless `is_flipped`.
     pub(super) points: Poly,
-    /// Into [`Tree::planes`].
+    /// Index into [`Tree::planes`].
     pub(super) plane: u32,
-    /// It looks against its plane's normal.
+    /// It faces against its plane's normal.
     pub(super) is_flipped: bool,
 }
 
-/// What a leaf is.
+/// Content of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
-    /// Surfaces around it look into it.
+    /// Surfaces around it face into it.
     Empty,
-    /// Surfaces around it look away.
+    /// Surfaces around it face away.
     Solid,
-    /// No surface bounds it, or as many look in as away.
+    /// No surface bounds it, or as many face in as away.
     Unknown,
 }
 
@@ -49,11 +49,11 @@ pub(super) enum Content {
 pub(super) struct Node {
     pub(super) plane: u32,
     pub(super) children: [i32; 2],
-    /// Where its fragments begin in [`Tree::on_plane`]; they end where the next node's begin.
+    /// Start of its fragments in [`Tree::on_plane`]; they end where the next node's begin.
     pub(super) on_start: u32,
 }
 
-/// Nodes are in preorder.
+/// A binary space partition. Nodes are in preorder.
 pub(super) struct Tree {
     pub(super) bounds: Aabb,
     pub(super) planes: Vec<Plane>,
@@ -62,12 +62,12 @@ pub(super) struct Tree {
     pub(super) root: i32,
     /// Content of each leaf.
     pub(super) contents: Vec<Content>,
-    /// How often a fragment was cut in two.
+    /// Number of cuts of a fragment in two.
     pub(super) n_splits: usize,
 }
 
 impl Tree {
-    /// The leaf that holds `p`; points in a plane belong to its front.
+    /// Returns the leaf that contains `p`; points in a plane belong to its front.
     pub(super) fn leaf_of(&self, p: DVec3) -> u32 {
         let mut at = self.root;
         while at >= 0 {
@@ -78,7 +78,7 @@ impl Tree {
         leaf_index(at)
     }
 
-    /// The fragments that lie in a node's plane within its region.
+    /// Returns the fragments that lie in a node's plane within its region.
     pub(super) fn fragments_on(&self, node: usize) -> &[Fragment] {
         let end = self
             .nodes
@@ -87,7 +87,7 @@ impl Tree {
         &self.on_plane[self.nodes[node].on_start as usize..end]
     }
 
-    /// Hands out the leaves on the side that a fragment looks to, with its piece there.
+    /// Calls `take` for each leaf on the side that a fragment faces.
     pub(super) fn leaves_before(&self, f: &Fragment, eps: f64, take: &mut impl FnMut(u32)) {
         self.descend(self.root, &f.points, f, eps, take);
     }
@@ -136,7 +136,7 @@ impl Tree {
     }
 }
 
-/// The leaf that a child value stands for.
+/// Returns the leaf that a child value encodes.
 pub(super) fn leaf_index(child: i32) -> u32 {
     (-1 - child) as u32
 }
@@ -169,7 +169,7 @@ pub(super) fn build(
     };
     builder.n_own_planes = builder.tree.planes.len() as u32;
     for plane in guide.planes(&bounds) {
-        // A guide that coincides with a surface is that surface's plane.
+        // A guide that coincides with a surface uses that surface's plane.
         let same = builder.tree.planes.iter().position(|p| {
             p.normal.dot(plane.normal).abs() > 1.0 - 1e-9
                 && (p.d * p.normal.dot(plane.normal).signum() - plane.d).abs() < tolerance.plane
@@ -198,22 +198,22 @@ struct Builder<'a> {
     purse: Purse<'a>,
 }
 
-/// Numbers that choose a splitter.
+/// Measures of a splitter.
 #[derive(Clone, Copy, Default)]
 struct Count {
     front: u32,
     back: u32,
     cut: u32,
     on_area: f64,
-    /// Sum over cut fragments of how far they are from being orthogonal.
+    /// Sum over cut fragments of their deviation from orthogonal.
     skew: f64,
 }
 
-/// Candidates tried where a region holds many planes; the largest surfaces come first.
+/// Candidates tried if a region contains many planes; the largest surfaces come first.
 const CANDIDATES: usize = 160;
-/// Fragments that a candidate is tried on.
+/// Fragments on which a candidate is tried.
 const SAMPLE: usize = 2048;
-/// With more trials of a fragment than this, candidates are tried in parallel.
+/// Trials of a fragment above which candidates are tried in parallel.
 const PARALLEL: usize = 20_000;
 
 impl Builder<'_> {
@@ -222,7 +222,7 @@ impl Builder<'_> {
         -(self.tree.contents.len() as i32)
     }
 
-    /// Cuts by the guides that pass through the region first.
+    /// Cuts first by the guides that pass through the region.
     fn split_guided(
         &mut self,
         fragments: Vec<Fragment>,
@@ -280,7 +280,7 @@ impl Builder<'_> {
         node as i32
     }
 
-    /// Makes a node; returns it, what lies on either side, and what the surfaces in it say of them.
+    /// Makes a node. Returns it, the fragments on either side, and the contents that surfaces in its plane imply.
     fn cut(
         &mut self,
         fragments: Vec<Fragment>,
@@ -335,7 +335,7 @@ impl Builder<'_> {
     }
 
     fn choose(&self, fragments: &[Fragment]) -> u32 {
-        // Planes by the area that lies in them, largest first.
+        // Planes by the area of their surfaces, largest first.
         let mut areas: Vec<(u32, f64)> = fragments
             .iter()
             .map(|f| (f.plane, poly::area(&f.points)))
@@ -350,7 +350,7 @@ impl Builder<'_> {
             return by_plane[0].0;
         }
         if self.heuristic == Heuristic::Default && by_plane.len() > CANDIDATES {
-            // The largest, and some of the others: where all surfaces are small, any may be best.
+            // The largest, and some of the others: if all surfaces are small, any may be best.
             let step = (by_plane.len() - CANDIDATES / 2).div_ceil(CANDIDATES / 2);
             let others: Vec<(u32, f64)> = by_plane[CANDIDATES / 2..]
                 .iter()
@@ -373,8 +373,8 @@ impl Builder<'_> {
                 Heuristic::MinCut => (f64::from(c.cut), -c.on_area),
                 Heuristic::MaxOrtho => (c.skew / f64::from(c.cut.max(1)), f64::from(c.cut)),
                 _ => {
-                    // A cut fragment is there twice in what follows, an unbalanced tree is deep, and
-                    // deep regions are cut by more planes.
+                    // A cut fragment counts twice from here on, an unbalanced tree is deep, and deep regions are cut by
+                    // more planes.
                     let lean = f64::from(c.front.abs_diff(c.back));
                     let n = f64::from(c.front + c.back + 1);
                     let is_axial = self.tree.planes[id as usize].normal.abs().max_element() == 1.0;
@@ -432,7 +432,7 @@ impl Builder<'_> {
     }
 }
 
-/// What a cut costs, in fragments that lie on the wrong side of a perfect halving.
+/// Cost of a cut, in fragments that lie on the wrong side of a perfect halving.
 const CUT_COST: f64 = 40.0;
-/// What each fragment more on one side costs.
+/// Cost of each surplus fragment on one side.
 const LEAN_COST: f64 = 0.25;

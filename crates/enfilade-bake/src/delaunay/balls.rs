@@ -2,14 +2,14 @@
 
 use enfilade_geom::{Bvh, DVec3, Triangle};
 
-/// A surface may enter a ball by this share of its radius. Walls then have points about half a radius
-/// apart, and radii are right to a twentieth.
+/// Share of a ball's radius by which a surface may enter it. Walls then have points about half a radius apart, and
+/// radii are accurate to a twentieth.
 pub(super) const ENTERS: f64 = 0.1;
-/// A tetrahedron of less than this share of the cube over its longest edge has no reliable circumsphere.
+/// Least volume of a tetrahedron with a reliable circumsphere, as a share of the cube over its longest edge.
 const FLAT: f64 = 1e-5;
 
-/// Center and radius of the sphere through four points, and the volume of their tetrahedron. The radius is
-/// infinite where the points are too flat for it to mean anything.
+/// Returns center and radius of the sphere through four points, and the volume of their tetrahedron. The radius is
+/// infinite if the points are too flat for it to mean anything.
 pub(super) fn circumsphere(c: [DVec3; 4]) -> (DVec3, f64, f64) {
     let (u, v, w) = (c[0] - c[3], c[1] - c[3], c[2] - c[3]);
     let det = u.dot(v.cross(w));
@@ -28,7 +28,7 @@ pub(super) fn circumsphere(c: [DVec3; 4]) -> (DVec3, f64, f64) {
     (c[3] + to_center, to_center.length(), volume)
 }
 
-/// Center and radius of the circle through three points; `None` when they lie on a line.
+/// Returns center and radius of the circle through three points; `None` if they lie on a line.
 pub(super) fn circle(f: Triangle) -> Option<(DVec3, f64)> {
     let (p, q) = (f[0] - f[2], f[1] - f[2]);
     let normal = p.cross(q);
@@ -40,7 +40,7 @@ pub(super) fn circle(f: Triangle) -> Option<(DVec3, f64)> {
     Some((f[2] + to_middle, to_middle.length()))
 }
 
-/// Radius of the ball of air about the center of a circumsphere: smaller than `radius` where a surface enters
+/// Returns the radius of the ball of air about the center of a circumsphere: smaller than `radius` if a surface enters
 /// the sphere by more than [`ENTERS`].
 pub(super) fn of_air(center: DVec3, radius: f64, bvh: &Bvh) -> f64 {
     bvh.nearest(center, radius * (1.0 - ENTERS))

@@ -1,7 +1,8 @@
 //! Cells: parts of the air merged wherever nothing narrows between them, and the portals where cells meet.
 //!
-//! One sweep over all links, widest first, turns millions of tetrahedra into a few cells a room. Cells are then
-//! divided where branches leave them ([`divided_at_mouths`]), which no pinch shows. What is left is for decimation.
+//! One sweep over all links, widest first, turns millions of tetrahedra into a few cells per room. Cells are then
+//! divided where branches leave them ([`divided_at_mouths`]), since no pinch marks those places. Decimation does the
+//! rest.
 //!
 //! Ties are broken by the ids of parts, which depend on coordinates only. `O(n log n)`.
 
@@ -12,15 +13,15 @@ use enfilade_geom::{Aabb, DVec3, Sets};
 use super::branches::Branches;
 use super::space::Space;
 
-/// Two cells whose lesser ball is at most this many times as large as what passes between them are one bulge.
-/// Differences that small come from where points happen to be sampled. A lower bound leaves more cells to
-/// decimation, a higher one merges across faint necks.
+/// Two cells are one bulge if the lesser ball of the two is at most this many times the ball that passes between them.
+/// Differences that small come from the sampling of points. A lower bound leaves more cells to decimation, a higher one
+/// merges across faint necks.
 const FLOWS: f64 = 1.05;
 
 /// The cell around the scene.
 pub const OUTDOOR_CELL: u32 = 0;
 
-/// Cells before decimation, and how they meet.
+/// Cells before decimation, and the portals between them.
 pub struct Cells {
     /// Cell of each part of the space.
     pub cell_of_part: Vec<u32>,
@@ -30,11 +31,11 @@ pub struct Cells {
     pub volumes: Vec<f64>,
     /// Box of each cell. [Units: wu]
     pub boxes: Vec<Aabb>,
-    /// Where two cells meet, lesser id first.
+    /// Portals between two cells, lesser id first.
     pub portals: BTreeMap<(u32, u32), CellPortal>,
 }
 
-/// Where two cells meet.
+/// The portal between two cells.
 #[derive(Clone, Debug)]
 pub struct CellPortal {
     /// Radius of the widest ball that passes. [Units: wu]
@@ -45,11 +46,11 @@ pub struct CellPortal {
     pub vector: DVec3,
     /// Mean of the facets' centers. [Units: wu]
     pub center: DVec3,
-    /// Links of the space.
+    /// Indices of its links in the space.
     pub links: Vec<u32>,
 }
 
-/// Merges parts that flow into one another. Outdoors is [`OUTDOOR_CELL`].
+/// Merges parts between which nothing narrows. Outdoors is [`OUTDOOR_CELL`].
 #[must_use]
 pub fn flow_together(space: &Space) -> Cells {
     let n = space.radii.len();
@@ -78,7 +79,7 @@ pub fn flow_together(space: &Space) -> Cells {
     gathered(space, |t| (roots[t as usize], 0), &Branches::none(n))
 }
 
-/// The cells, divided where a branch leaves its trunk.
+/// Returns the cells, divided where a branch leaves its trunk.
 pub(super) fn divided_at_mouths(space: &Space, cells: &Cells, branches: &Branches) -> Cells {
     let key = |t: u32| {
         let t = t as usize;
@@ -87,7 +88,7 @@ pub(super) fn divided_at_mouths(space: &Space, cells: &Cells, branches: &Branche
     gathered(space, key, branches)
 }
 
-/// Cells of parts with equal keys, in the order of their first parts.
+/// Returns the cells of parts with equal keys, in the order of their first parts.
 fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches) -> Cells {
     let n = space.radii.len() as u32;
     let mut id_of_key: BTreeMap<(u32, u32), u32> = BTreeMap::new();
@@ -120,7 +121,7 @@ fn gathered(space: &Space, key: impl Fn(u32) -> (u32, u32), branches: &Branches)
     cells
 }
 
-/// Where the cells of two parts differ.
+/// Returns the portals, made of the links between parts of different cells.
 fn portals(
     space: &Space,
     cell_of_part: &[u32],

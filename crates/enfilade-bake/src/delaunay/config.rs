@@ -1,20 +1,20 @@
-//! What only tetrahedra ask.
+//! Delaunay-only settings.
 
 use super::decimate::{Choices, Weight};
 
-/// What only tetrahedra ask.
+/// Delaunay-only settings.
 #[derive(Clone, Debug, Default)]
 pub struct DelaunayConfig {
-    /// How portals are weighed.
+    /// The measure of portals.
     pub weight: Weight,
     /// The weight at which decimation stops; `None` for the weight's own. [Limit: above 0]
     pub stop: Option<f64>,
-    /// What a person decided.
+    /// Decisions of the user.
     pub choices: Choices,
 }
 
 impl DelaunayConfig {
-    /// Whether a person decided anything.
+    /// Returns `true` if the user decided anything.
     pub(crate) fn has_choices(&self) -> bool {
         self.choices != Choices::default()
     }

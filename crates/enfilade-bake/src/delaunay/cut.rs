@@ -1,9 +1,8 @@
-//! Tetrahedra cut by the model's polygons.
+//! Cuts tetrahedra by the model's polygons.
 //!
-//! Gjørup 1999, §4.2.1–4.2.2: a tetrahedron that a polygon runs through is cut along the polygon's
-//! plane, and its parts by the next polygon, until every polygon lies on boundaries. An opening is then what
-//! the polygons leave of a boundary, as convex pieces. He loops over all pairs; here a BVH
-//! finds those that meet.
+//! Gjørup 1999, §4.2.1–4.2.2: a tetrahedron that a polygon crosses is cut along the polygon's plane, and its parts by
+//! the next polygon, until every polygon lies on boundaries. An opening is the rest of a boundary that no polygon
+//! covers, as convex pieces. He loops over all pairs; here a BVH finds those that intersect.
 
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Plane, Triangle};
 use smallvec::{SmallVec, smallvec};
@@ -11,31 +10,31 @@ use smallvec::{SmallVec, smallvec};
 use super::tetrahedra::Delaunay;
 use crate::complex::poly::{Poly, Sides, area_normal, clip, cut_out, split, width};
 
-/// Most parts of one tetrahedron; polygons that would cut it further are passed over, and counted.
+/// Most parts of one tetrahedron; polygons that would cut it further are skipped and counted.
 pub(super) const MAX_PARTS: usize = 512;
 
-/// Which lengths count as zero when polygons are cut.
+/// Lengths that count as zero when polygons are cut.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CutTolerance {
     /// Points this near to a plane lie in it. [Units: wu]
     pub(super) plane: f64,
-    /// A piece of a facet that polygons leave is open if it is at least this wide. [Units: wu]
+    /// Least width of an open piece of a facet between polygons. [Units: wu]
     pub(super) width: f64,
 }
 
-/// A boundary of a part.
+/// A face of a part.
 struct Face {
     poly: Poly,
-    /// Positive on the part's side.
+    /// Its plane, positive on the part's side.
     plane: Plane,
     on: On,
 }
 
-/// What a face of a part lies on.
+/// The surface on which a face of a part lies.
 #[derive(Clone, Copy, PartialEq)]
 enum On {
     Facet(u8),
-    /// A plane that the tetrahedron was cut along.
+    /// A plane along which the tetrahedron was cut.
     Cut(u32),
 }
 
@@ -67,12 +66,12 @@ impl Part {
         }
     }
 
-    /// Whether a vertex of the tetrahedron is one of the part's own.
+    /// Returns `true` if a vertex of the tetrahedron is a vertex of the part.
     pub(super) fn has_vertex(&self, p: DVec3) -> bool {
         self.faces.iter().any(|f| f.poly.contains(&p))
     }
 
-    /// The faces of this part that lie on a facet of the tetrahedron.
+    /// Returns the faces of this part that lie on a facet of the tetrahedron.
     pub(super) fn on_facet(&self, i: usize) -> impl Iterator<Item = &Poly> {
         let on = On::Facet(i as u8);
         self.faces
@@ -82,19 +81,19 @@ impl Part {
     }
 }
 
-/// A tetrahedron that polygons run through.
+/// A tetrahedron that polygons divide.
 pub(super) struct CutParts {
     pub(super) parts: Vec<Part>,
-    /// Where two parts meet openly: the parts, and an outline counter-clockwise seen from the second.
+    /// Openings between two parts: the parts, and an outline counter-clockwise seen from the second.
     pub(super) inner: Vec<([u32; 2], Poly)>,
-    /// Polygons that were passed over, for [`MAX_PARTS`].
+    /// Polygons skipped because of [`MAX_PARTS`].
     pub(super) n_passed_over: usize,
 }
 
-/// How polygons cut and cover a tetrahedron.
+/// Cuts and covers of a tetrahedron by polygons.
 #[derive(Default)]
 pub(super) struct TetrahedraCut {
-    /// Bit `i`: a polygon lies in facet `i`, in some of it.
+    /// Bit `i`: a polygon covers facet `i`, at least in part.
     covered: u8,
     /// The parts, if there are several.
     pub(super) parts: Option<Box<CutParts>>,
@@ -106,28 +105,28 @@ impl TetrahedraCut {
     }
 }
 
-/// What of a polygon lies in a tetrahedron.
+/// The part of a polygon that lies in a tetrahedron.
 struct Cutter {
     poly: Poly,
     plane: Plane,
 }
 
-/// How a wall lies to a tetrahedron.
+/// Position of a wall relative to a tetrahedron.
 enum Lies {
     Beside,
-    /// In the plane of these facets (bit `i`: facet `i`), or touching no more than an edge or a vertex.
+    /// In the plane of these facets (bit `i`: facet `i`), or touching an edge or a vertex at most.
     InFacets(u8),
     Through(Cutter),
 }
 
-/// What tetrahedra are cut with.
+/// The walls by which tetrahedra are cut, and tolerances.
 #[derive(Clone, Copy)]
 pub(super) struct Knife<'a> {
     pub(super) delaunay: &'a Delaunay,
     pub(super) walls: &'a [Triangle],
     pub(super) bvh: &'a Bvh,
     pub(super) tolerance: CutTolerance,
-    /// What cutting spends from.
+    /// Allowance of work for cutting.
     pub(super) allowance: &'a Allowance,
 }
 
@@ -143,7 +142,7 @@ impl Knife<'_> {
         if near.is_empty() {
             return cutting;
         }
-        // Seen from outside facets run counter-clockwise; their planes face inwards.
+        // Facets run counter-clockwise seen from outside; their planes face inwards.
         let facets: [Option<Plane>; 4] =
             std::array::from_fn(|i| Plane::of_triangle(&self.facet(t, i)).map(Plane::flipped));
         let mut cutters: SmallVec<[Cutter; 4]> = SmallVec::new();
@@ -161,7 +160,7 @@ impl Knife<'_> {
         cutting
     }
 
-    /// Walls whose boxes are near the box of some points, in order.
+    /// Returns the walls whose boxes are near the box of some points, in order.
     pub(super) fn walls_near(&self, points: &[DVec3]) -> SmallVec<[u32; 16]> {
         let bounds = Aabb::of_points(points).expanded(self.tolerance.plane);
         let mut near: SmallVec<[u32; 16]> = SmallVec::new();
@@ -170,7 +169,7 @@ impl Knife<'_> {
         near
     }
 
-    /// The facet opposite vertex `i`, counter-clockwise seen from outside. [Units: wu]
+    /// Returns the facet opposite vertex `i`, counter-clockwise seen from outside. [Units: wu]
     pub(super) fn facet(&self, t: u32, i: usize) -> Triangle {
         let tet = &self.delaunay.tetrahedra[t as usize];
         tet.facet(i).map(|v| self.delaunay.vertices[v as usize])
@@ -192,7 +191,7 @@ impl Knife<'_> {
             let is_in = |i: &usize| (0..4).all(|k| k == *i || side[k].abs() <= eps);
             return Lies::InFacets((0..4).filter(is_in).fold(0, |bits, i| bits | 1 << i));
         }
-        // Where facets are too thin to have a plane there is nothing to cut.
+        // If a facet is too thin to have a plane, there is nothing to cut.
         let inside = facets.iter().try_fold(Poly::from_slice(wall), |poly, f| {
             clip(&poly, f.as_ref()?, eps)
         });
@@ -202,7 +201,7 @@ impl Knife<'_> {
         }
     }
 
-    /// The parts of a tetrahedron; `None` if it stays whole.
+    /// Returns the parts of a tetrahedron; `None` if it stays whole.
     fn divided(&self, t: u32, facets: &[Option<Plane>; 4], cutters: &[Cutter]) -> Option<CutParts> {
         let eps = self.tolerance.plane;
         let mut whole = Vec::with_capacity(4);
@@ -226,7 +225,7 @@ impl Knife<'_> {
                 continue;
             }
             for k in 0..parts.len() {
-                // Only what the polygon itself runs through is cut.
+                // Only parts that the polygon itself crosses are cut.
                 let in_part = parts[k]
                     .iter()
                     .try_fold(c.poly.clone(), |poly, f| clip(&poly, &f.plane, eps));
@@ -251,7 +250,7 @@ impl Knife<'_> {
         })
     }
 
-    /// What the cutters leave open where two parts of a tetrahedron meet.
+    /// Returns the openings that the cutters leave where two parts of a tetrahedron meet.
     fn inner_openings(
         &self,
         parts: &[Vec<Face>],
@@ -288,10 +287,10 @@ impl Knife<'_> {
     }
 }
 
-/// Parts and their faces before a plane, and those behind it, all turned to its normal.
+/// Parts with their faces before a plane, and those behind it, all turned to its normal.
 type FacesOnCut = [Vec<(u32, Poly)>; 2];
 
-/// The faces that lie on each cut.
+/// Returns the faces that lie on each cut.
 fn faces_on_cuts(parts: &[Vec<Face>], cuts: &[Plane]) -> Vec<FacesOnCut> {
     let mut on_cut: Vec<FacesOnCut> = cuts.iter().map(|_| Default::default()).collect();
     for (k, faces) in parts.iter().enumerate() {
@@ -307,12 +306,12 @@ fn faces_on_cuts(parts: &[Vec<Face>], cuts: &[Plane]) -> Vec<FacesOnCut> {
     on_cut
 }
 
-/// What two convex polygons of one plane share.
+/// Returns the intersection of two convex polygons of one plane.
 pub(super) fn shared(a: &Poly, b: &Poly, normal: DVec3, eps: f64) -> Option<Poly> {
     cut_out(a, b, normal, eps, 4.0 * eps, &mut Vec::new())
 }
 
-/// The parts of a part before and behind a plane; `None` when one of them has no volume.
+/// Returns the sides of a part before and behind a plane; `None` if one of them has no volume.
 fn split_part(faces: &[Face], plane: &Plane, cut: u32, eps: f64) -> Option<(Vec<Face>, Vec<Face>)> {
     let bounds = Aabb::of_points(faces.iter().flat_map(|f| &f.poly));
     let reach = bounds.size().length() + 1.0;
@@ -355,7 +354,7 @@ fn split_part(faces: &[Face], plane: &Plane, cut: u32, eps: f64) -> Option<(Vec<
     Some((front, back))
 }
 
-/// The polygon, reversed if need be so that it runs counter-clockwise about a normal.
+/// Returns the polygon, reversed if needed to run counter-clockwise about a normal.
 pub(super) fn turned_to(mut poly: Poly, normal: DVec3) -> Poly {
     if area_normal(&poly).dot(normal) < 0.0 {
         poly.reverse();
@@ -363,7 +362,7 @@ pub(super) fn turned_to(mut poly: Poly, normal: DVec3) -> Poly {
     poly
 }
 
-/// What the covers leave of convex polygons, as convex pieces.
+/// Returns the rest of convex polygons outside the covers, as convex pieces.
 pub(super) fn less(
     open: SmallVec<[Poly; 2]>,
     covers: &[Poly],
@@ -405,7 +404,7 @@ mod tests {
         DVec3::new(rng.unit(), rng.unit(), rng.unit())
     }
 
-    /// How far inside the convex polygon a point of its plane lies; negative outside.
+    /// Returns the depth of a point inside a convex polygon of its plane; negative outside.
     fn inset(outline: &[DVec3], p: DVec3) -> f64 {
         let normal = area_normal(outline).normalize();
         let n = outline.len();
@@ -414,8 +413,8 @@ mod tests {
         heights.fold(f64::INFINITY, f64::min)
     }
 
-    /// Follows random lines from part to part of one tetrahedron: where they leave a part, there is an opening exactly where
-    /// no polygon is.
+    /// Follows random lines from part to part of one tetrahedron: where a line leaves a part, there is an opening
+    /// exactly if no polygon is there.
     #[test]
     fn parts_are_open_to_each_other_where_no_polygon_is() {
         let mut rng = Rng::new(3);
@@ -448,7 +447,7 @@ mod tests {
             let whole = a.cross(b).dot(c).abs() / 6.0;
             assert!((total - whole).abs() < 1e-9, "{seed}: {total} {whole}");
             for _ in 0..60 {
-                // Any mean of the vertices.
+                // A random convex combination of the vertices.
                 let shares = [(); 4].map(|()| rng.unit() + 1e-3);
                 let sum: f64 = shares.iter().sum();
                 let p: DVec3 = (0..4).map(|k| points[k] * (shares[k] / sum)).sum();
@@ -472,7 +471,7 @@ mod tests {
                 let Some(to) = parts.parts.iter().position(|q| inside(q, beyond, 1e-9)) else {
                     continue;
                 };
-                // By the polygons themselves; points near an edge may be either.
+                // The oracle is the polygons themselves; points near an edge may be on either side.
                 let depths = walls.iter().map(|w| {
                     let plane = Plane::of_triangle(w).unwrap();
                     let off = plane.signed_distance(exit).abs();

@@ -1,22 +1,22 @@
-//! Decimation: neighboring cells are merged, one portal at a time, until rooms are left.
+//! Decimation: merges neighboring cells, one portal at a time, until rooms are left.
 //!
-//! Gjørup 1999, §4.1.4 and §4.2.3: every portal between two cells has a weight, the cells on both sides of the
-//! portal of least weight become one, and so on. His two weights are here beside ours:
+//! Gjørup 1999, §4.1.4 and §4.2.3: every portal between two cells has a weight; the cells on both sides of the portal
+//! of least weight are merged, and so on. His two weights, and ours:
 //!
-//! | weight | is | source |
+//! | weight | definition | source |
 //! | --- | --- | --- |
 //! | [`Weight::Aspect`] | largest projected cell ÷ portal | §4.1.4 |
 //! | [`Weight::SizeCorrected`] | the same ÷ square root of the projected cell | §4.3.2 |
 //! | [`Weight::ScaleFree`] | radius of the lesser cell's largest ball ÷ that of the ball that passes; at the mouth of a branch, the trunk's ÷ the branch's, if that is more | ours |
 //!
-//! His first slips through doors where cells begin alike, his second depends on the model's scale,
-//! and both leave spikes for the end (§4.3.2, §4.3.3). A ratio of two radii has no scale, a
-//! tetrahedron in the middle of a room has the same ball as its neighbors, and a spike has none, so
-//! it goes first. Doors come out at 1.8 and more, alcoves and bulges below 1.5.
+//! His first fails at doors if cells begin alike, his second depends on the model's scale, and both leave spikes for
+//! the end (§4.3.2, §4.3.3). A ratio of two radii has no scale; a tetrahedron in the middle of a room has the same ball
+//! as its neighbors; and a spike has none, so it goes first. Doors weigh 1.8 and more, alcoves and bulges less than
+//! 1.5.
 //!
-//! It begins with the [`Cells`] that parts of the air flow together to, and is recorded down to the last portal
-//! ([`Decimation`]), so that a person can go forwards and back, and overrule it. The steps that give a branch
-//! (`branches`) back to its trunk are part of the record.
+//! Decimation begins with [`Cells`], parts of the air already merged, and is recorded down to the last portal
+//! ([`Decimation`]), so that a user can go forward and back, and overrule it. The record includes the steps that return
+//! a branch (`branches`) to its trunk.
 //!
 //! Ties are broken by the ids of cells, which depend on coordinates only. `O(n log n)`.
 
@@ -29,24 +29,24 @@ use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::cells::{CellPortal, Cells};
 
-/// A cell of less than this share of its ball's volume does not hold the ball, which lies in a neighbor: it is
-/// a bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
+/// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
+/// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
 const HOLDS: f64 = 0.1;
-/// What a step costs, in units of [`Allowance`], and each portal that it changes.
+/// Costs of a step, and of each portal that it changes, in units of [`Allowance`].
 const WORK_A_STEP: u64 = 10;
 const WORK_A_PAIR: u64 = 5;
 
-/// Factor on the weight of a crevice's portal that is the mouth of a branch. Weights of crevices are negative, so
-/// crevices behind mouths merge last: only when they have no other way.
+/// Factor on the weight of a crevice's portal at the mouth of a branch. Weights of crevices are negative, so crevices
+/// behind mouths merge last: only if they have no other way.
 const LAST: f64 = 1e-9;
 
-/// Weight of a portal that a person joined: less than that of any other.
+/// Weight of a portal that the user joined: less than that of any other.
 pub const JOINED: f64 = -2.0;
 
-/// Portals and areas count as at least this large, so that no ratio is infinite. [Units: wu, wu²]
+/// Least value of radii and areas in weights, so that no ratio is infinite. [Units: wu, wu²]
 const TINY: f64 = 1e-9;
 
-/// How the quality of a portal is measured.
+/// The measure of a portal's quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Weight {
     /// Gjørup's ratio of areas.
@@ -58,14 +58,14 @@ pub enum Weight {
     ScaleFree,
 }
 
-/// One step: two cells become one, which keeps the lesser id.
+/// One step: two cells are merged under the lesser id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// The cell that stays.
     pub into: u32,
-    /// The cell that is gone.
+    /// The cell that vanishes.
     pub from: u32,
-    /// What the portal between them weighed.
+    /// Weight of the portal between them.
     pub weight: f64,
     /// The weight is that of a branch at its mouth, not that of a pinch.
     pub is_mouth: bool,
@@ -73,23 +73,23 @@ pub struct Step {
     pub position: DVec3,
 }
 
-/// What a person decided, by places as [`Step::position`] reports them. A choice is about the portal between cells before
-/// decimation that has its center there, and later about whatever that has become part of. Where none has, since the
-/// scene was mended or has other points, it is about the nearest portal that goes if nobody decides.
+/// Decisions of the user, by places as in [`Step::position`]. A choice concerns the portal between initial cells whose
+/// center is there, and later whatever that has become part of. If there is none, because the scene was repaired or has
+/// other points, it concerns the nearest portal that decimation removes without choices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
-    /// Portals here stay, whatever they weigh. [Units: wu]
+    /// Portals here stay, whatever their weight. [Units: wu]
     pub keep: Vec<DVec3>,
-    /// Portals here go once nothing else goes by itself: the rooms that are there then become one, however many steps a
-    /// person took to see the portal. [Units: wu]
+    /// Portals here are removed once no other portal goes by itself: the rooms present then are merged, however many
+    /// steps the user took to see the portal. [Units: wu]
     pub join: Vec<DVec3>,
 }
 
 impl Choices {
-    /// How far from a portal's center a choice may lie. [Units: radii of the ball that passes]
+    /// Greatest distance of a choice from a portal's center. [Units: radii of the ball that passes]
     pub const REACH: f64 = 1.0;
 
-    /// The portals that are decided about. `undecided` are the portals that go if nobody decides.
+    /// Returns the choice for each portal that has one. `undecided` are the portals removed without choices.
     fn by_portal(&self, cells: &Cells, undecided: &[(u32, u32)]) -> BTreeMap<(u32, u32), Choice> {
         let portal = |p: &DVec3| {
             let off = |pair: &(u32, u32)| cells.portals[pair].center.distance(*p);
@@ -115,29 +115,29 @@ impl Choices {
     }
 }
 
-/// What a person decided about one portal.
+/// Decision of the user on one portal.
 #[derive(Clone, Copy, PartialEq)]
 enum Choice {
     Keep,
     Join,
 }
 
-/// A decimation on record, from the first cells down to one cell in each connected part of the air.
+/// A recorded decimation, from the first cells down to one cell in each connected part of the air.
 pub struct Decimation {
     /// Number of cells before the first step.
     pub n_cells: usize,
     /// The steps, in order.
     pub steps: Vec<Step>,
-    /// After how many steps it stops by itself.
+    /// Number of steps after which it stops by itself.
     pub stop: usize,
 }
 
 impl Decimation {
-    /// The cell that each cell of the beginning belongs to after the first `n` steps.
+    /// Returns the cell to which each initial cell belongs after the first `n` steps.
     #[must_use]
     pub fn after(&self, n: usize) -> Vec<u32> {
         let mut cell: Vec<u32> = (0..self.n_cells as u32).collect();
-        // A cell is gone before the one that it went into: from the last on.
+        // A cell vanishes before the cell that absorbed it, so go backward from the last step.
         for s in self.steps.iter().take(n).rev() {
             cell[s.from as usize] = cell[s.into as usize];
         }
@@ -145,8 +145,8 @@ impl Decimation {
     }
 }
 
-/// The weight at which decimation stops by itself, for [`Weight::ScaleFree`] and, as Gjørup suggests
-/// (§4.3.1), for his ratio. The size-corrected weight has no natural stop.
+/// Returns the weight at which decimation stops by itself, for [`Weight::ScaleFree`] and, as Gjørup suggests (§4.3.1),
+/// for his ratio. The size-corrected weight has no natural stop.
 #[must_use]
 pub fn default_stop(weight: Weight) -> f64 {
     match weight {
@@ -158,9 +158,8 @@ pub fn default_stop(weight: Weight) -> f64 {
 
 /// Removes portals, least weight first, and records each step.
 ///
-/// A cell in which no ball of `min_radius` fits is a crevice, and one much smaller than its ball is a
-/// bundle of spikes: both are merged across their largest opening before anything else is decided, choices
-/// excepted.
+/// A cell in which no ball of `min_radius` fits is a crevice, and one much smaller than its ball is a bundle of spikes:
+/// both are merged across their largest opening before all else, except choices.
 #[must_use]
 pub fn decimate(
     cells: &Cells,
@@ -179,7 +178,7 @@ pub fn decimate(
     if *choices == Choices::default() {
         return undecided;
     }
-    // Nobody means a crevice that lies in a doorway.
+    // No user means a crevice in a doorway.
     let steps = undecided.steps.iter().zip(portals);
     let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
     Merging::new(cells, rules, &choices.by_portal(cells, &portals))
@@ -187,7 +186,7 @@ pub fn decimate(
         .0
 }
 
-/// What decides which portal goes next, and when to stop.
+/// Rules that select the next portal, and that stop.
 #[derive(Clone, Copy)]
 struct Rules {
     weight: Weight,
@@ -196,10 +195,10 @@ struct Rules {
     min_radius: f64,
 }
 
-/// A cell while others are merged into it.
+/// A cell during the merging.
 #[derive(Clone, Copy)]
 struct Body {
-    /// Of its largest ball. [Units: wu]
+    /// Radius of its largest ball. [Units: wu]
     radius: f64,
     /// [Units: wu³]
     volume: f64,
@@ -208,13 +207,13 @@ struct Body {
 }
 
 impl Rules {
-    /// Too narrow for a room, or a bundle of spikes.
+    /// Returns `true` if a cell is too narrow for a room, or a bundle of spikes.
     fn is_crevice(&self, cell: &Body) -> bool {
         let ball = 4.0 / 3.0 * PI * cell.radius.powi(3);
         cell.radius < self.min_radius || ball.is_finite() && cell.volume < HOLDS * ball
     }
 
-    /// What a portal between two cells weighs if nobody decided about it.
+    /// Returns the weight of a portal between two cells, without choices.
     fn weigh(&self, portal: &Live, [a, b]: [&Body; 2]) -> f64 {
         if self.is_crevice(a) || self.is_crevice(b) {
             // Between -1 and 0, widest opening first.
@@ -239,7 +238,7 @@ impl Rules {
         }
     }
 
-    /// Whether portals of `before` must be weighed anew when it has become `after`.
+    /// Returns `true` if the portals of a cell must be weighed again after it changes from `before` to `after`.
     fn weighs_anew(&self, before: &Body, after: &Body) -> bool {
         before.radius != after.radius
             || self.is_crevice(before) != self.is_crevice(after)
@@ -247,7 +246,7 @@ impl Rules {
     }
 }
 
-/// A portal in the queue. It is stale if the portal has another version by now.
+/// A portal in the queue. It is stale if the portal now has another version.
 struct QueuedPortal {
     weight: f64,
     pair: (u32, u32),
@@ -256,7 +255,7 @@ struct QueuedPortal {
 
 impl Ord for QueuedPortal {
     fn cmp(&self, other: &Self) -> Ordering {
-        // The heap gives the greatest first; least weight first, then least ids.
+        // The heap returns the greatest first: least weight, then least ids.
         other
             .weight
             .total_cmp(&self.weight)
@@ -279,20 +278,20 @@ impl PartialEq for QueuedPortal {
 
 impl Eq for QueuedPortal {}
 
-/// A portal that is still there, merged from one or several.
+/// A portal that still exists, merged from one or several.
 #[derive(Clone, Copy)]
 struct Live {
-    /// Of the widest ball that passes. [Units: wu]
+    /// Radius of the widest ball that passes. [Units: wu]
     radius: f64,
-    /// As [`CellPortal::mouth`] of the widest one.
+    /// [`CellPortal::mouth`] of the widest one.
     mouth: f64,
     /// Sum of area vectors, from the lesser to the greater slot. [Units: wu²]
     vector: DVec3,
-    /// The widest of the portals before decimation that are part of it.
+    /// The widest of its initial portals.
     widest: (u32, u32),
-    /// A person wants it to stay; two cells with such a portal among theirs never merge.
+    /// The user wants it to stay; two cells with such a portal among theirs never merge.
     stays: bool,
-    /// A person wants it to go.
+    /// The user wants it to go.
     goes: bool,
     version: u32,
 }
@@ -310,7 +309,7 @@ impl Live {
         }
     }
 
-    /// Takes in another portal between the same two cells.
+    /// Absorbs another portal between the same two cells.
     fn absorb(&mut self, other: &Self) {
         if (other.radius, other.mouth) > (self.radius, self.mouth) {
             (self.radius, self.mouth, self.widest) = (other.radius, other.mouth, other.widest);
@@ -321,31 +320,31 @@ impl Live {
     }
 }
 
-/// The key of the portal between two cells: lesser slot first.
+/// Returns the key of the portal between two cells: lesser slot first.
 fn pair_of(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// A decimation under way.
+/// A decimation in progress.
 ///
-/// A merged cell lives in the slot of the one that had more neighbors, so that a hall that takes in thousands of
-/// crevices is not moved each time.
+/// A merged cell takes the slot of the one that had more neighbors, so that a hall that absorbs thousands of crevices
+/// is not moved each time.
 struct Merging<'a> {
     cells: &'a Cells,
     rules: Rules,
-    /// Of each slot.
+    /// The cell in each slot.
     bodies: Vec<Body>,
-    /// Of each slot, the slots that a portal leads to.
+    /// For each slot, the slots to which a portal leads.
     neighbors: Vec<BTreeSet<u32>>,
     portals: BTreeMap<(u32, u32), Live>,
     queue: BinaryHeap<QueuedPortal>,
-    /// Of each slot, the original cell id as reported in [`Step`].
+    /// For each slot, the original cell id as reported in [`Step`].
     ids: Vec<u32>,
     steps: Vec<Step>,
-    /// Of each step, the widest of the portals before decimation that it removed.
+    /// For each step, the widest of the initial portals that it removed.
     removed: Vec<(u32, u32)>,
     stop_at: Option<usize>,
-    /// Portals that a person joined are in the queue with their own weight.
+    /// Portals that the user joined are in the queue with their own weight.
     has_joins: bool,
 }
 
@@ -383,7 +382,7 @@ impl<'a> Merging<'a> {
         merging
     }
 
-    /// Merges until no portal is left. Also gives, for each step, the portal before decimation that it removed.
+    /// Merges until no portal is left. Also returns, for each step, the initial portal that it removed.
     fn run(mut self, allowance: &Allowance) -> (Decimation, Vec<(u32, u32)>) {
         while let Some(candidate) = self.queue.pop() {
             if self.is_stale(&candidate) {
@@ -409,7 +408,7 @@ impl<'a> Merging<'a> {
         (decimation, self.removed)
     }
 
-    /// How many portals a step may weigh anew.
+    /// Returns the number of portals that a step may weigh again.
     fn n_pairs(&self, (a, b): (u32, u32)) -> u64 {
         let degrees = [a, b].map(|c| self.neighbors[c as usize].len() as u64);
         degrees[0] + degrees[1]
@@ -436,8 +435,8 @@ impl<'a> Merging<'a> {
         portal.is_none_or(|p| p.version != candidate.version)
     }
 
-    /// Queues the portals that a person joined, once; false if there are none. Rooms are what they are without the
-    /// joins before they are joined: what was shown is what was meant.
+    /// Queues the portals that the user joined, once; returns `false` if there are none. Joins apply to the rooms that
+    /// result without them: those that the user saw.
     fn take_up_joins(&mut self) -> bool {
         if self.has_joins {
             return false;
@@ -450,7 +449,7 @@ impl<'a> Merging<'a> {
         is_any
     }
 
-    /// Removes a portal: the cells on both sides become one.
+    /// Removes a portal: merges the cells on both sides.
     fn remove(&mut self, candidate: &QueuedPortal) {
         let (a, b) = candidate.pair;
         let degree = |x: u32| self.neighbors[x as usize].len();
@@ -489,7 +488,7 @@ impl<'a> Merging<'a> {
         self.ids[into as usize] = one.min(other);
     }
 
-    /// Whether the portals of `into` must be weighed anew.
+    /// Merges two bodies; returns `true` if the portals of `into` must be weighed again.
     fn merge_bodies(&mut self, into: u32, from: u32) -> bool {
         let [before, other] = [into, from].map(|x| self.bodies[x as usize]);
         let after = Body {
@@ -501,7 +500,7 @@ impl<'a> Merging<'a> {
         self.rules.weighs_anew(&before, &after)
     }
 
-    /// Makes the portals of `from` portals of `into`, and gives the cells that they lead to.
+    /// Makes the portals of `from` portals of `into`; returns the cells to which they lead.
     fn move_portals(&mut self, into: u32, from: u32) -> Vec<u32> {
         self.neighbors[into as usize].remove(&from);
         let mut others = std::mem::take(&mut self.neighbors[from as usize]);
@@ -534,7 +533,7 @@ impl<'a> Merging<'a> {
             .portals
             .get_mut(&pair)
             .expect("neighbors have a portal");
-        // Unlike any version of this pair before, since steps only grow in number.
+        // Unlike any earlier version of this pair, since the number of steps only grows.
         live.version = self.steps.len() as u32;
         let live = *live;
         let candidate = self.candidate(pair, &live);

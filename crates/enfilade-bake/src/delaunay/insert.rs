@@ -1,15 +1,14 @@
-//! Inserting points: how the Delaunay tetrahedra come about.
+//! Inserts points into Delaunay tetrahedra.
 //!
-//! Bowyer 1981 and Watson 1981: each point removes the tetrahedra whose circumspheres hold it, which leaves a cavity, and new
-//! tetrahedra connect it with each facet of the cavity's boundary. A point at infinity closes the hull, so that a point outside
-//! needs no case of its own. Points are inserted in Hilbert order in rounds (`order`) and found by a
-//! walk that begins where the last one ended.
+//! Bowyer 1981 and Watson 1981: each point removes the tetrahedra whose circumspheres contain it, which leaves a
+//! cavity; new tetrahedra connect the point with each facet of the cavity's boundary. A point at infinity closes the
+//! hull, so that a point outside is not a special case. Points are inserted in Hilbert order in rounds (`order`), and
+//! located by a walk that begins where the last one ended.
 //!
-//! **Ties need no perturbation.** A tetrahedron conflicts with a point *strictly* inside its sphere,
-//! and one at infinity whose facet's plane holds the point conflicts when its finite neighbor does.
-//! All spheres through a facet meet the facet's plane in one circle, so a facet coplanar with the
-//! new point is in conflict on both sides or on neither: it is never part of the boundary, and no
-//! flat tetrahedron can come about.
+//! **Ties need no perturbation.** A tetrahedron conflicts with a point *strictly* inside its sphere, and one at
+//! infinity whose facet's plane contains the point conflicts if its finite neighbor does. All spheres through a facet
+//! meet the facet's plane in one circle, so a facet coplanar with the new point is in conflict on both sides or on
+//! neither: it is never part of the boundary, and no flat tetrahedron can arise.
 
 use std::collections::BTreeMap;
 
@@ -19,14 +18,14 @@ use super::order::insertion_order;
 use super::predicate::{LARGEST, LEAST, Predicates};
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, walk};
 
-/// Most points: seven tetrahedra a point, four facets each, must fit 32 bits with room to spare.
+/// Most points: seven tetrahedra per point, with four facets each, must fit in 32 bits with room to spare.
 const MOST_POINTS: usize = 100_000_000;
-/// What it costs to put a point in, in units of [`Allowance`], and each tetrahedron that it makes.
+/// Costs of inserting a point, and of each tetrahedron that it makes, in units of [`Allowance`].
 const WORK_A_POINT: u64 = 10;
 const WORK_A_FAN: u64 = 2;
 
-/// For a new point in slot `i`, the edge that is left when vertex `j` is dropped, in such a direction that the
-/// neighbor across has it the other way round.
+/// For a new point in slot `i`, the edge that remains when vertex `j` is dropped, in the direction opposite to that of
+/// the neighbor across.
 const EDGES: [[[usize; 2]; 4]; 4] = [
     [[0, 0], [2, 3], [3, 1], [1, 2]],
     [[3, 2], [0, 0], [0, 3], [2, 0]],
@@ -36,15 +35,15 @@ const EDGES: [[[usize; 2]; 4]; 4] = [
 
 /// Finds the Delaunay tetrahedra of `points`.
 ///
-/// Among several right answers (points on one sphere) the choice depends on the coordinates alone.
+/// If several results are correct (points on one sphere), the choice depends on the coordinates alone.
 ///
 /// # Errors
-/// When a coordinate is out of limits, or all points lie in one plane.
+/// If there are too many points, a coordinate is out of limits, or all points lie in one plane.
 pub fn tetrahedralize(points: &[DVec3]) -> Result<Delaunay, DelaunayError> {
     tetrahedralize_within(points, &Allowance::default())
 }
 
-/// [`tetrahedralize`], as far as an allowance goes: once that is over, points are left out.
+/// [`tetrahedralize`] within an allowance: once that is spent, points are left out.
 pub(super) fn tetrahedralize_within(
     points: &[DVec3],
     allowance: &Allowance,
@@ -54,14 +53,14 @@ pub(super) fn tetrahedralize_within(
             n_points: points.len(),
         });
     }
-    // Not a number is within no limits.
+    // NaN is not within any limits.
     let within = |x: f64| x == 0.0 || (x.abs() >= LEAST && x.abs() <= LARGEST);
     for (index, p) in points.iter().enumerate() {
         if let Some(value) = p.to_array().into_iter().find(|&x| !within(x)) {
             return Err(DelaunayError::Coordinate { index, value });
         }
     }
-    // Adding 0 makes +0 of -0, so that equal coordinates have equal bits.
+    // Adding 0 turns -0 into +0, so that equal coordinates have equal bits.
     let points: Vec<DVec3> = points.iter().map(|&p| p + DVec3::ZERO).collect();
     let mut vertices: Vec<DVec3> = Vec::with_capacity(points.len());
     let mut vertex_of_point = vec![0; points.len()];
@@ -85,7 +84,7 @@ pub(super) fn tetrahedralize_within(
     Ok(builder.finished(vertex_of_point))
 }
 
-/// Tetrahedra that more points are added to, round by round.
+/// Tetrahedra to which points are added, round by round.
 pub(super) struct Growing {
     builder: Insertion,
     vertex_of_point: Vec<u32>,
@@ -104,7 +103,7 @@ impl Growing {
     /// Adds a round of points, which must differ from all points before and from each other.
     ///
     /// # Errors
-    /// When there are more points than indices.
+    /// If there are more points than indices.
     pub(super) fn add(
         &mut self,
         points: &[DVec3],
@@ -129,7 +128,7 @@ impl Growing {
         Ok(())
     }
 
-    /// Finite tetrahedra.
+    /// Returns the finite tetrahedra.
     pub(super) fn all(&self) -> Vec<u32> {
         let tets = &self.builder.tets;
         (0..tets.len() as u32)
@@ -137,7 +136,7 @@ impl Growing {
             .collect()
     }
 
-    /// Finite tetrahedra that the last round made.
+    /// Returns the finite tetrahedra that the last round made.
     pub(super) fn fresh(&self) -> Vec<u32> {
         let fresh = self.builder.fresh.iter().copied();
         let mut fresh: Vec<u32> = fresh.filter(|&t| self.is_finite(t)).collect();
@@ -146,7 +145,7 @@ impl Growing {
         fresh
     }
 
-    /// Whether there is such a tetrahedron and all its vertices are finite. Vacant slots hold none.
+    /// Returns `true` if the slot has a tetrahedron with finite vertices only. Vacant slots have none.
     fn is_finite(&self, t: u32) -> bool {
         !self.builder.tets[t as usize].vertices.contains(&INFINITE)
     }
@@ -159,19 +158,19 @@ impl Growing {
         &self.builder.vertices
     }
 
-    /// The tetrahedra. [`Delaunay::vertex_of_point`] knows the points of the beginning only.
+    /// Returns the tetrahedra. [`Delaunay::vertex_of_point`] covers the initial points only.
     pub(super) fn finished(self) -> Delaunay {
         self.builder.finished(self.vertex_of_point)
     }
 }
 
-/// Four vertices not in one plane, oriented positively, found early in the order.
+/// Returns four vertices that are not coplanar, positively oriented, found early in the order.
 fn first_four(vertices: &[DVec3], predicates: Predicates) -> Option<[u32; 4]> {
     let (&a, rest) = vertices.split_first()?;
     let b = *rest.first()?;
     let on_line = |p: DVec3| {
-        // Three points are on one line when they are in one plane with each of three others that
-        // no plane through two of them holds all of; unit steps of their own size do.
+        // Three points are collinear if they are coplanar with each of three others that do not all lie in one plane
+        // through two of the points; unit steps scaled to the points are such others.
         let reach = (b - a).abs().max_element().max((p - a).abs().max_element());
         [DVec3::X, DVec3::Y, DVec3::Z]
             .into_iter()
@@ -188,48 +187,48 @@ fn first_four(vertices: &[DVec3], predicates: Predicates) -> Option<[u32; 4]> {
     }
 }
 
-/// A boundary facet of the cavity: the tetrahedron inside with the new point in place of a vertex.
+/// A boundary facet of the cavity: the tetrahedron inside, with the new point in place of a vertex.
 #[derive(Clone, Copy)]
 struct Fan {
     vertices: [u32; 4],
-    /// Where the new point stands.
+    /// Slot of the new point.
     slot: u32,
-    /// What lies across.
+    /// Tetrahedron and slot across.
     outer: u32,
     /// The new tetrahedron.
     tet: u32,
 }
 
-/// Vertices of a cavity's boundary that the table of edges has room for.
+/// Vertices of a cavity's boundary for which the table of edges has room.
 const TABLE: usize = 64;
 
 struct Insertion {
     vertices: Vec<DVec3>,
     predicates: Predicates,
     tets: Vec<Tetrahedron>,
-    /// Of each tetrahedron, twice the number of the insertion that last looked at it, plus 1 if there was no conflict.
+    /// For each tetrahedron, twice the number of the insertion that last tested it, plus 1 if there was no conflict.
     marks: Vec<u32>,
-    /// Slots that no tetrahedron uses.
+    /// Slots without a tetrahedron.
     free: Vec<u32>,
     cavity: Vec<u32>,
     fans: Vec<Fan>,
-    /// Place of each vertex in `local_vertices`, where the two agree; the infinite one comes first.
+    /// Place of each vertex in `local_vertices`, valid if the two agree; the infinite vertex comes first.
     place: Vec<u32>,
     local_vertices: Vec<u32>,
     table: Vec<u32>,
     epoch: u32,
     last: u32,
-    /// If `is_tracked`, the tetrahedra made since this was cleared; some of them are gone by now.
+    /// If `is_tracked`, the tetrahedra made since this was cleared; some may no longer exist.
     fresh: Vec<u32>,
     is_tracked: bool,
 }
 
-/// Where a vertex stands in the table of places.
+/// Returns the index of a vertex in the table of places.
 fn slot_of(v: u32) -> usize {
     v.wrapping_add(1) as usize
 }
 
-/// Marks a slot that holds no tetrahedron.
+/// Marks a slot without a tetrahedron.
 const VACANT: u32 = u32::MAX;
 
 impl Insertion {
@@ -239,7 +238,7 @@ impl Insertion {
             neighbors: [0; 4],
         }];
         for i in 0..4 {
-            // With infinity in place of a vertex the rest must turn, for infinity lies on the other side.
+            // With infinity in place of a vertex, the others must reverse, since infinity lies on the other side.
             let mut vertices = first;
             vertices[i] = INFINITE;
             vertices.swap((i + 1) % 4, (i + 2) % 4);
@@ -269,7 +268,7 @@ impl Insertion {
         }
     }
 
-    /// Goes on from finished tetrahedra.
+    /// Continues from finished tetrahedra.
     fn of(vertices: Vec<DVec3>, tets: Vec<Tetrahedron>, predicates: Predicates) -> Self {
         let mut marks = Vec::with_capacity(tets.capacity());
         marks.resize(tets.len(), 0);
@@ -307,7 +306,7 @@ impl Insertion {
         self.vertices[v as usize]
     }
 
-    /// Whether `p` lies strictly inside the sphere of a tetrahedron.
+    /// Returns `true` if `p` lies strictly inside the sphere of a tetrahedron.
     fn conflicts(&self, t: u32, p: DVec3) -> bool {
         let tet = &self.tets[t as usize];
         let Some(slot) = tet.infinite_slot() else {
@@ -330,12 +329,13 @@ impl Insertion {
         }
     }
 
-    /// The tetrahedron that holds `p`: a finite one, or one at infinity if `p` is outside.
+    /// Returns the tetrahedron that contains `p`: a finite one, or one at infinity if `p` is outside.
     fn locate(&self, p: DVec3) -> u32 {
         walk(&self.tets, &self.vertices, self.predicates, self.last, p)
     }
 
-    /// Inserts, and says whether to go on: an insertion costs what it makes.
+    /// Inserts a vertex; returns `true` if the allowance has room for more. An insertion costs the tetrahedra that it
+    /// makes.
     fn insert_within(&mut self, v: u32, allowance: &Allowance) -> bool {
         self.insert(v);
         allowance.spend(WORK_A_POINT + WORK_A_FAN * self.fans.len() as u64)
@@ -348,7 +348,7 @@ impl Insertion {
         self.last = self.fans[0].tet;
     }
 
-    /// Finds the cavity of a new point, the tetrahedra that conflict with it, and the facets that bound it.
+    /// Finds the cavity of a new point (the tetrahedra that conflict with it) and the facets that bound it.
     fn carve(&mut self, v: u32) {
         let p = self.at(v);
         let start = self.locate(p);
@@ -389,7 +389,7 @@ impl Insertion {
 
     /// Puts a new tetrahedron on each facet that bounds the cavity.
     fn fill(&mut self) {
-        // They take the slots of the cavity, then free ones, then new ones.
+        // They take the slots of the cavity, then free slots, then new ones.
         for i in 0..self.fans.len() {
             let t = self
                 .cavity
@@ -421,7 +421,7 @@ impl Insertion {
         self.free.append(&mut self.cavity);
     }
 
-    /// Makes neighbors of the new tetrahedra that share an edge of the cavity's boundary.
+    /// Makes new tetrahedra neighbors if they share an edge of the cavity's boundary.
     fn join_fan(&mut self) {
         // A closed surface of n vertices has 2n - 4 triangles; the new point is one more vertex.
         if self.fans.len() > 2 * (TABLE - 1) - 4 {
@@ -478,7 +478,7 @@ impl Insertion {
         }
     }
 
-    /// The tetrahedra without gaps, finite ones first, and how many those are.
+    /// Returns the tetrahedra without gaps, finite ones first, and the number of those.
     fn compacted(self) -> (Vec<Tetrahedron>, usize) {
         let mut number = self.marks;
         let mut n = 0;

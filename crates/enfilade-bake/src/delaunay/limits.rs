@@ -1,14 +1,14 @@
-//! What dividing the air may take.
+//! Limits on dividing the air.
 
 use enfilade_geom::Allowance;
 
-/// Memory that a point takes, at most, while tetrahedra become cells. [Units: bytes]
+/// Most memory per point while tetrahedra become cells. [Units: bytes]
 pub(super) const BYTES_A_POINT: u64 = 5_000;
 
-/// What dividing may take.
+/// Limits on dividing the air.
 pub(super) struct Limits<'a> {
     /// Most points added to surfaces.
     pub(super) n_points: usize,
-    /// What loops may spend.
+    /// Allowance of work for loops.
     pub(super) allowance: &'a Allowance,
 }

@@ -1,18 +1,18 @@
 //! The Delaunay builder: tetrahedra between the surfaces, merged into rooms.
 //!
-//! Gjørup, "Portal techniques for large interactive worlds" (1999), chapter 4. As with the
-//! watershed, what comes out are candidate portals and votes, and the cell complex makes them exact.
+//! Gjørup, "Portal techniques for large interactive worlds" (1999), chapter 4. As with the watershed, the results are
+//! candidate portals and votes, and the cell complex makes them exact.
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
 //! | tetrahedra of points | `insert`, `tetrahedra`, `order`, `predicate` | Bowyer 1981, Watson 1981 |
 //! | points where surfaces need them | `refine`, `balls` | Chew 1993; Boissonnat & Oudot 2005 |
-//! | tetrahedra cut by polygons, what is open between | `cut`, `openings` | §4.2.1, §4.2.2 |
+//! | tetrahedra cut by polygons, and openings between them | `cut`, `openings` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
-//! | parts of the air that nothing narrows between, merged | `cells` | ours |
+//! | merging of parts of the air between which nothing narrows | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
 //! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
-//! | rooms that are left, and matter | `standing` | ours |
+//! | remaining rooms, and matter | `standing` | ours |
 //! | candidates and votes | `rooms` | ours |
 //!
 //! `session` runs the stages up to decimation, `propose` the rest.

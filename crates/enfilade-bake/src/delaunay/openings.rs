@@ -1,4 +1,4 @@
-//! What polygons leave open of the facet between two tetrahedra.
+//! Openings in the facet between two tetrahedra: the pieces that no polygon covers.
 
 use enfilade_geom::{DVec3, Plane, Triangle};
 use smallvec::{SmallVec, smallvec};
@@ -6,7 +6,7 @@ use smallvec::{SmallVec, smallvec};
 use super::cut::{Knife, TetrahedraCut, less, shared, turned_to};
 use crate::complex::poly::{Poly, area_normal};
 
-/// An outline that is less than a facet; `None` for the facet.
+/// An outline smaller than a facet; `None` for the whole facet.
 pub(super) type Outline = Option<Poly>;
 
 /// An open piece of a facet, between a part of one tetrahedron and a part of its neighbor.
@@ -17,11 +17,11 @@ pub(super) struct OpenPiece {
     pub(super) outline: Outline,
 }
 
-/// An open piece under way: the parts on both sides, as far as they are known, and its outline.
+/// An unfinished open piece: the parts on both sides, as far as they are known, and its outline.
 type Piece = ([u32; 2], Poly);
 
 impl Knife<'_> {
-    /// What is open of facet `i` of tetrahedron `t` towards its neighbor. `pair` is how the two are cut.
+    /// Returns the open pieces of facet `i` of tetrahedron `t` towards its neighbor. `pair` holds the cuts of the two.
     pub(super) fn openings(
         &self,
         (t, i): (u32, usize),
@@ -57,7 +57,7 @@ impl Knife<'_> {
         let open = open.into_iter().map(|p| ([0, 0], p)).collect();
         let open = by_part(open, pair[0], i, 0, normal, eps);
         let open = by_part(open, pair[1], other_facet, 1, normal, eps);
-        // A wall that ends within the facet may lie in a piece of it though not in all of it.
+        // A wall that ends within the facet may be coplanar with a piece of it, though not with all of it.
         let rest = |(parts, poly): Piece| {
             let covers = self.covers(&near, &poly, normal, 2.0 * eps);
             let open = less(smallvec![poly], &covers, normal, self.tolerance);
@@ -69,7 +69,7 @@ impl Knife<'_> {
         open.into_iter().flat_map(rest).collect()
     }
 
-    /// Those of some walls whose planes a polygon lies in, within a distance of `off`.
+    /// Returns the walls in whose planes a polygon lies, within a distance of `off`.
     fn covers(&self, near: &[u32], poly: &[DVec3], normal: DVec3, off: f64) -> Vec<Poly> {
         let walls = near.iter().map(|&w| &self.walls[w as usize]);
         let in_plane = |p: Plane| poly.iter().all(|&c| p.signed_distance(c).abs() <= off);
@@ -80,15 +80,15 @@ impl Knife<'_> {
     }
 }
 
-/// Whether nothing of a facet is missing.
+/// Returns `true` if nothing of a facet is missing.
 fn is_all_of(open: &[Poly], facet: &Triangle) -> bool {
     open.len() == 1
         && open[0].len() == 3
         && area_normal(&open[0]).length() >= area_normal(facet).length() * (1.0 - 1e-12)
 }
 
-/// Open pieces of a facet divided by the parts of one of its two tetrahedra (`side`). A tetrahedron in one part is that
-/// part, whose face is the facet.
+/// Divides open pieces of a facet by the parts of one of its two tetrahedra (`side`). An uncut tetrahedron is one part,
+/// whose face is the facet.
 fn by_part(
     open: SmallVec<[Piece; 4]>,
     cutting: &TetrahedraCut,

@@ -1,23 +1,23 @@
-//! The order in which points are inserted: rounds of growing size, along a Hilbert curve in each.
+//! The order in which points are inserted: rounds of growing size, each along a Hilbert curve.
 //!
-//! Amenta, Choi & Rote, "Incremental constructions con BRIO" (SoCG 2003): enough chance between
-//! rounds for the expected cost to stay low, enough locality within a round for the walk to be short.
+//! Amenta, Choi & Rote, "Incremental constructions con BRIO" (SoCG 2003): enough randomness between rounds to keep the
+//! expected cost low, enough locality within a round to keep the walk short.
 //! The curve is Skilling's, "Programming the Hilbert curve" (AIP 707, 2004).
 
 use enfilade_geom::{Aabb, DVec3};
 
-/// Bits of the curve's index for each axis.
+/// Bits of the curve's index per axis.
 const BITS: u32 = 19;
 
-/// Indices of `points` in the order of insertion, equal points next to each other.
+/// Returns the indices of `points` in the order of insertion, equal points next to each other.
 ///
-/// Depends on the coordinates only, so that the order of the input has no say in the result.
+/// Depends on the coordinates only, not on the order of the input.
 pub(super) fn insertion_order(points: &[DVec3]) -> Vec<u32> {
     let bounds = Aabb::of_points(points);
     let size = bounds.size().max_element();
     let cells = f64::from((1_u32 << BITS) - 1);
     let scale = if size > 0.0 { cells / size } else { 0.0 };
-    // Each round is about an eighth of the next; the last holds seven eighths of all.
+    // Each round is about an eighth of the next; the last contains seven eighths of all.
     let n_rounds = (points.len() as f64 / 64.0).max(1.0).log(8.0).ceil() as u32;
     let mut keys: Vec<(u64, u32)> = points
         .iter()
@@ -43,7 +43,7 @@ pub(super) fn insertion_order(points: &[DVec3]) -> Vec<u32> {
     keys.into_iter().map(|k| k.1).collect()
 }
 
-/// Hash of a point (the finalizer of splitmix64, for each coordinate).
+/// Returns a hash of a point (the finalizer of splitmix64, for each coordinate).
 fn hash(p: DVec3) -> u64 {
     p.to_array().iter().fold(0x9e37_79b9_7f4a_7c15, |h, x| {
         let mut z = h ^ x.to_bits();
@@ -53,7 +53,7 @@ fn hash(p: DVec3) -> u64 {
     })
 }
 
-/// Index along the curve of a lattice cell.
+/// Returns the index of a lattice cell along the curve.
 fn hilbert(mut x: [u32; 3]) -> u64 {
     let mut q = 1 << (BITS - 1);
     while q > 1 {
@@ -83,7 +83,7 @@ fn hilbert(mut x: [u32; 3]) -> u64 {
     a << 2 | b << 1 | c
 }
 
-/// Puts two zeros before each bit.
+/// Inserts two zeros before each bit.
 fn spread(x: u32) -> u64 {
     let mut x = u64::from(x) & 0x1f_ffff;
     x = (x | x << 32) & 0x001f_0000_0000_ffff;

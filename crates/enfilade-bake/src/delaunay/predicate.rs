@@ -1,12 +1,12 @@
-//! Signs of determinants, never wrong: on which side of a plane, inside which sphere.
+//! Exact signs of determinants: on which side of a plane, or inside which sphere, a point lies.
 //!
-//! Three steps, each taken only when the one before is not certain:
+//! Three steps, each taken only if the one before is not certain:
 //! 1. floating point, with an error bound taken from the largest difference along each axis
 //!    (Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 //!    Predicates", 1997, table 4, with the permanent bounded from above);
-//! 2. whole numbers: coordinates are multiples of powers of two, and most differences need at most
-//!    40 bits, so that `i128` (and a sum of 256 bits) is exact. Cospherical vertices of buildings
-//!    end here, in a tenth of the time that expansions take;
+//! 2. integers: coordinates are multiples of powers of two, and most differences need at most 40 bits, so that `i128`
+//! (and a sum of 256 bits) is exact. Cospherical vertices of buildings end here, in a tenth of the time that expansions
+//! take;
 //! 3. the expansions of the `robust` crate.
 
 use enfilade_geom::DVec3;
@@ -26,8 +26,8 @@ const SPHERE_BOUND: f64 = 24.0 * 1.776_356_839_400_254e-15 * 1.001;
 /// The predicates for one set of points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Predicates {
-    /// Differences below this make the sphere's determinant exact in `f64`: every coordinate is a
-    /// multiple of one power of two, and they are few enough bits.
+    /// Bound on differences below which the sphere's determinant is exact in `f64`: every coordinate is a multiple of
+    /// one power of two, with few enough bits.
     small_sphere: f64,
     /// The same for the plane's determinant.
     small_orient: f64,
@@ -41,7 +41,7 @@ impl Predicates {
             .filter(|&x| x != 0.0)
             .map(last_bit)
             .min();
-        // Nothing but zeros: any differences are zero.
+        // Only zeros: all differences are zero.
         let unit = power_of_two(unit.unwrap_or(0));
         Self {
             // 72 · 2^(5·9) < 2^53.
@@ -51,7 +51,8 @@ impl Predicates {
         }
     }
 
-    /// Positive when `a`, `b`, `c` run counter-clockwise seen from the side away from `d`.
+    /// Returns 1 if `a`, `b`, `c` run counter-clockwise seen from the side away from `d`, -1 if clockwise, 0 if
+    /// coplanar.
     pub(super) fn orient(&self, a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
         let (u, v, w) = (a - d, b - d, c - d);
         let det = u.dot(v.cross(w));
@@ -69,8 +70,8 @@ impl Predicates {
         exact_orient(a, b, c, d)
     }
 
-    /// Positive when `e` is inside the sphere through `a`, `b`, `c`, `d`, which are oriented
-    /// positively; 0 on it.
+    /// Returns 1 if `e` is inside the sphere through `a`, `b`, `c`, `d`, which are oriented positively; 0 on it, -1
+    /// outside.
     pub(super) fn in_sphere(&self, a: DVec3, b: DVec3, c: DVec3, d: DVec3, e: DVec3) -> i32 {
         let (p, q, r, s) = (a - e, b - e, c - e, d - e);
         let minor = |u: DVec3, v: DVec3| u.x * v.y - v.x * u.y;
@@ -101,7 +102,7 @@ fn sign(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
 }
 
-/// Exponent of the lowest bit set in a finite number other than 0.
+/// Returns the exponent of the lowest bit set in a finite number other than 0.
 fn last_bit(x: f64) -> i32 {
     let bits = x.to_bits();
     let exponent = ((bits >> 52) & 0x7ff) as i32;
@@ -109,13 +110,13 @@ fn last_bit(x: f64) -> i32 {
     exponent - 1075 + mantissa.trailing_zeros() as i32
 }
 
-/// 2 to the `e`, for exponents of normal numbers.
+/// Returns 2 to the `e`, for exponents of normal numbers.
 fn power_of_two(e: i32) -> f64 {
     f64::from_bits(((e + 1023) as u64) << 52)
 }
 
-/// Differences to `origin` as whole multiples of one power of two, of at most `bits` bits; `None`
-/// when they are not.
+/// Returns differences to `origin` as integer multiples of one power of two, of at most `bits` bits; `None` if they are
+/// not.
 fn whole<const N: usize>(points: [DVec3; N], origin: DVec3, bits: i32) -> Option<[[i64; 3]; N]> {
     let mut differences = [[0.0; 3]; N];
     let (mut low, mut largest) = (i32::MAX, 0.0_f64);
@@ -123,7 +124,7 @@ fn whole<const N: usize>(points: [DVec3; N], origin: DVec3, bits: i32) -> Option
         for (k, slot) in out.iter_mut().enumerate() {
             let (a, b) = (p[k], origin[k]);
             let d = a - b;
-            // Knuth's two-sum: what rounding took away.
+            // Knuth's two-sum: the part lost by rounding.
             let b_virtual = a - d;
             let tail = (a - (d + b_virtual)) + (b_virtual - b);
             if tail != 0.0 {

@@ -16,11 +16,11 @@ use crate::realize::realize;
 use crate::structure::{OUTDOORS, Structure};
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Resolution, Stage};
 
-/// Air around the scene that the cell complex knows. [Units: wu]
+/// Width of the air around the scene that the cell complex covers. [Units: wu]
 const AROUND: f64 = 1.0;
 
-/// Votes for the outdoors between two boxes, with nothing between them. Tetrahedra there reach far beyond the outer box,
-/// and so do their middles.
+/// Returns votes for the outdoors in the empty space between two boxes. Tetrahedra there reach far beyond the outer
+/// box, and so do their middles.
 fn votes_around(inner: &Aabb, outer: &Aabb) -> impl Iterator<Item = Vote> {
     let [volume, less] = [outer, inner].map(|b| b.size().element_product());
     let middle = Aabb::new((inner.min + outer.min) * 0.5, (inner.max + outer.max) * 0.5);
@@ -35,10 +35,10 @@ fn votes_around(inner: &Aabb, outer: &Aabb) -> impl Iterator<Item = Vote> {
 
 /// Finds rooms by tetrahedra.
 ///
-/// About `O(n log n)` in the points that stand for the surfaces, and in triangles.
+/// About `O(n log n)` in the points sampled on surfaces, and in triangles.
 ///
 /// # Errors
-/// When a setting or coordinate is out of limits, or the caller cancels.
+/// If a setting or coordinate is out of limits, or the caller cancels.
 pub(crate) fn propose(
     structure: &Structure<'_>,
     config: &BakeConfig,
@@ -54,10 +54,10 @@ pub(crate) fn propose(
     )
 }
 
-/// Makes a world of the rooms that are left after the first `n_steps` of a session's decimation.
+/// Makes a world of the rooms that remain after the first `n_steps` of a session's decimation.
 ///
 /// # Errors
-/// When the caller cancels.
+/// If the caller cancels.
 pub fn bake_session(
     scene: &Scene,
     session: &Session,

@@ -1,16 +1,15 @@
-//! Refinement: points are added to surfaces until every ball between points is a ball of air.
+//! Refinement: adds points to surfaces until every ball between points is a ball of air.
 //!
-//! The circumsphere of a tetrahedron is empty of points, but surfaces may run through it where points are
-//! few; then the tetrahedron says nothing about the air. The point of the surface nearest to the sphere's
-//! center is added, and so on (Chew, "Guaranteed-quality mesh generation for curved surfaces", 1993;
-//! Boissonnat & Oudot, "Provably good sampling and meshing of surfaces", 2005, for the density that comes
-//! of it: in proportion to the distance to the next surface). Large walls of large halls get few points,
-//! the jambs of a door many, whatever the scale of the scene.
+//! The circumsphere of a tetrahedron is empty of points, but surfaces may cross it where points are few; then the
+//! tetrahedron carries no information on the air. The surface point nearest to the sphere's center is added, and so on
+//! (Chew, "Guaranteed-quality mesh generation for curved surfaces", 1993; Boissonnat & Oudot, "Provably good sampling
+//! and meshing of surfaces", 2005, for the resulting density: in proportion to the distance to the next surface). Large
+//! walls of large halls get few points, the jambs of a door many, whatever the scale of the scene.
 //!
-//! Wide places come first: each pass goes down to narrower balls of air, and the last one also refines narrow gaps,
-//! such as those between the two faces of a wall. When points run out, wide places are right all the same.
+//! Wide places come first: each pass continues to narrower balls of air, and the last one also refines narrow gaps,
+//! such as those between the two faces of a wall. If points run out, wide places are still correct.
 //!
-//! **It ends**: a new point is at least a tenth of a radius away from all others, and radii have a lower bound.
+//! **Termination:** a new point is at least a tenth of a radius away from all others, and radii have a lower bound.
 
 use std::collections::HashMap;
 
@@ -22,18 +21,17 @@ use super::insert::Growing;
 use super::limits::Limits;
 use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
 
-/// No two points that are added in one round are nearer to each other than this share of the ball's radius.
+/// Least distance between points added in one round, as a share of the ball's radius.
 const APART: f64 = 0.4;
-/// More rounds of a pass than any scene took. After that, points count as having run out.
+/// Most rounds of a pass, more than any scene took. After that, points count as having run out.
 const MAX_ROUNDS: usize = 100;
-/// What it costs to look at a tetrahedron, in units of [`enfilade_geom::Allowance`].
+/// Cost of examining a tetrahedron, in units of [`enfilade_geom::Allowance`].
 const WORK_A_LOOK: u64 = 5;
 
 /// Tetrahedra whose balls are balls of air.
 pub(super) struct Refined {
     pub(super) delaunay: Delaunay,
-    /// Radius down to which that holds; above the requested one where points ran out.
-    /// [Units: wu]
+    /// Radius down to which that holds; above the requested one if points ran out. [Units: wu]
     pub(super) down_to: f64,
 }
 
@@ -46,7 +44,7 @@ struct Wanted {
 
 /// Adds points of `surfaces` to `points` until no ball wider than `least` has a surface in it.
 ///
-/// `O(n log n)` in the points that come out, of which there are no more than the limits say.
+/// `O(n log n)` in the resulting points, whose number the limits bound.
 pub(super) fn refined(
     points: &[DVec3],
     surfaces: &Bvh,
@@ -92,7 +90,7 @@ pub(super) fn refined(
     })
 }
 
-/// Points to add where surfaces enter the ball of a tetrahedron or those of its facets.
+/// Returns points to add where surfaces enter the ball of a tetrahedron or those of its facets.
 fn wanted_by(
     growing: &Growing,
     t: u32,
@@ -125,8 +123,8 @@ fn wanted_by(
     }
     out[4] = entered(center, radius);
     if out[4].is_none() {
-        // What passes a facet is as wide as the facet's own ball where that is a bottleneck: between the
-        // centers of the balls on both sides.
+        // The passage through a facet is as wide as the facet's own ball if the facet is a bottleneck: if it lies
+        // between the centers of the balls on both sides.
         let tet = growing.tetrahedron(t);
         for (i, out) in out.iter_mut().take(4).enumerate() {
             let other = tet.neighbor(i);
@@ -163,7 +161,7 @@ fn wanted_by(
     out.into_iter().flatten()
 }
 
-/// Those of some points to add that are not near to each other, preferring those of the largest balls.
+/// Returns those points to add that are not near to each other, preferring those of the largest balls.
 fn thinned(mut wanted: Vec<Wanted>) -> Vec<Wanted> {
     wanted.sort_unstable_by(|a, b| {
         let (p, q) = (a.point.to_array(), b.point.to_array());
@@ -181,7 +179,7 @@ fn thinned(mut wanted: Vec<Wanted>) -> Vec<Wanted> {
     let cell = |p: DVec3, octave: i32| (p / size(octave)).floor().to_array().map(|x| x as i64);
     let mut out = Vec::new();
     for w in wanted {
-        // Larger balls came first, and their grid cells are no smaller than this ball's distance.
+        // Larger balls came first, and their grid cells are at least as large as this ball's distance.
         let is_near = octaves.iter().any(|&octave| {
             let [x, y, z] = cell(w.point, octave);
             (0..27).any(|i| {

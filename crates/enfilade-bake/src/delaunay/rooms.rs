@@ -1,4 +1,4 @@
-//! From cells of tetrahedra to what the cell complex needs: candidates, and votes.
+//! Converts cells of tetrahedra to the input of the cell complex: candidates and votes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,36 +12,36 @@ use super::standing::Standing;
 use crate::complex::Vote;
 use crate::structure::{Candidate, OUTDOORS, Opening, fit_candidate, is_inside};
 
-/// Tetrahedra this close to where two rooms meet do not vote: a candidate may lie on either
-/// side of them. [Units: wu]
+/// Tetrahedra this close to the border of two rooms do not vote: a candidate may lie on either side of them.
+/// [Units: wu]
 const UNSURE: f64 = 0.35;
-/// Tetrahedra with their middle this close to a wall do not vote: what is there may be the space
-/// between two polygons that nearly touch. [Units: wu]
+/// Tetrahedra with their middle this close to a wall do not vote: they may fill the space between two polygons that
+/// nearly touch. [Units: wu]
 const AT_WALL: f64 = 0.01;
-/// Distance between the points that stand for an opening. [Units: wu]
+/// Distance between the points sampled on an opening. [Units: wu]
 const STEP: f64 = 0.1;
-/// About as many points stand for an opening at most.
+/// Approximate limit of points sampled on an opening.
 const MAX_CENTERS: f64 = 4000.0;
-/// How far from an opening's point a door leaf or pane may be to close it there. [Units: wu]
+/// Distance from an opening's point within which a door leaf or pane closes it there. [Units: wu]
 const CLOSE_BY: f64 = 0.15;
-/// What it costs to place a point of an opening, and to ask whether a part votes, in units of [`Allowance`].
+/// Costs of placing a point of an opening, and of deciding if a part votes, in units of [`Allowance`].
 const WORK_A_CENTER: u64 = 5;
 const WORK_A_PART: u64 = 20;
 /// Openings smaller than this are left to the complex, which finds them as cracks. [Units: wu²]
 const MIN_AREA: f64 = 0.04;
-/// What the complex makes a world of.
+/// Input of the cell complex.
 pub(super) struct FoundRooms {
     pub(super) candidates: Vec<Candidate>,
     pub(super) votes: Vec<Vote>,
 }
 
-/// The label of a cell: regions count from [`OUTDOORS`] on.
+/// Returns the label of a cell: regions count from [`OUTDOORS`] on.
 fn label(cell: u32) -> u32 {
     cell - OUTDOOR_CELL + OUTDOORS
 }
 
-/// Candidates where rooms meet and votes where they are. `room_of_cell` is what decimation left; `stairs` stand in
-/// rooms and are no part of them.
+/// Returns candidates where rooms meet, and votes within rooms. `room_of_cell` is the result of decimation; `stairs`
+/// stand in rooms but are not part of them.
 pub(super) fn find_rooms(
     session: &Session,
     room_of_cell: &[u32],
@@ -127,7 +127,7 @@ pub(super) fn find_rooms(
             votes.push(vote(t));
         }
     }
-    // A room that is all doorway speaks from its widest place.
+    // A room that is only a doorway votes at its widest place.
     votes.extend(
         widest
             .iter()
@@ -140,7 +140,7 @@ pub(super) fn find_rooms(
     }
 }
 
-/// Points all over the facets of an opening, and its measures.
+/// Returns points all over the facets of an opening, and its measures.
 fn opening_of(
     space: &Space,
     pair: (u32, u32),

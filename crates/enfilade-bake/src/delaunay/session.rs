@@ -1,4 +1,4 @@
-//! The state of decimation, which a bake goes through at once and a person step by step.
+//! The state of decimation, which a bake runs through at once and a user step by step.
 
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Allowance, Bvh, Triangle};
@@ -13,7 +13,7 @@ use crate::budget::n_structural;
 use crate::structure::{Structure, in_own_order};
 use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
 
-/// The state of decimation, for a person to look at and to overrule.
+/// The state of decimation, for a user to inspect and overrule.
 pub struct Session {
     /// The tetrahedra and the ways between them.
     pub space: Space,
@@ -23,7 +23,7 @@ pub struct Session {
     pub decimation: Decimation,
     /// Structural triangles that bound rooms: all but stairs.
     pub(super) walls: Vec<Triangle>,
-    /// Of the walls.
+    /// BVH of the walls.
     pub(super) bvh: Bvh,
     pub(super) closures: Vec<Triangle>,
     pub(super) stairs: Bvh,
@@ -35,14 +35,14 @@ impl Session {
     /// Divides the air of a scene and decimates. `config` is that of a bake by [`Method::Delaunay`].
     ///
     /// # Errors
-    /// When there is nothing structural, a coordinate is out of limits, or the caller cancels.
+    /// If nothing is structural, a coordinate is out of limits, or the caller cancels.
     pub fn begin(
         scene: &Scene,
         config: &BakeConfig,
         context: &BakeContext<'_>,
     ) -> Result<Self, BakeError> {
         let context = &context.within(&config.budget, n_structural(scene));
-        context.begin_method(Method::Delaunay, "asked for")?;
+        context.begin_method(Method::Delaunay, "as requested")?;
         let structure = Method::Delaunay.structure_of(scene, context.allowance())?;
         let session = Self::of(&structure, config, context)?;
         context.check()?;
@@ -56,7 +56,7 @@ impl Session {
     ) -> Result<Self, BakeError> {
         context.begin(Stage::Tetrahedra)?;
         config.check_opening()?;
-        // The result shall not depend on how a file lists triangles.
+        // The result must not depend on the order of triangles in a file.
         let walls = in_own_order(&structure.walls);
         let bvh = Bvh::build(&walls);
         let closures = in_own_order(&structure.blockers(&bvh));
@@ -100,8 +100,9 @@ impl Session {
         Ok(session)
     }
 
-    /// How many rooms are left after the first `n_steps`, which is how many cells indoors [`bake_session`](super::bake_session) makes of them,
-    /// and how many cells besides: crevices, and the insides of walls, which are dropped.
+    /// Returns the number of rooms left after the first `n_steps`, which is the number of cells indoors that
+    /// [`bake_session`](super::bake_session) makes of them, and the number of other cells: crevices, and interiors of
+    /// walls, which are dropped.
     ///
     /// `O(n log n)` in the parts of the space; a fraction of a second.
     #[must_use]
@@ -115,7 +116,7 @@ impl Session {
         )
     }
 
-    /// Decimates anew, after other choices or with another weight or stop. Takes milliseconds.
+    /// Decimates again, after other choices or with another weight or stop. Takes milliseconds.
     pub fn decimate(&mut self, config: &BakeConfig) {
         self.decimate_within(config, &Allowance::default());
     }
@@ -135,7 +136,7 @@ impl Session {
     }
 }
 
-/// Cells, divided where branches leave the rooms that a decimation without choices ends with.
+/// Divides cells where branches leave the rooms with which a decimation without choices ends.
 fn with_branches(
     space: &Space,
     cells: Cells,

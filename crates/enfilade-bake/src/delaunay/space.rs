@@ -1,15 +1,15 @@
-//! Air as tetrahedra: which parts of it are connected, and how wide the way between two of them is.
+//! The air as tetrahedra: which parts of it are connected, and how wide the way between two of them is.
 //!
-//! Gjørup 1999, §4.2.1–4.2.2. Large triangles give spikes because their few vertices say little about where
-//! the surface is (his §4.3.3), so points are added to surfaces first (`refine`), the denser the narrower the
-//! air beside them is. A tetrahedron that polygons still run through is cut into parts along them (`cut`), and two parts are
-//! linked by what the polygons leave open of their common boundary: no opening is missed and no wall passed, however
-//! few points there are.
+//! Gjørup 1999, §4.2.1–4.2.2. Large triangles give spikes because their few vertices carry little information on the
+//! surface (his §4.3.3), so points are added to surfaces first (`refine`), the denser the narrower the air beside them
+//! is. A tetrahedron that polygons still cross is cut into parts along them (`cut`), and two parts are linked by the
+//! openings that the polygons leave in their common boundary: no opening is missed and no wall passed, however few
+//! points there are.
 //!
-//! The circumsphere of a tetrahedron is a ball of air that touches four surface points, so its center is on the
-//! medial axis. The widest ball that passes between two neighbors is as wide as the circle through their common facet, or as
-//! the lesser of their balls where the circle is no bottleneck (Dey, Giesen & Goswami, "Shape segmentation and matching
-//! with flow discretization", 2003). A part of a tetrahedron that is cut is a spike and has no ball.
+//! The circumsphere of a tetrahedron is a ball of air that touches four surface points, so its center is on the medial
+//! axis. The widest ball that passes between two neighbors is as wide as the circle through their common facet, or as
+//! the lesser of their balls if the circle is not a bottleneck (Dey, Giesen & Goswami, "Shape segmentation and matching
+//! with flow discretization", 2003). A part of a cut tetrahedron is a spike and has no ball.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,49 +27,50 @@ use crate::complex::poly::{area, area_normal, width};
 
 /// Most points added to surfaces.
 const MAX_POINTS: usize = 300_000;
-/// What a tetrahedron and a part of one that is cut cost from there to rooms, in units of [`Allowance`].
+/// Costs of a tetrahedron, and of a part of a cut one, from there to rooms, in units of [`Allowance`].
 const WORK_A_TETRAHEDRON: u64 = 15;
 const WORK_A_PART: u64 = 30;
-/// What it costs to measure the ball of a tetrahedron.
+/// Cost of measuring the ball of a tetrahedron.
 const WORK_A_BALL: u64 = 30;
-/// Distance between the scene and the box around it, in addition to a quarter of the scene's size. [Units: narrowest openings]
+/// Distance between the scene and the box around it, besides a quarter of the scene's size. [Units: narrowest openings]
 const MARGIN: f64 = 4.0;
 /// Points along each edge of the box around the scene.
 const BOX_POINTS: usize = 9;
-/// What polygons leave of a facet is a crack if its width is less than this share of the narrowest opening: a way
-/// through, but no place for a candidate portal, since the cell complex finds the exact one.
+/// An opening that polygons leave in a facet is a crack if its width is less than this share of the narrowest opening:
+/// a way through, but not a place for a candidate portal, since the cell complex finds the exact one.
 const CRACK: f64 = 1.0 / 60.0;
-/// Balls of air are known down to this share of the narrowest opening, through which a ball of half its width passes.
+/// Balls of air are known down to this share of the narrowest opening, which a ball of half its width passes.
 pub const LEAST_BALL: f64 = 1.0 / 3.0;
 /// Points lie in a plane if they are nearer to it than this share of the largest coordinate.
 const ON_PLANE: f64 = 1e-9;
-/// A gap is closed if it is narrower than this many times the distance at which points still lie in a plane. Coordinates are
-/// rounded to a grid of `2⁻²⁴` of their size, 60 times that distance, and walls that met before may have gaps as wide.
+/// A gap is closed if it is narrower than this many times the distance at which points still lie in a plane.
+/// Coordinates are rounded to a grid of `2⁻²⁴` of their size, 60 times that distance, so walls that met before may have
+/// gaps as wide.
 const CLOSED: f64 = 64.0;
 
 /// The air between surfaces, as tetrahedra and parts of tetrahedra.
 pub struct Space {
     /// The tetrahedra. [Units: wu]
     pub delaunay: Delaunay,
-    /// Balls of air of this radius and more are known: no surface runs through them. More than [`LEAST_BALL`] of the
-    /// narrowest opening where points ran out. [Units: wu]
+    /// Radius down to which balls of air are known: no surface crosses them. More than [`LEAST_BALL`] of the narrowest
+    /// opening if points ran out. [Units: wu]
     pub finest: f64,
     /// The tetrahedron of each part: the first part of each tetrahedron in order, then the further parts of those
     /// that are cut.
     pub tetrahedron_of_part: Vec<u32>,
-    /// Polygons that were not cut along, since a tetrahedron had too many parts already.
+    /// Number of polygons along which nothing was cut, since a tetrahedron had too many parts already.
     pub n_passed_over: usize,
     /// A point well inside each part. [Units: wu]
     pub middles: Vec<DVec3>,
-    /// Volume of each. [Units: wu³]
+    /// Volume of each part. [Units: wu³]
     pub volumes: Vec<f64>,
-    /// Radius of the ball of air that each one belongs to; 0 for spikes, infinite outdoors. [Units: wu]
+    /// Radius of the ball of air to which each part belongs; 0 for spikes, infinite outdoors. [Units: wu]
     pub radii: Vec<f64>,
-    /// Ways from one part to the next.
+    /// Ways between parts.
     pub links: Vec<Link>,
     /// Outlines narrower than this are cracks. [Units: wu]
     crack: f64,
-    /// Vertices of openings that are no whole facets, one outline after the other. [Units: wu]
+    /// Vertices of openings that are not whole facets, one outline after the other. [Units: wu]
     vertices: Vec<DVec3>,
 }
 
@@ -78,19 +79,19 @@ pub struct Space {
 pub struct Link {
     /// The two parts.
     pub parts: [u32; 2],
-    /// A tetrahedron that the opening bounds or lies in: that of the first part.
+    /// The tetrahedron of the first part, which the opening bounds or lies in.
     pub tetrahedron: u32,
-    /// Its facet, or 4 where the opening lies inside.
+    /// Its facet, or 4 if the opening lies inside.
     pub facet: u8,
-    /// Vertices of the opening's outline; 0 for the whole facet.
+    /// Number of vertices of the opening's outline; 0 for the whole facet.
     n_vertices: u16,
-    /// Where they begin.
+    /// Start of those vertices.
     first_vertex: u32,
     /// Radius of the widest ball that passes. [Units: wu]
     pub radius: f64,
 }
 
-/// What is known of a part.
+/// Measurements of a part.
 #[derive(Clone, Copy)]
 struct Measured {
     middle: DVec3,
@@ -101,7 +102,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// What stands where an allowance is over.
+    /// Measurements once an allowance is spent.
     const NOTHING: Self = Self {
         middle: DVec3::ZERO,
         volume: 0.0,
@@ -112,12 +113,12 @@ impl Measured {
 
 /// Divides the air around `walls` into tetrahedra.
 ///
-/// `bvh` holds the walls; the points of `closures` (door leaves, panes) narrow what is near them but
-/// close nothing. Openings down to `narrowest` are weighed rightly; if that takes more points than there
-/// is memory for, [`Space::finest`] says from which width on.
+/// `bvh` contains the walls; the points of `closures` (door leaves, panes) narrow the space near them but close
+/// nothing. Openings down to `narrowest` are weighed correctly; if that takes more points than memory allows,
+/// [`Space::finest`] is the limit.
 ///
 /// # Errors
-/// When coordinates are out of limits; the box around the scene always has a volume.
+/// If coordinates are out of limits; the box around the scene always has a volume.
 pub fn divide(
     walls: &[Triangle],
     closures: &[Triangle],
@@ -131,7 +132,7 @@ pub fn divide(
     divide_within(walls, closures, bvh, narrowest, &limits)
 }
 
-/// [`divide`], as far as limits go: once the allowance is over, the space is not to be used.
+/// [`divide`] within limits: once the allowance is spent, the space must not be used.
 pub(super) fn divide_within(
     walls: &[Triangle],
     closures: &[Triangle],
@@ -173,14 +174,14 @@ pub(super) fn divide_within(
 /// Tetrahedra of points on the surfaces and on a box around the scene.
 struct Sampled {
     delaunay: Delaunay,
-    /// As [`Space::finest`]. [Units: wu]
+    /// See [`Space::finest`]. [Units: wu]
     finest: f64,
     /// Vertices of the box.
     box_vertices: BTreeSet<u32>,
     tolerance: CutTolerance,
 }
 
-/// Points on the surfaces, as dense as the air needs, and their tetrahedra.
+/// Samples points on the surfaces, as dense as the air needs, and makes their tetrahedra.
 fn sample(
     walls: &[Triangle],
     closures: &[Triangle],
@@ -215,7 +216,7 @@ fn sample(
     })
 }
 
-/// Tetrahedra that are about to be cut by the walls.
+/// Tetrahedra for the walls to cut.
 struct Air<'a> {
     knife: Knife<'a>,
     /// Vertices of the box around the scene.
@@ -228,15 +229,15 @@ struct Air<'a> {
 struct AllParts {
     /// The first part of each tetrahedron, then all further ones.
     measured: Vec<Measured>,
-    /// As [`Space::tetrahedron_of_part`].
+    /// See [`Space::tetrahedron_of_part`].
     tetrahedron_of_part: Vec<u32>,
-    /// Where the further parts of each tetrahedron begin.
+    /// Start of the further parts of each tetrahedron.
     further: Vec<u32>,
     n_passed_over: usize,
 }
 
 impl AllParts {
-    /// The id of part `k` of tetrahedron `t`.
+    /// Returns the id of part `k` of tetrahedron `t`.
     fn id(&self, t: usize, k: u32) -> u32 {
         if k == 0 {
             t as u32
@@ -251,7 +252,7 @@ impl AllParts {
 }
 
 impl Air<'_> {
-    /// How the walls cut each tetrahedron.
+    /// Cuts each tetrahedron by the walls.
     fn cut_all(&self) -> Vec<TetrahedraCut> {
         let allowance = self.knife.allowance;
         (0..self.knife.delaunay.n_finite as u32)
@@ -268,14 +269,15 @@ impl Air<'_> {
             .collect()
     }
 
-    /// Whether a tetrahedron reaches the border: it has an infinite neighbor, or all its vertices lie on the box.
+    /// Returns `true` if a tetrahedron reaches the border: it has an infinite neighbor, or all its vertices lie on the
+    /// box.
     fn is_outdoors(&self, t: usize) -> bool {
         let tet = &self.knife.delaunay.tetrahedra[t];
         (0..4).any(|i| tet.neighbor(i) as usize >= self.knife.delaunay.n_finite)
             || tet.vertices.iter().all(|v| self.box_vertices.contains(v))
     }
 
-    /// Measures a tetrahedron that nothing cuts.
+    /// Measures an uncut tetrahedron.
     fn measure_whole(&self, t: usize) -> Measured {
         if !self.knife.allowance.spend(WORK_A_BALL) {
             return Measured::NOTHING;
@@ -283,7 +285,7 @@ impl Air<'_> {
         let c = self.knife.delaunay.corners(t as u32);
         let middle = c.iter().sum::<DVec3>() / 4.0;
         let (center, radius, volume) = circumsphere(c);
-        // A ball on the other side of a wall says nothing about this side.
+        // A ball on the other side of a wall carries no information on this side.
         let is_own = radius.is_finite() && !self.knife.bvh.any_hit(middle, center, |_| false);
         let radius = if self.is_outdoors(t) {
             f64::INFINITY
@@ -300,8 +302,9 @@ impl Air<'_> {
         }
     }
 
-    /// Measures a part of tetrahedron `t`, whose ball `whole` is: a polygon runs through the ball, which says nothing about
-    /// the part, so the part is a spike. Of a tetrahedron that reaches the box, some parts may lie in a wall.
+    /// Measures a part of tetrahedron `t`, whose ball is `whole`. A polygon crosses the ball, which therefore carries
+    /// no information on the part: the part is a spike. If the tetrahedron reaches the box, some parts may lie in a
+    /// wall.
     fn measure_part(&self, t: usize, whole: &Measured, part: &Part) -> Measured {
         let vertices = self.knife.delaunay.tetrahedra[t].vertices.iter();
         let is_outdoors = whole.radius == f64::INFINITY
@@ -344,7 +347,7 @@ impl Air<'_> {
         all
     }
 
-    /// All links, each with its outline.
+    /// Returns all links, each with its outline.
     fn ways(&self, cuts: &[TetrahedraCut], parts: &AllParts) -> Vec<Way> {
         (0..self.knife.delaunay.n_finite)
             .into_par_iter()
@@ -360,7 +363,7 @@ impl Air<'_> {
             .collect()
     }
 
-    /// Links across facet `i` of tetrahedron `t`, unless they are found from the other side.
+    /// Collects the links across facet `i` of tetrahedron `t`, unless they are found from the other side.
     fn ways_across(
         &self,
         (t, i): (usize, usize),
@@ -384,7 +387,8 @@ impl Air<'_> {
             let [a, b] = ids.map(|p| parts.at(p));
             let whole = passing_radius(f, a, b);
             let radius = match &piece.outline {
-                // What a polygon covers of a facet narrows it; where it cuts beside it does not, but for cracks.
+                // A polygon that covers part of a facet narrows it; one that cuts beside it does not, except for
+                // cracks.
                 Some(outline) if !is_cut || width(outline) < CRACK * self.narrowest => {
                     whole.min(by_size(outline))
                 }
@@ -400,7 +404,7 @@ type Way = (Link, Outline);
 /// The links that one tetrahedron finds; a few, unless polygons cut it.
 type Ways = SmallVec<[Way; 4]>;
 
-/// Links between the parts of one tetrahedron.
+/// Collects the links between the parts of one tetrahedron.
 fn ways_within(t: usize, cut: &TetrahedraCut, parts: &AllParts, out: &mut Ways) {
     for (pair, outline) in cut.parts.iter().flat_map(|p| &p.inner) {
         let ids = pair.map(|k| parts.id(t, k));
@@ -414,7 +418,7 @@ fn ways_within(t: usize, cut: &TetrahedraCut, parts: &AllParts, out: &mut Ways) 
     }
 }
 
-/// Links that know where their outlines are, and the vertices of all outlines.
+/// Returns links that refer to their outlines, and the vertices of all outlines.
 fn with_outlines(ways: Vec<Way>) -> (Vec<Link>, Vec<DVec3>) {
     let mut vertices = Vec::new();
     let links = ways
@@ -431,12 +435,12 @@ fn with_outlines(ways: Vec<Way>) -> (Vec<Link>, Vec<DVec3>) {
     (links, vertices)
 }
 
-/// Radius of what passes an outline beside a spike: nothing is known but the size of the outline.
+/// Returns the radius of the ball that passes an outline beside a spike: only the size of the outline is known.
 fn by_size(outline: &[DVec3]) -> f64 {
     (area(outline) / std::f64::consts::PI).sqrt()
 }
 
-/// A lattice on the faces of a box.
+/// Returns a lattice of points on the faces of a box.
 pub(super) fn box_points(b: &Aabb) -> Vec<DVec3> {
     let n = BOX_POINTS;
     let step = |i: usize| i as f64 / (n - 1) as f64;
@@ -451,12 +455,12 @@ pub(super) fn box_points(b: &Aabb) -> Vec<DVec3> {
     out
 }
 
-/// Radius of the widest ball that passes a facet from the center of one part's ball to that of the other's.
+/// Returns the radius of the widest ball that passes a facet from the center of one part's ball to that of the other's.
 fn passing_radius(f: Triangle, a: &Measured, b: &Measured) -> f64 {
     let least = a.radius.min(b.radius);
     let circle = circle(f).map_or(0.0, |c| c.1);
     if least == 0.0 {
-        // Beside a spike nothing is known but the facet; no ball is wider than what it leads to.
+        // Beside a spike, only the facet is known; no ball is wider than the space beyond.
         let most = a.radius.max(b.radius);
         return if most > 0.0 { circle.min(most) } else { circle };
     }
@@ -482,7 +486,7 @@ impl Link {
 }
 
 impl Space {
-    /// Outline of an opening: convex, counter-clockwise seen from the second part. [Units: wu]
+    /// Returns the outline of an opening: convex, counter-clockwise seen from the second part. [Units: wu]
     pub(super) fn outline(&self, link: &Link) -> SmallVec<[DVec3; 6]> {
         if link.n_vertices > 0 {
             let first = link.first_vertex as usize;
@@ -499,19 +503,19 @@ impl Space {
             .collect()
     }
 
-    /// Whether polygons leave less of a facet than a portal could be put in.
+    /// Returns `true` if the opening that polygons leave in a facet is too narrow for a portal.
     pub(super) fn is_crack(&self, link: &Link) -> bool {
         link.n_vertices > 0 && width(&self.outline(link)) < self.crack
     }
 
-    /// Area of an opening times its unit normal, which points from the first part to the second.
+    /// Returns the area of an opening times its unit normal, which points from the first part to the second.
     /// [Units: wu²]
     #[must_use]
     pub fn area_vector(&self, link: &Link) -> DVec3 {
         area_normal(&self.outline(link)) * 0.5
     }
 
-    /// Vertices of the facet or tetrahedron that an opening lies in: openings that share one touch.
+    /// Returns the vertices of the facet or tetrahedron in which an opening lies: openings that share one touch.
     pub(super) fn vertices_about(&self, link: &Link) -> SmallVec<[u32; 4]> {
         let tet = &self.delaunay.tetrahedra[link.tetrahedron as usize];
         if link.facet == 4 {
@@ -521,7 +525,7 @@ impl Space {
         }
     }
 
-    /// Vertices of the tetrahedron of a part. [Units: wu]
+    /// Returns the vertices of the tetrahedron of a part. [Units: wu]
     #[must_use]
     pub fn corners(&self, part: u32) -> [DVec3; 4] {
         self.delaunay
@@ -529,7 +533,7 @@ impl Space {
     }
 }
 
-/// Groups of links whose facets share vertices, each in order.
+/// Returns groups of links whose facets share vertices, each in order.
 pub(super) fn connected(space: &Space, links: &[u32]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(links.len());
     let mut first_at: BTreeMap<u32, u32> = BTreeMap::new();

@@ -1,11 +1,11 @@
-//! Whether the air's parts are joined just where one can get from one to the next: an oracle by lines.
+//! Tests that parts of the air are joined exactly where a free line leads from one to the next.
 
 use enfilade_geom::{Bvh, DMat4, DVec3, Sets, Triangle};
 use proptest::prelude::*;
 
 use super::space::{Space, divide};
 
-/// Whether a triangle meets a segment, by signs of volumes alone.
+/// Returns `true` if a triangle meets a segment, by signs of volumes alone.
 fn meets(t: &Triangle, p: DVec3, q: DVec3) -> bool {
     let volume = |a: DVec3, b: DVec3, c: DVec3| a.cross(b).dot(c);
     let side = |x: DVec3| volume(t[1] - t[0], t[2] - t[0], x - t[0]);
@@ -21,7 +21,7 @@ fn is_free(walls: &[Triangle], p: DVec3, q: DVec3) -> bool {
     !walls.iter().any(|t| meets(t, p, q))
 }
 
-/// The connected region of each part.
+/// Returns the connected region of each part.
 fn regions(space: &Space) -> Vec<u32> {
     let mut sets = Sets::new(space.middles.len());
     for l in &space.links {
@@ -30,7 +30,7 @@ fn regions(space: &Space) -> Vec<u32> {
     (0..sets.len() as u32).map(|x| sets.find(x)).collect()
 }
 
-/// Regions of the parts of the tetrahedron around `p` that `p` sees; its own is one of them.
+/// Returns the regions of those parts of the tetrahedron around `p` that `p` sees, its own included.
 fn regions_at(space: &Space, region: &[u32], walls: &[Triangle], p: DVec3) -> Vec<u32> {
     let t = space.delaunay.locate(p, 0);
     let parts = (0..space.middles.len()).filter(|&i| space.tetrahedron_of_part[i] == t);
@@ -46,7 +46,7 @@ fn point() -> impl Strategy<Value = DVec3> {
     prop::array::uniform3(-1.0..1.0_f64).prop_map(DVec3::from_array)
 }
 
-/// A wall across a box, with a hole from `lo` to `hi` if it is larger than nothing.
+/// Returns a box with a wall across, and a hole in the wall from `lo` to `hi` if that is not empty.
 fn parted_box(lo: [f64; 2], hi: [f64; 2]) -> Vec<Triangle> {
     let mut out = Vec::new();
     let mut quad = |c: [[f64; 3]; 4]| {
@@ -86,8 +86,8 @@ fn parted_box(lo: [f64; 2], hi: [f64; 2]) -> Vec<Triangle> {
     out
 }
 
-/// Whether the two sides of a box with a wall across are one region, if the wall has a square hole of half side `s`, and
-/// all is turned and scaled.
+/// Returns `true` if the two sides of a box with a wall across are one region, for a wall with a square hole of half
+/// side `s`, rotated and scaled.
 fn is_joined(center: [f64; 2], s: f64, turn: DVec3, scale: f64) -> bool {
     let turned = DMat4::from_axis_angle(turn.normalize_or(DVec3::X), turn.length());
     let place = |p: DVec3| turned.transform_point3(p) * scale;
@@ -102,7 +102,7 @@ fn is_joined(center: [f64; 2], s: f64, turn: DVec3, scale: f64) -> bool {
     a.iter().any(|r| b.contains(r))
 }
 
-/// Tetrahedra cut it to pieces, each less than a portal could be put in.
+/// Tetrahedra cut the hole to pieces, each too narrow for a portal.
 #[test]
 fn a_hole_joins_though_each_piece_of_it_is_a_crack() {
     assert!(is_joined([0.0; 2], 0.002, DVec3::ZERO, 1.0));
@@ -112,13 +112,13 @@ fn a_hole_joins_though_each_piece_of_it_is_a_crack() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Triangles through each other, larger than what points are added for.
+    /// Triangles that cross each other, wider apart than the points added to them.
     #[test]
     fn parts_are_joined_where_free_lines_go_and_nowhere_else(
         walls in prop::collection::vec(prop::array::uniform3(point()), 1..9),
         lines in prop::collection::vec((point(), point()), 40),
     ) {
-        // Only balls of a fifth of the scene's size are looked after: the rest is for polygons to cut.
+        // Points are added only for balls of a fifth of the scene's size: polygons cut the rest.
         let space = divided(&walls, 0.6);
         let region = regions(&space);
         for l in &space.links {
@@ -137,11 +137,11 @@ proptest! {
         for (t, &volume) in volumes.iter().enumerate() {
             let [a, b, c, d] = space.delaunay.corners(t as u32);
             let whole = (a - d).cross(b - d).dot(c - d).abs() / 6.0;
-            // Corners within the tolerance of a plane stay with both parts.
+            // Vertices within the tolerance of a plane stay with both parts.
             prop_assert!((volume - whole).abs() < 1e-6, "{volume} of {whole}");
         }
         for (p, q) in lines {
-            // Wide enough to be no crack: free lines all around.
+            // Wide enough not to be a crack: free lines all around.
             let around = [DVec3::ZERO, DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
             if around.iter().all(|&d| is_free(&walls, p + d * 0.02, q + d * 0.02)) {
                 let [from, to] = [p, q].map(|x| regions_at(&space, &region, &walls, x));
@@ -150,11 +150,11 @@ proptest! {
         }
     }
 
-    /// However large the box is about its hole, and however it is turned.
+    /// For any size of the box relative to its hole, and any rotation.
     #[test]
     fn a_wall_parts_a_box_just_when_it_has_no_hole(
         center in prop::array::uniform2(-0.9..0.9_f64),
-        // Half the side: from a fiftieth of the narrowest opening asked for.
+        // Half the side; the smallest hole is a fiftieth of the narrowest opening.
         size in prop::option::of(prop_oneof![0.002..0.01_f64, 0.01..0.08]),
         turn in point(),
         scale in 0.1..100.0_f64,

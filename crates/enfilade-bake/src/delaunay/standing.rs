@@ -1,4 +1,4 @@
-//! The rooms that a decimation leaves standing, and which of its cells are none.
+//! The rooms that a decimation leaves, and which of its cells are not rooms.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,15 +9,15 @@ use super::cells::{Cells, OUTDOOR_CELL};
 use super::space::{Space, connected};
 use crate::structure::{count_backs, is_crevice};
 
-/// Points of a region that ask around whether it is a room.
+/// Points of a region from which rays test if it is a room.
 const POINTS: usize = 32;
-/// The rooms that decimation left, and what of it is none.
+/// The rooms that decimation left, and the cells that are not rooms.
 pub(super) struct Standing {
-    /// Room of each cell, the void in the outdoors.
+    /// Room of each cell; the void belongs to the outdoors.
     pub(super) room_of_cell: Vec<u32>,
-    /// Openings between two rooms: links that touch.
+    /// Openings between two rooms: links that touch each other.
     pub(super) patches: Vec<((u32, u32), Vec<u32>)>,
-    /// Rooms that are the insides of walls and solids.
+    /// Rooms that are interiors of walls and solids.
     pub(super) hollow: BTreeSet<u32>,
 }
 
@@ -35,7 +35,7 @@ impl Standing {
         for (&(a, b), portal) in &cells.portals {
             let (a, b) = (room_of_cell[a as usize], room_of_cell[b as usize]);
             if a != b {
-                // Pieces of an opening that tetrahedra cut off are missed by nobody.
+                // Slivers cut off by tetrahedra are ignored.
                 let wide = |l: &&u32| !space.is_crack(&space.links[**l as usize]);
                 between
                     .entry((a.min(b), a.max(b)))
@@ -67,7 +67,7 @@ impl Standing {
     }
 }
 
-/// How many rooms a decimation left, and how many cells besides: crevices, and the insides of walls.
+/// Returns the number of rooms that a decimation left, and of other cells: crevices, and interiors of walls.
 pub(super) fn count_rooms(
     space: &Space,
     cells: &Cells,
@@ -83,8 +83,8 @@ pub(super) fn count_rooms(
     [all.len() - n_hollow, n_hollow]
 }
 
-/// Rooms with the void joined to the outdoors. Where the outdoors sees backs, the model has insides
-/// only, and whatever else sees backs is part of the same void.
+/// Returns the room of each cell, with the void joined to the outdoors. If the outdoors sees backs, the model has
+/// interiors only, and every other space that sees backs is part of the same void.
 fn void_joined(
     space: &Space,
     cells: &Cells,
@@ -115,8 +115,8 @@ fn void_joined(
     room_of_cell.iter().map(room).collect()
 }
 
-/// Rooms that are none: the insides of walls and solids, which nothing can get into and from which
-/// one sees the backs of surfaces. The rule is the watershed's (`structure/backs.rs`).
+/// Returns the rooms that are not rooms but interiors of walls and solids: nothing can enter them, and they see the
+/// backs of surfaces. The rule is the watershed's (`structure/backs.rs`).
 fn hollow_rooms(
     space: &Space,
     cells: &Cells,
@@ -165,7 +165,7 @@ fn hollow_rooms(
             any_room = true;
         }
     }
-    // A closed shell of a building, with nothing modelled inside, is a building and not a boulder.
+    // A closed shell of a building with nothing modeled inside is a building, not a boulder.
     if any_room {
         hollow.extend(doubtful);
     }
@@ -176,9 +176,9 @@ fn hollow_rooms(
         .collect()
 }
 
-/// Of the rays from the largest of some tetrahedra, the share that meets backs.
+/// Returns the share of the rays from the largest of some tetrahedra that meet backs.
 fn share_of_backs(space: &Space, bvh: &Bvh, tets: &mut [u32], allowance: &Allowance) -> f64 {
-    // The largest speak for a region: those at its surface are many and see little.
+    // The largest represent a region: those at its surface are many and see little.
     tets.sort_by(|&a, &b| {
         space.volumes[b as usize]
             .total_cmp(&space.volumes[a as usize])

@@ -1,4 +1,4 @@
-//! The tetrahedra against exact arithmetic on whole numbers of any length.
+//! Tests the tetrahedra against exact arithmetic on integers of any length.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A coordinate as a multiple of 2^-220, exactly; enough for 1e-40 with its last bits.
+/// Returns a coordinate as an exact multiple of 2^-220; enough for 1e-40 with its last bits.
 fn whole(x: f64) -> BigInt {
     let bits = x.to_bits();
     let exponent = ((bits >> 52) & 0x7ff) as i64;
@@ -24,7 +24,7 @@ fn whole(x: f64) -> BigInt {
     if x < 0.0 { -magnitude } else { magnitude }
 }
 
-/// Determinant by expansion along the first row.
+/// Returns the determinant, by expansion along the first row.
 fn det(m: &[Vec<BigInt>]) -> BigInt {
     if m.len() == 1 {
         return m[0][0].clone();
@@ -53,7 +53,7 @@ fn row(p: DVec3, origin: DVec3, lifted: bool) -> Vec<BigInt> {
     row
 }
 
-/// Six times the volume, by the definition.
+/// Returns six times the volume, by definition.
 fn volume(c: [DVec3; 4]) -> BigInt {
     det(&[
         row(c[0], c[3], false),
@@ -62,14 +62,14 @@ fn volume(c: [DVec3; 4]) -> BigInt {
     ])
 }
 
-/// Above 0 where `e` is inside the sphere of a tetrahedron of positive volume.
+/// Returns a number above 0 if `e` is inside the sphere of a tetrahedron of positive volume.
 fn in_sphere(c: [DVec3; 4], e: DVec3) -> BigInt {
     let rows: Vec<_> = c.iter().map(|&p| row(p, e, true)).collect();
-    // The lift stands last, which turns the sign against a lift that stands first.
+    // The lift comes last, which flips the sign compared with a lift that comes first.
     det(&rows)
 }
 
-/// Everything that makes it a Delaunay triangulation of the hull of the points.
+/// Checks all properties of a Delaunay triangulation of the hull of the points.
 fn check(points: &[DVec3], d: &Delaunay) {
     let zero = BigInt::ZERO;
     let distinct: BTreeSet<[u64; 3]> = points
@@ -125,7 +125,7 @@ fn check(points: &[DVec3], d: &Delaunay) {
             }
         }
     }
-    assert!(used.iter().all(|&u| u), "a point is no corner");
+    assert!(used.iter().all(|&u| u), "a point is not a vertex");
     // The pieces fill the hull exactly.
     assert_eq!(total, boundary_volume);
 }

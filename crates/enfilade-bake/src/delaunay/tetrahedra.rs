@@ -1,9 +1,9 @@
-//! Delaunay tetrahedra of points: who neighbors whom, and which one holds a point.
+//! Delaunay tetrahedra of points: their neighbors, and the search for the one that contains a point.
 //!
-//! A point at infinity closes the hull: each facet of the hull bounds an infinite tetrahedron, so that every facet
-//! has two sides. `insert` makes them, exact whatever the points are.
+//! A point at infinity closes the hull: each facet of the hull bounds an infinite tetrahedron, so that every facet has
+//! two sides. `insert` makes them, exact for any points.
 //!
-//! Expected `O(n log n)` for points spread out; 32 bytes a tetrahedron, about 7 tetrahedra a point.
+//! Expected `O(n log n)` for points spread out; 32 bytes per tetrahedron, about 7 tetrahedra per point.
 
 use enfilade_geom::DVec3;
 
@@ -12,8 +12,7 @@ use super::predicate::Predicates;
 /// The vertex at infinity.
 pub const INFINITE: u32 = u32::MAX;
 
-/// A tetrahedron: vertices, and across the facet opposite each vertex, which facet of which
-/// tetrahedron, as four times the tetrahedron plus the facet.
+/// A tetrahedron: its vertices and, for the facet opposite each vertex, the tetrahedron and facet across.
 ///
 /// With vertices `[a, b, c, d]`, seen from the side away from `d`, `a b c` run counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,19 +25,19 @@ pub struct Tetrahedron {
 }
 
 impl Tetrahedron {
-    /// The neighbor across the facet opposite vertex `i`.
+    /// Returns the neighbor across the facet opposite vertex `i`.
     #[must_use]
     pub fn neighbor(&self, i: usize) -> u32 {
         self.neighbors[i] >> 2
     }
 
-    /// The vertices of the facet opposite vertex `i`, counter-clockwise seen from outside.
+    /// Returns the vertices of the facet opposite vertex `i`, counter-clockwise seen from outside.
     #[must_use]
     pub fn facet(&self, i: usize) -> [u32; 3] {
         FACETS[i].map(|k| self.vertices[k])
     }
 
-    /// Where among the vertices the infinite one stands.
+    /// Returns the index of the infinite one among the vertices, if any.
     pub(super) fn infinite_slot(&self) -> Option<usize> {
         self.vertices.iter().position(|&v| v == INFINITE)
     }
@@ -47,7 +46,7 @@ impl Tetrahedron {
 /// Vertices of the facet opposite each vertex, counter-clockwise seen from outside.
 const FACETS: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
 
-/// Why points have no tetrahedra.
+/// Errors of [`tetrahedralize`](super::tetrahedralize).
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DelaunayError {
@@ -56,7 +55,7 @@ pub enum DelaunayError {
         "point {index} has the coordinate {value}; coordinates must be 0 or between 1e-40 and 1e50"
     )]
     Coordinate {
-        /// Which point.
+        /// Index of the point.
         index: usize,
         /// The coordinate.
         value: f64,
@@ -64,13 +63,13 @@ pub enum DelaunayError {
     /// All points lie in one plane, or there are fewer than four.
     #[error("all {n_points} points lie in one plane, so there is no volume to divide")]
     Flat {
-        /// How many points there are.
+        /// Number of points.
         n_points: usize,
     },
     /// More points than indices.
     #[error("{n_points} points are more than the 100 million that indices of 32 bits allow")]
     TooMany {
-        /// How many points there are.
+        /// Number of points.
         n_points: usize,
     },
 }
@@ -80,26 +79,26 @@ pub enum DelaunayError {
 pub struct Delaunay {
     /// Distinct points, in the order of insertion. [Units: wu]
     pub vertices: Vec<DVec3>,
-    /// The vertex of each point given; equal points share one.
+    /// The vertex of each given point; equal points share one.
     pub vertex_of_point: Vec<u32>,
     /// Tetrahedra, finite ones first.
     pub tetrahedra: Vec<Tetrahedron>,
-    /// How many of them are finite.
+    /// Number of finite ones.
     pub n_finite: usize,
     pub(super) predicates: Predicates,
 }
 
 impl Delaunay {
-    /// The finite tetrahedra.
+    /// Returns the finite tetrahedra.
     #[must_use]
     pub fn finite(&self) -> &[Tetrahedron] {
         &self.tetrahedra[..self.n_finite]
     }
 
-    /// Positions of the vertices of a finite tetrahedron. [Units: wu]
+    /// Returns the positions of the vertices of a finite tetrahedron. [Units: wu]
     ///
     /// # Panics
-    /// When there is no such tetrahedron, or it is infinite.
+    /// If there is no such tetrahedron, or it is infinite.
     #[must_use]
     pub fn corners(&self, t: u32) -> [DVec3; 4] {
         self.tetrahedra[t as usize]
@@ -107,19 +106,19 @@ impl Delaunay {
             .map(|v| self.vertices[v as usize])
     }
 
-    /// The tetrahedron that holds `p`, an infinite one if `p` is outside the hull; `hint` is where to
-    /// begin, the nearer the faster. On a facet that several share, one of them.
+    /// Returns the tetrahedron that contains `p`, an infinite one if `p` is outside the hull; one of those that share a
+    /// facet if `p` is on it. The search begins at `hint`: the nearer, the faster.
     ///
     /// # Panics
-    /// When there is no tetrahedron `hint`. Coordinates of `p` that are not finite find any.
+    /// If there is no tetrahedron `hint`. For coordinates of `p` that are not finite, the result is arbitrary.
     #[must_use]
     pub fn locate(&self, p: DVec3, hint: u32) -> u32 {
         walk(&self.tetrahedra, &self.vertices, self.predicates, hint, p)
     }
 }
 
-/// Walks from `start` to the tetrahedron that holds `p`, across facets that have `p` on their far side. In Delaunay
-/// tetrahedra such a walk never returns to where it was (Edelsbrunner 1990).
+/// Walks from `start` to the tetrahedron that contains `p`, across facets that have `p` on their far side. In Delaunay
+/// tetrahedra such a walk never returns to a tetrahedron (Edelsbrunner 1990).
 pub(super) fn walk(
     tets: &[Tetrahedron],
     vertices: &[DVec3],

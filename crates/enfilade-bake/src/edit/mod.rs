@@ -1,10 +1,9 @@
-//! A portal added to a finished world: the cell that it lies in becomes two.
+//! Adds a portal to a finished world: divides the cell in which the portal lies.
 //!
-//! Everything happens within that one cell. The exact complex is built anew from the cell's own
-//! triangles, its portals and the new polygon ([`crate::complex`]); what the polygon parts are the
-//! new cells. Of the world only what names the cell changes: its part of the locator, its lists of
-//! triangles and details, and those of its portals that the polygon runs into, which are cut in two.
-//! Taking a portal away is [`crate::simplify::delete_portal`].
+//! Everything happens within that one cell. The exact complex is rebuilt from the cell's own triangles, its portals and
+//! the new polygon ([`crate::complex`]); the polygon divides it into the new cells. Only the parts of the world that
+//! refer to the cell change: its part of the locator, its lists of triangles and details, and those of its portals that
+//! the polygon crosses, which are cut in two. [`crate::simplify::delete_portal`] removes a portal.
 //!
 //! **Which way it errs:** a triangle that neither part is found to see is listed in both.
 
@@ -23,12 +22,12 @@ use crate::subset::subset_of;
 
 use splice::{SideTree, spliced};
 
-/// Corners may be this far off the plane through them all; they are moved into it. [Units: wu]
+/// Greatest distance of a vertex from the plane through them all; vertices are moved into it. [Units: wu]
 ///
 /// People type coordinates with two or three digits.
 const FLAT: f64 = 0.005;
 
-/// Corners nearer to the line between their neighbors may bend inwards: rounding. [Units: wu]
+/// Greatest distance by which a vertex may bend inwards from the line between its neighbors: rounding. [Units: wu]
 const BEND: f64 = 1e-3;
 
 /// A world with one more portal.
@@ -42,104 +41,115 @@ pub struct Added {
     pub new_cell: CellId,
     /// The new portals between the two, the largest first.
     pub portals: Vec<PortalId>,
-    /// Portals of the cell that the polygon ran into, each with the number of its second half.
+    /// Portals of the cell that the polygon crosses, each with the number of its second half.
     pub halved: Vec<(PortalId, PortalId)>,
 }
 
-/// Why a portal could not be added.
+/// The reason why a portal could not be added.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AddPortalError {
-    /// Fewer than three corners.
-    #[error("a portal needs at least 3 corners, not {n}")]
+    /// Fewer than three vertices.
+    #[error("a portal needs at least 3 vertices, not {n}")]
     TooFewCorners {
-        /// How many there are.
+        /// Number of vertices.
         n: usize,
     },
-    /// A coordinate is no number.
-    #[error("corner {corner} of the portal is not finite")]
+    /// A coordinate is not finite.
+    #[error("vertex {corner} of the portal is not finite")]
     NotFinite {
-        /// Its index.
+        /// Index of the vertex.
         corner: usize,
     },
-    /// No polygon: all corners on one line.
-    #[error("the portal's corners lie on one line")]
+    /// No polygon: all vertices on one line.
+    #[error("the portal's vertices lie on one line")]
     NoArea,
     /// Not planar.
     #[error(
-        "corner {corner} of the portal, {}, is {off:.3} m off the plane of the others; at most {FLAT} m is taken for rounding",
+        "vertex {corner} of the portal, {}, is {off:.3} m off the plane of the others; at most {FLAT} m \
+         counts as rounding",
         place(*.at)
     )]
     NotPlanar {
-        /// Index of the corner.
+        /// Index of the vertex.
         corner: usize,
-        /// Where it is. [Units: wu]
+        /// Position of the vertex. [Units: wu]
         at: DVec3,
-        /// How far it is off. [Units: wu]
+        /// Its distance from the plane. [Units: wu]
         off: f64,
     },
     /// Not convex.
-    #[error("the portal is not convex at corner {corner}, {}: give its corners in order around a convex outline", place(*.at))]
+    #[error(
+        "the portal is not convex at vertex {corner}, {}: give its vertices in order around a convex outline",
+        place(*.at)
+    )]
     NotConvex {
-        /// Index of the corner.
+        /// Index of the vertex.
         corner: usize,
-        /// Where it is. [Units: wu]
+        /// Position of the vertex. [Units: wu]
         at: DVec3,
     },
-    /// The middle is in no cell.
-    #[error("the portal's middle, {}, lies in no cell but in solid matter", place(*.at))]
+    /// The middle is not in a cell.
+    #[error("the portal's middle, {}, lies in solid matter, not in a cell", place(*.at))]
     InSolid {
         /// The middle. [Units: wu]
         at: DVec3,
     },
-    /// Nothing of the cell lies on both sides.
-    #[error("the portal at {} has cell {} on one side only: it lies in a wall or on a portal that is there", place(*.at), .cell.0)]
+    /// The cell does not lie on both sides.
+    #[error(
+        "the portal at {} has cell {} on one side only: it lies in a wall or on an existing portal",
+        place(*.at), .cell.0
+    )]
     Aside {
         /// Its middle. [Units: wu]
         at: DVec3,
         /// The cell.
         cell: CellId,
     },
-    /// One gets around it.
+    /// A way leads around it.
     #[error(
-        "the portal does not part cell {}: one gets around it at {}; it must span from wall to wall (it may reach into them)",
+        "the portal does not divide cell {}: a way leads around it at {}; it must span from wall to wall (it may \
+         reach into them)",
         .cell.0, place(*.at)
     )]
     DoesNotPart {
         /// The cell.
         cell: CellId,
-        /// Where the plane of the portal is open beside it. [Units: wu]
+        /// A point beside the portal where its plane is open. [Units: wu]
         at: DVec3,
     },
     /// Both parts would be outdoors.
-    #[error("the portal at {} parts the outdoors, cell {}, in two that are one again beyond the scene", place(*.at), .cell.0)]
+    #[error(
+        "the portal at {} divides the outdoors, cell {}, into two parts that join again beyond the scene",
+        place(*.at), .cell.0
+    )]
     Endless {
         /// Its middle. [Units: wu]
         at: DVec3,
         /// The cell.
         cell: CellId,
     },
-    /// Nothing of it would be left in a file.
-    #[error("what the portal at {} opens is narrower than the rounding of coordinates", place(*.at))]
+    /// It would vanish by rounding.
+    #[error("the opening of the portal at {} is narrower than the rounding of coordinates", place(*.at))]
     TooNarrow {
         /// Its middle. [Units: wu]
         at: DVec3,
     },
 }
 
-/// A point in the form that the command takes.
+/// Formats a point as the command takes it.
 fn place(p: DVec3) -> String {
     format!("{:.2},{:.2},{:.2}", p.x, p.y, p.z)
 }
 
-/// Cuts the cell that holds the middle of a polygon in two by that polygon.
+/// Divides the cell that contains the middle of a polygon by that polygon.
 ///
-/// `corners` of a convex planar polygon, in order, either way around; what reaches into walls or other
-/// cells does not count. Both promises hold of the result if they do of `world`; cells and portals keep
-/// their numbers, new ones come last. Time as a bake's for the triangles of the one cell.
+/// `corners` are the vertices of a convex planar polygon, in order, either way around; parts of it in walls or other
+/// cells are ignored. The result keeps both promises if `world` does; cells and portals keep their numbers, new ones
+/// come last. Time: that of a bake for the triangles of the one cell.
 ///
 /// # Errors
-/// When the corners are no convex planar polygon, or it does not part a cell; the world is as it was.
+/// If the vertices are not a convex planar polygon, or it does not divide a cell; `world` is unchanged.
 pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalError> {
     let (plane, candidate) = checked(corners)?;
     let at = candidate.centroid();
@@ -157,22 +167,22 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         Uncut::Undivided(Undivided::Endless) => AddPortalError::Endless { at, cell },
         Uncut::TooNarrow => AddPortalError::TooNarrow { at },
     })?;
-    // Whoever reads the file knows by it that no rule says where its portals are.
+    // The count shows readers of the file that no rule placed its portals.
     let counts = &mut added.world.graph.statistics.counts;
     *counts.entry("edits".to_owned()).or_default() += 1.0;
     Ok(added)
 }
 
-/// Why a cell could not be cut.
+/// The reason why a cell could not be cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Uncut {
-    /// The candidates part nothing.
+    /// The candidates divide nothing.
     Undivided(Undivided),
-    /// Nothing of the portals would be left in a file.
+    /// The portals would vanish by rounding.
     TooNarrow,
 }
 
-/// Cuts a cell in two by candidates; `distance` tells how far before all of them a point lies.
+/// Cuts a cell in two by candidates; `distance` returns how far in front of all of them a point lies.
 pub(crate) fn cut_cell(
     world: &World,
     cell: CellId,
@@ -198,7 +208,7 @@ pub(crate) fn cut_cell(
         triangles: &triangles,
         candidates: &candidates,
         missing: &[],
-        // All of the scene's box, so that tolerances are those of the bake.
+        // The whole box of the scene, so that tolerances are those of the bake.
         bounds: old.locator.bounds,
         gap: 0.0,
         has_seals: false,
@@ -210,7 +220,7 @@ pub(crate) fn cut_cell(
         .map_err(Uncut::Undivided)?;
     let parts = Parts::new(cell, old.cells.len(), &partition);
 
-    // 3. Everything that names the cell.
+    // 3. Everything that refers to the cell.
     let mut out = world.clone();
     out.pvs = None;
     out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids);
@@ -245,7 +255,7 @@ pub(crate) fn cut_cell(
     })
 }
 
-/// The plane of a polygon and the polygon in it, counter-clockwise.
+/// Returns the plane of a polygon, and the polygon in it, counter-clockwise.
 fn checked(corners: &[DVec3]) -> Result<(Plane, Winding), AddPortalError> {
     let n = corners.len();
     if n < 3 {
@@ -285,7 +295,7 @@ fn checked(corners: &[DVec3]) -> Result<(Plane, Winding), AddPortalError> {
         }
     }
     let hull = Winding::hull_in_plane(&plane, &flat);
-    // A star turns the same way at every corner, too, but does not fill its hull.
+    // A star turns the same way at every vertex, too, but does not fill its hull.
     let rounding = BEND * n as f64 * size;
     if (Winding::new(flat).area() - hull.area()).abs() > rounding {
         return Err(AddPortalError::NotConvex {
@@ -305,7 +315,7 @@ fn winding(points: &[[f32; 3]]) -> Winding {
     )
 }
 
-/// The structural triangles that a cell sees: batch, place in the batch, corners.
+/// Returns the structural triangles that a cell sees: batch, place in the batch, vertices.
 fn triangles_of(world: &World, cell: CellId) -> Vec<(u32, u32, Triangle)> {
     let mut out = Vec::new();
     for (b, batch) in world.batches.iter().enumerate() {
@@ -321,12 +331,12 @@ fn triangles_of(world: &World, cell: CellId) -> Vec<(u32, u32, Triangle)> {
     out
 }
 
-/// Numbers of the two parts.
+/// The two parts of a cell, with their numbers.
 struct Parts {
     cell: CellId,
-    /// By side: [`FRONT`] and [`BACK`].
+    /// For each side, [`FRONT`] and [`BACK`], its cell.
     ids: [CellId; 2],
-    /// The locator that tells the two parts apart, for points of the cell; its leaves are sides.
+    /// The locator that separates the two parts, for points of the cell; its leaves are sides.
     sides: SideTree,
 }
 
@@ -354,7 +364,8 @@ impl Parts {
         self.ids[usize::from(self.ids[0] == self.cell)]
     }
 
-    /// Portals of the old cell go to one part; those that both border on are cut in two.
+    /// Gives portals of the old cell to one part; divides those that border on both, and returns them with their second
+    /// halves.
     fn hand_out_portals(&self, out: &mut World, outward: f64) -> Vec<(PortalId, PortalId)> {
         let mut halved = Vec::new();
         for id in out.graph[self.cell].portals.clone() {
@@ -416,7 +427,7 @@ impl Parts {
                     halved.push((id, second));
                 }
                 rest => {
-                    // Whole as it was, but for the cell's number.
+                    // Unchanged, except for the cell's number.
                     let side = rest.first().map_or(FRONT, |(side, _)| *side);
                     kept.cells[end] = self.id(side);
                     out.graph[id] = kept;
@@ -426,7 +437,7 @@ impl Parts {
         halved
     }
 
-    /// `cells` with the old cell replaced by those parts that `sees` says.
+    /// Returns `cells` with the old cell replaced by the parts that `sees` marks; by both if it marks none.
     fn relisted(&self, cells: &[CellId], sees: [bool; 2]) -> Vec<CellId> {
         let mut list: Vec<CellId> = cells.iter().copied().filter(|&c| c != self.cell).collect();
         for (side, &id) in self.ids.iter().enumerate() {

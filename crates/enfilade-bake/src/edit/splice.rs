@@ -1,4 +1,4 @@
-//! A locator with the leaves of one cell told apart.
+//! A locator with the leaves of one cell divided.
 
 use std::collections::BTreeMap;
 
@@ -8,13 +8,13 @@ use enfilade_geom::{Aabb, DVec3, Plane};
 use crate::complex::poly::{self, Sides};
 use crate::complex::region::{Region, halves, shape_of, whole};
 
-/// Corners this near to a plane are on it when regions are cut; planes are exact. [Units: wu]
+/// Distance from a plane within which vertices are on it when regions are cut; planes are exact. [Units: wu]
 const CUT: f64 = 1e-9;
 
-/// Neither side: matter, or another cell.
+/// Marks a leaf on neither side: matter, or another cell.
 const NONE: i32 = -1;
 
-/// A tree that tells the two sides of a cut cell apart; of points beyond the cell it says anything.
+/// A tree that separates the two sides of a cut cell; for points beyond the cell, its answer is arbitrary.
 pub(super) struct SideTree {
     planes: Vec<Plane>,
     /// Plane and children: a node, or `-2 - side`.
@@ -23,7 +23,8 @@ pub(super) struct SideTree {
 }
 
 impl SideTree {
-    /// From a locator whose cells are the sides; what is in neither joins what is across its plane.
+    /// Makes the tree of a locator whose cells are the sides; leaves on neither side join the space across their
+    /// planes.
     pub(super) fn of(locator: &Locator) -> Self {
         let plane = |&[x, y, z, d]: &[f64; 4]| Plane {
             normal: DVec3::new(x, y, z),
@@ -54,8 +55,8 @@ impl SideTree {
         out
     }
 
-    /// Hands out the parts of a convex polygon on the border of the cell by the side that they border
-    /// on; `inward` points from the border into the cell. What is nearer to a plane than `eps` lies in it.
+    /// Calls `take` with the parts of a convex polygon on the border of the cell, each with the side on which it
+    /// borders; `inward` points from the border into the cell. Parts nearer to a plane than `eps` lie in it.
     pub(super) fn divide(
         &self,
         points: &[DVec3],
@@ -97,7 +98,7 @@ impl SideTree {
     }
 }
 
-/// `old` with the leaves of `cell` replaced by those of `ids` that `sides` says.
+/// Returns `old` with the leaves of `cell` replaced by those of `ids` that `sides` selects.
 pub(super) fn spliced(old: &Locator, cell: CellId, sides: &SideTree, ids: [CellId; 2]) -> Locator {
     let leaf = Locator::leaf(Some(cell));
     let mut has_cell = vec![false; old.nodes.len()];
@@ -129,9 +130,9 @@ pub(super) fn spliced(old: &Locator, cell: CellId, sides: &SideTree, ids: [CellI
 
 struct Splice<'a> {
     old: &'a Locator,
-    /// What stands for the cell.
+    /// The value of the cell's leaves.
     leaf: i32,
-    /// Whether it comes up below each node.
+    /// `true` for each node with such a leaf below it.
     has_cell: Vec<bool>,
     sides: &'a SideTree,
     ids: [CellId; 2],
@@ -141,7 +142,7 @@ struct Splice<'a> {
 }
 
 impl Splice<'_> {
-    /// Appends a subtree of the old locator, whose region is given as long as the cell is in it.
+    /// Appends a subtree of the old locator; `region` is valid as long as the cell is in the subtree.
     fn copy(&mut self, child: i32, region: Region) -> i32 {
         if child < 0 {
             return if child == self.leaf {
@@ -172,10 +173,10 @@ impl Splice<'_> {
         at as i32
     }
 
-    /// Appends what the sides come to within a region.
+    /// Appends the part of the side tree within a region.
     fn insert(&mut self, child: i32, region: Region) -> i32 {
         if child < 0 {
-            // Without either side anywhere, the cell is as it was.
+            // If neither side occurs anywhere, the cell is unchanged.
             let side = usize::from(child == -3);
             return Locator::leaf(Some(self.ids[side]));
         }

@@ -1,21 +1,21 @@
-//! An upright opening, seen from the front: how much of it something covers.
+//! Measures how much of an upright opening an object covers, seen from the front.
 
 use enfilade_cpg::Portal;
 use enfilade_geom::{Aabb, DVec2, DVec3, Triangle};
 
 /// Samples along each side of a rectangle.
 const SAMPLES: usize = 32;
-/// An opening is upright if its normal rises by less.
+/// An opening is upright if the y-component of its normal is smaller.
 const LEVEL: f64 = 0.5;
 
-/// The rectangle around an upright opening, or around a plate: a place, and where things lie beside it.
+/// The rectangle around an upright opening or a plate, and coordinates along it.
 #[derive(Clone, Debug)]
 pub(super) struct Rectangle {
-    /// Horizontal, along it.
+    /// Horizontal direction along it.
     pub(super) across: DVec3,
-    /// Up, along it.
+    /// Upward direction along it.
     pub(super) up: DVec3,
-    /// Out of it.
+    /// Direction out of it.
     pub(super) normal: DVec3,
     /// Least and greatest coordinate along `across`, `up` and `normal`. [Units: wu]
     pub(super) low: DVec3,
@@ -23,7 +23,7 @@ pub(super) struct Rectangle {
 }
 
 impl Rectangle {
-    /// The one around a portal's pieces; `None` where it does not stand upright.
+    /// Returns the rectangle around a portal's pieces; `None` if the portal is not upright.
     pub(super) fn of_portal(portal: &Portal) -> Option<Self> {
         let normal = DVec3::from(portal.normal.map(f64::from));
         if normal.y.abs() >= LEVEL {
@@ -34,7 +34,7 @@ impl Rectangle {
         Some(Self::around(normal, &corners))
     }
 
-    /// The one around points, out of which `normal` points.
+    /// Returns the rectangle around points, with `normal` pointing out of it.
     pub(super) fn around(normal: DVec3, points: &[DVec3]) -> Self {
         let across = DVec3::Y.cross(normal).normalize_or(DVec3::X);
         let up = normal.cross(across);
@@ -52,28 +52,28 @@ impl Rectangle {
         out
     }
 
-    /// A point along its three directions. [Units: wu]
+    /// Returns the coordinates of a point along its three directions. [Units: wu]
     pub(super) fn place(&self, p: DVec3) -> DVec3 {
         DVec3::new(self.across.dot(p), self.up.dot(p), self.normal.dot(p))
     }
 
-    /// The point at a place.
+    /// Returns the point with these coordinates.
     pub(super) fn point(&self, place: DVec3) -> DVec3 {
         self.across * place.x + self.up * place.y + self.normal * place.z
     }
 
-    /// Width, height and depth. [Units: wu]
+    /// Returns width, height and depth. [Units: wu]
     pub(super) fn size(&self) -> DVec3 {
         self.high - self.low
     }
 
-    /// The box of triangles along its directions.
+    /// Returns the bounding box of triangles along its directions.
     pub(super) fn bounds(&self, triangles: &[Triangle]) -> Aabb {
         let corners = triangles.iter().flatten();
         corners.fold(Aabb::EMPTY, |b, p| b.including(self.place(*p)))
     }
 
-    /// Which samples of it the triangles cover, seen along its normal.
+    /// Returns the samples that the triangles cover, seen along its normal.
     pub(super) fn mask(&self, triangles: impl Iterator<Item = Triangle>) -> Mask {
         let mut mask = Mask::default();
         let size = self.size().truncate();
@@ -88,7 +88,7 @@ impl Rectangle {
         mask
     }
 
-    /// The samples of a portal's pieces.
+    /// Returns the samples that a portal's pieces cover.
     pub(super) fn open(&self, portal: &Portal) -> Mask {
         let corner = |p: [f32; 3]| DVec3::from(p.map(f64::from));
         let fans = portal.pieces.iter().flat_map(|piece| {
@@ -98,12 +98,12 @@ impl Rectangle {
     }
 }
 
-/// A sample a bit, rows from below.
+/// One bit per sample; rows from the bottom up.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Mask([u32; SAMPLES]);
 
 impl Mask {
-    /// Adds a triangle in units of samples.
+    /// Adds a triangle, in units of samples.
     fn add(&mut self, p: [DVec2; 3]) {
         let area = (p[1] - p[0]).perp_dot(p[2] - p[0]);
         if area == 0.0 || !area.is_finite() {
@@ -139,7 +139,7 @@ impl Mask {
         self.0.iter().map(|row| row.count_ones()).sum()
     }
 
-    /// The share of these samples that `other` covers; 0 where there are none.
+    /// Returns the share of these samples that `other` covers; 0 if there are none.
     pub(super) fn share_in(&self, other: &Self) -> f64 {
         let both = self
             .0
@@ -149,12 +149,12 @@ impl Mask {
         f64::from(both.sum::<u32>()) / f64::from(self.n().max(1))
     }
 
-    /// The share of all samples of the rectangle.
+    /// Returns these samples as a share of the whole rectangle.
     pub(super) fn share(&self) -> f64 {
         f64::from(self.n()) / (SAMPLES * SAMPLES) as f64
     }
 
-    /// The share of the lowest samples.
+    /// Returns the share of the lowest row that these samples cover.
     pub(super) fn share_at_foot(&self) -> f64 {
         f64::from(self.0[0].count_ones()) / SAMPLES as f64
     }

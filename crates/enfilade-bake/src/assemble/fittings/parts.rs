@@ -1,8 +1,8 @@
-//! Which shells of an object are the leaf of a door, and how it stands: shut, or turned by how much.
+//! Finds the leaves of doors among the shells of an object, and their poses: shut, or open by an angle.
 //!
-//! A *body* is a shell that is a plate about as high as the opening: a leaf, one of its two skins, or the glass within its
-//! rails. A *ring* runs around something: a frame, or the rails of a leaf. All else is small, a handle or a hinge, and goes
-//! with the leaf whose middle it lies on.
+//! A *body* is a plate about as high as the opening: a leaf, one of its two skins, or the glass within its rails. A
+//! *ring* runs around something: a frame, or the rails of a leaf. Other shells are small, such as a handle or a hinge,
+//! and belong to the leaf on which their middle lies.
 
 use std::collections::BTreeMap;
 
@@ -13,29 +13,29 @@ use super::opening::{Mask, Rectangle};
 use crate::assemble::LEAST_DOOR;
 use crate::structure::{MAX_THICKNESS, thin_direction};
 
-/// A leaf's height over that of its opening; less where a light is above the door, more where it overlaps the frame.
+/// Height of a leaf over that of its opening; less if a light is above the door, more if it overlaps the frame.
 const HEIGHT: [f64; 2] = [0.7, 1.1];
-/// A body's width over that of its opening: of the glass in one of two leaves, and of a leaf that overlaps the frame.
+/// Width of a body over that of its opening: from the glass in one of two leaves to a leaf that overlaps the frame.
 const WIDTH: [f64; 2] = [0.2, 1.1];
-/// The width of a leaf that stands open, one of one or one of two, over that of its opening.
+/// Width of an open leaf over that of its opening, for a single leaf and for one of two.
 const OPEN_WIDTHS: [[f64; 2]; 2] = [[0.8, 1.1], [0.4, 0.55]];
 /// Least share of its own rectangle that a body covers; a ring covers less.
 const FULL: f64 = 0.6;
-/// A leaf off the opening's plane by less is shut: the sine of 3 degrees.
+/// A shut leaf is tilted from the opening's plane by less: the sine of 3 degrees.
 const SHUT: f64 = 0.05;
-/// What stands open is turned by no more: beyond, it would lie beside the wall as a cupboard does. [Units: degrees]
+/// Largest angle of an open leaf: beyond it, the object would lie along the wall, as a cupboard does. [Units: degrees]
 const MOST_TURNED: f64 = 130.0;
-/// A leaf that stands open is no thicker: beyond, it is a cupboard. [Units: wu]
+/// Greatest thickness of an open leaf: a thicker object is a cupboard. [Units: wu]
 const THICK: f64 = 0.1;
-/// How far a leaf or frame may end off the jamb, sill or head. [Units: wu]
+/// Greatest distance from the edge of a leaf or frame to the jamb, sill or head. [Units: wu]
 const OFF: f64 = 0.15;
-/// What lies on a leaf may reach over its edges by less. [Units: wu]
+/// Greatest distance by which an object on a leaf reaches over its edges. [Units: wu]
 const HAIR: f64 = 0.01;
-/// How far from the portal's plane a leaf or frame may stand, within a wall. [Units: wu]
+/// Greatest distance of a leaf or frame from the portal's plane, within a wall. [Units: wu]
 pub(super) const DEEP: f64 = 0.4;
-/// Openings of these widths have doors. [Units: wu]
+/// Range of widths of openings that have doors. [Units: wu]
 const DOOR_WIDTH: [f64; 2] = [0.5, 6.0];
-/// Least share of a door that all of an object covers to be its leaf though no shell of it is a plate.
+/// Least share of a door that an object covers to be its leaf if none of its shells is a plate.
 const WHOLE: f64 = 0.5;
 /// Least share of a window that a pane covers.
 const PANE: f64 = 0.3;
@@ -43,19 +43,19 @@ const PANE: f64 = 0.3;
 /// A leaf in an object.
 #[derive(Clone, Debug)]
 pub(super) struct Leaf {
-    /// Ascending.
+    /// Shell numbers, ascending.
     pub(super) shells: Vec<u32>,
-    /// Around its bodies.
+    /// The rectangle around its bodies.
     pub(super) around: Rectangle,
     pub(super) pose: Pose,
-    /// Where its handles are, along `around.across` from its middle, in halves of its width; 0 where it has none.
+    /// Position of its outermost handle along `around.across`, from the middle in half widths; 0 if it has none.
     pub(super) handle: f64,
-    /// Share of the opening that it covers, or how well it fits where it stands open: 1 at best.
+    /// Share of the opening that it covers; for an open leaf, how well it fits: 1 at best.
     pub(super) fit: f64,
 }
 
 impl Leaf {
-    /// Whether triangles lie on it, as those of a handle or of the glass in it.
+    /// Returns `true` if triangles lie on it, like those of a handle or of its glass.
     pub(super) fn carries(&self, triangles: &[Triangle]) -> bool {
         let r = &self.around;
         let b = r.bounds(triangles);
@@ -64,7 +64,7 @@ impl Leaf {
     }
 }
 
-/// How the model has a leaf.
+/// The pose of a leaf in the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pose {
     Shut,
@@ -75,16 +75,16 @@ pub(super) enum Pose {
     },
 }
 
-/// What an object is to an opening.
+/// Roles of an object at an opening.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Roles {
     pub(super) leaves: Vec<Leaf>,
-    /// What is no leaf of it runs around the opening.
+    /// The shells that are not leaves run around the opening.
     pub(super) is_frame: bool,
     pub(super) is_pane: bool,
 }
 
-/// An opening of a portal.
+/// The opening of a portal.
 pub(super) struct Aperture {
     pub(super) kind: PortalKind,
     pub(super) around: Rectangle,
@@ -92,7 +92,7 @@ pub(super) struct Aperture {
 }
 
 impl Aperture {
-    /// `None` for what is no opening to be filled.
+    /// Returns `None` if the portal is a crack or not upright.
     pub(super) fn of(portal: &Portal) -> Option<Self> {
         let around = Rectangle::of_portal(portal).filter(|_| portal.kind != PortalKind::Crack)?;
         Some(Self {
@@ -102,16 +102,16 @@ impl Aperture {
         })
     }
 
-    /// Whether a door fits into it.
+    /// Returns `true` if a door fits into it.
     fn takes_door(&self) -> bool {
         let size = self.around.size();
         size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR
     }
 
-    /// The box in which its leaves, frames and panes lie.
+    /// Returns the box that contains its leaves, frames and panes.
     pub(super) fn reach(&self) -> Aabb {
         let r = &self.around;
-        // A leaf that stands open reaches as far as it is wide.
+        // An open leaf reaches as far as it is wide.
         let out = if self.takes_door() {
             r.size().x + OFF
         } else {
@@ -126,12 +126,12 @@ impl Aperture {
     }
 }
 
-/// A shell and what it looks like.
+/// A shell and its shape.
 struct Shell<'t> {
     number: u32,
     triangles: Vec<&'t Triangle>,
     around: Rectangle,
-    /// Of its own rectangle.
+    /// Share of its own rectangle that it covers.
     share: f64,
     foot: f64,
 }
@@ -142,11 +142,11 @@ impl<'t> Shell<'t> {
         let normal = thin_direction(&owned);
         let corners: Vec<DVec3> = owned.iter().flatten().copied().collect();
         let flat = DVec3::new(normal.x, 0.0, normal.z);
-        // What lies flat is no plate of a door, whatever it is seen along.
+        // A horizontal shell is not a door plate, whatever the direction of view.
         let normal = if normal.y.abs() < 0.5 { flat } else { DVec3::Z };
         let seen_along = |n: DVec3| Rectangle::around(n.normalize(), &corners);
         let (facing, aside) = (seen_along(normal), seen_along(DVec3::Y.cross(normal)));
-        // Most of a frame's surface is that of its jambs; what it looks like shows from where it is widest.
+        // Jambs make up most of a frame's surface; its shape shows in the direction from which it is widest.
         let is_deep = aside.size().z < facing.size().z;
         let around = if is_deep { aside } else { facing };
         let mask = around.mask(owned.iter().copied());
@@ -168,23 +168,23 @@ impl<'t> Shell<'t> {
             && self.share >= FULL
     }
 
-    /// Whether it runs around something that is as high as the opening.
+    /// Returns `true` if it runs around something as high as the opening.
     fn is_ring(&self, opening: &Rectangle) -> bool {
         let (own, size) = (self.around.size(), opening.size());
         own.y >= HEIGHT[0] * size.y && own.x >= WIDTH[0] * size.x && self.share < FULL
     }
 }
 
-/// An object in shells.
+/// An object divided into shells.
 pub(super) struct InShells<'a> {
     pub(super) triangles: &'a [Triangle],
-    /// By triangle.
+    /// Shell of each triangle.
     pub(super) shells: &'a [u32],
-    /// By shell.
+    /// Bounding box of each shell.
     pub(super) bounds: &'a [Aabb],
 }
 
-/// What an object is to an opening.
+/// Returns the roles of an object at an opening.
 pub(super) fn roles(opening: &Aperture, object: &InShells<'_>) -> Roles {
     let near = near_shells(opening, object);
     let mut roles = Roles::default();
@@ -224,7 +224,7 @@ pub(super) fn roles(opening: &Aperture, object: &InShells<'_>) -> Roles {
     roles
 }
 
-/// The shells of an object that lie about an opening. Looks at triangles only where there are such.
+/// Returns the shells of an object near an opening. Reads triangles only if there are any.
 fn near_shells<'t>(opening: &Aperture, object: &InShells<'t>) -> Vec<Shell<'t>> {
     let inside = opening.reach().expanded(OFF);
     let is_near = |b: &Aabb| inside.contains(b.min) && inside.contains(b.max);
@@ -246,7 +246,7 @@ fn near_shells<'t>(opening: &Aperture, object: &InShells<'t>) -> Vec<Shell<'t>> 
         .collect()
 }
 
-/// All of an object as one leaf that is shut.
+/// Returns an entire object as one shut leaf.
 fn whole(opening: &Aperture, near: &[Shell], covered: f64) -> Leaf {
     let corners = near
         .iter()
@@ -306,7 +306,7 @@ fn leaves(opening: &Aperture, near: &[Shell]) -> Vec<Leaf> {
     leaves
 }
 
-/// How a body stands in an opening, and how well it fits; `None` if it is no leaf of it.
+/// Returns the pose of a body in an opening, and how well it fits; `None` if it is not a leaf of the opening.
 fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
     let (r, own) = (&opening.around, &body.around);
     let center = own.point((own.low + own.high) * 0.5);
@@ -317,7 +317,7 @@ fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
         let covered = opening
             .open
             .share_in(&r.mask(body.triangles.iter().map(|t| **t)));
-        // An opening without a door is not shut by what stands before it.
+        // An object in front of an opening without a door does not shut it.
         let is_shut = opening.kind == PortalKind::Door && covered >= WIDTH[0];
         return is_shut.then_some((Pose::Shut, covered));
     }
@@ -348,7 +348,7 @@ fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
     best.map(|(off, pose)| (pose, 1.0 - off))
 }
 
-/// The angle by which one horizontal direction turns to another, counter-clockwise seen from above. [Units: rad]
+/// Returns the angle from one horizontal direction to another, counter-clockwise seen from above. [Units: rad]
 fn turn(from: DVec3, to: DVec3) -> f64 {
     // Seen from above with x to the right, z points down.
     let cross = from.z * to.x - from.x * to.z;
@@ -356,7 +356,7 @@ fn turn(from: DVec3, to: DVec3) -> f64 {
     cross.atan2(dot)
 }
 
-/// Whether a body lies on a leaf: another skin, or a panel of it.
+/// Returns `true` if a body lies on a leaf: another skin or a panel of it.
 fn is_one(leaf: &Leaf, body: &Shell) -> bool {
     let (a, b) = (&leaf.around, &body.around);
     let center = a.place(b.point((b.low + b.high) * 0.5));
@@ -367,8 +367,8 @@ fn is_one(leaf: &Leaf, body: &Shell) -> bool {
     is_flat && is_inside && (is_around || center.x >= a.low.x && center.x <= a.high.x)
 }
 
-/// Whether a ring is a frame rather than the rails of a leaf: it stands on the floor without a rail at its foot, or another
-/// ring lies in it; and it lies in none.
+/// Returns `true` if a ring is a frame, not the rails of a leaf: it has no rail at its foot or contains another ring,
+/// and no ring contains it.
 fn is_frame(ring: &Shell, rings: &[&Shell]) -> bool {
     let lies_in = |inner: &Shell, outer: &Shell| {
         let b = outer.around.bounds(&[[
@@ -386,7 +386,7 @@ fn is_frame(ring: &Shell, rings: &[&Shell]) -> bool {
     !is_inner && (is_outer || ring.foot < FULL)
 }
 
-/// Makes one leaf of those that have their rails in common: what is one piece cannot part in the middle.
+/// Merges leaves that share their rails: a single piece cannot part in the middle.
 fn join_within(rails: &Shell, leaves: &mut Vec<Leaf>) {
     let r = &rails.around;
     let is_within = |l: &Leaf| {
@@ -414,7 +414,7 @@ fn join_within(rails: &Shell, leaves: &mut Vec<Leaf>) {
     leaves.push(whole);
 }
 
-/// Gives a shell that is no body to the leaf that it lies on, if any.
+/// Adds a shell that is not a body to the leaf on which it lies, if any.
 fn attach(shell: &Shell, is_ring: bool, leaves: &mut [Leaf]) {
     let own = &shell.around;
     let center = own.point((own.low + own.high) * 0.5);
@@ -427,7 +427,7 @@ fn attach(shell: &Shell, is_ring: bool, leaves: &mut [Leaf]) {
             leaf.shells.push(shell.number);
             let half = r.size().x * 0.5;
             let off = (at.x - (r.low.x + r.high.x) * 0.5) / half;
-            // Of several handles that farthest out.
+            // Keep the outermost of several handles.
             if !is_ring && off.abs() > leaf.handle.abs() {
                 leaf.handle = off;
             }
@@ -457,7 +457,7 @@ mod tests {
         Aperture::of(&portal).unwrap()
     }
 
-    /// Boxes across the opening, 4 cm thick, by the shell that each belongs to: left, foot, right, head.
+    /// Returns the roles of boxes across the opening, 4 cm thick, each with its shell: left, foot, right, head.
     fn roles_of(boxes: &[(u32, [f64; 4])]) -> Roles {
         let (mut triangles, mut shells, mut bounds) = (Vec::new(), Vec::new(), Vec::new());
         for &(shell, [x0, y0, x1, y1]) in boxes {

@@ -1,4 +1,4 @@
-//! The separate surfaces of an object: leaf, frame, handles of a door that is modeled in one piece.
+//! Divides an object into its separate surfaces: leaf, frame and handles of a door modeled in one piece.
 
 use std::cell::OnceCell;
 use std::collections::HashMap;
@@ -6,22 +6,22 @@ use std::f64::consts::TAU;
 
 use enfilade_geom::{DVec3, Sets, Triangle};
 
-/// Corners nearer than this are one: the first distance by which nearly all edges find another triangle. Models whose
-/// corners were moved need more; where none does, the last is taken. [Units: wu]
+/// Distances within which vertices are welded: the first that pairs nearly all edges is used, else the last. Models
+/// with moved vertices need a larger one. [Units: wu]
 const WELDS: [f64; 3] = [1e-4, 1e-3, 5e-3];
-/// Nearly all: this share of edges.
+/// Share of edges that counts as nearly all.
 const PAIRED: f64 = 0.9;
-/// Faces at an edge coincide if their angles differ by no more than corners moved by the weld turn a face of 5 cm.
-/// [Units: rad/wu]
+/// Angle, per unit of weld, within which faces at an edge coincide: the turn of a 5 cm face when its vertices move by
+/// the weld. [Units: rad/wu]
 const COINCIDE: f64 = 20.0;
-/// An object of more triangles is not taken apart: doors have fewer. [Units: triangles]
+/// An object with more triangles is not divided: doors have fewer. [Units: triangles]
 const MAX_TRIANGLES: usize = 50_000;
 
-/// For each triangle the number of its shell, from 0 in the order in which they begin; and how many there are.
+/// Returns the shell number of each triangle, from 0 in order of first triangles, and the number of shells.
 ///
-/// Two triangles are of one shell if one can walk from one to the other across edges. Where solids touch along an edge,
-/// more than two triangles meet; there the walk goes around the solid whose inside lies between, so that a leaf that
-/// touches its frame stays one of its own. `O(n log n)`, as long as few corners lie in one place.
+/// Two triangles belong to one shell if a path across edges joins them. Where solids touch along an edge, more than two
+/// triangles meet; there the path goes around the solid between them, so that a leaf that touches its frame stays
+/// separate. `O(n log n)`, as long as few vertices lie in one place.
 pub(super) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
     if triangles.len() > MAX_TRIANGLES {
         return (vec![0; triangles.len()], 1);
@@ -59,13 +59,13 @@ pub(super) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
 /// A triangle at one of its edges.
 struct HalfEdge {
     edge: [u32; 2],
-    /// Whether the triangle runs along the edge from its lesser corner to its greater.
+    /// The triangle runs along the edge from the lesser vertex to the greater.
     is_forward: bool,
     apex: u32,
     triangle: u32,
 }
 
-/// Triangles whose corners are one where they are near each other.
+/// Triangles after welding nearby vertices.
 struct Welded {
     points: Vec<DVec3>,
     /// Sorted by edge.
@@ -98,7 +98,7 @@ impl Welded {
         }
     }
 
-    /// The share of sides whose edge is another triangle's, too.
+    /// Returns the share of half-edges whose edge belongs to another triangle, too.
     fn paired_share(&self) -> f64 {
         let edges = self.sides.chunk_by(|a, b| a.edge == b.edge);
         let n_alone = edges.filter(|e| e.len() == 1).count();
@@ -117,13 +117,13 @@ impl Welded {
         };
         let mut around: Vec<(f64, &HalfEdge)> = sides.iter().map(|s| (angle(s), s)).collect();
         around.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.triangle.cmp(&q.1.triangle)));
-        // From the widest gap on, so that no place is at both ends.
+        // Begin at the widest gap, so that no place is at both ends.
         let n = around.len();
         let gap = |i: usize| (around[i].0 - around[(i + n - 1) % n].0).rem_euclid(TAU);
         let begin = (0..n).max_by(|&i, &k| gap(i).total_cmp(&gap(k)));
         let begin = begin.unwrap_or_default();
-        // A triangle that runs forward has its solid before it, turning around the edge; one that runs back, behind it.
-        // Of those in one place, what ends comes before what begins.
+        // Turning around the edge, a forward triangle has its solid ahead, a backward one behind. In one place,
+        // triangles that end a solid come before those that begin one.
         let mut place = 0;
         let mut ordered: Vec<(u32, bool, u32)> = Vec::with_capacity(n);
         for i in (begin..n).chain(0..begin) {
@@ -143,15 +143,15 @@ impl Welded {
     }
 }
 
-/// By triangle the numbers of its corners, and by number where they are. Corners within `weld` of each other are one, and
-/// so are those that a chain of such joins.
+/// Returns the vertex numbers of each triangle, and the position of each number. Vertices within `weld` of each other,
+/// directly or through a chain of others, have one number.
 fn welded_corners(triangles: &[Triangle], weld: f64) -> (Vec<[u32; 3]>, Vec<DVec3>) {
     let mut number: HashMap<[u64; 3], u32> = HashMap::new();
     let mut points: Vec<DVec3> = Vec::new();
     let corners: Vec<[u32; 3]> = (triangles.iter())
         .map(|t| {
             t.map(|p| {
-                // Adding zero makes one of the two zeros.
+                // Adding zero turns -0 into 0.
                 let key = (p + 0.0).to_array().map(f64::to_bits);
                 *number.entry(key).or_insert_with(|| {
                     points.push(p);
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn solids_that_touch_are_shells_of_their_own() {
-        // A leaf between two posts: whole faces of each coincide, and with them edges and corners.
+        // A leaf between two posts: whole faces of each coincide, and with them edges and vertices.
         let left = cuboid([-0.1, 0.0, 0.0], [0.0, 2.0, 0.1]);
         let leaf = cuboid([0.0, 0.0, 0.0], [0.9, 2.0, 0.1]);
         let right = cuboid([0.9, 0.0, 0.0], [1.0, 2.0, 0.1]);
@@ -204,7 +204,7 @@ mod tests {
         }
     }
 
-    /// A frame along `profile`, seen from the front, as deep as it is, and the leaf in it, flush with its front.
+    /// Returns a frame along `rim`, 0.1 deep, and a leaf in it, flush with its front.
     fn framed_leaf() -> Vec<Triangle> {
         let rim = [
             [0.0, 0.0],
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn a_ring_is_one_shell() {
-        // Faces between the posts and the head are left out, as of one solid.
+        // Faces between the posts and the head are left out, as in one solid.
         let inner = |p: &DVec3| (p.y - 2.0).abs() < 1e-9;
         let mut all = cuboid([0.0, 0.0, 0.0], [0.1, 2.0, 0.1]);
         all.retain(|t| !t.iter().all(inner));

@@ -1,4 +1,4 @@
-//! Leaves become objects of their own.
+//! Splits leaves off as objects of their own.
 
 use std::collections::HashMap;
 
@@ -8,13 +8,13 @@ use enfilade_geom::scene::Mesh;
 use super::{Hung, Object, triangles_of};
 use crate::subset::subset_of;
 
-/// What stays of an object that leaves are taken out of.
+/// Part number of the rest of an object after its leaves are split off.
 const REST: u32 = u32::MAX;
 
-/// Takes leaves out of their objects; returns the number of the detail that each one is then.
+/// Splits leaves off their objects; returns the index of the detail that each leaf becomes.
 ///
-/// An object that is nothing but leaves is the first of them. Objects of one mesh that are divided in the same way share
-/// the new meshes.
+/// If an object consists of leaves only, it becomes the first of them. Objects that share a mesh and are divided alike
+/// share the new meshes.
 pub(super) fn take_out(world: &mut World, objects: &[Object], hung: &[Hung]) -> Vec<u32> {
     let mut numbers = vec![0; hung.len()];
     let mut of_object: Vec<Vec<usize>> = vec![Vec::new(); objects.len()];
@@ -36,7 +36,7 @@ pub(super) fn take_out(world: &mut World, objects: &[Object], hung: &[Hung]) -> 
             .map(|&s| part_of_shell[s as usize])
             .collect();
         if !parts.contains(&REST) {
-            // The first leaf is what stays of the object.
+            // The first leaf takes the object's place.
             numbers[leaves[0]] = object.detail;
             for p in &mut parts {
                 *p = if *p == 0 { REST } else { *p };
@@ -82,7 +82,7 @@ pub(super) fn take_out(world: &mut World, objects: &[Object], hung: &[Hung]) -> 
     numbers
 }
 
-/// The triangles of one part, with the vertices that they use.
+/// Returns the triangles of one part, with the vertices that they use.
 fn part_mesh(mesh: &Mesh, parts: &[u32], part: u32) -> Mesh {
     let mut first = 0;
     let mut primitives = Vec::new();
@@ -104,7 +104,7 @@ fn part_mesh(mesh: &Mesh, parts: &[u32], part: u32) -> Mesh {
     }
 }
 
-/// Cells of what stays of a detail and of the parts that were just taken out of it.
+/// Recomputes the cells of a detail and of the parts just split off it.
 fn relist(world: &mut World, detail: u32, n_parts: usize) {
     let last = world.details.len();
     let before = world.details[detail as usize].cells.clone();
@@ -129,7 +129,7 @@ fn relist(world: &mut World, detail: u32, n_parts: usize) {
             world.graph.locator.cells_touching(&t, &mut cells);
         }
         if cells.is_empty() {
-            // Buried in solid matter: seen from where the whole is.
+            // Buried in solid matter: keep the cells of the whole.
             cells.clone_from(&before);
         }
         let n = n_triangles(world, d);

@@ -1,7 +1,8 @@
-//! How a leaf opens: at which side its hinge is, to which side it turns, or whether it slides.
+//! Finds how a leaf opens: the side of its hinge and the direction of its turn, or that it slides.
 //!
-//! Models rarely say. What counts, in this order: a handle is opposite the hinge; a leaf opens where it has room; it lies
-//! flush with its frame on the side to which it opens; doors open into the smaller of two rooms, against the nearest wall.
+//! Models rarely record this. Criteria, in this order: a handle is opposite the hinge; a leaf opens where it has room;
+//! it lies flush with its frame on the side to which it opens; doors open into the smaller of two rooms, against the
+//! nearest wall.
 
 use std::cmp::Ordering;
 use std::f64::consts::FRAC_PI_2;
@@ -12,34 +13,34 @@ use enfilade_geom::{Bvh, DMat4, DVec3};
 use super::opening::Rectangle;
 use super::parts::{Leaf, Pose};
 
-/// A single leaf that is wider slides: those on hinges are made up to 1.25 m wide (DIN 18101), with some room for
-/// what else is in a model. [Units: wu]
+/// A wider single leaf slides: hinged leaves are made up to 1.25 m wide (DIN 18101), plus some margin for other things
+/// in a model. [Units: wu]
 const WIDEST_TURN: f64 = 1.45;
-/// A handle is off the middle by this share of half the leaf's width at least.
+/// Least offset of a handle from the middle, as a share of half the leaf's width.
 const HANDLE: f64 = 0.3;
 /// A leaf is flush with one side of its frame if its middle is off the frame's by more. [Units: wu]
 const FLUSH: f64 = 0.01;
 /// A leaf that the model turns by less is not fully open. [Units: rad]
 const OPEN: f64 = 60.0 * std::f64::consts::PI / 180.0;
-/// Samples across and up a leaf that must find room.
+/// Samples across and up a leaf, to test how much of it has room.
 const SAMPLES: [usize; 2] = [5, 4];
-/// How far from the open leaf a wall is looked for. [Units: wu]
+/// Greatest distance of a wall that an open leaf may lie against. [Units: wu]
 const WALL_WITHIN: f64 = 1.5;
 
-/// What is around a door.
+/// The surroundings of a door.
 pub(super) struct Around<'a> {
     pub(super) locator: &'a Locator,
     pub(super) walls: &'a Bvh,
-    /// The opening, its normal from the first cell to the second.
+    /// The opening; its normal points from the first cell to the second.
     pub(super) opening: &'a Rectangle,
     pub(super) cells: [CellId; 2],
-    /// Of the two cells; infinite outdoors. [Units: wu³]
+    /// Volumes of the two cells; infinite outdoors. [Units: wu³]
     pub(super) volumes: [f64; 2],
-    /// The middle of the frame along the opening's normal, where there is one.
+    /// The middle of the frame along the opening's normal, if there is one.
     pub(super) frame: Option<f64>,
-    /// Leaves in this opening.
+    /// Number of leaves in this opening.
     pub(super) n_leaves: usize,
-    /// Whether something else stands at a point.
+    /// Returns `true` if another object stands at a point.
     pub(super) is_furnished: &'a dyn Fn(DVec3) -> bool,
 }
 
@@ -59,7 +60,7 @@ impl Around<'_> {
     }
 
     fn of_shut(&self, leaf: &Leaf) -> Motion {
-        // In the opening's directions, whichever way the plate was measured.
+        // Measure along the opening's directions, whatever those of the plate.
         let o = self.opening;
         let corners = corners(&leaf.around);
         let r = Rectangle::around(o.normal, &corners);
@@ -76,7 +77,8 @@ impl Around<'_> {
                 let x = if side < 0.0 { r.low.x } else { r.high.x };
                 let z = if toward < 0.0 { r.low.z } else { r.high.z };
                 let hinge = r.point(DVec3::new(x, r.low.y, z));
-                // Seen from above, with the normal ahead, `across` points right: up is its turn to the left.
+                // Seen from above with the normal ahead, `across` points right; a turn to the left takes it to the
+                // normal.
                 let angle = FRAC_PI_2 * side * toward * self.handedness();
                 let motion = turning(hinge, 0.0, angle);
                 let (blocked, wall) = self.room(&r, &motion, x);
@@ -106,7 +108,7 @@ impl Around<'_> {
         best.map_or_else(|| turning(o.point(o.low), 0.0, FRAC_PI_2), |(_, m)| m)
     }
 
-    /// 1 if a turn counter-clockwise, seen from above, takes `across` to the normal; else -1.
+    /// Returns 1 if a counter-clockwise turn, seen from above, takes `across` to the normal; else -1.
     fn handedness(&self) -> f64 {
         let o = self.opening;
         let turned = DVec3::new(o.across.z, 0.0, -o.across.x);
@@ -114,7 +116,7 @@ impl Around<'_> {
         -turned.dot(o.normal).signum()
     }
 
-    /// How much of an open leaf finds no room, and how far its middle is from a wall. [Units: samples, wu]
+    /// Returns how much of an open leaf has no room, and the distance of its middle from a wall. [Units: samples, wu]
     fn room(&self, leaf: &Rectangle, motion: &Motion, hinge: f64) -> (f64, f64) {
         let mut blocked = 0.0;
         for share in [0.5, 1.0] {
@@ -134,7 +136,7 @@ impl Around<'_> {
         (blocked, wall.map_or(WALL_WITHIN, |n| n.distance))
     }
 
-    /// Along the wall, to the side on which more of it is hidden or has room.
+    /// Returns a slide along the wall, to the side where more of the leaf is hidden in solid matter.
     fn sliding(&self, leaf: &Rectangle) -> Motion {
         let width = leaf.size().x;
         let way = |side: f64| Motion {
@@ -159,11 +161,11 @@ impl Around<'_> {
     }
 }
 
-/// What speaks against a way to open, the most important first.
+/// Objections to a way of opening, the most important first.
 struct Rank([f64; 6]);
 
 impl Rank {
-    /// Less is better; what differs by rounding is the same.
+    /// Less is better; values that differ only by rounding are equal.
     fn cmp(&self, other: &Self) -> Ordering {
         let pairs = self.0.iter().zip(&other.0);
         for (a, b) in pairs {
@@ -199,7 +201,7 @@ fn corners(r: &Rectangle) -> Vec<DVec3> {
     (0..8).map(corner).collect()
 }
 
-/// Points of a leaf's middle, none near its hinge, where its jamb is.
+/// Returns points in the middle plane of a leaf, none near its hinge, where the jamb is.
 fn samples(leaf: &Rectangle, hinge: f64) -> impl Iterator<Item = DVec3> + '_ {
     let size = leaf.size();
     let z = (leaf.low.z + leaf.high.z) * 0.5;

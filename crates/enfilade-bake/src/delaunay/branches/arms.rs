@@ -1,8 +1,8 @@
-//! Arms of forks: how deep they are, and whether their walls are round.
+//! Arms of forks: measures how deep they are, and how round their walls.
 //!
-//! Crossing corridors of a building are forks, too, and one room to their architect. Corridors have flat walls
-//! at right angles: with θ the directions of normals about the axis, the mean of `exp(4iθ)` has length one there and
-//! zero in any tube that is round.
+//! Crossing corridors of a building are forks, too, but one room to their architect. Corridors have flat walls at right
+//! angles: with θ the direction of a normal about the axis, the mean of `exp(4iθ)` has length one there and zero in any
+//! round tube.
 
 use std::f64::consts::TAU;
 
@@ -11,29 +11,29 @@ use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use super::regions::TubeRegions;
 use super::rule::{Arm, ArmFacts, classify_arm};
 
-/// Rays about an axis: enough for a polygon of a dozen sides to look round.
+/// Rays about an axis: enough for a polygon of a dozen sides to count as round.
 const RAYS: usize = 32;
 
-/// The walls around, for normals.
+/// The walls around a fork, for normals.
 pub(super) struct Walls<'a> {
     pub(super) triangles: &'a [Triangle],
     pub(super) bvh: &'a Bvh,
 }
 
-/// A piece of what is around a fork.
+/// A piece of the space around a fork.
 pub(super) struct ArmPiece {
-    /// Nearest to the middle of the fork first.
+    /// Parts, nearest to the middle of the fork first.
     pub(super) parts: Vec<u32>,
     /// Mean radius of its balls. [Units: wu]
     pub(super) radius: f64,
-    /// Where it begins. [Units: wu]
+    /// The place where it begins. [Units: wu]
     pub(super) mouth: DVec3,
     pub(super) kind: Arm,
 }
 
 impl TubeRegions<'_> {
-    /// Measures an arm. `piece` holds its parts, nearest first, with their distances from the middle of the fork, from which
-    /// a ball of radius `removed` is removed; `radius` is that of the ball there.
+    /// Measures an arm. `piece` contains its parts, nearest first, with their distances from the middle of the fork,
+    /// where a ball of radius `removed` is removed; `radius` is that of the ball in the middle.
     pub(super) fn arm(
         &self,
         piece: &[(f64, u32)],
@@ -41,7 +41,7 @@ impl TubeRegions<'_> {
         radius: f64,
         walls: &Walls<'_>,
     ) -> ArmPiece {
-        // Mean center of the balls of a stretch, given by distances in radii from where the arm begins.
+        // Mean center of the balls of a stretch, given by distances in radii from the start of the arm.
         let stretch = |from: f64, to: f64| {
             let at = |d: f64| piece.partition_point(|p| (p.0 - removed) / radius < d);
             let from = at(from).min(piece.len() - 1);
@@ -68,7 +68,7 @@ impl TubeRegions<'_> {
     }
 }
 
-/// Of rays about an axis, the share that meets a wall; and the length of the mean of `exp(4iθ)` over these walls.
+/// Returns the share of rays about an axis that meet a wall, and the length of the mean of `exp(4iθ)` over these walls.
 fn squareness(origin: DVec3, axis: DVec3, walls: &Walls<'_>) -> (f64, f64) {
     let Some(axis) = axis.try_normalize() else {
         return (0.0, 0.0);

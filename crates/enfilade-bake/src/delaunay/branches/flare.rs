@@ -1,4 +1,4 @@
-//! Flares: what lies between the mouth of a limb and where the limb has its own width.
+//! Flares: the space from the mouth of a limb to where the limb has its own width.
 
 use std::collections::VecDeque;
 
@@ -7,8 +7,8 @@ use super::regions::{NONE, TubeRegions};
 use super::rule::FLARES;
 
 impl TubeRegions<'_> {
-    /// Gives the flare of a limb to the regions that the limb leaves. What is left may fall apart into several limbs, as the
-    /// legs of a pair of trousers do; they come narrowest first.
+    /// Gives the flare of a limb to the regions that the limb leaves. The rest may fall apart into several limbs, like
+    /// the legs of a pair of trousers; returns them narrowest first.
     pub(super) fn without_flare(&mut self, limb: u32) -> Vec<u32> {
         let mouths = self.mouths(limb);
         let mouths = self.main(limb, &mouths);
@@ -39,9 +39,9 @@ impl TubeRegions<'_> {
         limbs
     }
 
-    /// Extends what lies beyond some mouths into parts without an owner, as far as balls of radius `least` get.
+    /// Extends the regions beyond some mouths into parts without an owner, as far as balls of radius `least` pass.
     fn reach_in(&mut self, mouths: &[Mouth], least: f64) {
-        // Nobody else is without an owner by now, except in rooms that nothing reaches into from here.
+        // No other part is without an owner by now, except in rooms that nothing reaches from here.
         let outer = |&l: &u32| {
             let [a, b] = self.space.links[l as usize].parts;
             let t = if self.owner[a as usize] == NONE { b } else { a };
@@ -56,7 +56,7 @@ impl TubeRegions<'_> {
         }
     }
 
-    /// Opens limbs among parts that have no owner, widest first.
+    /// Opens limbs among parts that have no owner; returns them widest first.
     fn limbs_of(&mut self, parts: &[u32]) -> Vec<u32> {
         let free = |t: &u32| self.owner[*t as usize] == NONE;
         let mut limbs = Vec::new();

@@ -1,11 +1,11 @@
-//! Forks: where three or more tubes of one width meet.
+//! Forks: places where three or more tubes of one width meet.
 //!
-//! No ball distinguishes an arm from its stem there. This does: remove a ball a little wider than the tubes, and what is left
-//! nearby falls apart into three pieces or more that each go on for [`DEEP`] diameters. In a tube it falls into two, in a
-//! hall, around a pillar or in a bend into fewer. Only what is near is looked at, so that arms that meet again further on are
-//! arms all the same.
+//! No ball distinguishes an arm from its stem there. Instead, remove a ball a little wider than the tubes: at a fork,
+//! the space nearby falls apart into three or more pieces that each continue for [`DEEP`] diameters. A tube gives two
+//! pieces; a hall, a pillar or a bend gives fewer. Only nearby space is examined, so that arms that meet again farther
+//! on still count as arms.
 //!
-//! `O(n log n)` in the parts of tubes; in halls one ball in hundreds is tested.
+//! `O(n log n)` in the parts of tubes; in halls, one ball in hundreds is tested.
 
 use std::collections::BTreeMap;
 
@@ -17,15 +17,15 @@ use super::rule::{Arm, DEEP, Meeting, NARROWS, REMOVED, STRIDE, WIDEST, is_fork,
 
 /// A place where tubes meet.
 pub(super) struct Fork {
-    /// The part that holds the ball in its middle.
+    /// The part that contains the ball in its middle.
     pub(super) part: u32,
     /// Radius of that ball. [Units: wu]
     pub(super) radius: f64,
-    /// Radius of the ball that is removed. [Units: wu]
+    /// Radius of the removed ball. [Units: wu]
     pub(super) removed: f64,
-    /// Parts in the ball that is removed.
+    /// Parts in the removed ball.
     pub(super) middle: Vec<u32>,
-    /// Widest first.
+    /// Arms, widest first.
     pub(super) arms: Vec<ArmPiece>,
     /// Least distance between the mouths of two arms. [Units: radii]
     spread: f64,
@@ -60,27 +60,27 @@ impl Places {
     }
 }
 
-/// What a search for forks keeps from one place to the next.
+/// State that a search for forks keeps from one place to the next.
 struct Search {
     was_tested: Vec<bool>,
     places: Places,
 }
 
-/// What surrounds a part within its region.
+/// Surroundings of a part within its region.
 struct Surroundings {
     /// Parts with the distances of their balls' centers, nearest first. [Units: wu]
     parts: Vec<(f64, u32)>,
-    /// How near the nearest ball is that is much wider; infinite if there is none. [Units: wu]
+    /// Distance of the nearest ball that is much wider; infinite if there is none. [Units: wu]
     wide: f64,
 }
 
-/// How far the arms of a fork are looked at, from its middle. [Units: wu]
+/// Returns the distance from the middle of a fork within which its arms are examined. [Units: wu]
 pub(super) fn reach(removed: f64, radius: f64) -> f64 {
     removed + 2.0 * DEEP * radius
 }
 
 impl TubeRegions<'_> {
-    /// All forks; balls that are removed for two of them do not meet.
+    /// Returns all forks; the balls removed for any two of them are disjoint.
     pub(super) fn forks(&self, walls: &Walls<'_>) -> Vec<Fork> {
         let n = self.owner.len();
         let mut search = Search {
@@ -114,21 +114,21 @@ impl TubeRegions<'_> {
         forks
     }
 
-    /// Whether a part lies in a room, or in a branch of the outdoors.
+    /// Returns `true` if a part lies in a room, or in a branch of the outdoors.
     fn is_enclosed(&self, t: u32) -> bool {
         let owner = self.owner[t as usize];
         owner != NONE && (self.regions[owner as usize].branch.is_some() || !self.is_outdoors(t))
     }
 
-    /// The neighbors of a part that a ball [`NARROWS`] times narrower than `radius` gets to.
+    /// Returns the neighbors of a part that a ball [`NARROWS`] times narrower than `radius` reaches.
     fn wide_ways(&self, t: u32, radius: f64) -> impl Iterator<Item = u32> {
         let ways = self.ways(t).iter();
         ways.filter(move |w| self.passes(w.1) * NARROWS >= radius)
             .map(|w| w.0)
     }
 
-    /// What a ball [`NARROWS`] times narrower than that of part `c` gets to. `None` if `c` cannot be the middle of a fork: a wider ball
-    /// is beside it, or a much wider one nearer than the arms are long.
+    /// Returns the parts that a ball [`NARROWS`] times narrower than that of part `c` reaches. `None` if `c` cannot be
+    /// the middle of a fork: if a wider ball is beside it, or a much wider one nearer than the arms are long.
     fn surroundings(&self, c: u32, search: &mut Search) -> Option<Surroundings> {
         let (radius, region) = (self.radius(c), self.owner[c as usize]);
         let center = self.centers[c as usize];
@@ -170,7 +170,7 @@ impl TubeRegions<'_> {
         Some(Surroundings { parts, wide })
     }
 
-    /// The fork about a ball, if there is one.
+    /// Returns the fork about a ball, if there is one.
     fn fork_at(&self, c: u32, walls: &Walls<'_>, search: &mut Search) -> Option<Fork> {
         let radius = self.radius(c);
         let around = self.surroundings(c, search)?;
@@ -198,7 +198,7 @@ impl TubeRegions<'_> {
         None
     }
 
-    /// The connected pieces of some parts, in their order.
+    /// Returns the connected pieces of some parts, in their order.
     fn pieces(
         &self,
         parts: &[(f64, u32)],

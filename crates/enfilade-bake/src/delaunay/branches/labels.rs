@@ -1,29 +1,29 @@
-//! Branches as the rest of the builder sees them: a label for each part, and what each mouth weighs.
+//! Branches in the form that the rest of the builder uses: a label for each part, and a weight for each mouth.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use super::super::space::Space;
 
-/// Which parts lie in branches.
+/// The parts that lie in branches.
 pub(in super::super) struct Branches {
     /// Branch of each part; 0 for none.
     pub(in super::super) label_of_part: Vec<u32>,
-    /// Of each branch, from label 1 on.
+    /// Mouth of each branch, from label 1 on.
     pub(super) mouths: Vec<BranchMouth>,
 }
 
-/// What the mouth of a branch weighs, and how it compares with others.
+/// Weight of a branch's mouth, and a radius to compare it with others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BranchMouth {
     /// Radius of the trunk's largest ball near the mouth ÷ that of the branch's largest ball well inside.
     pub(super) weight: f64,
-    /// Of the branch's largest ball well inside. [Units: wu]
+    /// Radius of the branch's largest ball well inside. [Units: wu]
     pub(super) radius: f64,
 }
 
 impl Branches {
-    /// No branch among so many parts.
+    /// Returns branches of which no part has any.
     pub(in super::super) fn none(n_parts: usize) -> Self {
         Self {
             label_of_part: vec![0; n_parts],
@@ -31,8 +31,8 @@ impl Branches {
         }
     }
 
-    /// Drops a label whose share of a cell is under one ball: that share takes the label of most of the cell. Cells are those
-    /// of [`flow_together`](super::super::cells::flow_together).
+    /// Drops each label whose share of a cell is less than one ball: that share takes the label of most of the cell.
+    /// Cells are those of [`flow_together`](super::super::cells::flow_together).
     pub(in super::super) fn without_leftovers(
         mut self,
         space: &Space,
@@ -64,8 +64,8 @@ impl Branches {
         self.mouths.is_empty()
     }
 
-    /// What an opening between two parts weighs as a mouth, by their labels: the narrower branch ends there. 0 within
-    /// a branch and where there is none.
+    /// Returns the weight of an opening between two parts as a mouth, by their labels: the narrower branch ends there.
+    /// 0 within a branch, and away from branches.
     pub(in super::super) fn weight(&self, [a, b]: [u32; 2]) -> f64 {
         if a == b {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Measuring limbs: their mouths, and the facts that the rule asks for.
+//! Measures limbs: their mouths, and the facts that the rule needs.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::rule::{DEEP, LimbFacts, MouthFacts, NARROWS, n_main_mouths};
 
 /// A way out of a region within its room.
 pub(super) struct Mouth {
-    /// The region it leads to.
+    /// The region to which it leads.
     pub(super) parent: u32,
     /// Links across it.
     pub(super) links: Vec<u32>,
@@ -20,7 +20,8 @@ pub(super) struct Mouth {
 }
 
 impl TubeRegions<'_> {
-    /// The ways out of a region, widest first. Branches that leave the region itself, which are known by then, do not count.
+    /// Returns the ways out of a region, widest first. Branches that leave the region itself are known by then, and do
+    /// not count.
     pub(super) fn mouths(&self, region: u32) -> Vec<Mouth> {
         let mut contacts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         let parts = self.regions[region as usize].parts.iter();
@@ -68,7 +69,7 @@ impl TubeRegions<'_> {
         }
     }
 
-    /// The first of the mouths: those that count for the width of a limb.
+    /// Returns the first of the mouths: those that count for the width of a limb.
     pub(super) fn main<'m>(&self, limb: u32, mouths: &'m [Mouth]) -> &'m [Mouth] {
         let radii: Vec<f64> = mouths.iter().map(|m| m.facts.radius).collect();
         &mouths[..n_main_mouths(&radii, self.is_in_outdoors(limb))]
@@ -82,7 +83,7 @@ impl TubeRegions<'_> {
         self.centers[t as usize].distance(mouth.center)
     }
 
-    /// The facts of a limb with the given mouths.
+    /// Returns the facts of a limb with the given mouths.
     pub(super) fn facts(&self, limb: u32, mouths: &[Mouth]) -> LimbFacts {
         let is_outdoors = self.is_in_outdoors(limb);
         let parts = self.regions[limb as usize].parts.iter();
@@ -99,7 +100,7 @@ impl TubeRegions<'_> {
         }
     }
 
-    /// As [`LimbFacts::body`].
+    /// Returns [`LimbFacts::body`].
     pub(super) fn body(&self, region: u32, main: &[Mouth]) -> Option<f64> {
         let parts = self.regions[region as usize].parts.iter();
         let is_within = |t: u32| main.iter().all(|m| self.far(t, m) >= 2.0 * m.facts.radius);
@@ -110,11 +111,11 @@ impl TubeRegions<'_> {
         (radius >= self.space.finest).then_some(radius)
     }
 
-    /// As [`LimbFacts::trunk`].
+    /// Returns [`LimbFacts::trunk`].
     fn trunk(&self, mouth: &Mouth, is_outdoors: bool) -> f64 {
         let near = 2.0 * DEEP * mouth.facts.radius;
         let is_near = |t: u32| {
-            // Outdoors, where there are few points, balls may be near and their centers far.
+            // Outdoors, where points are few, balls may be near and their centers far.
             let ball = if is_outdoors { self.ball(t) } else { 0.0 };
             self.far(t, mouth) - ball <= near
         };
@@ -125,7 +126,7 @@ impl TubeRegions<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// As [`LimbFacts::depth`].
+    /// Returns [`LimbFacts::depth`].
     fn depth(&self, limb: u32, mouth: &Mouth) -> f64 {
         let parts = self.regions[limb as usize].parts.iter();
         parts
@@ -134,7 +135,7 @@ impl TubeRegions<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// Area of the openings from a region to rooms with balls wider than `radius`. [Units: wu²]
+    /// Returns the area of the openings from a region to rooms with balls wider than `radius`. [Units: wu²]
     fn exits(&self, region: u32, radius: f64) -> f64 {
         let mut area = 0.0;
         for t in &self.regions[region as usize].parts {

@@ -1,31 +1,31 @@
-//! Branches: tubes that leave a wider room though nothing pinches them.
+//! Branches: tubes that leave a wider room although nothing narrows at their mouths.
 //!
-//! What decimation weighs is a pinch, and a tube that leaves a trunk has none: every ball of the tube passes its mouth. What
-//! distinguishes the two is that the trunk's balls do not get in. So each room is opened by balls, from wide to narrow, into
-//! limbs; the limb of the room's largest ball is its trunk. What is left between limbs goes to the one that reaches it by the
-//! widest way. Each limb but the trunks is then measured and classified:
+//! Decimation weighs pinches, and a tube that leaves a trunk has none: every ball of the tube passes its mouth. The
+//! difference is that the trunk's balls do not get in. So each room is opened by balls, from wide to narrow, into
+//! limbs; the limb of the room's largest ball is its trunk. The space between limbs goes to the one that reaches it by
+//! the widest way. Each limb except the trunks is then measured. It is a branch if:
 //!
-//! - it has one mouth: what has two is a neck between chambers, or a ring;
+//! - it has one mouth: a limb with two is a neck between chambers, or a ring;
 //! - no opening leads from it to a room that is wider than its mouth, for the same reason;
-//! - its mouth is not much longer than wide, so it is no slit under a bed, along a wall or in a corner;
-//! - it is deep, so it is no alcove;
-//! - the trunk is much wider near the mouth, so it is no tube that tapers.
+//! - its mouth is not much longer than wide, so it is not a slit under a bed or along one or two walls;
+//! - it is deep, so it is not an alcove;
+//! - the trunk is much wider near the mouth, so it is not a tube that tapers.
 //!
-//! Outdoors is a room, too, and what branches off it is a room: a tube that is open at its ends, a tunnel, a garage, a living
-//! room with its terrace door open. It may have several mouths, none a slit, and doors to rooms.
+//! Outdoors is a room, too, and its branches are rooms: a tube that is open at its ends, a tunnel, a garage, a living
+//! room with its terrace door open. Such a branch may have several mouths, none a slit, and doors to rooms.
 //!
-//! All else is merged across its largest opening. Pockets between rough walls and the balls of a room count as branches, too; they hold
-//! less than a ball, and decimation takes them for the spikes that they are. Where a trunk divides into arms as wide as itself
-//! no ball tells them apart; `forks` does.
+//! Every other limb is merged across its largest opening. Pockets between rough walls and the balls of a room count as
+//! branches, too; they are smaller than a ball, and decimation treats them as the spikes that they are. Where a trunk
+//! divides into arms as wide as itself, no ball distinguishes them; `forks` does.
 //!
-//! | file | answers |
+//! | file | contents |
 //! | --- | --- |
-//! | `regions` | which parts are connected, and by how wide a ball |
-//! | `measure` | what the facts of a limb are |
-//! | `rule` | what a limb or an arm with such facts is: all bounds, and nothing else |
-//! | `flare` | where in its mouth a limb begins |
-//! | `forks`, `arms`, `separate` | where tubes of one width meet, and how they are separated |
-//! | `labels` | what the rest of the builder sees of it |
+//! | `regions` | connected sets of parts, and the width of the balls that connect them |
+//! | `measure` | the facts of a limb |
+//! | `rule` | the kind of a limb or an arm with such facts: all bounds, and nothing else |
+//! | `flare` | the start of a limb within its mouth |
+//! | `forks`, `arms`, `separate` | meetings of tubes of one width, and their separation |
+//! | `labels` | the result for the rest of the builder |
 
 mod arms;
 mod flare;
@@ -48,7 +48,7 @@ use rule::{LimbKind, classify};
 
 /// Finds the branches of rooms, given by the room of each part.
 ///
-/// `O(n log n)` in parts, and the parts of trunks times their limbs.
+/// `O(n log n)` in parts, plus the parts of trunks times their limbs.
 pub(super) fn find_branches(
     space: &Space,
     room_of_part: &[u32],
@@ -58,7 +58,7 @@ pub(super) fn find_branches(
 ) -> Branches {
     let mut regions = TubeRegions::new(space, room_of_part, allowance);
     let limbs = open_rooms(&mut regions);
-    // Narrow ones first: what is no branch is merged into a wider limb, which may be one.
+    // Narrow ones first: a limb that is not a branch is merged into a wider limb, which may be one.
     for limb in limbs.into_iter().rev() {
         for limb in regions.without_flare(limb) {
             settle(&mut regions, limb);
@@ -71,7 +71,7 @@ pub(super) fn find_branches(
     regions.finished()
 }
 
-/// Divides rooms into trunks and limbs; gives the limbs, widest first.
+/// Divides rooms into trunks and limbs; returns the limbs, widest first.
 fn open_rooms(regions: &mut TubeRegions<'_>) -> Vec<u32> {
     let mut has_trunk = BTreeSet::new();
     let (mut limbs, mut seeds) = (Vec::new(), Vec::new());

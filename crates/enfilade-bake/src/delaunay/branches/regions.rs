@@ -1,7 +1,7 @@
 //! Connected sets of the parts of a room, grown by balls.
 //!
-//! A limb is what a ball a little smaller than the largest free one reaches: a morphological opening (Matheron,
-//! "Random sets and integral geometry", 1975, on size distributions).
+//! A limb is the space that a ball a little smaller than the largest free one reaches: a morphological opening
+//! (Matheron, "Random sets and integral geometry", 1975, on size distributions).
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
@@ -14,19 +14,19 @@ use super::super::space::Space;
 use super::labels::{BranchMouth, Branches};
 use super::rule::NARROWS;
 
-/// No region.
+/// Marks the absence of a region.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// A connected set of parts.
 pub(super) struct Region {
     pub(super) parts: Vec<u32>,
-    /// Of its largest ball. [Units: wu]
+    /// Radius of its largest ball. [Units: wu]
     pub(super) radius: f64,
-    /// Once it is known to be a branch.
+    /// Set once it is known to be a branch.
     pub(super) branch: Option<BranchMouth>,
 }
 
-/// The parts of all rooms, and which region owns each.
+/// The parts of all rooms, and the region that owns each.
 pub(super) struct TubeRegions<'a> {
     pub(super) space: &'a Space,
     pub(super) room_of_part: &'a [u32],
@@ -39,13 +39,13 @@ pub(super) struct TubeRegions<'a> {
     /// Region of each part, or [`NONE`].
     pub(super) owner: Vec<u32>,
     pub(super) regions: Vec<Region>,
-    /// Where the ways of each part begin in `ways`.
+    /// Start of each part's ways in `ways`.
     starts: Vec<u32>,
-    /// Neighbor and link: the ways from each part to others of its room.
+    /// Ways from each part to others of its room: neighbor and link.
     ways: Vec<(u32, u32)>,
-    /// What counts as the radius of infinite balls. [Units: wu]
+    /// Radius to use for infinite balls. [Units: wu]
     most: f64,
-    /// What growing spends from.
+    /// Allowance of work for growing regions.
     pub(super) allowance: &'a Allowance,
 }
 
@@ -91,23 +91,24 @@ impl<'a> TubeRegions<'a> {
         }
     }
 
-    /// Radius of the ball that a part holds. [Units: wu]
+    /// Returns the radius of a part's ball. [Units: wu]
     pub(super) fn radius(&self, t: u32) -> f64 {
         self.space.radii[t as usize].min(self.most)
     }
 
-    /// Radius of the ball about the center of a part: 0 where it is infinite, and so has no center. [Units: wu]
+    /// Returns the radius of the ball about the center of a part; 0 if it is infinite, and so has no center.
+    /// [Units: wu]
     pub(super) fn ball(&self, t: u32) -> f64 {
         let radius = self.space.radii[t as usize];
         if radius.is_finite() { radius } else { 0.0 }
     }
 
-    /// Radius of the widest ball that passes a link. [Units: wu]
+    /// Returns the radius of the widest ball that passes a link. [Units: wu]
     pub(super) fn passes(&self, l: u32) -> f64 {
         self.space.links[l as usize].radius.min(self.most)
     }
 
-    /// Neighbor and link: the ways from a part to others of its room.
+    /// Returns the ways from a part to others of its room: neighbor and link.
     pub(super) fn ways(&self, t: u32) -> &[(u32, u32)] {
         let [from, to] = [t as usize, t as usize + 1].map(|i| self.starts[i] as usize);
         &self.ways[from..to]
@@ -117,8 +118,8 @@ impl<'a> TubeRegions<'a> {
         self.room_of_part[t as usize] == OUTDOOR_CELL
     }
 
-    /// Those of some parts whose balls are known well enough to begin a limb, in rooms with space for a branch.
-    /// Widest first.
+    /// Returns those parts whose balls are known well enough to begin a limb, in rooms with space for a branch, widest
+    /// first.
     pub(super) fn by_radius(&self, parts: impl Iterator<Item = u32>) -> Vec<u32> {
         let finest = self.space.finest;
         let mut order: Vec<u32> = parts
@@ -134,7 +135,7 @@ impl<'a> TubeRegions<'a> {
         order
     }
 
-    /// Makes a new region of what a ball reaches that is [`NARROWS`] times narrower than that of part `b`.
+    /// Makes a new region of the parts that a ball [`NARROWS`] times narrower than that of part `b` reaches.
     pub(super) fn open_limb(&mut self, b: u32) -> u32 {
         let radius = self.radius(b);
         let region = self.push(radius, None);
@@ -143,7 +144,7 @@ impl<'a> TubeRegions<'a> {
         region
     }
 
-    /// A new region without parts.
+    /// Adds a region without parts; returns its index.
     pub(super) fn push(&mut self, radius: f64, branch: Option<BranchMouth>) -> u32 {
         self.regions.push(Region {
             parts: Vec::new(),
@@ -158,8 +159,8 @@ impl<'a> TubeRegions<'a> {
         self.regions[region as usize].parts.push(t);
     }
 
-    /// Extends a region into parts without an owner: where balls of radius `least` pass, and where the region's
-    /// balls cover the middle of a part. `queue` holds parts, each with the part whose ball covers it.
+    /// Extends a region into parts without an owner: across links that balls of radius `least` pass, and to parts whose
+    /// middle is covered by the region's balls. `queue` contains parts, each with the part whose ball covers it.
     pub(super) fn reach(&mut self, region: u32, mut queue: VecDeque<(u32, u32)>, least: f64) {
         while let Some((t, witness)) = queue.pop_front() {
             if !self.allowance.spend(2) {
@@ -182,13 +183,13 @@ impl<'a> TubeRegions<'a> {
         }
     }
 
-    /// Whether the ball of one part holds the middle of another.
+    /// Returns `true` if the ball of one part contains the middle of another.
     fn covers(&self, t: u32, other: u32) -> bool {
         let middle = self.space.middles[other as usize];
         middle.distance(self.centers[t as usize]) < self.ball(t)
     }
 
-    /// Whether a limb extends from its largest ball by the ball's radius or more. Shorter ones are not looked at.
+    /// Returns `true` if a limb extends from its largest ball by the ball's radius or more. Shorter ones are ignored.
     pub(super) fn is_long(&self, limb: u32) -> bool {
         let limb = &self.regions[limb as usize];
         let from = self.centers[limb.parts[0] as usize];
@@ -211,7 +212,7 @@ impl<'a> TubeRegions<'a> {
 
     /// Gives parts without an owner to the region that reaches them from `seeds` by the widest way.
     pub(super) fn flood(&mut self, seeds: &[u32]) {
-        // Radii are not negative, so their bits are in order. Ties go to the least ids.
+        // Radii are not negative, so their bits sort like them. Ties go to the least ids.
         let mut heap: BinaryHeap<(u64, Reverse<(u32, u32)>)> = BinaryHeap::new();
         let push = |heap: &mut BinaryHeap<_>, this: &Self, t: u32| {
             for &(other, l) in this.ways(t) {
@@ -245,7 +246,7 @@ impl<'a> TubeRegions<'a> {
                 *label = mouths.len() as u32;
             }
         }
-        // A part without an owner has none.
+        // A part without an owner is in no branch.
         let label = |&o: &u32| labels.get(o as usize).copied().unwrap_or(0);
         Branches {
             label_of_part: self.owner.iter().map(label).collect(),
@@ -254,7 +255,7 @@ impl<'a> TubeRegions<'a> {
     }
 }
 
-/// Neighbor and link of each way from a part to another of its room, part by part, and where each part's begin.
+/// Returns the start of each part's ways, and all ways, part by part: neighbor and link of a part within its room.
 fn ways_within_rooms(space: &Space, room_of_part: &[u32]) -> (Vec<u32>, Vec<(u32, u32)>) {
     let n = space.radii.len();
     let is_within = |parts: [u32; 2]| {

@@ -1,48 +1,50 @@
-//! The rule: what a limb or an arm is, from what was measured of it.
+//! The rule: classifies limbs and arms by their measurements.
 //!
-//! Nothing here looks at the model. A limb that is no branch is merged across its largest mouth, so each bound errs
-//! either towards more rooms or towards fewer; its comment says which. The bounds stand between what was measured:
-//! vessels and generated tubes on one side; eaves, niches, beds, window reveals and cave walls of a dozen scenes on the
-//! other. None depends on the unit.
+//! Nothing here reads the model. A limb that is not a branch is merged across its largest mouth, so each bound errs
+//! either to more rooms or to fewer; its comment says which. The bounds lie between measurements: vessels and generated
+//! tubes on one side; eaves, niches, beds, window reveals and cave walls of a dozen scenes on the other. None depends
+//! on the unit.
 
 use std::f64::consts::PI;
 
 use super::labels::BranchMouth;
 
-/// The trunk's largest ball near the mouth ÷ the branch's largest ball well inside, at least. Tubes of nearly one width go on
-/// from each other. Higher gives fewer branches.
+/// Least ratio of the trunk's largest ball near the mouth to the branch's largest ball well inside. Tubes of nearly one
+/// width continue each other. A higher value gives fewer branches.
 pub(super) const NARROWS: f64 = 1.5;
-/// Depth of a branch, from its mouth to its far end, ÷ diameter of the mouth, at least. Alcoves are about as deep as wide.
-/// Higher gives fewer branches.
+/// Least depth of a branch, from its mouth to its far end, in diameters of the mouth. Alcoves are about as deep as
+/// wide. A higher value gives fewer branches.
 pub(super) const DEEP: f64 = 2.0;
-/// Root mean square distance of a mouth from its center ÷ radius of its ball, at most: a disk has 0.7, a rectangle of
-/// 1 : 2 has 1.3, what runs all around a bed 2.5 and more. Lower gives fewer branches.
+/// Greatest root mean square distance of a mouth from its center, in radii of its ball: a disk has 0.7, a rectangle of
+/// 1 : 2 has 1.3, the gap around a bed 2.5 and more. A lower value gives fewer branches.
 const SPREAD: f64 = 1.5;
-/// The mouth is moved to where balls of this many times the branch's own no longer pass. Balls of one tube differ by as much,
-/// depending on where points are. Higher puts the mouth further into the trunk.
+/// The mouth moves to where balls of this many times the branch's own no longer pass. Balls of one tube differ by as
+/// much, depending on where points are. A higher value puts the mouth farther into the trunk.
 pub(super) const FLARES: f64 = 1.05;
 
-/// Radii of the balls that are removed where tubes may meet, least first, ÷ that of the ball there. Arms at a right angle
-/// are apart from 1.42 on, at 40° from 2.75. A larger last one separates arms at smaller angles, but needs longer arms.
+/// Radii of the balls removed where tubes may meet, ascending, in radii of the ball there. Arms at a right angle are
+/// separate from 1.42 on, at 40° from 2.75. A larger last one separates arms at smaller angles, but needs longer arms.
 pub(super) const REMOVED: [f64; 4] = [1.5, 2.0, 2.5, 3.0];
-/// Balls beside the one in the middle of a fork are at most this many times as wide: balls of one tube differ by that
-/// much. Higher tests more places that are no middle.
+/// Greatest width of balls beside the one in the middle of a fork, as a multiple of its width: balls of one tube differ
+/// by that much. A higher value tests more places that are not a middle.
 pub(super) const WIDEST: f64 = 1.1;
-/// A place this near to one that was tested is not. Lower finds the middle of a fork better, and takes longer. [Units: radii]
+/// Distance from a tested place within which places are skipped. A lower value finds the middle of a fork better, and
+/// takes longer. [Units: radii]
 pub(super) const STRIDE: f64 = 0.5;
-/// Squareness of an arm that is a corridor, at least: 1 between four walls, 0.5 under a barrel vault, 0 in a round tube.
-/// Higher gives more branches.
+/// Least squareness of a corridor: 1 between four walls, 0.5 under a barrel vault, 0 in a round tube. A higher value
+/// gives more branches.
 const SQUARE: f64 = 0.5;
-/// Share of the rays about an arm's axis that meet a wall, at least: the walls of fewer say nothing. Higher gives fewer branches.
+/// Least share of the rays about an arm's axis that meet a wall: fewer walls carry no information. A higher value gives
+/// fewer branches.
 const ENCLOSED: f64 = 0.5;
-/// What the mouth of a fork's arm weighs: as much as that of a branch half as wide as its trunk. Only a person who
-/// decimates on sees the difference.
+/// Weight of the mouth of a fork's arm: that of a branch half as wide as its trunk. It matters only to users who
+/// decimate further.
 pub(super) const ARM_WEIGHS: f64 = 2.0;
 
-/// What is measured of a mouth: a connected set of facets where a limb meets another region of its room.
+/// Measurements of a mouth: a connected set of facets where a limb meets another region of its room.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MouthFacts {
-    /// Of the widest ball that passes. [Units: wu]
+    /// Radius of the widest ball that passes. [Units: wu]
     pub(super) radius: f64,
     /// Projected area: the length of the sum of the facets' area vectors. [Units: wu²]
     pub(super) area: f64,
@@ -51,25 +53,25 @@ pub(super) struct MouthFacts {
 }
 
 impl MouthFacts {
-    /// Much longer than wide: under a bed, along a wall or in a corner.
+    /// Returns `true` if it is much longer than wide: under a bed, along a wall or where two walls meet.
     fn is_slit(&self) -> bool {
         self.spread > SPREAD * self.radius
     }
 
-    /// Radius of the widest disk that can pass: less than the ball's where most of the mouth's rim leads elsewhere.
-    /// [Units: wu]
+    /// Returns the radius of the widest disk that can pass: less than the ball's if most of the mouth's rim leads
+    /// elsewhere. [Units: wu]
     fn disk(&self) -> f64 {
         self.radius.min((self.area / PI).sqrt())
     }
 
-    /// Much narrower than another, so that it is no second mouth.
+    /// Returns `true` if it is much narrower than another, and so not a second mouth.
     fn is_chink_beside(&self, other: &Self) -> bool {
         self.disk() * NARROWS < other.radius
     }
 }
 
-/// How many mouths of a limb, which are given widest first, are main ones: a single one, but outdoors all that are nearly as wide as the
-/// first, since a tunnel is open at both ends.
+/// Returns the number of main mouths of a limb, given widest first: one, but outdoors all that are nearly as wide as
+/// the first, since a tunnel is open at both ends.
 pub(super) fn n_main_mouths(radii: &[f64], is_outdoors: bool) -> usize {
     match radii.first() {
         Some(first) if is_outdoors => radii.partition_point(|r| r * NARROWS >= *first),
@@ -77,52 +79,51 @@ pub(super) fn n_main_mouths(radii: &[f64], is_outdoors: bool) -> usize {
     }
 }
 
-/// What is measured of a limb.
+/// Measurements of a limb.
 #[derive(Clone, Debug)]
 pub(super) struct LimbFacts {
     /// It lies in the room around the scene.
     pub(super) is_outdoors: bool,
-    /// Widest first. Mouths of branches that leave the limb itself do not count.
+    /// Mouths, widest first. Those of branches that leave the limb itself do not count.
     pub(super) mouths: Vec<MouthFacts>,
     /// Radius of its largest ball that is a diameter or more away from each main mouth; `None` if no ball that large is
     /// known. [Units: wu]
     pub(super) body: Option<f64>,
-    /// Radius of the trunk's largest ball near the widest mouth, that is within twice [`DEEP`] radii. A taper narrows
-    /// further away, too. [Units: wu]
+    /// Radius of the trunk's largest ball near the widest mouth, within twice [`DEEP`] radii. A taper narrows farther
+    /// away, too. [Units: wu]
     pub(super) trunk: f64,
-    /// From the center of the widest mouth to the far side of the furthest ball not [`NARROWS`] times narrower than the
-    /// mouth: narrower ones lie in corners. [Units: wu]
+    /// Distance from the center of the widest mouth to the far side of the farthest ball not [`NARROWS`] times narrower
+    /// than the mouth: narrower ones lie where walls meet. [Units: wu]
     pub(super) depth: f64,
     /// [Units: wu³]
     pub(super) volume: f64,
-    /// Area of all openings to rooms with a ball wider than the widest mouth. By area and not by the balls that
-    /// pass, since a door leaf or a pane in an opening lets none pass. [Units: wu²]
+    /// Area of all openings to rooms with a ball wider than the widest mouth. Area counts, not the balls that pass,
+    /// since a door leaf or a pane in an opening lets none pass. [Units: wu²]
     pub(super) exits: f64,
-    /// Radius of the least ball of air that is known. [Units: wu]
+    /// Radius of the smallest known ball of air. [Units: wu]
     pub(super) finest: f64,
 }
 
-/// What a limb is. All but a branch is merged across its widest mouth, if it has one.
+/// Kinds of limbs. All but branches are merged across their widest mouths, if they have any.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LimbKind {
     /// Nothing else is left of its room.
     Whole,
-    /// Not as deep as its mouth is wide.
+    /// It is less deep than its mouth is wide.
     Bulge,
-    /// It has a second mouth, or leads on to a room that is wider than its mouth: a passage between chambers, or a ring.
+    /// It has a second mouth, or leads on to a room wider than its mouth: a passage between chambers, or a ring.
     Neck,
     /// Its mouth is a slit.
     Crevice,
-    /// Not [`DEEP`] enough.
+    /// It is less than [`DEEP`].
     Alcove,
-    /// Hardly narrower than its trunk.
+    /// It is hardly narrower than its trunk.
     Continuation,
     /// A tube that leaves its trunk: a room.
     Branch(BranchMouth),
 }
 
-/// What a limb is. A tube outdoors may have several mouths and doors to rooms, and counts as deep by what it
-/// holds.
+/// Classifies a limb. A tube outdoors may have several mouths and doors to rooms; its volume decides if it is deep.
 pub(super) fn classify(limb: &LimbFacts) -> LimbKind {
     let Some((widest, others)) = limb.mouths.split_first() else {
         return LimbKind::Whole;
@@ -131,7 +132,7 @@ pub(super) fn classify(limb: &LimbFacts) -> LimbKind {
         return LimbKind::Bulge;
     };
     let has_two_mouths = others.iter().any(|m| !m.is_chink_beside(widest));
-    // Less than the disk of the least ball that is known is a crack.
+    // Less than the disk of the smallest known ball is a crack.
     let leads_on = limb.exits > PI * limb.finest.powi(2);
     if !limb.is_outdoors && (has_two_mouths || leads_on) {
         return LimbKind::Neck;
@@ -160,18 +161,18 @@ pub(super) fn classify(limb: &LimbFacts) -> LimbKind {
     })
 }
 
-/// What is left of a limb's surroundings when a ball is removed.
+/// Meaning of the pieces that remain around a removed ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Meeting {
-    /// A tube, a bend or a hall, and a larger ball leaves no more.
+    /// A tube, a bend or a hall; a larger ball would leave no more pieces.
     None,
-    /// A tube, or a fork with arms that are not apart yet: a larger ball may tell.
+    /// A tube, or a fork with arms that are not separate yet: a larger ball may decide.
     Unclear,
     /// Perhaps a fork.
     Fork,
 }
 
-/// What a place is where so many pieces go on for [`DEEP`] diameters from a ball that is removed.
+/// Classifies a place by the number of pieces that continue for [`DEEP`] diameters from a removed ball.
 pub(super) fn meeting(n_pieces: usize) -> Meeting {
     match n_pieces {
         0 | 1 => Meeting::None,
@@ -180,12 +181,12 @@ pub(super) fn meeting(n_pieces: usize) -> Meeting {
     }
 }
 
-/// What is measured of a piece that is left around a fork.
+/// Measurements of a piece around a fork.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ArmFacts {
-    /// From where it begins to the far side of its furthest ball. [Units: wu]
+    /// Distance from its start to the far side of its farthest ball. [Units: wu]
     pub(super) depth: f64,
-    /// Of the ball in the middle of the fork. [Units: wu]
+    /// Radius of the ball in the middle of the fork. [Units: wu]
     pub(super) radius: f64,
     /// Share of the rays about its axis that meet a wall.
     pub(super) enclosed: f64,
@@ -193,18 +194,18 @@ pub(super) struct ArmFacts {
     pub(super) squareness: f64,
 }
 
-/// What an arm of a fork is.
+/// Kinds of arms of a fork.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Arm {
-    /// No deeper than an alcove: the ball that was removed may lie off the fork's middle.
+    /// No deeper than an alcove: the removed ball may lie off the fork's middle.
     Stub,
     /// Four walls at right angles: where corridors of a building cross, an architect sees one room.
     Corridor,
-    /// Round, whichever its roundness: a circle, an ellipse, a regular polygon with other than four corners.
+    /// Round in some way: a circle, an ellipse, a regular polygon other than a square.
     Tube,
 }
 
-/// What an arm of a fork is.
+/// Classifies an arm of a fork.
 pub(super) fn classify_arm(arm: &ArmFacts) -> Arm {
     if arm.depth < 2.0 * DEEP * arm.radius {
         Arm::Stub
@@ -215,8 +216,8 @@ pub(super) fn classify_arm(arm: &ArmFacts) -> Arm {
     }
 }
 
-/// Whether tubes meet where the given arms do, widest first and without stubs: three or more, of which one that is not the widest is
-/// a tube.
+/// Returns `true` if tubes meet at the given arms, sorted widest first and without stubs: three or more, of which one
+/// that is not the widest is a tube.
 pub(super) fn is_fork(arms: &[Arm]) -> bool {
     arms.len() >= 3 && arms[1..].contains(&Arm::Tube)
 }
@@ -255,7 +256,7 @@ mod tests {
 
     type Change = fn(&mut LimbFacts);
 
-    /// Changes a tube, row by row, and compares what it is then.
+    /// Changes a tube, row by row, and compares the kind that results.
     fn check(rows: &[(&str, Change, LimbKind)]) {
         for (what, change, expected) in rows {
             let mut limb = tube();
@@ -302,7 +303,7 @@ mod tests {
             // A dead end.
             ("a door to a hall", |l| l.exits = 2.0, LimbKind::Neck),
             ("a crack to a hall", |l| l.exits = 0.03, BRANCH),
-            // No slit.
+            // Not a slit.
             (
                 "under a bed",
                 |l| l.mouths[0] = slit(1.0),

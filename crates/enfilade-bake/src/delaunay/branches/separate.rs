@@ -1,4 +1,4 @@
-//! Separating forks: the arms become branches; the widest arm keeps the middle of the fork.
+//! Separates forks: the arms become branches; the widest arm keeps the middle of the fork.
 
 use std::cmp::Reverse;
 use std::collections::btree_map::Entry;
@@ -26,13 +26,13 @@ impl TubeRegions<'_> {
         }
     }
 
-    /// Closes the mouths of a fork's arms but for the widest: arms and middle are flooded at once, and the links where two floods
-    /// meet are closed.
+    /// Closes the mouths of a fork's arms, except the widest: floods arms and middle at once, and closes the links
+    /// where two floods meet.
     fn close_mouths(&self, fork: &Fork, closed: &mut BTreeSet<u32>) {
         let region = self.owner[fork.part as usize];
         let center = self.centers[fork.part as usize];
         let reach = reach(fork.removed, fork.radius);
-        // Arms count from 1 on; the middle, and with it the widest arm and the corridors, is 0.
+        // Arms have labels from 1 on; the middle has 0, and so have the widest arm and the corridors.
         let mut label: BTreeMap<u32, u32> = fork.middle.iter().map(|&t| (t, 0)).collect();
         for (i, arm) in fork.arms.iter().enumerate() {
             let l = if arm.kind == Arm::Tube { i as u32 } else { 0 };
@@ -69,7 +69,8 @@ impl TubeRegions<'_> {
         }
     }
 
-    /// Divides a region along closed links: a piece that holds an arm becomes a branch, unless it holds the widest ball.
+    /// Divides a region along closed links: a piece that contains an arm becomes a branch, unless it contains the
+    /// widest ball.
     fn divide(&mut self, region: u32, closed: &BTreeSet<u32>, forks: &[Fork]) {
         let parts = std::mem::take(&mut self.regions[region as usize].parts);
         let places = parts.iter().enumerate();
