@@ -19,7 +19,7 @@ fn user_seconds() -> f64 {
     t.tv_sec() as f64 + t.tv_usec() as f64 * 1e-6
 }
 
-/// Not known here.
+/// Unknown on this platform.
 #[cfg(not(unix))]
 fn user_seconds() -> f64 {
     f64::NAN

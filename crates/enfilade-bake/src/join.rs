@@ -1,5 +1,5 @@
-//! Joins what belongs together: a shallow void and the room below it, although no opening joins
-//! them, and regions that no plane parts.
+//! Joins cells that belong together: a shallow void and the room below it, although no opening connects
+//! them, and regions that no plane separates.
 
 use std::collections::BTreeMap;
 
@@ -9,11 +9,11 @@ use enfilade_geom::DVec3;
 use crate::complex::{Complex, Contact, LeafCells, Partition, Vote};
 use crate::structure::OUTDOORS;
 
-/// Marks the label of a void; the rest of the label is the region that the void belongs to.
+/// Bit that marks the label of a void; the other bits are the region that the void belongs to.
 pub(crate) const VOID: u32 = 1 << 31;
 
-/// Gives every cell that goes by a void's label to the largest cell of its region, and numbers the
-/// cells anew. Voids that have grown into something with portals stay as they are.
+/// Merges each cell with a void's label into the largest cell of its region, and renumbers the cells.
+/// Voids that have grown and now have portals stay as they are.
 pub(crate) fn join_voids(partition: &mut Partition) {
     let n = partition.label_of_cell.len();
     let mut home_of_label: BTreeMap<u32, u32> = BTreeMap::new();
@@ -87,15 +87,15 @@ fn renumber_locator(locator: &mut Locator, number: &[u32]) {
     }
 }
 
-/// Regions that leak into each other over more than this, and over more than their candidates cover,
-/// have no opening between them. [Units: wu²]
+/// Regions that touch outside their candidates over more than this area, and over more than the
+/// candidates cover, have no opening between them. [Units: wu²]
 const MAX_LEAK: f64 = 1.0;
 
-/// Gives regions that no plane parts one label, in the votes and the voids; whether there were any.
+/// Gives regions that no plane separates one label, in the votes and the voids. Returns `true` if there were any.
 ///
-/// A portal is planar. Where two regions meet in the open, not in their candidates (over a flight of
-/// stairs, say), the border between them would follow whatever planes the cell complex happens to
-/// have: dozens of portals that mean nothing. Such regions are one room.
+/// A portal is planar. Where two regions meet in the open, outside their candidates (over a flight of
+/// stairs, say), the border between them would follow arbitrary planes of the cell complex: dozens of
+/// meaningless portals. Such regions are one room.
 pub(crate) fn join_unparted(
     complex: &Complex<'_>,
     cells: &LeafCells,
@@ -111,7 +111,7 @@ pub(crate) fn join_unparted(
             sum.beside += contact.beside;
         }
     }
-    // The lesser label stands for both; pairs ascend, so chains end in the least of all.
+    // The smaller label stands for both. Pairs ascend, so chains end in the smallest label of all.
     let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
     for (pair, contact) in between {
         // A model full of holes must not lose its rooms to the outdoors.

@@ -1,9 +1,8 @@
-//! Which primitives can share a vertex buffer.
+//! Vertex layouts: primitives with the same layout can share a vertex buffer.
 
 use enfilade_geom::scene::Primitive;
 
-/// Which attributes a primitive carries: normals, tangents, sets of texture coordinates, colors. Primitives that carry
-/// different ones cannot share a vertex buffer.
+/// Attributes of a primitive: has normals, has tangents, number of texture coordinate sets, has colors.
 pub(crate) type Layout = (bool, bool, usize, bool);
 
 pub(crate) fn layout_of(p: &Primitive) -> Layout {

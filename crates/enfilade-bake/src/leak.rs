@@ -1,12 +1,12 @@
-//! The leak doctor: the way from air that should be a room to the outdoors, where it is widest.
+//! The leak doctor: the widest path to the outdoors from air that should be a room.
 //!
-//! Compilers of levels end with a trail of points when a map leaks (`qbsp` of Quake wrote `.pts` files): any way out will do, since
-//! a sealed map has none. A model of a building has doors, so that here the way matters: of all ways out the one through
-//! which the largest ball passes ([`widest_path`]), the shortest among those. Its narrowest place is what a wall, a
-//! door leaf or a smaller hole would have to close first.
+//! Level compilers report a leak as a trail of points (Quake's `qbsp` wrote `.pts` files). Any way out will do there,
+//! since a sealed map has none. A building has doors, so the choice matters here: of all paths to the outdoors, the one
+//! through which the largest ball passes ([`widest_path`]), and the shortest among those. Its narrowest place is the
+//! first that a wall, a door leaf or a smaller hole would have to close.
 //!
-//! Works on a grid of voxels of its own, the same that the watershed has, so that it is there for any builder.
-//! Holes narrower than about two voxels are closed in it.
+//! Works on its own voxel grid, equal to the watershed's, so that it works with any builder.
+//! Holes narrower than about two voxels count as closed.
 
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, DVec3};
@@ -20,63 +20,62 @@ use crate::voxel::{
 use crate::budget::n_structural;
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
-/// A way from air that should be a room to the outdoors, as wide as can be.
+/// The widest path to the outdoors from air that should be a room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeakTrail {
-    /// Corners of the way, from the middle of the room to the edge of the air around the scene. It touches no
+    /// Vertices of the path, from the middle of the room to the edge of the air around the scene. It touches no
     /// structure, door leaf or pane. [Units: wu]
     pub points: Vec<DVec3>,
-    /// Where it is narrowest, one of its corners; of a long narrow stretch the outer end. [Units: wu]
+    /// The narrowest place of the path, one of its vertices; the outer end of a long narrow stretch. [Units: wu]
     pub narrowest: DVec3,
-    /// Diameter of the largest ball that passes there, two voxels less at worst. [Units: wu]
+    /// Diameter of the largest ball that passes there; at worst two voxels too small. [Units: wu]
     pub width: f64,
-    /// Where it comes out of the last air that is enclosed like a room, one of its corners. The narrowest place
-    /// is not beyond. [Units: wu]
+    /// The point where the path leaves the last air that is enclosed like a room, one of its vertices. The narrowest
+    /// place is never beyond it. [Units: wu]
     pub exit: DVec3,
     /// Diameter of the largest ball around its first point. [Units: wu]
     pub room_width: f64,
 }
 
 impl LeakTrail {
-    /// How long the way is. [Units: wu]
+    /// Returns the length of the path. [Units: wu]
     #[must_use]
     pub fn length(&self) -> f64 {
         self.points.windows(2).map(|p| p[0].distance(p[1])).sum()
     }
 
-    /// Whether the way is nowhere much narrower than the room that it begins in, so that it passes no hole but a wall, floor
-    /// or roof that is not there.
+    /// Returns `true` if the path is nowhere much narrower than its room: a wall, floor or roof is missing.
     #[must_use]
     pub fn is_wide_open(&self) -> bool {
         self.width >= WIDE_OPEN * self.room_width
     }
 }
 
-/// Share of a room's width from which on an opening is as wide as the room; what voxels round away is below it.
+/// Share of a room's width from which on an opening counts as wide as the room. It allows for voxel rounding.
 const WIDE_OPEN: f64 = 0.85;
-/// A point in matter is taken for the free voxel nearest to it within so many. [Units: vx]
+/// A point inside matter moves to the nearest free voxel within this distance. [Units: vx]
 const NUDGE: usize = 3;
 
-/// Why there is no trail.
+/// The reason why there is no trail.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoTrail {
-    /// Nothing structural, settings out of limits, or too many voxels.
+    /// Nothing structural, invalid settings, or too many voxels.
     #[error(transparent)]
     Bake(#[from] BakeError),
-    /// The point is not among the voxels.
+    /// The point lies outside the voxel grid.
     #[error(
-        "the point {:.2} {:.2} {:.2} lies beyond the scene; give one in the room, in meters and with y up, as the world \
-         has it", .point.x, .point.y, .point.z
+        "the point {:.2} {:.2} {:.2} lies outside the scene; give a point in the room, in meters and with y up, as in \
+         the world", .point.x, .point.y, .point.z
     )]
     Outside {
         /// The point. [Units: wu]
         point: DVec3,
     },
-    /// There is no air where the point is.
+    /// There is no air at the point.
     #[error(
-        "the point {:.2} {:.2} {:.2} lies in a wall or narrower air than the voxels of {voxel:.2} m show; give one in the \
-         middle of the room", .point.x, .point.y, .point.z
+        "the point {:.2} {:.2} {:.2} lies in a wall or in air too narrow for voxels of {voxel:.2} m; give a point in \
+         the middle of the room", .point.x, .point.y, .point.z
     )]
     InMatter {
         /// The point. [Units: wu]
@@ -86,32 +85,32 @@ pub enum NoTrail {
     },
     /// Nothing leaks.
     #[error(
-        "nothing leaks: the air around {:.2} {:.2} {:.2} is closed on all sides, but for holes narrower than {hole:.2} m; \
-         door leaves and panes count as closed", .from.x, .from.y, .from.z
+        "nothing leaks: the air around {:.2} {:.2} {:.2} is closed on all sides, except for holes narrower \
+         than {hole:.2} m; door leaves and panes count as closed", .from.x, .from.y, .from.z
     )]
     Closed {
-        /// Where a way was looked for. [Units: wu]
+        /// The start of the search. [Units: wu]
         from: DVec3,
-        /// Narrower holes are not in the grid. [Units: wu]
+        /// Width below which holes are closed in the grid. [Units: wu]
         hole: f64,
     },
-    /// No air is there that anybody would call a room.
+    /// No air is enclosed like a room.
     #[error(
-        "no air as wide as a room that is open to outdoors has walls, a floor or a ceiling on four of its six sides"
+        "no air that is open to outdoors and as wide as a room has walls, floor or ceiling on four of its six sides"
     )]
     NothingEnclosed,
 }
 
-/// Finds the widest way to the outdoors from `from`, or else from the middle of the largest air that is enclosed on four
-/// sides or more, open to outdoors, and as wide as a room ([`MergeSettings::min_radius`](crate::MergeSettings)).
-/// A point is moved to the middle of its surroundings first, lest its own distance to a wall be the narrowest.
-/// [Units: wu]
+/// Finds the widest path to the outdoors from `from`. [Units: wu] Without `from`, starts in the middle of the largest
+/// air that is enclosed on at least four sides, open to the outdoors, and as wide as a room
+/// ([`MergeSettings::min_radius`](crate::MergeSettings)).
+/// First moves the start to the middle of its surroundings, so that it is not itself the narrowest place.
 ///
-/// Deterministic. Linear in voxels, in triangles about; takes up to 5 bytes a voxel while it runs, and 16 for each voxel of a
-/// front. Uses the voxel size of a bake by watershed with the same settings.
+/// Deterministic. Linear in voxels and about linear in triangles; takes up to 5 bytes a voxel, and 16 for each voxel of
+/// a front. Uses the voxel size of a watershed bake with the same settings.
 ///
 /// # Errors
-/// When there is nothing to tell, or the budget is spent: see [`NoTrail`].
+/// If there is no trail, or the budget is spent: see [`NoTrail`].
 pub fn find_leak_trail(
     scene: &Scene,
     config: &BakeConfig,
@@ -129,7 +128,7 @@ pub fn find_leak_trail(
     }
     let frame = Frame::of(&matter);
     let grid = config.grid(&bounds_of(&frame.triangles_to_grid(&matter)), matter.len())?;
-    // Leaves that stand open, too: a room ends at its doorways.
+    // Includes leaves that stand open: a room ends at its doorways.
     matter.extend(plates(scene).concat());
     let matter = frame.triangles_to_grid(&matter);
     context.grant_voxels(grid.n_voxels() as u64);
@@ -172,7 +171,7 @@ pub fn find_leak_trail(
     })
 }
 
-/// The free voxel nearest to a point of the grid, ties by index.
+/// Returns the free voxel nearest to a point of the grid; ties go to the lower index.
 fn free_voxel(grid: &Grid, distances: &[u16], at: DVec3, point: DVec3) -> Result<usize, NoTrail> {
     let here = grid.voxel_at(at).ok_or(NoTrail::Outside { point })?;
     let around = |k: usize| here[k].saturating_sub(NUDGE)..(here[k] + NUDGE + 1).min(grid.dims[k]);
@@ -198,9 +197,9 @@ fn free_voxel(grid: &Grid, distances: &[u16], at: DVec3, point: DVec3) -> Result
     })
 }
 
-/// The last voxel of the path in air that is enclosed like a room; the narrowest where that comes later.
+/// Returns the index of the path's last voxel in air enclosed like a room, or of the narrowest if that is later.
 fn exit_of(path: &WidestPath, enclosure: &[u8]) -> usize {
-    // Before a window even the middle of a room is open on one side.
+    // In front of a window even the middle of a room is open on one side.
     let of_room = enclosure[path.voxels[0]].clamp(*ENCLOSED.start(), ENCLOSED.end() - 1);
     let last = path
         .voxels
@@ -210,8 +209,8 @@ fn exit_of(path: &WidestPath, enclosure: &[u8]) -> usize {
     last.max(path.narrowest)
 }
 
-/// Diameter of the largest ball about voxel `i` of the path, its middle moved straight across the path by up to a voxel, and
-/// no farther than there is air around. [Units: wu]
+/// Returns the diameter of the largest ball around voxel `i` of the path. Its center may move across the path by up to
+/// a voxel, but not beyond the air around it. [Units: wu]
 fn width_at(grid: &Grid, bvh: &Bvh, path: &WidestPath, i: usize) -> f64 {
     let center = |i: usize| {
         let [x, y, z] = grid.coords(path.voxels[i]);
@@ -232,5 +231,5 @@ fn width_at(grid: &Grid, bvh: &Bvh, path: &WidestPath, i: usize) -> f64 {
     2.0 * widest
 }
 
-/// Places on each side that are tried within a voxel.
+/// Positions tried on each side within a voxel.
 const STEPS: i32 = 4;

@@ -1,15 +1,15 @@
 //! Finds the rooms and doorways of a scene.
 //!
-//! Start with [`bake()`]: a method *proposes* where rooms and their openings are, and the exact cell complex *realizes* the
-//! proposal, so that the promises hold whatever the method missed.
+//! Start with [`bake()`]: a method *proposes* rooms and their openings, and the exact cell complex *realizes* the
+//! proposal, so that the guarantees hold even where the method missed something.
 //!
-//! | room | question |
+//! | module | purpose |
 //! | --- | --- |
-//! | `structure` | what is there: walls, stairs, door leaves and panes, slabs; where an opening is a pinch |
-//! | [`watershed`], [`bsp`], [`delaunay`] | where do rooms end: three methods, none of which knows another |
-//! | [`complex`] | what is open: convex leaves and the facets between them, exactly |
-//! | `realize`, `assemble` | which leaves are a cell, what each cell sees: the world |
-//! | [`simplify`], [`bound`], [`edit`] | a world, changed |
+//! | `structure` | the input: walls, stairs, door leaves and panes, slabs; which openings are a pinch |
+//! | [`watershed`], [`bsp`], [`delaunay`] | where rooms end: three methods, independent of each other |
+//! | [`complex`] | which space is open: convex leaves and the facets between them, exactly |
+//! | `realize`, `assemble` | the world: which leaves form a cell, which geometry each cell sees |
+//! | [`simplify`], [`bound`], [`edit`] | changes to a finished world |
 //! | [`leak`] | where a model is open that should be closed |
 
 mod assemble;

@@ -1,4 +1,4 @@
-//! How cells are found, and what chooses.
+//! The methods that find cells, and the choice among them.
 
 use enfilade_geom::Allowance;
 use enfilade_geom::scene::Scene;
@@ -6,11 +6,11 @@ use enfilade_geom::scene::Scene;
 use crate::structure::{Frame, Stairs, Structure};
 use crate::{BakeError, Stage};
 
-/// How cells are found.
+/// A method that finds cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// The partition where all structure is made of brushes, the watershed for everything else; tetrahedra where that finds
-    /// one cell or none in a vessel: a surface that is curved and closed but for its ends, which may have branches.
+    /// BSP if all structure is made of brushes, else the watershed. Delaunay if the watershed finds at most one cell in
+    /// a vessel: a curved surface, closed except at its ends, that may branch.
     #[default]
     Auto,
     /// Voxels, distances, watershed: [`crate::watershed`].
@@ -22,7 +22,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Its name in files and on the command line.
+    /// Returns the name in files and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -33,7 +33,7 @@ impl Method {
         }
     }
 
-    /// What a bake by it goes through, in order; nothing before [`Method::Auto`] has chosen.
+    /// Returns the stages of a bake with this method, in order; none for [`Method::Auto`], which chooses first.
     #[must_use]
     pub fn stages(self) -> &'static [Stage] {
         use Stage::{
@@ -53,7 +53,7 @@ impl Method {
         }
     }
 
-    /// The method that is asked for or fits a scene, and why.
+    /// Returns this method, or the one that fits the scene for [`Method::Auto`], and the reason.
     pub(crate) fn choose(self, scene: &Scene) -> (Self, String) {
         match self {
             Self::Auto if scene.solids.is_empty() => (
@@ -64,11 +64,11 @@ impl Method {
                 Self::Bsp,
                 format!("the structure is made of {} brushes", scene.solids.len()),
             ),
-            asked => (asked, "asked for".to_owned()),
+            asked => (asked, "as requested".to_owned()),
         }
     }
 
-    /// The structure of a scene as this method sees it.
+    /// Returns the structure of a scene as this method uses it.
     pub(crate) fn structure_of<'a>(
         self,
         scene: &'a Scene,
@@ -80,7 +80,7 @@ impl Method {
             Stairs::Apart
         };
         match self {
-            // Voxels lie along the walls, however the building is turned.
+            // Voxels follow the walls, however the building is turned.
             Self::Watershed | Self::Auto => Structure::of(scene, Frame::of, stairs, allowance),
             Self::Bsp | Self::Delaunay => Structure::of(scene, |_| Frame::SCENE, stairs, allowance),
         }

@@ -1,4 +1,4 @@
-//! What a bake gives.
+//! The result of a bake.
 
 use std::time::Duration;
 
@@ -7,34 +7,34 @@ use enfilade_cpg::World;
 use crate::complex::Leak;
 use crate::{Method, Stage};
 
-/// What a bake gives besides the world.
+/// The world and a report on how it was made.
 #[derive(Clone, Debug)]
 pub struct BakeOutput {
     /// Cells, portals, geometry.
     pub world: World,
-    /// What found the cells.
+    /// The method that found the cells.
     pub method: Method,
-    /// How fine it looked.
+    /// The builder's resolution.
     pub resolution: Resolution,
     /// Wall time of each stage.
     pub times: Vec<(Stage, Duration)>,
-    /// Work that each stage spent from the [`Budget`](crate::Budget), in units of about 100 ns. Depends on no clock.
+    /// Work that each stage spent from the [`Budget`](crate::Budget), in units of about 100 ns. Uses no clock.
     pub work: Vec<(Stage, u64)>,
-    /// Where cells meet though no opening was foreseen: cracks and holes of the model.
+    /// Places where cells meet without a designed opening: cracks and holes of the model.
     pub leaks: Vec<Leak>,
-    /// What the builder assumed or decided in doubt, one sentence each.
+    /// Assumptions and doubtful decisions of the builder, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl BakeOutput {
-    /// How many cells are indoors.
+    /// Returns the number of indoor cells.
     #[must_use]
     pub fn n_indoors(&self) -> usize {
         self.world.graph.indoor_cells().count()
     }
 }
 
-/// How fine a builder looked.
+/// Resolution of a builder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
     /// The watershed: cubes.

@@ -1,4 +1,4 @@
-//! What a builder proposes: where rooms are and where portals may be. [`realize`](crate::realize) makes it exact.
+//! A builder's proposal: rooms and possible portals. [`realize`](crate::realize) makes it exact.
 
 use std::collections::BTreeMap;
 
@@ -8,31 +8,31 @@ use crate::Resolution;
 use crate::complex::{LabelSettings, Vote};
 use crate::structure::Candidate;
 
-/// Rooms and openings as a builder found them, where the scene has them.
+/// Rooms and openings that a builder found, in scene coordinates.
 pub(crate) struct Proposal {
-    /// What is to be parted into cells.
+    /// The box to divide into cells.
     pub(crate) bounds: Aabb,
     /// Candidate portals.
     pub(crate) candidates: Vec<Candidate>,
-    /// Points that are known to be in a region.
+    /// Points known to lie in a region.
     pub(crate) votes: Vec<Vote>,
-    /// Points in shallow voids, each with the region that it belongs to though no opening joins them.
+    /// Points in shallow voids, each with its region, although no opening connects the two.
     pub(crate) voids: Vec<(DVec3, u32)>,
     /// How votes become cells.
     pub(crate) label: LabelSettings,
-    /// Whether regions that no plane parts are joined: see [`crate::join::join_unparted`].
+    /// Joins regions that no plane separates: see [`crate::join::join_unparted`].
     pub(crate) joins_unparted: bool,
     /// Numbers for the statistics of the file.
     pub(crate) counts: Vec<(&'static str, f64)>,
-    /// What was assumed or decided in doubt, one sentence each.
+    /// Assumptions and doubtful decisions, one sentence each.
     pub(crate) notes: Vec<String>,
-    /// The settings that it went by, for the provenance of the file.
+    /// The settings used, for the provenance of the file.
     pub(crate) settings: BTreeMap<String, String>,
     pub(crate) resolution: Resolution,
 }
 
 impl Proposal {
-    /// One without candidates.
+    /// Makes a proposal without candidates.
     pub(crate) fn new(bounds: Aabb, votes: Vec<Vote>) -> Self {
         Self {
             bounds,

@@ -1,5 +1,5 @@
-//! From a proposal to a world: space cut into convex cells, exactly; cells by votes; portals where cells are open to each
-//! other; geometry to the cells that see it. The same for all builders.
+//! From a proposal to a world: an exact cut of space into convex leaves, cells by votes, portals where cells are open
+//! to each other, and geometry assigned to the cells that see it. The same for all builders.
 
 use std::collections::BTreeSet;
 
@@ -14,10 +14,10 @@ use crate::proposal::Proposal;
 use crate::structure::Structure;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
 
-/// Makes a world of what a method proposes.
+/// Turns a method's proposal into a world.
 ///
 /// # Errors
-/// When the caller cancels.
+/// If the caller cancels.
 pub(crate) fn realize(
     structure: Structure<'_>,
     method: Method,
@@ -26,7 +26,7 @@ pub(crate) fn realize(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin(Stage::Complex)?;
-    // Exact, whatever candidates the method has fitted there.
+    // Exact, independent of the candidates that the method fitted there.
     let to_scene = |p: DVec3| structure.frame.to_scene(p);
     let missing: Vec<Triangle> = structure
         .missing(config)
@@ -37,7 +37,7 @@ pub(crate) fn realize(
     let hole = config.smallest_hole.resolved(structure.misfit);
     if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
         proposal.notes.push(format!(
-            "triangles that should meet miss each other: gaps up to {:.0} mm are closed instead of {:.0} (--smallest-hole)",
+            "triangles that should meet do not: closing gaps up to {:.0} mm instead of {:.0} (--smallest-hole)",
             hole.gap() * 1e3,
             SmallestHole::LEAST * 1e3
         ));
@@ -105,7 +105,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     while *joins_unparted && join_unparted(complex, &cells, votes, voids) {
         cells = complex.label(votes, label);
     }
-    // Voids that rays found above ceilings and no room's votes reached.
+    // Voids that rays found above ceilings and that no room's votes reached.
     let unreached: Vec<Vote> = std::mem::take(voids)
         .into_iter()
         .filter(|(p, _)| complex.cell_at(&cells, *p).is_none())
@@ -121,7 +121,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     let n = votes.len();
     votes.extend(unreached);
     cells = complex.label(votes, label);
-    // What opens to something is a cavity of the construction, not a void: left as it was.
+    // A void that opens to something is a cavity of the construction: left as it was.
     let contacts = complex.contacts(&cells);
     let opening: BTreeSet<u32> = contacts.into_keys().flatten().collect();
     let mut rest = votes.split_off(n);
@@ -140,7 +140,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     partition
 }
 
-/// Hands out the geometry, and says how the world came to be.
+/// Assigns the geometry and records the provenance of the world.
 fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
     let n_detail = cut.scene.triangle_sources(Role::Detail).count();
     let seals = &cut.partition.seals;
@@ -164,7 +164,7 @@ fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
     assemble(cut, provenance, statistics)
 }
 
-/// FNV-1a over the triangles and settings, as 16 hexadecimal digits.
+/// Returns the FNV-1a hash of the triangles and settings, as 16 hexadecimal digits.
 fn input_hash(
     triangles: &[Triangle],
     settings: &std::collections::BTreeMap<String, String>,

@@ -1,41 +1,41 @@
 //! The steps of a bake.
 
-/// A step of a bake; which there are, [`Method::stages`](crate::Method::stages) says.
+/// A step of a bake; [`Method::stages`](crate::Method::stages) lists the steps of each method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Stage {
-    /// Structural triangles, told from stairs; a bounding volume hierarchy of them.
+    /// Structural triangles, separated from stairs, with a bounding volume hierarchy.
     Structure,
     /// Watershed: triangles to voxels.
     Voxelize,
-    /// Watershed: distance of each voxel of air from the next surface.
+    /// Watershed: distance of each air voxel to the nearest surface.
     Distance,
-    /// Watershed: the flood, which ends with basins.
+    /// Watershed: the flood, which yields basins.
     Flood,
     /// Watershed: basins merged into rooms.
     Rooms,
-    /// Partition: leaves and the portals between them.
+    /// BSP: leaves and the portals between them.
     Tree,
-    /// Partition: separators, and the cells that they part.
+    /// BSP: separators, and the cells between them.
     Separators,
     /// Delaunay: tetrahedra between the surfaces.
     Tetrahedra,
-    /// Delaunay: cells of tetrahedra joined into rooms.
+    /// Delaunay: tetrahedral cells joined into rooms.
     Decimation,
     /// A plane for each opening.
     Candidates,
     /// Space cut into convex leaves.
     Complex,
-    /// Leaves divided among cells, and the portals between these.
+    /// Leaves divided among cells, and the portals between the cells.
     Partition,
-    /// Geometry to the cells that see it.
+    /// Geometry assigned to the cells that see it.
     Geometry,
-    /// After a bake or before: the way out of a room that leaks, see [`crate::leak`].
+    /// Before or after a bake: the way out of a room that leaks, see [`crate::leak`].
     WayOut,
 }
 
 impl Stage {
-    /// Its name in tables of times.
+    /// Returns the name in tables of times.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

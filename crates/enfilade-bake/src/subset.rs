@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::Primitive;
 
-/// The triangles of a primitive that `indices` list, with the vertices that they use.
+/// Returns the triangles of a primitive listed by `indices`, with the vertices that they use.
 pub(crate) fn subset_of(p: &Primitive, indices: &[u32]) -> Primitive {
     let mut number: BTreeMap<u32, u32> = BTreeMap::new();
     let mut used: Vec<usize> = Vec::new();

@@ -1,4 +1,4 @@
-//! Whether a scene is a vessel: a surface that is curved nearly everywhere, and closed but for its ends.
+//! Detects vessels: surfaces that are curved nearly everywhere, and closed except at their ends.
 
 use std::collections::HashMap;
 
@@ -7,23 +7,23 @@ use enfilade_geom::{DVec3, Sets, triangle_area_normal};
 
 /// Larger scenes are left to the watershed, which takes seconds where tetrahedra take minutes.
 const MAX_TRIANGLES: usize = 200_000;
-/// A flat patch is a plane if it has this share of the surface: the flat patches of a scanned aorta and of a cave have 0.0007 at
-/// most, the walls of a building a hundredth.
+/// Least share of the surface for a flat patch to count as a plane: flat patches of a scanned aorta and of a cave have
+/// at most 0.0007, the walls of a building a hundredth.
 const PLANE: f64 = 0.001;
-/// Share of the surface that may lie in planes: the caps of cut vessels. Of buildings half does and more.
+/// Largest share of the surface in planes: the caps of cut vessels. Buildings have half and more.
 const FLAT: f64 = 0.2;
-/// Of the edges, the share that may have a triangle on one side only.
+/// Largest share of edges with an odd number of triangles.
 const OPEN: f64 = 0.05;
-/// Length of the sum of all area normals ÷ area, at most: that of a closed surface is 0, of a vessel that of its ends, a
-/// terrain has 0.7 and more.
+/// Largest length of the sum of all area normals ÷ area. A closed surface has 0, a vessel the share of its open ends, a
+/// terrain 0.7 and more.
 const HOLES: f64 = 0.1;
-/// Cosine of the angle between two triangles of one patch: a tenth of a degree, which single precision leaves of a
+/// Cosine of the angle between two triangles of one patch: a tenth of a degree, the single precision error of a
 /// plane in a large scene.
 const ONE_PATCH: f64 = 0.999_998_5;
 
-/// Whether the structure is closed, with an even number of triangles at each edge, but for holes that are small beside it,
-/// and hardly any of it lies in planes.
-/// `O(n)` in triangles, of which there may be [`MAX_TRIANGLES`].
+/// Returns `true` if the structure is closed, with an even number of triangles at each edge, except for holes that are
+/// small beside it, and hardly any of it lies in planes.
+/// `O(n)` in triangles; `false` above [`MAX_TRIANGLES`].
 pub(crate) fn is_vessel(scene: &Scene) -> bool {
     let triangles: Vec<_> = scene
         .triangle_sources(Role::Structural)
@@ -33,7 +33,7 @@ pub(crate) fn is_vessel(scene: &Scene) -> bool {
     if triangles.is_empty() || triangles.len() > MAX_TRIANGLES {
         return false;
     }
-    // Corners are equal where their places are: files repeat them for normals and materials.
+    // Vertices are equal if their positions are: files repeat them for normals and materials.
     let key = |p: DVec3| (p + 0.0).to_array().map(f64::to_bits);
     let mut sides: HashMap<_, Vec<usize>> = HashMap::new();
     for (t, corners) in triangles.iter().enumerate() {
@@ -49,7 +49,7 @@ pub(crate) fn is_vessel(scene: &Scene) -> bool {
     let mut n_open = 0;
     for around in sides.values() {
         n_open += around.len() % 2;
-        // Sheets that touch along an edge are no planes that go on there.
+        // Sheets that touch along an edge are not planes that continue there.
         let &[a, b] = &around[..] else { continue };
         if unit(a).dot(unit(b)) > ONE_PATCH {
             patches.join(a as u32, b as u32);
@@ -61,7 +61,7 @@ pub(crate) fn is_vessel(scene: &Scene) -> bool {
     }
     let all: f64 = areas.iter().sum();
     let planes: f64 = areas.iter().filter(|&&a| a >= PLANE * all).sum();
-    // The area normals of holes are what those of the surface lack to zero.
+    // The area normals of the holes and of the surface add up to zero.
     let holes = normals.iter().sum::<DVec3>().length();
     planes <= FLAT * all && holes <= HOLES * all && n_open as f64 <= OPEN * sides.len() as f64
 }

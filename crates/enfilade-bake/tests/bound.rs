@@ -1,4 +1,4 @@
-//! An upper bound on what cells cost: met by cuts, by one cost model, or said why not. Covers B7 and P3.
+//! An upper bound on the cost of cells: met by cuts, with one cost model, or reported as missed. Covers B7 and P3.
 
 use enfilade_bake::bound::{Reason, keep_bounds};
 use enfilade_bake::simplify::{CostModel, SimplifySettings, costs};
@@ -21,7 +21,7 @@ fn most(world: &World, cost: &CostModel) -> f64 {
     costs(world, cost).into_iter().fold(0.0, f64::max)
 }
 
-/// A cost model at random: triangles or area, with or without objects, materials cheap or dear.
+/// A random cost model: triangles or area, with or without objects, materials cheap or expensive.
 fn model(rng: &mut Rng, world: &World) -> CostModel {
     let mut cost = CostModel {
         area: rng.unit(),

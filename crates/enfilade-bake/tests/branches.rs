@@ -1,4 +1,4 @@
-//! Branches of tubes through the Delaunay builder: a cell each, though nothing pinches them.
+//! Branches of tubes through the Delaunay builder: one cell each, though nothing pinches them.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use enfilade_testkit::{Generated, Tube, tubes};
 use enfilade_verify::{VerifyOptions, verify_world};
 use proptest::prelude::*;
 
-/// A tube that leaves the axis of another at `foot`, in the direction `away`, and ends `length` from there.
+/// A tube that leaves the axis of another at `foot`, in the direction `away`, and has this `length` from there.
 fn side_tube(foot: DVec3, away: DVec3, length: f64, radius: f64) -> Tube {
     let away = away.normalize();
     Tube {
@@ -26,7 +26,7 @@ fn trunk(half: f64, radius: f64) -> Tube {
     }
 }
 
-/// The room of each point after the default stop.
+/// Returns the room of each point after the default stop.
 fn rooms_at(g: &Generated, scale: f64, points: &[DVec3]) -> Vec<u32> {
     let mut config = BakeConfig::of(Method::Delaunay);
     config.min_opening *= scale;
@@ -49,7 +49,7 @@ fn vessel() -> (Vec<Tube>, [DVec3; 3], DVec3) {
         side_tube(DVec3::X * -0.5, DVec3::new(0.7, 0.0, 1.0), 5.5, 0.5),
         side_tube(DVec3::X * 3.0, DVec3::new(-0.6, -0.8, -0.3), 5.0, 0.4),
     ];
-    // Not twice as deep as wide.
+    // Less than twice as deep as wide.
     let stub = side_tube(DVec3::X * 3.5, DVec3::Y, 2.7, 0.5);
     let tips = sides.map(|t| t.ends[1]);
     let mut all = vec![trunk(6.0, 1.0)];
@@ -58,7 +58,7 @@ fn vessel() -> (Vec<Tube>, [DVec3; 3], DVec3) {
     (all, tips, stub.ends[1])
 }
 
-// Covers V10, and T6: once decimation has left rooms, they are divided where branches leave them, and decimated again.
+// Covers V10, and T6: the rooms left by decimation are divided where branches leave them, and decimated again.
 #[test]
 fn side_tubes_are_cells_and_a_stub_is_none() {
     let (all, tips, stub) = vessel();
@@ -95,7 +95,7 @@ fn side_tubes_are_cells_and_a_stub_is_none() {
         let along = (tube.ends[1] - tube.ends[0]).normalize();
         let from_foot = sum / n - tube.ends[0];
         let off = from_foot - along * from_foot.dot(along);
-        // Within a diameter of where the tube's axis leaves the trunk.
+        // Within a diameter of the point where the tube's axis leaves the trunk.
         let wall = 1.0 / (1.0 - along.x * along.x).sqrt();
         let out = from_foot.dot(along) - wall;
         assert!(
@@ -118,7 +118,7 @@ fn a_neck_between_chambers_and_a_handle_are_none() {
         ends: [a, b].map(DVec3::from_array),
         radius,
     };
-    // A narrow way of nine diameters between chambers, which are two rooms: it is part of one of them.
+    // A narrow passage of nine diameters between two chambers, which are rooms: it is part of one of them.
     let neck = [
         tube([-7.0, 0.0, 0.0], [-6.0, 0.0, 0.0], 1.2),
         tube([-6.0, 0.0, 0.0], [6.0, 0.0, 0.0], 0.55),
@@ -130,7 +130,7 @@ fn a_neck_between_chambers_and_a_handle_are_none() {
     for neck in &rooms[1..3] {
         assert!([rooms[0], rooms[3]].contains(neck), "{rooms:?}");
     }
-    // A handle leaves the trunk and comes back.
+    // A handle leaves the trunk and returns to it.
     let handle = [
         trunk(4.0, 1.0),
         tube([-2.5, 0.0, 0.0], [-2.5, 3.0, 0.0], 0.5),
@@ -150,7 +150,7 @@ fn an_alcove_and_a_crevice_are_none() {
         let rooms = rooms_at(&tubes(&all, 0.2), 1.0, &[DVec3::ZERO, tip]);
         assert_eq!(rooms[0] == rooms[1], what != "tube", "{what}");
     };
-    // Half as wide as the trunk, and so many diameters deep: the bound is two.
+    // Half as wide as the trunk, and this many diameters deep: the bound is two.
     let deep = |depth: f64| side_tube(DVec3::ZERO, DVec3::Y, 1.0 + depth, 0.5);
     lies_in_the_trunk(&[deep(2.6)], deep(2.6).ends[1], "tube");
     lies_in_the_trunk(&[deep(1.9)], deep(1.9).ends[1], "alcove");
@@ -161,7 +161,7 @@ fn an_alcove_and_a_crevice_are_none() {
     lies_in_the_trunk(&slit, DVec3::Y * 3.8, "crevice");
 }
 
-/// A scene larger or smaller, about the origin.
+/// Scales a scene about the origin.
 fn times(mut g: Generated, scale: f64) -> Generated {
     let meshes = g.scene.meshes.iter_mut();
     for p in meshes.flat_map(|m| &mut m.primitives) {
@@ -176,8 +176,8 @@ proptest! {
     // Each case divides a few thousand triangles.
     #![proptest_config(ProptestConfig::with_cases(6))]
 
-    /// Two tubes that leave a trunk of radius 1 at random angles: one is a cell if it is narrow and deep, the other if
-    /// it is narrow enough, whatever the scale.
+    /// Two tubes leave a trunk of radius 1 at random angles. One is a cell if it is narrow and deep, the other if
+    /// it is narrow enough, at any scale.
     #[test]
     fn narrow_and_deep_is_a_cell(
         narrow in 0.35..0.6_f64,
@@ -189,7 +189,7 @@ proptest! {
         turn in 0.8..2.4_f64,
         scale in prop::sample::select(vec![0.01, 1.0, 40.0]),
     ) {
-        // The mouth is where the trunk's wall is, an extra bit out where the tube leans.
+        // The mouth is at the trunk's wall, slightly farther out if the tube leans.
         let one = side_tube(
             DVec3::X * -1.5,
             DVec3::new(lean, 1.0, 0.0),
@@ -214,7 +214,7 @@ proptest! {
     }
 }
 
-/// Tubes from the origin, in directions by their angles in degrees, so many meters long.
+/// Tubes from the origin, with directions as angles in degrees, `length` meters long.
 fn star(angles: &[f64], length: f64, radius: f64) -> Vec<Tube> {
     let arm = |angle: &f64| {
         let (sin, cos) = angle.to_radians().sin_cos();
@@ -241,7 +241,7 @@ fn arms_as_wide_as_their_stem_are_cells() {
         let rooms = rooms_at(&tubes(&arms, 0.12), 1.0, &tips);
         assert_eq!(n_different(&rooms), tips.len(), "{what}: {rooms:?}");
     }
-    // A bend is no fork, and neither is one with an arm that is less than two diameters long.
+    // A bend is not a fork, and neither is a junction with an arm less than two diameters long.
     let mut bend = star(&[0.0, 90.0], 5.0, 0.5);
     bend.extend(star(&[220.0], 2.0, 0.5));
     let tips: Vec<DVec3> = bend.iter().map(|t| t.ends[1]).collect();
@@ -271,7 +271,7 @@ fn arms_that_part_again_and_meet_again_are_cells() {
     let rooms = rooms_at(&tubes(&tree, 0.12), 1.0, &points);
     assert_eq!(n_different(&rooms), 7, "{rooms:?}");
     assert_eq!(rooms[3..7], rooms[7..]);
-    // A ring with a spur: there are three arms about the fork, two of which are one.
+    // A ring with a spur: three arms leave the fork, but two of them are one.
     let ring: Vec<Tube> = (0..12)
         .map(|i| {
             let at = |i: i32| (f64::from(i) * 30.0).to_radians().sin_cos();
@@ -288,7 +288,7 @@ fn arms_that_part_again_and_meet_again_are_cells() {
     assert_eq!(n_different(&rooms[..12]), 1, "{rooms:?}");
 }
 
-/// Corridors of one height that cross are one room to their architect.
+/// Crossing corridors of one height are one room to their architect.
 #[test]
 fn corridors_that_cross_are_one_room() {
     let (half, height, long) = (0.9, 2.4, 8.0);
@@ -340,7 +340,7 @@ fn corridors_that_cross_are_one_room() {
     assert_ne!(rooms[0], 0);
 }
 
-/// Tubes without what is beyond some ends of theirs.
+/// Opens tubes at some ends: removes everything beyond.
 fn opened(mut g: Generated, ends: &[(DVec3, DVec3)]) -> Generated {
     let mesh = &mut g.scene.meshes[0].primitives[0];
     let is_gone = |i: &u32| {
@@ -375,7 +375,7 @@ fn a_vessel_that_is_open_at_its_ends_is_indoors() {
             assert!(!cells.contains(&0), "{what}, {n_open} open: {cells:?}");
             let n_cells = if angles.len() == 2 { 1 } else { 3 };
             assert_eq!(cells.len(), n_cells, "{what}, {n_open} open: {cells:?}");
-            // Where the tube ends there is a portal to the outdoors, as wide as the tube.
+            // At the end of the tube there is a portal to the outdoors, as wide as the tube.
             let out: Vec<_> = graph
                 .portals
                 .iter()
@@ -384,7 +384,7 @@ fn a_vessel_that_is_open_at_its_ends_is_indoors() {
             assert_eq!(out.len(), n_open, "{what}");
         }
     }
-    // A ring is no tunnel: less than two diameters for each of its ends.
+    // A ring is not a tunnel: less than two diameters for each of its ends.
     let ring = star(&[0.0, 180.0], 1.7, 0.5);
     let end = |t: &Tube| (t.ends[1], (t.ends[1] - t.ends[0]).normalize());
     let g = opened(
@@ -398,12 +398,12 @@ proptest! {
     // Each case divides ten thousand triangles.
     #![proptest_config(ProptestConfig::with_cases(6))]
 
-    /// Three tubes of nearly one width that meet at any angles are three cells, whatever the scale; one if one of them is
-    /// shorter than two diameters, from where it leaves the others.
+    /// Three tubes of nearly one width that meet at any angles are three cells, at any scale; one cell if one of them
+    /// is shorter than two diameters, from where it leaves the others.
     #[test]
     fn where_three_tubes_meet_are_three_cells(
         angles in prop::array::uniform3((-0.9..0.9_f64, 0.0..6.3_f64)),
-        // Narrower ones are branches, and the other two a bend.
+        // With narrower ones, those are branches and the other two a bend.
         narrow in 0.8..1.0_f64,
         is_short in any::<bool>(),
         scale in prop::sample::select(vec![0.01, 1.0, 40.0]),

@@ -1,5 +1,4 @@
-//! One suite over all builders: whatever finds the cells, the world that comes out keeps the same
-//! promises.
+//! One suite over all builders: the world keeps the same guarantees whichever method finds the cells.
 //!
 //! The oracles (free lines by brute force, volumes by counting points) share no code with a builder.
 
@@ -58,11 +57,11 @@ fn keeps_promises(builder: Builder, g: &Generated) {
     assert_eq!(encode_glb(&back).unwrap(), bytes, "{what}");
 }
 
-/// A sphere of this radius fits into pieces that are looked at. [Units: wu]
+/// Only space that fits a sphere of this radius is tested. [Units: wu]
 const WIDE: f64 = 0.02;
 
-/// Steps from the middle of each opening to both sides are steps into the two cells of its portal. Returns how
-/// many openings were tried.
+/// Checks that steps from the middle of each opening to both sides end in the two cells of its portal. Returns the
+/// number of openings tested.
 fn portals_lie_between_their_cells(graph: &CellPortalGraph, what: &str) -> usize {
     let mut n = 0;
     for (i, portal) in graph.portals.iter().enumerate() {
@@ -98,7 +97,7 @@ fn portals_lie_between_their_cells(graph: &CellPortalGraph, what: &str) -> usize
     n
 }
 
-/// Points counted in each cell's box give the volume that the cell says it has.
+/// Checks the recorded volume of each cell against points counted in its box.
 fn volumes_are_what_points_say(graph: &CellPortalGraph, what: &str) {
     const N: usize = 4_000;
     for (i, cell) in graph.cells.iter().enumerate().filter(|(_, c)| !c.outdoor) {
@@ -121,7 +120,7 @@ fn volumes_are_what_points_say(graph: &CellPortalGraph, what: &str) {
     }
 }
 
-/// Cells hold all free space: where one end of a free line is in a cell, so is the other.
+/// Checks that cells contain all free space: if one end of a free line is in a cell, so is the other.
 fn free_lines_end_in_cells(g: &Generated, graph: &CellPortalGraph) {
     let triangles = structural_triangles(&g.scene);
     let bounds = Aabb::of_points(&triangles.concat());
@@ -146,8 +145,8 @@ fn free_lines_end_in_cells(g: &Generated, graph: &CellPortalGraph) {
     }
 }
 
-/// What a graph is, numbering apart: volumes of cells, and what each portal joins, with its area.
-/// Rounded to what `f32` and another order of additions leave alone.
+/// The graph without its numbering: volumes of cells, and for each portal what it joins, with its area.
+/// Rounded so that `f32` and another order of additions make no difference.
 fn shape(world: &World) -> (Vec<i64>, Vec<(i64, i64, i64)>) {
     let round = |x: f32| (f64::from(x) * 100.0).round() as i64;
     let graph = &world.graph;
@@ -176,7 +175,7 @@ macro_rules! builder_tests {
         use super::*;
 
         const BUILDER: Builder = super::$builder;
-        /// Of a tower that this builder takes seconds for.
+        /// Rooms of a tower that takes this builder seconds.
         const ROOMS: usize = $rooms;
 
         // Covers V7.

@@ -25,7 +25,7 @@ fn graph_of(mesh: Mesh) -> CellPortalGraph {
     baked.world.graph
 }
 
-/// Rooms and corridors, 2.7 m high, in plan: low and high corner (x, z).
+/// Rooms and corridors, 2.7 m high, in plan: minimum and maximum (x, z).
 fn plan(air: &[[f64; 4]]) -> CellPortalGraph {
     let voids: Vec<_> = air
         .iter()
@@ -41,7 +41,7 @@ fn n_indoors(graph: &CellPortalGraph) -> usize {
     graph.indoor_cells().count()
 }
 
-/// Where along x the portals are, ascending.
+/// Returns the positions of the portals along x, ascending.
 fn portals_at(graph: &CellPortalGraph) -> Vec<f64> {
     let middle = |outline: &[[f32; 3]]| {
         let sum: f64 = outline.iter().map(|p| f64::from(p[0])).sum();
@@ -104,7 +104,7 @@ fn corridors_that_bend_and_cross_are_one_room() {
 fn alcoves_and_doors_stay_what_they_are() {
     let alcove = plan(&[[0.0, 0.0, 6.0, 6.0], [6.0, 2.2, 8.0, 3.8]]);
     assert_eq!(n_indoors(&alcove), 1);
-    // A corridor with two chambers at it, not much wider, by doors, and open to a hall at its end.
+    // A corridor that has doors to two chambers hardly wider than itself, and opens to a hall at its end.
     let doors = plan(&[
         [0.0, 0.0, 6.0, 6.0],
         [6.0, 2.2, 16.0, 3.8],
@@ -118,7 +118,7 @@ fn alcoves_and_doors_stay_what_they_are() {
 
 #[test]
 fn a_tube_between_two_spheres_is_a_room_with_two_portals() {
-    // Radius at each place along x: spheres of 3 m at 0 and 16, a tube of 0.8 m between them.
+    // Radius at positions along x: spheres of 3 m at 0 and 16, a tube of 0.8 m between them.
     let mouth = (9.0_f64 - 0.64).sqrt();
     let ring = |x: f64, c: f64| (x, (9.0 - (x - c) * (x - c)).max(0.0).sqrt());
     let n = 24;

@@ -1,4 +1,4 @@
-//! The thesis's cases through the Delaunay builder: with the default stop, the portals that stand are
+//! The thesis's cases through the Delaunay builder: with the default stop, the remaining portals are
 //! exactly the separations of the rooms.
 
 use enfilade_bake::delaunay::{JOINED, Session, bake_session};
@@ -17,7 +17,7 @@ fn baked(g: &Generated) -> World {
     out.world
 }
 
-/// Complaints, if the rooms are not parted by exactly the openings.
+/// Returns complaints unless exactly the openings separate the rooms.
 fn problems(g: &Generated, what: &str) -> Vec<String> {
     let world = baked(g);
     let mut out = Vec::new();
@@ -28,7 +28,7 @@ fn problems(g: &Generated, what: &str) -> Vec<String> {
             g.truth.rooms.len()
         ));
     }
-    // Hairline gaps where distorted walls meet are faults of the model, and kept apart as such.
+    // Hairline gaps where distorted walls meet are faults of the model, and kept separate as such.
     let open = |p: &&enfilade_cpg::Portal| p.kind != PortalKind::Crack;
     let openings: Vec<_> = world.graph.portals.iter().filter(open).collect();
     if openings.len() != g.truth.openings.len() {
@@ -84,7 +84,7 @@ fn the_cavern_is_parted_at_its_necks_however_it_is_turned() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// The stairs stand in the hall, whose door leads outdoors; walls and roofs have insides. A gap is no portal.
+/// The stairs stand in the hall, whose door leads outdoors; walls and roofs have insides. A gap is not a portal.
 // Covers T2.
 #[test]
 fn no_room_is_lost_to_the_outdoors_and_no_solid_is_a_cell() {
@@ -101,7 +101,7 @@ fn no_room_is_lost_to_the_outdoors_and_no_solid_is_a_cell() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// All along the top of the wall between two rooms: too narrow for the least ball that is known, and nearly as open as
+/// All along the top of the wall between two rooms: too narrow for the smallest known ball, and nearly as open as
 /// their door.
 #[test]
 fn a_slit_between_rooms_is_weighed_by_its_width() {
@@ -112,13 +112,13 @@ fn a_slit_between_rooms_is_weighed_by_its_width() {
         let session = Session::begin(&g.scene, &config, &context).unwrap();
         let ahead = &session.decimation.steps[session.decimation.stop..];
         let weights: Vec<f64> = ahead.iter().map(|s| s.weight).collect();
-        // One step joins them, by way of the door: balls 1.35 in radius, and 0.45 where the widest passes.
+        // One step joins them, through the door: balls 1.35 in radius, and 0.45 for the widest that passes.
         assert_eq!(weights.len(), 1, "{width}: {weights:?}");
         assert!((2.7..3.2).contains(&weights[0]), "{width}: {weights:?}");
     }
 }
 
-/// Moves every corner by up to `reach` along each axis, equal corners alike.
+/// Moves every vertex by up to `reach` along each axis, equal vertices alike.
 fn with_noise(mut g: Generated, reach: f32) -> Generated {
     for p in g
         .scene
@@ -128,7 +128,7 @@ fn with_noise(mut g: Generated, reach: f32) -> Generated {
         .flat_map(|p| &mut p.positions)
     {
         let mut h = p.iter().fold(0x9e37_79b9_u32, |h, x| {
-            // +0 and -0 are one corner.
+            // +0 and -0 are one vertex.
             (h ^ (x + 0.0).to_bits())
                 .wrapping_mul(0x85eb_ca6b)
                 .rotate_left(13)
@@ -141,7 +141,7 @@ fn with_noise(mut g: Generated, reach: f32) -> Generated {
     g
 }
 
-/// Adds boxes to the walls of a scene, their faces outwards.
+/// Adds boxes to the walls of a scene, with their faces outwards.
 fn with_boxes(mut g: Generated, boxes: &[[[f32; 3]; 2]]) -> Generated {
     let primitive = &mut g.scene.meshes[0].primitives[0];
     primitive.normals.clear();
@@ -185,7 +185,7 @@ fn noise_and_furniture_change_nothing() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// A hall of 150 × 100 m and 12 m high, parted by a wall half a meter thick with one door of 0.8 m by 2 m: its
+/// A hall of 150 × 100 m and 12 m high, divided by a wall half a meter thick with one door of 0.8 m by 2 m: its
 /// surfaces have forty thousand times the door's area.
 #[test]
 fn a_small_door_of_a_large_hall_is_found() {
@@ -209,7 +209,7 @@ fn a_small_door_of_a_large_hall_is_found() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// Rooms that a walk counts after some steps; a bake has to come to the same.
+/// Returns the session's room count after `n` steps, which must equal that of the bake.
 fn rooms_left(g: &Generated, session: &Session, n: usize, config: &BakeConfig) -> usize {
     let context = BakeContext::new(&Silent, None);
     let out = bake_session(&g.scene, session, n, config, &context).unwrap();
@@ -228,16 +228,16 @@ fn a_person_s_choices_hold_and_steps_go_back() {
     let mut config = BakeConfig::of(Method::Delaunay);
     let mut session = Session::begin(&g.scene, &config, &context).unwrap();
     let stop = session.decimation.stop;
-    // A step forwards joins two of the rooms; back again, they are four.
+    // A step forwards joins two of the rooms; a step back makes them four again.
     assert_eq!(rooms_left(&g, &session, stop + 1, &config), 3);
     assert_eq!(rooms_left(&g, &session, stop, &config), 4);
-    // The same, decided for good.
+    // The same as a permanent choice.
     let door = session.decimation.steps[stop].position;
     config.delaunay.choices.join.push(door);
     session.decimate(&config);
     let stop = session.decimation.stop;
     assert_eq!(rooms_left(&g, &session, stop, &config), 3);
-    // And the other way round: a portal is kept that would go.
+    // The reverse: keeps a portal that would be removed.
     config.delaunay.choices.join.clear();
     config.delaunay.choices.keep.push(door);
     config.delaunay.stop = Some(4.0);
@@ -248,7 +248,7 @@ fn a_person_s_choices_hold_and_steps_go_back() {
     assert!(rooms_left(&g, &session, stop, &config) > 1);
 }
 
-/// However far ahead a portal was looked at, and however much the walls and stairs about it are no rooms.
+/// Holds however far ahead a portal is, and although much of the walls and stairs around it is not a room.
 #[test]
 fn each_portal_ahead_can_be_joined_and_the_walk_s_count_is_the_bake_s() {
     let g = stair_hall();
@@ -275,7 +275,7 @@ fn each_portal_ahead_can_be_joined_and_the_walk_s_count_is_the_bake_s() {
     }
 }
 
-/// In rooms of a few centimeters all doors are within a handbreadth.
+/// In rooms of a few centimeters, all doors are within a handbreadth.
 #[test]
 fn a_choice_is_about_one_portal_whatever_the_scale() {
     let g = gjorup_rooms(Variant::Optimised, [0.0; 3]);
@@ -292,7 +292,7 @@ fn a_choice_is_about_one_portal_whatever_the_scale() {
             let steps = &session.decimation.steps[..session.decimation.stop];
             steps.iter().filter(|s| s.weight == JOINED).count()
         };
-        // Openings are 0.45 in radius: half of that aside is about the same one, more than that about none.
+        // Openings are 0.45 in radius: half of that aside still selects the same one, more than that selects none.
         for (aside, n) in [(0.0, 1), (0.2, 1), (0.6, 0)] {
             config.delaunay.choices.join = vec![ahead[0].position + DVec3::Y * (aside * scale)];
             session.decimate(&config);
@@ -305,7 +305,7 @@ fn a_choice_is_about_one_portal_whatever_the_scale() {
 // Covers T4.
 #[test]
 fn the_weight_has_no_scale() {
-    // The same rooms eight times as large, with openings eight times as wide asked for.
+    // The same rooms eight times as large, with `min_opening` eight times as wide.
     let g = gjorup_rooms(Variant::Tessellated, [0.0; 3]);
     let mut large = g.clone();
     for m in &mut large.scene.meshes {

@@ -1,4 +1,4 @@
-//! Portals know what fills them: leaves, frames and panes, and how leaves move. FEATURES: W5.
+//! Portals know their fittings: leaves, frames and panes, and how leaves move. FEATURES: W5.
 
 use enfilade_bake::edit::add_portal;
 use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
@@ -28,7 +28,7 @@ fn transform(world: &World, detail: u32) -> DMat4 {
     DMat4::from_cols_array(&world.details[detail as usize].transform.map(f64::from))
 }
 
-/// All leaves of the house are hung open, each a mesh of its own whose origin is the hinge, from which it points along x.
+/// All leaves of the house are hung open. Each has a mesh of its own, with the hinge as origin, along x.
 #[test]
 fn each_leaf_of_a_house_turns_around_its_hinge() {
     let world = baked(&furnished_house().scene);
@@ -124,13 +124,13 @@ fn add_boxes(scene: &mut Scene, name: &str, role: Role, boxes: &[([f64; 3], [f64
     });
 }
 
-/// Two rooms of 4 × 3 m with a wall of 0.2 m between them, and a doorway of 1 × 2.1 m in it, filled by `door`, which is
-/// told along the wall, up, and through it.
+/// Two rooms of 4 × 3 m with a wall of 0.2 m between them, and a doorway of 1 × 2.1 m in it, filled by `door`, in
+/// coordinates along the wall, up, and through it.
 fn two_rooms(door: &[([f64; 3], [f64; 3])]) -> Scene {
     let mut scene = Scene::default();
     let (w, h) = (0.2, 2.6);
     let walls = [
-        // Floor and ceiling, and the four walls around.
+        // Floor and ceiling, and the four outer walls.
         ([-0.2, -0.2, -0.2], [8.4, 0.0, 3.2]),
         ([-0.2, h, -0.2], [8.4, h + 0.2, 3.2]),
         ([-0.2, 0.0, -0.2], [8.4, h, 0.0]),
@@ -192,7 +192,7 @@ fn a_leaf_in_one_piece_with_its_frame_becomes_an_object() {
     let MotionKind::Turn { through, .. } = motion.kind else {
         panic!("it slides");
     };
-    // Opposite the handle, and to the side where leaf and frame are flush.
+    // Opposite the handle, and on the side where leaf and frame are flush.
     assert!((through[2] - 1.05).abs() < 0.01, "{through:?}");
     assert!((through[0] - 4.0).abs() < 0.01, "{through:?}");
     let open = motion.at(1.0).transform_point3(DVec3::new(4.02, 1.0, 1.9));
@@ -201,7 +201,7 @@ fn a_leaf_in_one_piece_with_its_frame_becomes_an_object() {
         "it opens to the other side: {open}"
     );
     assert_eq!(motion.share_of_model(), 0.0);
-    // Each counts where it is.
+    // Each counts in the cell where it is.
     for (id, cell) in (0..).zip(&world.graph.cells) {
         let own = world.details.iter().enumerate();
         let own = own.filter(|(_, d)| d.cells.iter().any(|c| c.0 == id));
@@ -218,7 +218,7 @@ fn a_leaf_in_one_piece_with_its_frame_becomes_an_object() {
 
 #[test]
 fn a_leaf_opens_to_the_side_where_it_has_room() {
-    // In the middle of the wall, without a handle or a frame: nothing but the wardrobe tells.
+    // In the middle of the wall, without a handle or a frame: only the wardrobe decides.
     for (wardrobe, opens_to) in [([3.2, 3.8], 1.0), ([4.4, 5.0], -1.0)] {
         let mut scene = two_rooms(&[([0.0, 0.0, 0.08], [1.0, 2.1, 0.12])]);
         let block = ([wardrobe[0], 0.0, 0.8], [wardrobe[1], 2.0, 2.2]);
@@ -253,7 +253,7 @@ fn two_leaves_part_in_the_middle() {
 
 #[test]
 fn what_stands_beside_a_doorway_is_no_leaf_of_it() {
-    // A cupboard door, a picture on the wall, a table before the doorway.
+    // A cupboard door, a picture on the wall, a table in front of the doorway.
     for (what, block) in [
         ("cupboard", ([-0.9, 0.0, -0.5], [-0.05, 2.0, -0.46])),
         ("picture", ([1.1, 1.2, -0.03], [1.7, 1.8, -0.01])),

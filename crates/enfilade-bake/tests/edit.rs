@@ -1,4 +1,4 @@
-//! Portals added to finished worlds: promises kept, all else as it was, or an error that says where. Covers P4.
+//! Portals added to finished worlds: guarantees hold and the rest stays, or an error has the position. Covers P4.
 
 use enfilade_bake::edit::{AddPortalError, Added, add_portal};
 use enfilade_bake::simplify::delete_portal;
@@ -47,7 +47,7 @@ fn point_in(rng: &mut Rng, world: &World) -> DVec3 {
     b.min + b.size() * DVec3::new(rng.unit(), rng.unit(), rng.unit())
 }
 
-/// What an edit of one cell leaves alone, and that its parts make up the whole.
+/// Checks that an edit of one cell leaves all others unchanged, and that its parts add up to the whole.
 fn only_the_cell_changed(before: &World, added: &Added, rng: &mut Rng) {
     let (old, new) = (&before.graph, &added.world.graph);
     let parts = [added.cell, added.new_cell];
@@ -74,7 +74,7 @@ fn only_the_cell_changed(before: &World, added: &Added, rng: &mut Rng) {
             area(before, a),
             area(&added.world, a) + area(&added.world, b),
         );
-        // Areas are `f32`, their pieces' corners rounded once more.
+        // Areas are `f32`, and the vertices of their pieces rounded once more.
         assert!((whole - sum).abs() < 1e-3 * whole + 1e-4, "{whole} {sum}");
     }
     for p in &added.portals {
@@ -123,7 +123,7 @@ fn a_polygon_across_a_cell_parts_it_and_keeps_every_promise() {
                 n_halved += added.halved.len();
                 only_the_cell_changed(&before, &added, &mut rng);
                 holds(&added.world);
-                // Taken away again, every point is where it was.
+                // After removing it, every point is in its old cell.
                 let back = delete_portal(&added.world, added.portals[0]).unwrap().world;
                 for _ in 0..200 {
                     let p = point_in(&mut rng, &before);
@@ -138,7 +138,7 @@ fn a_polygon_across_a_cell_parts_it_and_keeps_every_promise() {
             Err(AddPortalError::DoesNotPart { cell, at }) => {
                 assert_eq!(before.graph.locator.locate(at), Some(cell), "{at}");
                 let plane = Plane::through(center, normal);
-                // Corners are moved into shared planes by up to their rounding.
+                // Vertices move into shared planes by up to their rounding.
                 assert!(plane.signed_distance(at).abs() < 1e-4);
                 assert!(!polygon.contains_in_plane(at, -1e-4), "{at} is on it");
             }
@@ -192,7 +192,7 @@ fn baked_worlds_take_portals_across_each_of_their_rooms() {
     }
 }
 
-/// One room of 4 by 4 by 3 meters or so, nothing in it.
+/// One empty room of about 4 by 4 by 3 meters.
 fn hall() -> (World, DVec3) {
     let world = room_grid(&GridParams {
         size: [1, 1, 1],
@@ -249,7 +249,7 @@ fn a_polygon_that_parts_nothing_is_refused_with_the_place() {
     let [low, high] = world.graph.cells[0]
         .aabb
         .map(|c| DVec3::from(c.map(f64::from)));
-    // Short of the ceiling by 10 cm.
+    // 10 cm below the ceiling.
     let x = middle.x;
     let corner = |y: f64, z: f64| DVec3::new(x, y, z);
     let top = high.y - 0.1;
@@ -275,7 +275,7 @@ fn a_polygon_that_parts_nothing_is_refused_with_the_place() {
         add_portal(&world, &outside).unwrap_err(),
         AddPortalError::InSolid { .. }
     ));
-    // In the wall's own plane it has the room on one side.
+    // In the wall's own plane it has the room on one side only.
     let in_wall = short.map(|p| DVec3::new(low.x, p.y, p.z));
     assert!(matches!(
         add_portal(&world, &in_wall).unwrap_err(),

@@ -1,7 +1,6 @@
 //! Buildings with the faults of real models, baked with default settings, against their truth. Covers V1.
 //!
-//! Rooms and doors are judged as in `docs/benchmarks/rooms.md`; points in closed solids lie in no
-//! room.
+//! Rooms and doors are judged as in `docs/benchmarks/rooms.md`; points in closed solids lie in no room.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,16 +12,16 @@ use enfilade_testkit::{
 };
 use enfilade_verify::{VerifyOptions, verify_world};
 
-/// Faults that are not overcome yet: open leaves cut a corridor, and of boxes that count as
-/// structure some are air.
+/// Faults not yet handled: open leaves cut a corridor, and some of the boxes that count as
+/// structure are air.
 const LEFT: [Fault; 1] = [Fault::Boxes];
 
-/// Share of a room's points that lie in its cell, and of a cell's points that lie in its room.
+/// Least share of a room's points in its cell, and of a cell's points in its room.
 const MOST: f64 = 0.95;
-/// How far a portal's middle may lie from its door's, along the wall and beyond its faces.
+/// Largest distance of a portal's middle from its door's, along the wall and beyond its faces.
 /// [Units: wu]
 const NEAR: f64 = 0.3;
-/// Before and behind a door's wall the rooms that it joins are asked for. [Units: wu]
+/// Distance from a door's wall at which the rooms on both sides are located. [Units: wu]
 const BESIDE: f64 = 0.35;
 
 fn graph_of(g: &Generated) -> CellPortalGraph {
@@ -35,7 +34,7 @@ fn world_of(g: &Generated, config: &BakeConfig) -> World {
         .world
 }
 
-/// What holds most of `items`, and its share.
+/// Returns the most frequent of `items`, and its share.
 fn most<T: Copy + Ord>(items: &[T]) -> (T, f64) {
     let mut count = BTreeMap::new();
     for item in items {
@@ -45,7 +44,7 @@ fn most<T: Copy + Ord>(items: &[T]) -> (T, f64) {
     (item, n as f64 / items.len() as f64)
 }
 
-/// Names of rooms that have no cell of their own.
+/// Returns the names of rooms that have no cell of their own.
 fn rooms_missed(graph: &CellPortalGraph, g: &Generated) -> Vec<String> {
     let mut rooms_of_cell: BTreeMap<Option<CellId>, Vec<usize>> = BTreeMap::new();
     let mut cells_of_room = Vec::new();
@@ -70,7 +69,7 @@ fn rooms_missed(graph: &CellPortalGraph, g: &Generated) -> Vec<String> {
         .collect()
 }
 
-/// Middle and area of a portal's outline.
+/// Returns the middle and area of a portal's outline.
 fn middle(p: &Portal) -> (DVec3, f64) {
     let at: Vec<DVec3> = p
         .outline
@@ -95,7 +94,7 @@ fn lies_at(p: &Portal, o: &Opening) -> bool {
         && normal.dot(o.normal).abs() >= 15.0_f64.to_radians().cos()
 }
 
-/// A portal of about the opening's size between the cells on its two sides.
+/// Returns `true` if a portal of about the opening's size joins the cells on its two sides.
 fn is_found(graph: &CellPortalGraph, o: &Opening) -> bool {
     let reach = o.normal * (BESIDE + o.thickness * 0.5);
     let sides = [o.center - reach, o.center + reach].map(|p| graph.locator.locate(p));
@@ -137,7 +136,7 @@ fn rooms_doors_and_windows_are_found_in_spite_of_faults() {
     }
 }
 
-/// Names of doors without a portal.
+/// Returns the names of doors without a portal.
 fn doors_missed(graph: &CellPortalGraph, g: &Generated) -> Vec<String> {
     let doors = g.truth.openings.iter();
     doors
@@ -146,7 +145,7 @@ fn doors_missed(graph: &CellPortalGraph, g: &Generated) -> Vec<String> {
         .collect()
 }
 
-/// The same rooms and doors as `clean` has, and every promise kept.
+/// Checks for the same rooms and doors as in `clean`, and for all guarantees.
 fn holds_up(clean: &CellPortalGraph, world: &World, g: &Generated, what: &str) {
     let graph = &world.graph;
     assert_eq!(rooms_missed(graph, g), rooms_missed(clean, g), "{what}");
@@ -159,7 +158,7 @@ fn holds_up(clean: &CellPortalGraph, world: &World, g: &Generated, what: &str) {
     assert!(report.holds(), "{what}: {report}");
 }
 
-/// Area of the triangles that are no seals. [Units: wu²]
+/// Returns the area of the triangles that are not seals. [Units: wu²]
 fn model_area(world: &World) -> f64 {
     let mut area = 0.0;
     for batch in world.batches.iter().filter(|b| !b.is_seal) {
@@ -183,14 +182,14 @@ fn triangles_that_share_no_corners_leave_the_rooms_as_they_were() {
                 ..Disturbance::default()
             };
             let g = disturbed(&g, &by);
-            let what = format!("{}, corners moved by {jitter} m", g.truth.scene);
+            let what = format!("{}, vertices moved by {jitter} m", g.truth.scene);
             let world = world_of(&g, &BakeConfig::default());
             holds_up(&clean, &world, &g, &what);
-            // Gaps as wide as what counts as one plane (8 µm here) are the hardest: some cracks are left of them.
+            // Gaps as wide as the tolerance for one plane (8 µm here) are the hardest: some of their cracks are left.
             let is_counted = |p: &&Portal| jitter > 1e-5 || p.kind != PortalKind::Crack;
             let n = world.graph.portals.iter().filter(is_counted).count();
             assert!(5 * n <= 6 * clean.portals.len(), "{what}: {n} portals");
-            // Slits are closed, not the walls beside them: uncut slivers would have to be sealed over half of each wall.
+            // Closes slits, not the walls beside them: uncut slivers would cause seals over half of each wall.
             let share = Seals::of(&world).area / model_area(&world);
             assert!(
                 share > 0.0 && share < 0.02,

@@ -25,7 +25,7 @@ fn gjorup_s_rooms_are_parted_by_exactly_their_openings_however_they_are_turned()
             let indoor = world.graph.indoor_cells().count();
             let what = format!("{variant:?} turned by {degrees} degrees");
             assert_eq!(indoor, g.truth.rooms.len(), "cells of {what}");
-            // Hairline gaps where distorted walls meet are faults of the model, and kept apart as such.
+            // Hairline gaps where distorted walls meet are faults of the model, and kept separate as such.
             let openings: Vec<_> = world
                 .graph
                 .portals
@@ -81,7 +81,7 @@ fn gjorup_s_cavern_is_parted_at_its_necks_however_it_is_turned() {
             })
             .collect();
         assert_eq!(graph.indoor_cells().count(), 6);
-        // Turned corners are rounded, which must not leave hairs open along the edges.
+        // Turned vertices are rounded, which must not leave hairline gaps along the edges.
         let (cracks, openings): (Vec<_>, Vec<_>) = graph
             .portals
             .iter()

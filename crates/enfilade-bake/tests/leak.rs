@@ -1,4 +1,4 @@
-//! The widest way out of buildings with a hole, and that it goes through the hole.
+//! The widest way out of buildings with a hole goes through the hole.
 
 use enfilade_bake::leak::{LeakTrail, NoTrail, find_leak_trail};
 use enfilade_bake::{BakeConfig, BakeContext};
@@ -10,7 +10,8 @@ use enfilade_testkit::{Generated, OpeningKind, Side, Site, furnished_house, rota
 /// Edge of a voxel by default. [Units: wu]
 const VOXEL: f64 = 0.1;
 
-/// Rooms of 4 × 2.6 × 5 m and 3 × 2.6 × 5 m side by side along x, a doorway of 0.9 × 2.1 m between them, walls 0.2 m thick, less `hole`.
+/// Rooms of 4 × 2.6 × 5 m and 3 × 2.6 × 5 m side by side along x, with a doorway of 0.9 × 2.1 m between them and walls
+/// 0.2 m thick, minus `hole`.
 fn two_rooms(hole: Aabb) -> Generated {
     let mut site = Site::new("two rooms");
     let plaster = site.material("plaster", [0.8; 3]);
@@ -44,7 +45,7 @@ fn trail(scene: &Scene, from: Option<DVec3>) -> LeakTrail {
     let bvh = Bvh::build(&structure);
     for s in trail.points.windows(2) {
         assert!(!bvh.any_hit(s[0], s[1], |_| false), "{s:?} is in the way");
-        // Nowhere narrower than the narrowest place, but for the rounding of voxels.
+        // Nowhere narrower than the narrowest place, up to voxel rounding.
         for t in 0..=20 {
             let p = s[0].lerp(s[1], f64::from(t) / 20.0);
             let width = 2.0 * bvh.nearest(p, f64::INFINITY).unwrap().distance;
@@ -89,7 +90,7 @@ fn the_way_out_goes_through_the_hole() {
             let (narrowest, exit) = (back(found.narrowest), back(found.exit));
             assert!(lies_in(narrowest, &hole), "{what}: {narrowest}");
             assert!(lies_in(exit, &hole), "{what}: {exit}");
-            // The room may be less wide than its hole is.
+            // The room may be narrower than its hole.
             let seen = found.width;
             assert!(
                 seen < width + 0.02 && seen > width.min(2.6) - 2.0 * VOXEL,
@@ -103,7 +104,7 @@ fn the_way_out_goes_through_the_hole() {
 #[test]
 fn from_a_point_the_way_begins_in_its_room() {
     let g = two_rooms(west_wall());
-    // In a corner of the room that is closed but for its doorway.
+    // Where two walls of the room meet, which is closed except for its doorway.
     let found = trail(&g.scene, Some(DVec3::new(7.0, 0.3, 0.2)));
     assert!(lies_in(
         found.points[0],

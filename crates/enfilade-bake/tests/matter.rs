@@ -1,11 +1,11 @@
-//! What is a room, and what is the inside of something solid.
+//! Separation of rooms from the insides of solids.
 
 use enfilade_bake::{BakeConfig, BakeContext, BakeOutput, Silent, bake};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Material, Object, Role, Scene};
 use enfilade_testkit::solid::{MeshBuilder, aabb};
 
-/// Adds what `build` makes as an object.
+/// Adds the mesh that `build` makes as an object.
 fn add(scene: &mut Scene, role: Role, build: impl FnOnce(&mut MeshBuilder)) {
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
@@ -49,7 +49,7 @@ fn is_indoors(baked: &BakeOutput, p: [f64; 3]) -> bool {
     cell.is_some_and(|c| !graph[c].outdoor)
 }
 
-/// Turns over the triangles of which `is_turned` says so, by their number.
+/// Turns over the triangles for whose number `is_turned` returns `true`.
 fn turned(mut scene: Scene, is_turned: impl Fn(usize) -> bool) -> Scene {
     let mut n = 0;
     for mesh in &mut scene.meshes {
@@ -65,7 +65,7 @@ fn turned(mut scene: Scene, is_turned: impl Fn(usize) -> bool) -> Scene {
     scene
 }
 
-/// The same scene with its surfaces facing as they should, inside out, and anyhow.
+/// The same scene with its surfaces facing correctly, inside out, and randomly.
 fn three_ways(scene: &Scene) -> [(&'static str, Scene); 3] {
     let mixed = |n: usize| (n.wrapping_mul(2_654_435_761) >> 7) & 1 == 1;
     [
@@ -76,7 +76,7 @@ fn three_ways(scene: &Scene) -> [(&'static str, Scene); 3] {
 }
 
 /// A building of two rooms of 6 m × 3 m × 6 m with a door between them and a door to the open, and
-/// things in it.
+/// the given blocks in it.
 fn house(things: &[([f64; 3], [f64; 3])]) -> Scene {
     let mut scene = Scene::default();
     add(&mut scene, Role::Structural, |m| {
@@ -99,8 +99,8 @@ fn house(things: &[([f64; 3], [f64; 3])]) -> Scene {
 // Covers V1.
 #[test]
 fn things_that_stand_in_rooms_are_solid_whichever_way_they_face() {
-    // Free of the walls, so that the rooms flow around: a block, a column from floor to ceiling, and
-    // two that run into each other.
+    // Clear of the walls, so that the rooms flow around: a block, a column from floor to ceiling, and
+    // two that intersect.
     let scene = house(&[
         ([2.0, 0.0, 1.0], [3.5, 1.5, 2.5]),
         ([2.0, -0.1, 4.0], [3.4, 3.1, 5.4]),
@@ -137,7 +137,7 @@ fn a_room_behind_walls_stays_a_room_without_any_opening() {
 
 #[test]
 fn a_room_sunk_into_solid_ground_stays_a_room() {
-    // Ground that no one has dug out, and a vault in it, beside a house.
+    // Solid ground with a vault in it, beside a house.
     let mut scene = house(&[]);
     block(&mut scene, [14.0, -1.0, -2.0], [24.0, 8.0, 8.0]);
     add(&mut scene, Role::Structural, |m| {
@@ -159,7 +159,7 @@ fn blocks_on_open_land_have_no_rooms() {
     });
     block(&mut scene, [4.0, -0.5, 4.0], [10.0, 5.0, 10.0]);
     block(&mut scene, [8.0, -0.5, 7.0], [14.0, 7.0, 14.0]);
-    // One that stands on the land without an underside: as a tower it has little of it.
+    // One stands on the land without an underside: a tower, so that little of it is missing.
     add(&mut scene, Role::Structural, |m| {
         let (lo, hi) = ([24.0, 0.0, 10.0], [28.0, 16.0, 14.0]);
         m.sheet(aabb([lo[0], hi[1], lo[2]], hi), 1, true, &[]);
@@ -171,7 +171,7 @@ fn blocks_on_open_land_have_no_rooms() {
     });
     for (how, scene) in three_ways(&scene) {
         if how == "inside out" {
-            // Like a level of closed rooms, modelled from inside: no one can tell.
+            // Like a level of closed rooms modelled from inside: indistinguishable.
             continue;
         }
         let baked = baked(&scene);
@@ -187,7 +187,7 @@ fn a_closed_box_that_is_all_there_is_is_a_room_and_two_are_blocks() {
     for (how, scene) in three_ways(&scene) {
         let baked = baked(&scene);
         assert_eq!(n_indoors(&baked), 1, "{how}");
-        let is_said = baked.notes.iter().any(|n| n.contains("all there is"));
+        let is_said = baked.notes.iter().any(|n| n.contains("the whole scene"));
         assert_eq!(is_said, how != "inside out", "{how}: {:?}", baked.notes);
     }
     block(&mut scene, [8.0, 0.0, 0.0], [12.0, 3.0, 5.0]);

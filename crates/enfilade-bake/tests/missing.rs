@@ -30,7 +30,7 @@ fn three_rooms() -> Scene {
     }
 }
 
-/// Leaves out one of the two triangles of the slab's upper face.
+/// Removes one of the two triangles of the slab's upper face.
 fn without_floor(mut scene: Scene) -> Scene {
     let part = &mut scene.meshes[0].primitives[0];
     let at = |i: u32| DVec3::from(part.positions[i as usize].map(f64::from));
@@ -57,7 +57,7 @@ fn are_apart(graph: &CellPortalGraph) -> bool {
         && rooms[0] != rooms[2]
 }
 
-/// Portals of the size of the doors.
+/// Returns the number of portals of the size of the doors.
 fn n_doors(graph: &CellPortalGraph) -> usize {
     let is_door = |area: f32| (area - 1.8).abs() < 0.2;
     graph.portals.iter().filter(|p| is_door(p.area)).count()

@@ -1,4 +1,4 @@
-//! The order in which a file lists triangles, vertices and objects says nothing about the building.
+//! The order of triangles, vertices and objects in a file has no effect on the world.
 
 use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::World;
@@ -11,13 +11,13 @@ fn baked(g: &Generated, method: Method) -> World {
     done.unwrap().world
 }
 
-/// The corners of a triangle, by their bits, the least first: where it starts is no matter.
+/// The vertices of a triangle, by their bits, the least first: independent of the first vertex in the file.
 type Corners = [[u32; 3]; 3];
 
-/// The cells of a batch, its material, whether it is of seals, and its triangles.
+/// The cells of a batch, its material, `true` for seals, and its triangles.
 type Content = (Vec<u32>, Option<u32>, bool, Vec<Corners>);
 
-/// The batches in an order of their own.
+/// Returns the batches in a canonical order.
 fn geometry(world: &World) -> Vec<Content> {
     let batches = world.batches.iter().map(|b| {
         let p = &b.primitive;

@@ -1,4 +1,4 @@
-//! The simplifier on random worlds: promises kept, bounds kept, views not much dearer. Covers P1.
+//! The simplifier on random worlds: guarantees and bounds hold, and views are not much more expensive. Covers P1.
 
 use enfilade_bake::simplify::{
     CostModel, Metric, SimplifySettings, delete_portal, expected_cost, expected_cost_after,
@@ -37,7 +37,7 @@ fn merged_worlds_keep_their_promises_and_bounds() {
     for i in 0..40 {
         let world = grid(&mut rng);
         let before = simplify(&world, &SimplifySettings::default());
-        // Nothing asked, nothing done.
+        // Default settings change nothing.
         assert!(before.world.graph.cells == world.graph.cells);
         assert!(before.world.graph.portals == world.graph.portals);
         let max = before.max_cost * (1.0 + 3.0 * rng.unit());
@@ -103,7 +103,7 @@ fn a_deleted_portal_makes_one_cell_of_two() {
     let mut n_deleted = 0;
     for _ in 0..20 {
         let mut world = grid(&mut rng);
-        // It is about other cells, and is not kept.
+        // The visibility sets describe other cells, and are dropped.
         let n = world.graph.cells.len();
         world.pvs = Some(Pvs::of_rows(&vec![CellSet::all(n); n]));
         let Some(last) = world.graph.portals.len().checked_sub(1) else {
@@ -173,12 +173,12 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
         let n_portals = world.graph.portals.len();
         let settings = SimplifySettings {
             max_portals: Some(n_portals * (2 + rng.below(5)) / 10),
-            // The best of all ways may.
+            // The optimum over all ways may join the outdoors.
             join_outdoors: true,
             ..SimplifySettings::default()
         };
         let most = settings.max_portals.unwrap();
-        // 4,140 ways of eight cells; of nine it takes seconds.
+        // Eight cells have 4,140 ways; nine take seconds.
         if world.graph.cells.len() > 8 {
             continue;
         }
@@ -187,7 +187,7 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
         let ours = expected_cost_after(&world, &simple, &cost, VIEWS);
         assert!(simple.world.graph.portals.len() <= most, "{i}");
         assert!(ours >= least * (1.0 - 1e-12), "{i}: {ours} {least}");
-        // Nothing to join, nothing dearer.
+        // Without merges, the cost is unchanged.
         let all = least_expected_cost(&world, n_portals, &cost, VIEWS).unwrap();
         assert!(
             (all - expected_cost(&world, &cost, VIEWS)).abs() < 1e-9 * all,
@@ -207,7 +207,7 @@ fn small_worlds_are_joined_nearly_as_well_as_can_be() {
 
 #[test]
 fn graphs_without_surfaces_keep_their_bounds_and_merge_across_what_is_widest() {
-    // A row of cells whose openings get wider to the end, and one cell that nothing opens to.
+    // A row of cells whose openings get wider to the end, and one cell without openings.
     let square = |x: f64, size: f64| {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         corners
@@ -245,7 +245,7 @@ fn graphs_without_surfaces_keep_their_bounds_and_merge_across_what_is_widest() {
         (pairs.min_cost, pairs.max_cost, pairs.n_portals),
         (1.0, 2.0, 2)
     );
-    // The cell in the middle of the row goes where the opening is wider.
+    // The cell in the middle of the row merges across the wider opening.
     let mut dear = costs;
     dear[..2].fill(9.0);
     dear[3..].fill(9.0);
@@ -293,14 +293,14 @@ fn rooms_and_the_outdoors_stay_apart_and_numbers_are_met_from_above() {
         let left = after.portals.len();
         assert!(left <= most, "{left} {most}");
         n_met += usize::from(left == most);
-        // Fewer than lead outdoors, where that is asked for.
+        // Requests fewer than lead outdoors.
         let most = rng.below(n_out);
         let joined = simplify(&world, &with(most, true));
         let left = joined.world.graph.portals.len();
         assert!(left <= most, "{left} {most}");
         n_below += most - left;
     }
-    // Rooms may have several openings between them, of which none goes alone.
+    // Rooms may have several openings between them, none of which can be removed alone.
     assert!(n_worlds > 15, "{n_worlds}");
     assert!(
         3 * n_met > 2 * n_worlds && n_below < 2 * n_worlds,

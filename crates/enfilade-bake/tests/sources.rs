@@ -1,4 +1,4 @@
-//! Each triangle of a world knows the object that it comes from, whatever is done to the world.
+//! Each triangle of a world records its source object, through all operations on the world.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Role, Scene, SourceNode};
 use enfilade_testkit::furnished_house;
 
-/// The house with its walls dealt out to three objects, triangle by triangle, and a node an object.
+/// The house with its walls distributed over three objects, triangle by triangle, and one node per object.
 fn scene() -> Scene {
     let mut scene = furnished_house().scene;
     let n = scene.objects.len();
@@ -51,7 +51,7 @@ fn scene() -> Scene {
 
 type Bits = [[u32; 3]; 3];
 
-/// The triangles of each source, in no order of their own.
+/// Returns the triangles of each source, unordered.
 fn by_source(world: &World) -> BTreeMap<u32, Vec<Bits>> {
     let mut found: BTreeMap<u32, Vec<Bits>> = BTreeMap::new();
     for batch in world.batches.iter().filter(|b| !b.is_seal) {

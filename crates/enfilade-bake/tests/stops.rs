@@ -1,4 +1,4 @@
-//! A bake ends where its work is spent: at once, and with a word about the stage, whichever that is.
+//! A bake stops when its work budget is spent: promptly, and with an error that names the stage, in every stage.
 
 use enfilade_bake::{BakeConfig, BakeContext, BakeError, Budget, Method, Stage, bake};
 use enfilade_geom::scene::Scene;
@@ -6,7 +6,7 @@ use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::solid::MeshBuilder;
 use enfilade_testkit::{Site, furnished_house};
 
-/// Most that is spent beyond what is allowed: about 20 ms of work, on two threads or more.
+/// Most work spent beyond the budget: about 20 ms, on two threads or more.
 const MOST_BEYOND: u64 = 400_000;
 
 /// Deterministic numbers in `0..1` (SplitMix64).
@@ -47,7 +47,7 @@ fn soup(n: usize, size: f64, edge: f64) -> Scene {
     })
 }
 
-/// Boxes that run into each other.
+/// Intersecting boxes.
 fn boxes(n: usize) -> Scene {
     scene_of(|mesh, random| {
         for _ in 0..n {
@@ -77,7 +77,7 @@ fn scenes() -> [(&'static str, Scene); 5] {
     ]
 }
 
-/// What each stage of a bake spends, or why there is none.
+/// Returns the work of each stage of a bake, or its error.
 fn baked(scene: &Scene, method: Method, work: u64) -> Result<Vec<(Stage, u64)>, BakeError> {
     let config = BakeConfig {
         budget: Budget {
@@ -121,7 +121,7 @@ fn each_stage_of(method: Method) {
             }
             before += work;
         }
-        // The sum is the same on any number of threads, and so is what suffices.
+        // The sum is the same on any number of threads, and so is the sufficient budget.
         assert!(baked(&scene, method, before).is_ok(), "{name}: {before}");
     }
     // All scenes, all stages that do anything.

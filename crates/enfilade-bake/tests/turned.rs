@@ -1,4 +1,4 @@
-//! A building turned on its site has the rooms and doorways that it had.
+//! A building turned on its site keeps its rooms and doorways.
 
 use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade_cpg::{CellPortalGraph, Portal, PortalKind};
@@ -42,8 +42,8 @@ fn turned_buildings_keep_their_rooms_and_doorways() {
                     .collect();
                 assert_eq!(cells.len(), 1, "{} of {what}", room.name);
             }
-            // Where they were, too, if on another side of the wall. Hairline cracks come and go with the
-            // rounding of corners.
+            // Openings also keep their positions, though possibly on the wall's other side. Hairline cracks come and go
+            // with the rounding of vertices.
             let by = DMat4::from_rotation_y(f64::to_radians(degrees));
             let openings = |g: &CellPortalGraph| -> Vec<Portal> {
                 let is_opening = |p: &&Portal| p.kind != PortalKind::Crack;

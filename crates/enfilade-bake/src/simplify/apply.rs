@@ -1,4 +1,4 @@
-//! Merged cells in a world: everything that names a cell names the new one.
+//! Applies merges to a world: renumbers every reference to a cell.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use enfilade_geom::scene::Primitive;
 
 use crate::layout::{Layout, layout_of};
 
-/// The world with each cell part of the cell that `into` says, and the new number of each old cell.
+/// Returns the world with each cell merged into `into[cell]`, and the new number of each old cell.
 ///
-/// `into` names a cell of each group for all of it. Names such as `cell-3` follow the new numbers, others stay. Linear
-/// in the world.
+/// `into` holds the same cell for all cells of a group. Names such as `cell-3` follow the new numbers, others stay.
+/// Linear in the world.
 pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     let old = &world.graph;
     let mut number = vec![u32::MAX; into.len()];
@@ -96,18 +96,18 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     (out, cell_of)
 }
 
-/// Whether a name is one that a builder gave by number.
+/// Returns `true` if a builder gave this name by number.
 fn is_numbered(name: &str) -> bool {
     let number = name.strip_prefix("cell-");
     number.is_some_and(|n| n.parse::<u32>().is_ok())
 }
 
-/// Batches under way: one for each list of cells, material and set of attributes, seals apart.
+/// Batches under construction: one for each list of cells, material and set of attributes, with seals separate.
 #[derive(Default)]
 pub(crate) struct Batches(BTreeMap<BatchKey, (Primitive, SourceRuns)>);
 
 impl Batches {
-    /// Adds triangles that `cells`, ascending, see. Where some of a batch have no known source, none has.
+    /// Adds triangles that the ascending `cells` see. A batch with a triangle of unknown source has no sources.
     pub(crate) fn add(
         &mut self,
         cells: Vec<CellId>,
@@ -121,7 +121,7 @@ impl Batches {
         known.extend(sources);
     }
 
-    /// The batches in order of cells, material and attributes, seals last.
+    /// Returns the batches in order of cells, material and attributes, seals last.
     pub(crate) fn finish(self) -> Vec<Batch> {
         let batches = self.0.into_iter();
         let batch =
@@ -153,13 +153,13 @@ fn append(to: &mut Primitive, from: &Primitive) {
     to.indices.extend(from.indices.iter().map(|i| i + first));
 }
 
-/// The locator with new numbers; nodes that no longer tell cells apart are left out.
+/// Returns the locator with new numbers, without nodes that no longer separate cells.
 fn locator(old: &Locator, cell_of: &[CellId]) -> Locator {
     let renumbered = |child: i32| match child {
         c if c <= -2 => Locator::leaf(Some(cell_of[(-2 - c) as usize])),
         c => c,
     };
-    // What each node comes to: children come after their parents.
+    // The replacement of each node: children come after their parents.
     let mut becomes: Vec<i32> = vec![0; old.nodes.len()];
     let resolve = |becomes: &[i32], child: i32| {
         if child >= 0 {

@@ -1,6 +1,6 @@
-//! What drawing a cell costs (Lefebvre & Hornus 2003, §2): triangles and their area, weighted by material.
+//! The cost of drawing a cell (Lefebvre & Hornus 2003, §2): triangles and their area, weighted by material.
 //!
-//! Everything that asks for a cost asks here: which cells are merged, which are cut, what a view draws.
+//! The single source of costs: for merging cells, cutting cells, and judging views.
 
 use std::collections::BTreeMap;
 
@@ -10,16 +10,16 @@ use enfilade_geom::{Aabb, DVec3, shown};
 
 use super::merge::CostGraph;
 
-/// What drawing a cell costs.
+/// Weights of the cost of drawing a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CostModel {
-    /// Of a triangle. [Limit: at least 0]
+    /// Cost of a triangle. [Limit: at least 0]
     pub triangle: f64,
-    /// Of its area. [Units: 1/wu²] [Limit: at least 0]
+    /// Cost of its area. [Units: 1/wu²] [Limit: at least 0]
     pub area: f64,
-    /// By what a material's name multiplies both; 1 for those not named. [Limit: at least 0]
+    /// Factor on both by material name; 1 for unlisted names. [Limit: at least 0]
     pub materials: BTreeMap<String, f64>,
-    /// By what all that is of a detail object is multiplied; 0 where only structure counts. [Limit: at least 0]
+    /// Factor on the cost of detail objects; 0 counts structure alone. [Limit: at least 0]
     pub detail: f64,
 }
 
@@ -34,28 +34,28 @@ impl Default for CostModel {
     }
 }
 
-/// A material that a cost is given for and no surface has.
+/// A cost is given for a material that no surface has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no material of the scene is named '{}'; there are {}",
+    "the scene has no material named '{}'; it has {}",
     shown(name),
     shown(known)
 )]
 pub struct UnknownMaterial {
     /// Its name.
     pub name: String,
-    /// Names that there are, as text.
+    /// Existing names, as text.
     pub known: String,
 }
 
-/// Names that an error tells.
+/// Most names listed in an error.
 const TOLD: usize = 20;
 
 impl CostModel {
-    /// Whether each material that a cost is given for is one of `materials`.
+    /// Checks that each material with a cost is one of `materials`.
     ///
     /// # Errors
-    /// With the first name that is none of theirs.
+    /// The first name that is not among them.
     pub fn check(&self, materials: &[Material]) -> Result<(), UnknownMaterial> {
         let is_known = |name: &str| materials.iter().any(|m| m.name == name);
         let Some(name) = self.materials.keys().find(|name| !is_known(name)) else {
@@ -84,7 +84,7 @@ impl CostModel {
     }
 }
 
-/// What each cell of a world costs. Linear in the world.
+/// Returns the cost of each cell of a world. Linear in the world.
 #[must_use]
 pub fn costs(world: &World, cost: &CostModel) -> Vec<f64> {
     let graph = cost_graph(world, cost);
@@ -93,7 +93,7 @@ pub fn costs(world: &World, cost: &CostModel) -> Vec<f64> {
         .collect()
 }
 
-/// What one cell costs.
+/// Returns the cost of one cell.
 pub(crate) fn cost_of_cell(world: &World, cell: CellId, cost: &CostModel) -> f64 {
     let prices = Prices { world, cost };
     let sees = |cells: &[CellId]| cells.binary_search(&cell).is_ok();
@@ -103,15 +103,15 @@ pub(crate) fn cost_of_cell(world: &World, cell: CellId, cost: &CostModel) -> f64
     batches.chain(details.map(|d| prices.of_detail(d))).sum()
 }
 
-/// Something that is drawn as a whole: a structural triangle, or a detail object.
+/// A unit of drawing: a structural triangle, or a detail object.
 pub(crate) struct Surface {
-    /// Three of a triangle, eight of the box around an object. [Units: wu]
+    /// Three vertices of a triangle, or eight of the box around an object. [Units: wu]
     pub(crate) corners: Vec<DVec3>,
-    /// What it costs.
+    /// Cost of drawing it.
     pub(crate) cost: f64,
 }
 
-/// All that a cell sees. Their costs sum up to what the cell costs.
+/// Returns everything that a cell sees. The costs add up to the cell's cost.
 pub(crate) fn surfaces_of(world: &World, cell: CellId, cost: &CostModel) -> Vec<Surface> {
     let prices = Prices { world, cost };
     let sees = |cells: &[CellId]| cells.binary_search(&cell).is_ok();
@@ -162,7 +162,7 @@ fn double_area([a, b, c]: [DVec3; 3]) -> f64 {
     (b - a).cross(c - a).length()
 }
 
-/// What the surfaces of a world cost.
+/// Computes the costs of a world's surfaces.
 struct Prices<'a> {
     world: &'a World,
     cost: &'a CostModel,
@@ -199,7 +199,7 @@ impl Prices<'_> {
     }
 }
 
-/// Cells with what drawing them costs: a batch is an item, so is a detail object.
+/// Returns the cells with their drawing costs; each batch and each detail object is an item.
 pub(super) fn cost_graph(world: &World, cost: &CostModel) -> CostGraph {
     let mut graph = CostGraph {
         items: vec![Vec::new(); world.graph.cells.len()],

@@ -1,4 +1,4 @@
-//! Graphs without surfaces: portal files of games.
+//! Simplification of graphs without surfaces: portal files of games.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,10 @@ use enfilade_geom::Winding;
 use super::merge::{Badness, Bounds, CostGraph, merge};
 use super::settings::SimplifySettings;
 
-/// Which cells of a graph are one, and how that compares.
+/// The merged cells of a graph, and their costs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimplifiedGraph {
-    /// The cell of the result that each old cell is part of; numbered in the order of their least old cells.
+    /// The new cell that each old cell is part of; numbered in the order of their lowest old cells.
     pub cell_of: Vec<u32>,
     /// Cells of the result.
     pub n_cells: u32,
@@ -32,7 +32,7 @@ impl Badness for Openness {
     }
 
     fn merged(&mut self, kept: u32, gone: u32) {
-        // Pairs with `gone` as the lesser one are a range; of the others each is looked at.
+        // Pairs with `gone` as the lower one form a range, but the others need a look at every pair.
         let of_gone: Vec<[u32; 2]> = (self.0.keys())
             .filter(|pair| pair.contains(&gone))
             .copied()
@@ -51,17 +51,17 @@ impl Badness for Openness {
 }
 
 /// Merges cells of any graph of cells and openings until they are within bounds: the cheapest first, with the
-/// neighbor that it is most open to (Lefebvre & Hornus 2003, §3, but for the metric).
+/// neighbor that it is most open to (Lefebvre & Hornus 2003, §3, except for the metric).
 ///
-/// `costs` are of the cells. Without surfaces nothing tells what volume sees an opening, which is what the paper compares,
-/// so that the area of the openings between two cells counts: the wider they are, the less they hide. Of `settings`
-/// the metric and the cost model are not asked. A cell that has no opening stays as it is.
+/// `costs` holds one cost per cell. The paper compares the volume that sees an opening, which is unknown without
+/// surfaces; this uses the area of the openings between two cells: the wider they are, the less they hide. Ignores the
+/// metric and the cost model of `settings`. A cell without openings stays as it is.
 ///
 /// Time: `O(m n)` for `m` merges and `n` openings.
 ///
 /// # Panics
 ///
-/// When there are not as many costs as cells, or an opening names a cell that there is not.
+/// If the numbers of costs and cells differ, or an opening refers to a missing cell.
 #[must_use]
 pub fn simplify_graph(
     graph: &SightGraph,
@@ -94,7 +94,7 @@ pub fn simplify_graph(
     let mut cell_of = vec![0; n];
     let mut sums: Vec<f64> = Vec::new();
     for (c, &host) in into.iter().enumerate() {
-        // A host has the least number of its group.
+        // A host has the lowest number of its group.
         cell_of[c] = if host as usize == c {
             sums.push(0.0);
             sums.len() as u32 - 1

@@ -1,4 +1,4 @@
-//! What sampled views draw: by what merges and metrics are judged.
+//! The drawing cost of sampled views, to judge merges and metrics.
 
 use std::collections::BTreeMap;
 
@@ -9,25 +9,25 @@ use super::merge::Eyes;
 use super::metric;
 use super::run::Simplified;
 
-/// Where the sequence of eyes that judge results begins: none of them helped to choose.
+/// Start of the sequence of eyes that judge results; none of them takes part in choosing merges.
 const JUDGES: u32 = 1 << 20;
 
-/// Mean cost of what a view reaches, over sampled views: what a metric is judged by.
+/// Returns the mean cost of the cells that a view reaches, over sampled views. It judges metrics.
 ///
-/// A cell is drawn whole if a ray of the view comes into it; views are none of those that the metric
-/// [`ExpectedTriangles`](super::Metric::ExpectedTriangles) looks at.
+/// A cell is drawn whole if a ray of the view enters it. The views differ from those that the metric
+/// [`ExpectedTriangles`](super::Metric::ExpectedTriangles) uses.
 #[must_use]
 pub fn expected_cost(world: &World, cost: &CostModel, n_views: usize) -> f64 {
     let all = (0..world.graph.cells.len() as u32).map(CellId);
     cost_of_views(world, world, &all.collect::<Vec<_>>(), cost, n_views)
 }
 
-/// The same for a world made simpler, from the same eyes as [`expected_cost`] of the world `before`.
+/// Returns the same for a simplified world, from the same eyes as [`expected_cost`] of the world `before`.
 ///
-/// Views begin indoors, and a room that was joined to the outdoors would begin none any more.
+/// Views begin indoors, and none would begin in a room that was joined to the outdoors.
 ///
 /// # Panics
-/// When `after` was not made from `before`.
+/// If `after` was not made from `before`.
 #[must_use]
 pub fn expected_cost_after(
     before: &World,
@@ -38,13 +38,13 @@ pub fn expected_cost_after(
     cost_of_views(before, &after.world, &after.cell_of, cost, n_views)
 }
 
-/// Cells of worlds of which all ways to join them are tried: there are 115,975 for ten.
+/// Most cells for which all ways to join them are tried: ten have 115,975.
 const MAX_TRIED: usize = 10;
 
-/// The least mean cost of a view that any way to join cells comes to which leaves at most `max_portals`: all are tried, from
-/// the same eyes as [`expected_cost`] looks. `None` for worlds of more than ten cells.
+/// Returns the lowest mean cost of a view over all ways to join cells that leave at most `max_portals`, from the same
+/// eyes as [`expected_cost`]. `None` for worlds of more than ten cells.
 ///
-/// Cells need not touch to be joined here, so that [`simplify`](super::simplify) may not reach it, but nothing is less.
+/// A lower bound that [`simplify`](super::simplify) may not reach: here, cells need not touch to be joined.
 #[must_use]
 pub fn least_expected_cost(
     world: &World,
@@ -58,7 +58,7 @@ pub fn least_expected_cost(
     }
     let graph = cost_graph(world, cost);
     let Eyes(seen_by) = metric::views(world, n_views, JUDGES);
-    // Sets of cells are bits of a number from here on.
+    // From here on, sets of cells are bits of a number.
     let mut cells_of_item = vec![0_usize; graph.weights.len()];
     for (cell, items) in graph.items.iter().enumerate() {
         for &item in items {
@@ -81,7 +81,7 @@ pub fn least_expected_cost(
         *n_views_of.entry(cells).or_default() += 1;
     }
     let mut least = f64::INFINITY;
-    // A part for each cell, numbered as they come up, counted through like digits.
+    // The part of each cell, numbered by first appearance, counted up like digits.
     let mut part = vec![0_usize; n];
     loop {
         let parts = world.graph.portals.iter();
@@ -111,7 +111,7 @@ pub fn least_expected_cost(
     }
 }
 
-/// Views of one world, each of whose cells is drawn as a cell of another.
+/// Returns the mean cost of views of `world`, drawing for each of its cells the cell of `drawn` that it is part of.
 fn cost_of_views(
     world: &World,
     drawn: &World,

@@ -1,7 +1,7 @@
-//! Which cells to merge: smallest cell first, its worst portal removed (Lefebvre & Hornus 2003, §3).
+//! Choice of cells to merge: smallest cell first, its worst portal removed (Lefebvre & Hornus 2003, §3).
 //!
-//! Knows cells only as sets of weighted items, so that what two cells both see is not paid twice, and
-//! pairs of cells only by what the metric says of them.
+//! Sees a cell only as a set of weighted items, so that an item seen by both cells counts once, and a
+//! pair of cells only through its score in the metric.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -9,38 +9,38 @@ use std::collections::{BTreeMap, BinaryHeap};
 /// A graph as the simplifier sees it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CostGraph {
-    /// What drawing each item costs; not negative.
+    /// Drawing cost of each item; not negative.
     pub(super) weights: Vec<f64>,
     /// The items of each cell, ascending.
     pub(super) items: Vec<Vec<u32>>,
-    /// Cells that have a portal between them.
+    /// Pairs of cells with a portal between them, once per portal.
     pub(super) pairs: Vec<[u32; 2]>,
-    /// The outdoors: cells that merge with others only where that is asked for.
+    /// The outdoors: cells that merge with others only on request.
     pub(super) aloof: Vec<bool>,
 }
 
-/// What is asked of the result.
+/// Limits that the result should meet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
-    /// Of [`CostGraph::shares`]; the upper one is of all items.
+    /// Lower bound on [`CostGraph::shares`]; the upper bound applies to the cost of all items.
     pub(super) min_cost: f64,
     pub(super) max_cost: f64,
     pub(super) max_cells: usize,
     pub(super) max_portals: usize,
-    /// Lets rooms and the outdoors become one.
+    /// Lets rooms and the outdoors merge.
     pub(super) joins_outdoors: bool,
 }
 
-/// How good the portals between two cells are. Higher is worse: removed first.
+/// Scores the portals between two cells. Higher is worse: removed first.
 pub(super) trait Badness {
-    /// Of the portals between two cells, named by cells that live.
+    /// Returns the score of the portals between two cells that still exist.
     fn of(&mut self, graph: &CostGraph, a: u32, b: u32) -> f64;
-    /// `gone` is now part of `kept`.
+    /// Notes that `gone` is now part of `kept`.
     fn merged(&mut self, kept: u32, gone: u32);
 }
 
 impl CostGraph {
-    /// Tells if two cells may become one as far as the outdoors and the cost go.
+    /// Returns `true` if the outdoors and the cost allow two cells to merge.
     pub(super) fn may_join(&self, [a, b]: [u32; 2], both: f64, bounds: &Bounds) -> bool {
         let is_alike = self.aloof[a as usize] == self.aloof[b as usize];
         both <= bounds.max_cost && (is_alike || bounds.joins_outdoors)
@@ -50,11 +50,10 @@ impl CostGraph {
         self.sum(self.items[cell as usize].iter().copied())
     }
 
-    /// What each cell has of the whole: an item that reaches through several cells counts in each in part,
-    /// as in the paper, where polygons are cut to pieces that lie in one cell each.
+    /// Returns each cell's share of the total cost: an item that reaches through several cells counts in each in part,
+    /// as in the paper, where polygons are cut into pieces that lie in one cell each.
     ///
-    /// What all cells of a room see alike is hidden by none of their portals, and is no reason to keep
-    /// them.
+    /// Something that all cells of a room see is hidden by none of their portals, so it does not justify any.
     pub(super) fn shares(&self) -> Vec<f64> {
         let mut n_cells = vec![0_u32; self.weights.len()];
         for &i in self.items.iter().flatten() {
@@ -71,12 +70,12 @@ impl CostGraph {
         self.sum(union(&self.items[a as usize], &self.items[b as usize]))
     }
 
-    /// The items of both cells, ascending.
+    /// Returns the items of both cells, ascending.
     pub(super) fn union(&self, a: u32, b: u32) -> Vec<u32> {
         union(&self.items[a as usize], &self.items[b as usize]).collect()
     }
 
-    /// The same graph with cells as parts of others; those that are gone have no items.
+    /// Returns the same graph with cells merged into others; merged cells have no items.
     pub(super) fn contracted(&self, into: &[u32]) -> Self {
         let mut items = vec![Vec::new(); self.items.len()];
         let mut aloof = vec![false; self.items.len()];
@@ -103,7 +102,7 @@ impl CostGraph {
     }
 }
 
-/// Both lists, ascending, none twice.
+/// Returns the union of two ascending lists, ascending and without duplicates.
 fn union<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = u32> + 'a {
     let (mut i, mut j) = (0, 0);
     std::iter::from_fn(move || {
@@ -119,19 +118,19 @@ fn union<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = u32> + 'a {
     })
 }
 
-/// The cell that each cell becomes part of: itself, or a lesser one of its group.
+/// Returns the cell that each cell becomes part of: itself, or a lower one of its group.
 ///
-/// No merged cell costs more than `max_cost` (one that did so alone stays alone). A merge that is made for the number of portals alone
-/// takes no more of them away than are too many, as long as there is one. Every merge lowers the number of cells, so it ends;
-/// time `O(m log n)` merges times the items and neighbors of a cell.
+/// No merged cell costs more than `max_cost` (a cell that already does stays alone). A merge made only for the number
+/// of portals removes no more than the excess, as long as such a merge exists. Every merge lowers the number of cells,
+/// so it ends; time `O(m log n)` for `m` merges, times the items and neighbors of a cell.
 pub(super) fn merge(graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness) -> Vec<u32> {
     let mut merger = Merger::new(graph, bounds);
-    // They are not negative, so their bits compare like the numbers.
+    // Shares are not negative, so their bits compare like the numbers.
     let key = |merger: &Merger<'_>, c: u32| Reverse((merger.shares[c as usize].to_bits(), c));
     let mut queue: BinaryHeap<_> = (0..merger.into.len() as u32)
         .map(|c| key(&merger, c))
         .collect();
-    // Cells all of whose merges take too many portals. So they always will: pairs of cells only gain portals.
+    // Cells all of whose merges remove too many portals. They stay such: pairs of cells only gain portals.
     let mut waiting: Vec<u32> = Vec::new();
     loop {
         let merge = match queue.pop() {
@@ -154,7 +153,7 @@ pub(super) fn merge(graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness
                 if worst.is_none() && is_for_portals {
                     waiting.push(cell);
                 }
-                // One that fits nowhere never will: its neighbors only grow.
+                // A cell that fits nowhere never will: its neighbors only grow.
                 worst.map(|other| (cell, other))
             }
             None if merger.is_few() => break,
@@ -171,7 +170,7 @@ pub(super) fn merge(graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness
     }
     let mut into = merger.into;
     for c in 0..into.len() {
-        // A cell's host has a lesser number, so it is settled already.
+        // A cell's host has a lower number, so it is settled already.
         into[c] = into[into[c] as usize];
     }
     into
@@ -182,11 +181,12 @@ struct Merger<'a> {
     bounds: &'a Bounds,
     into: Vec<u32>,
     shares: Vec<f64>,
-    /// How many portals lead from one cell to another.
+    /// Number of portals to each neighbor.
     neighbors: Vec<BTreeMap<u32, usize>>,
     n_portals: usize,
     n_alive: usize,
-    /// Rooms are merged with each other first: not where the bound is below the portals that lead outdoors. All rooms would become one.
+    /// Merges rooms with each other first. Off where the bound is below the number of portals that lead outdoors, since
+    /// all rooms would become one.
     prefers_rooms: bool,
 }
 
@@ -215,7 +215,7 @@ impl<'a> Merger<'a> {
         }
     }
 
-    /// Portals.
+    /// Returns the number of portals above the bound.
     fn n_too_many(&self) -> usize {
         self.n_portals.saturating_sub(self.bounds.max_portals)
     }
@@ -224,7 +224,7 @@ impl<'a> Merger<'a> {
         self.n_alive <= self.bounds.max_cells && self.n_too_many() == 0
     }
 
-    /// The neighbors that a cell may be merged with, and how many portals that takes away.
+    /// Returns the neighbors that a cell may merge with, and the number of portals each merge removes.
     fn partners(&self, cell: u32) -> impl Iterator<Item = (u32, usize)> {
         let all = self.neighbors[cell as usize].iter();
         all.map(|(&other, &n)| (other, n))
@@ -234,7 +234,7 @@ impl<'a> Merger<'a> {
             })
     }
 
-    /// The neighbor with the worst portals, of those whose merge takes away at most so many.
+    /// Returns the neighbor with the worst portals, among merges that remove at most `most` portals.
     fn worst(&self, cell: u32, most: usize, badness: &mut dyn Badness) -> Option<u32> {
         let aloof = &self.graph.aloof;
         let mut best: Option<((bool, f64), u32)> = None;
@@ -251,7 +251,7 @@ impl<'a> Merger<'a> {
         best.map(|(_, other)| other)
     }
 
-    /// The merge of one of `cells` that takes the fewest portals away; of such, the worst.
+    /// Returns the merge of one of `cells` that removes the fewest portals; ties go to the worst portals.
     fn least_beyond(&self, cells: &[u32], badness: &mut dyn Badness) -> Option<(u32, u32)> {
         let alive = cells.iter().filter(|&&c| self.into[c as usize] == c);
         let pairs = alive.flat_map(|&c| self.partners(c).map(move |(other, n)| (n, c, other)));
@@ -280,7 +280,7 @@ impl<'a> Merger<'a> {
     }
 }
 
-/// A score a pair that does not change but by adding up: what portals have by themselves.
+/// A score for each pair, from its portals alone: merges only combine scores.
 pub(super) struct PairScores(pub(super) BTreeMap<[u32; 2], f64>);
 
 impl PairScores {
@@ -307,7 +307,7 @@ impl Badness for PairScores {
             self.0.remove(&key);
             let other = if key[0] == gone { key[1] } else { key[0] };
             if other != kept {
-                // Of several portals the one that is seen most counts.
+                // Among several portals, the most visible counts.
                 let slot = self.0.entry(Self::key(kept, other)).or_default();
                 *slot = slot.max(volume);
             }
@@ -315,10 +315,10 @@ impl Badness for PairScores {
     }
 }
 
-/// For each cell the sampled eyes that see it, as bits.
+/// For each cell, the sampled eyes that see it, as bits.
 pub(super) struct Eyes(pub(super) Vec<Vec<u64>>);
 
-/// Minus the triangles that a view draws more, on the mean, once the portals are gone.
+/// Minus the mean number of triangles that a view additionally draws without the portals.
 impl Badness for Eyes {
     fn of(&mut self, graph: &CostGraph, a: u32, b: u32) -> f64 {
         let (ea, eb) = (&self.0[a as usize], &self.0[b as usize]);
@@ -349,7 +349,7 @@ pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Cells of whole weights, some far from connected.
+    /// Cells with integer weights, often far from connected.
     pub(in super::super) fn graphs() -> impl Strategy<Value = CostGraph> {
         (1_usize..24, 1_usize..40).prop_flat_map(|(n_cells, n_items)| {
             let cell = 0..n_cells as u32;
@@ -371,7 +371,7 @@ pub(super) mod tests {
         })
     }
 
-    /// Costs of the groups, by looking at every item anew.
+    /// Computes the costs of the groups anew from every item.
     fn group_costs(graph: &CostGraph, into: &[u32]) -> BTreeMap<u32, (f64, usize)> {
         let mut groups: BTreeMap<u32, (BTreeSet<u32>, usize)> = BTreeMap::new();
         for (c, &to) in into.iter().enumerate() {
@@ -388,7 +388,7 @@ pub(super) mod tests {
 
     #[test]
     fn merges_for_the_number_of_portals_stop_at_it() {
-        // Cells of equal cost in a row; the cheapest opens to the next by five portals, worst of all.
+        // Cells of equal cost in a row; the cheapest opens to the next by five portals, the worst of all.
         let pairs = [[0, 1]; 5].into_iter().chain((1..6).map(|i| [i, i + 1]));
         let graph = CostGraph {
             weights: (1..=7).map(f64::from).collect(),
@@ -439,16 +439,16 @@ pub(super) mod tests {
                 merge(graph.clone(), &bounds, &mut PairScores(scores.collect()))
             };
             let groups = group_costs(&graph, &into);
-            // The upper bound holds for whatever was merged, never mind how.
+            // The upper bound holds for everything that was merged.
             for (&g, &(cost, n)) in &groups {
                 prop_assert!(n == 1 || cost <= bounds.max_cost, "group {g} costs {cost}");
             }
-            // The outdoors stays apart unless asked for.
+            // The outdoors stays separate unless requested.
             for (c, &host) in into.iter().enumerate() {
                 let is_alike = graph.aloof[c] == graph.aloof[host as usize];
                 prop_assert!(joins_outdoors || is_alike, "{c} and {host}");
             }
-            // Groups are joined by portals: each member reaches its host within the group.
+            // Portals connect each group: each member reaches its host within the group.
             for c in 0..n {
                 let mut seen = BTreeSet::from([c as u32]);
                 let mut stack = vec![c as u32];
@@ -463,7 +463,7 @@ pub(super) mod tests {
                 }
                 prop_assert!(seen.contains(&into[c]));
             }
-            // The lower bound is missed, or the number, only where nothing more fits.
+            // The lower bound or the number is missed only where nothing more fits.
             let n_left = graph.pairs.iter().filter(|p| into[p[0] as usize] != into[p[1] as usize]).count();
             let wants_more = groups.len() > bounds.max_cells || n_left > bounds.max_portals;
             let share = |g: u32| -> f64 {
@@ -474,7 +474,7 @@ pub(super) mod tests {
                 let whole: f64 = (0..graph.weights.len())
                     .map(|i| graph.weights[i] * part(i as u32))
                     .sum();
-                // Sums of thirds may miss the whole number that they are.
+                // Sums of thirds may differ from the exact integer.
                 whole + 1e-9
             };
             for &[a, b] in &graph.pairs {

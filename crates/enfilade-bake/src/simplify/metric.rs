@@ -1,8 +1,8 @@
-//! What portals are worth, sampled with rays.
+//! Scores of portals, sampled with rays.
 //!
-//! Two ways, compared in `docs/benchmarks/bsp.md`: how much of the scene sees a portal (Lefebvre &
-//! Hornus 2003, §3.0.2; their cube map is a fixed set of directions here), and how many triangles a
-//! sampled view draws more without it.
+//! Two metrics, compared in `docs/benchmarks/bsp.md`: how much of the scene sees a portal (Lefebvre &
+//! Hornus 2003, §3.0.2; a fixed set of directions replaces their cube map), and how many more triangles a
+//! sampled view draws without it.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +15,12 @@ use super::merge::{Eyes, PairScores};
 
 /// Texels along an edge of the cube map.
 const CUBE: usize = 8;
-/// Points on each portal of no more pieces.
+/// Points on each portal that has no more pieces than this.
 const POINTS: usize = 4;
-/// A ray that meets nothing goes this far, as a share of the scene's size.
+/// Length of a ray that hits nothing, as a share of the scene's size.
 const SKY: f64 = 1.0;
 
-/// All structural triangles of a world.
+/// Returns all structural triangles of a world.
 pub(super) fn triangles_of(world: &World) -> Vec<Triangle> {
     world
         .batches
@@ -33,7 +33,7 @@ pub(super) fn triangles_of(world: &World) -> Vec<Triangle> {
         .collect()
 }
 
-/// Directions through the texels of a cube map with their solid angles.
+/// Returns directions through the texels of a cube map with their solid angles.
 fn cube_map() -> Vec<(DVec3, f64)> {
     let mut out = Vec::with_capacity(6 * CUBE * CUBE);
     let at = |i: usize| (2.0 * i as f64 + 1.0) / CUBE as f64 - 1.0;
@@ -45,7 +45,7 @@ fn cube_map() -> Vec<(DVec3, f64)> {
             d[(axis + 1) % 3] = u;
             d[(axis + 2) % 3] = v;
             let length = d.length();
-            // A texel's area seen from the middle, at its distance and slant.
+            // A texel's area seen from the center, at its distance and slant.
             let solid_angle = (2.0 / CUBE as f64).powi(2) / length.powi(3);
             out.push((d / length, solid_angle));
         }
@@ -53,27 +53,27 @@ fn cube_map() -> Vec<(DVec3, f64)> {
     out
 }
 
-/// What a portal is worth by the paper's metric (Lefebvre & Hornus 2003, §3.0.2). Lower is better.
+/// Score of a portal by the paper's metric (Lefebvre & Hornus 2003, §3.0.2). Lower is better.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PortalScore {
-    /// Volume from which it is seen. [Units: wu³]
+    /// Volume that sees the portal. [Units: wu³]
     pub visible_volume: f64,
-    /// How far the costs of its two cells are apart.
+    /// Difference between the costs of its two cells.
     pub balance: f64,
 }
 
 impl PortalScore {
-    /// Visible volume times balance: the portal of highest score is the first to go.
+    /// Returns visible volume times balance: the portal of highest score is removed first.
     #[must_use]
     pub fn score(&self) -> f64 {
         self.visible_volume * self.balance
     }
 }
 
-/// The scores of all portals of a world.
+/// Returns the scores of all portals of a world.
 ///
-/// Sampled by 384 rays, through the texels of a cube map, from each of several points: about four on a portal, but at
-/// least one on every piece of it, each for its share of the area. Deterministic; time is that of the rays.
+/// Samples 384 rays, through the texels of a cube map, from each of several points: about four on a portal, but at
+/// least one on every piece of it, each weighted by its share of the area. Deterministic; takes the time of the rays.
 #[must_use]
 pub fn portal_scores(world: &World, cost: &CostModel) -> Vec<PortalScore> {
     let costs = costs(world, cost);
@@ -88,7 +88,7 @@ pub fn portal_scores(world: &World, cost: &CostModel) -> Vec<PortalScore> {
     portals.zip(volumes(world)).map(of_portal).collect()
 }
 
-/// The volume from which each pair of cells' most visible portal is seen. [Units: wu³]
+/// Returns, for each pair of cells, the volume that sees their most visible portal. [Units: wu³]
 pub(super) fn visible_volumes(world: &World) -> PairScores {
     let mut out = BTreeMap::new();
     for (p, volume) in world.graph.portals.iter().zip(volumes(world)) {
@@ -99,7 +99,7 @@ pub(super) fn visible_volumes(world: &World) -> PairScores {
     PairScores(out)
 }
 
-/// The volume from which each portal is seen. [Units: wu³]
+/// Returns the volume that sees each portal. [Units: wu³]
 fn volumes(world: &World) -> Vec<f64> {
     let bvh = Bvh::build(&triangles_of(world));
     let far = SKY * bvh.bounds().size().length().max(1.0);
@@ -110,7 +110,7 @@ fn volumes(world: &World) -> Vec<f64> {
         for (point, weight) in points_on(&p.pieces) {
             weights += weight;
             for &(direction, solid_angle) in &directions {
-                // Off the plane, lest what lies in it is met at once.
+                // Off the plane, so that the ray does not hit surfaces in it at once.
                 let origin = point + normal * 1e-4_f64.copysign(direction.dot(normal));
                 let ray = Ray {
                     origin,
@@ -126,7 +126,7 @@ fn volumes(world: &World) -> Vec<f64> {
     world.graph.portals.par_iter().map(of_portal).collect()
 }
 
-/// Points on every piece of a portal, [`POINTS`] in all or one a piece, with the area that each stands for.
+/// Returns points on every piece of a portal, [`POINTS`] in total or one per piece, with the area each represents.
 fn points_on(pieces: &[Vec<[f32; 3]>]) -> impl Iterator<Item = (DVec3, f64)> + '_ {
     let most = POINTS.div_ceil(pieces.len().max(1));
     pieces.iter().flat_map(move |piece| {
@@ -144,19 +144,19 @@ fn points_on(pieces: &[Vec<[f32; 3]>]) -> impl Iterator<Item = (DVec3, f64)> + '
     })
 }
 
-/// Eyes of which views are sampled.
+/// Rays of each sampled view.
 const RAYS: usize = 160;
-/// Steps along a ray at which the cell is asked; a cell thinner than a step may be missed.
+/// Steps along a ray at which cells are located; a cell thinner than a step may be missed.
 const STEPS: usize = 48;
 
-/// For each cell the eyes whose view reaches it. Eyes are spread over the indoors by a fixed sequence
-/// that starts at `first`, each looking a level way of its own with a field of 90 by 60 degrees.
+/// Returns, for each cell, the eyes whose view reaches it. Eyes spread over the indoors by a fixed sequence
+/// that starts at `first`; each looks in a level direction of its own with a field of view of 90 by 60 degrees.
 pub(super) fn views(world: &World, n_eyes: usize, first: u32) -> Eyes {
     let locator = &world.graph.locator;
     let bvh = Bvh::build(&triangles_of(world));
     let indoor = |p: DVec3| locator.locate(p).filter(|c| !world.graph[*c].outdoor);
     let b = locator.bounds;
-    // Halton's sequence: even, and the same every time.
+    // Halton sequence: even, and the same every time.
     let halton = |mut i: u32, base: u32| {
         let (mut f, mut r) = (1.0, 0.0);
         while i > 0 {
@@ -203,7 +203,7 @@ pub(super) fn views(world: &World, n_eyes: usize, first: u32) -> Eyes {
                     )
                     .map_or(far, |h| h.t);
                 for step in 1..=STEPS {
-                    // Just before the surface at last.
+                    // The last step ends just before the surface.
                     let t = t_max * (step as f64 / STEPS as f64) * (1.0 - 1e-6);
                     cells.extend(locator.locate(eye + direction * t).iter().map(|c| c.0));
                 }

@@ -1,12 +1,12 @@
-//! Makes any cell-and-portal graph simpler: merges cells until their costs are within bounds.
+//! Simplifies any cell-and-portal graph: merges cells until their costs are within bounds.
 //!
 //! After Lefebvre & Hornus 2003, §3: the cheapest cell first, the worst of its portals removed; the
-//! lower bound is sought, the upper one guaranteed. Where only a number of cells or portals is asked for,
-//! the merge that adds least to what sampled views draw is next, wherever it is (`views.rs`). Works on
-//! any [`World`](enfilade_cpg::World), whatever built it, since a merge needs nothing but the world: the two cells become one,
-//! the portals between them go, what either saw the new one sees.
+//! lower bound is a goal, the upper one guaranteed. If only a number of cells or portals is requested,
+//! the next merge is the one that adds least to the cost of sampled views, wherever it is (`views.rs`). Works on
+//! any [`World`](enfilade_cpg::World), whichever method built it, since a merge needs nothing else: the two cells
+//! become one, the portals between them disappear, and the new cell sees everything that either saw.
 //!
-//! **Every promise is kept:** a portal is left out only where both its sides are the same cell.
+//! **Every guarantee holds:** a portal is removed only where both its sides are the same cell.
 
 mod apply;
 mod cost;

@@ -7,12 +7,12 @@ use super::merge::{self, Bounds};
 use super::settings::{Metric, SimplifySettings};
 use super::{apply, metric, views};
 
-/// A simpler world and how it compares.
+/// A simplified world and its costs.
 #[derive(Clone, Debug)]
 pub struct Simplified {
     /// The world.
     pub world: World,
-    /// The cell of the result that each old cell is part of.
+    /// The new cell that each old cell is part of.
     pub cell_of: Vec<CellId>,
     /// Greatest cost of a cell.
     pub max_cost: f64,
@@ -53,9 +53,9 @@ pub fn simplify(world: &World, settings: &SimplifySettings) -> Simplified {
     finish(world, &into, &settings.cost)
 }
 
-/// Takes a portal away: its two cells become one, and all other portals between them go, too.
+/// Removes a portal: its two cells become one, and all other portals between them disappear, too.
 ///
-/// `None` when there is no such portal.
+/// `None` if the portal does not exist.
 #[must_use]
 pub fn delete_portal(world: &World, portal: PortalId) -> Option<Simplified> {
     let [a, b] = world

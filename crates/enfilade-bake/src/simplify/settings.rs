@@ -1,4 +1,4 @@
-//! What the simplifier is asked for.
+//! Settings of the simplifier.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::cost::CostModel;
 /// How portals are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Metric {
-    /// Triangles that sampled views draw more without the portal.
+    /// Triangles that sampled views additionally draw without the portal.
     #[default]
     ExpectedTriangles,
     /// Volume that sees the portal times the difference of its cells' costs (Lefebvre & Hornus 2003).
@@ -17,28 +17,28 @@ pub enum Metric {
 /// Settings of the simplifier.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimplifySettings {
-    /// Cheaper cells are merged with neighbors, where that keeps the upper bound. What reaches through
+    /// Merges cheaper cells with neighbors, where that keeps the upper bound. An item that reaches through
     /// several cells counts in each in part: no portal between them hides it.
     pub min_cost: f64,
-    /// No merge makes a cell that costs more; [`keep_bounds`](crate::bound::keep_bounds) cuts those that do.
+    /// No merge makes a cell that costs more; [`keep_bounds`](crate::bound::keep_bounds) cuts cells that do.
     pub max_cost: Option<f64>,
-    /// Whether the outdoors is cut, too, where it costs more.
+    /// Cuts the outdoors, too, if it costs more.
     pub outdoors: bool,
-    /// Cells are merged until there are no more than this, where that keeps the upper bound.
+    /// Merges cells until at most this many are left, where that keeps the upper bound.
     pub max_cells: Option<usize>,
-    /// Cells are merged until there are no more portals than this, where that keeps the upper bound.
+    /// Merges cells until at most this many portals are left, where that keeps the upper bound.
     pub max_portals: Option<usize>,
-    /// Lets rooms and the outdoors become one cell, where a bound cannot be met otherwise. Without it, portals that lead outdoors
-    /// all stay.
+    /// Lets rooms and the outdoors become one cell, if a bound cannot be met otherwise. Without it, all portals that
+    /// lead outdoors stay.
     pub join_outdoors: bool,
     /// How portals are compared.
     pub metric: Metric,
-    /// What drawing costs.
+    /// The cost of drawing.
     pub cost: CostModel,
 }
 
 impl SimplifySettings {
-    /// Every setting by name, as text, for the provenance of the file.
+    /// Returns every setting by name, as text, for the provenance of the file.
     #[must_use]
     pub fn to_settings(&self) -> BTreeMap<String, String> {
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());

@@ -1,10 +1,10 @@
-//! Which cells to merge for a number of cells or portals: those whose merge adds least to what sampled
-//! views draw.
+//! Merges cells down to a number of cells or portals: the merge that adds least to the cost of sampled views
+//! comes first.
 //!
-//! Lefebvre & Hornus 2003, §3, take the smallest cell first, which is right for a bound on cells and blind
-//! where only a number is asked for: the smallest cell may be a closet that nobody sees. Here any two
-//! neighbors may be next, and what a merge adds is counted exactly: an eye that sees one of the two draws
-//! from now on what it did not draw before, whichever cell that is listed in.
+//! Lefebvre & Hornus 2003, §3, take the smallest cell first. That is right for a bound on cell costs, but blind
+//! if only a number is requested: the smallest cell may be a closet that no view sees. Here any two
+//! neighbors may be next, and the added cost is counted exactly: an eye that sees one of the two additionally
+//! draws what it did not draw before, whichever cell lists it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,12 +12,12 @@ use rayon::prelude::*;
 
 use super::merge::{self, Bounds, CostGraph, Eyes};
 
-/// Which of two merges comes first.
+/// An order of merges.
 #[derive(Clone, Copy, Debug)]
 struct Order {
-    /// Rooms join the outdoors, where they may, only when nothing else is left to them.
+    /// Rooms merge with the outdoors, where allowed, only when no other merge is left.
     is_outdoors_last: bool,
-    /// While there are too many portals, what a merge adds is weighed by those that go; else as a whole.
+    /// While there are too many portals, divides the added cost by the number of portals removed.
     by_portal: bool,
 }
 
@@ -37,17 +37,17 @@ const ORDERS: [Order; 4] = {
     ]
 };
 
-/// How often a result is opened somewhere and closed anew; of many cells less often.
+/// Most groups that are reopened and merged anew; fewer in worlds of many cells.
 const MAX_RETRIES: usize = 64;
 const MAX_CELLS_RETRIED: usize = 8192;
 
-/// The cell that each cell becomes part of: itself, or a lesser one of its group.
+/// Returns the cell that each cell becomes part of: itself, or a lower one of its group.
 ///
-/// Cells below the lower bound come first, as in [`merge::merge`]; then what the numbers ask for, in several orders,
-/// of which the one counts that makes the eyes draw least. Then group by group is opened and all closed anew, as is
-/// best by now. No merged cell costs more than `max_cost`.
+/// Cells below the lower bound come first, as in [`merge::merge`]. Then merges down to the numbers, in several orders,
+/// and keeps the result with the cheapest views. Then reopens one group at a time and merges anew, and keeps
+/// improvements. No merged cell costs more than `max_cost`.
 ///
-/// Each merge costs the eyes and items of the pairs whose score it changes, and one look at all pairs.
+/// Each merge costs the eyes and items of the pairs whose score it changes, and one pass over all pairs.
 pub(super) fn merge(graph: &CostGraph, bounds: &Bounds, mut eyes: Eyes) -> Vec<u32> {
     let any_number = Bounds {
         max_cells: usize::MAX,
@@ -85,17 +85,17 @@ pub(super) fn merge(graph: &CostGraph, bounds: &Bounds, mut eyes: Eyes) -> Vec<u
     best.1
 }
 
-/// How many cells and portals there are too many, then what all eyes draw.
+/// Number of excess cells and portals, then the total cost of all views.
 type Excess = (usize, f64);
 
 #[derive(Clone)]
 struct ViewMerger {
     graph: CostGraph,
-    /// For each cell the eyes that see it, as bits.
+    /// For each cell, the eyes that see it, as bits.
     sees: Vec<Vec<u64>>,
-    /// For each eye the items that it draws, as bits.
+    /// For each eye, the items that it draws, as bits.
     drawn: Vec<Vec<u64>>,
-    /// Of each pair of neighbors, the lesser first.
+    /// Pairs of neighbors, the lower first.
     pairs: BTreeMap<(u32, u32), CellPair>,
     n_portals: usize,
     n_cells: usize,
@@ -106,17 +106,17 @@ struct ViewMerger {
 #[derive(Clone, Copy)]
 struct CellPair {
     n_portals: usize,
-    /// What all views draw more once they are one; stale where it is no number.
+    /// Added cost of all views if the two merge; stale if NaN.
     added: f64,
-    /// What drawing both costs.
+    /// Cost of drawing both.
     both: f64,
 }
 
-/// Whether the outdoors is one of the two, what their merge adds, what drawing both costs.
+/// One of the two is the outdoors; the added cost; the cost of drawing both.
 type MergeKey = (bool, f64, f64);
 
 impl ViewMerger {
-    /// Of a graph that was contracted to the hosts of `into`.
+    /// Starts with a graph that was contracted to the hosts of `into`.
     fn new(graph: CostGraph, sees: Vec<Vec<u64>>, into: Vec<u32>) -> Self {
         let n_eyes = 64 * sees.first().map_or(0, Vec::len);
         let mut drawn = vec![vec![0; graph.weights.len().div_ceil(64)]; n_eyes];
@@ -144,7 +144,7 @@ impl ViewMerger {
         out
     }
 
-    /// Cells that are not part of others.
+    /// Returns the cells that are not part of others.
     fn hosts(&self) -> Vec<u32> {
         let hosts = (0..).zip(&self.into).filter(|&(c, &host)| c == host);
         hosts.map(|(c, _)| c).collect()
@@ -155,7 +155,7 @@ impl ViewMerger {
             + self.n_portals.saturating_sub(bounds.max_portals)
     }
 
-    /// The best of what all orders come to: what is left too much of, and the cell that each cell becomes part of.
+    /// Returns the best result of all orders: its excess, and the cell that each cell becomes part of.
     fn merged(&mut self, bounds: &Bounds) -> (Excess, Vec<u32>) {
         // Once for all orders.
         self.weigh();
@@ -178,7 +178,7 @@ impl ViewMerger {
         tries.into_iter().min_by(by_excess).unwrap_or_default()
     }
 
-    /// Merges until the numbers are within bounds, or nothing can be merged any more.
+    /// Merges until the numbers are within bounds or no merge is possible.
     fn merge_in(&mut self, order: Order, bounds: &Bounds) {
         while self.n_too_many(bounds) > 0 {
             let by_portal = order.by_portal && self.n_portals > bounds.max_portals;
@@ -200,18 +200,18 @@ impl ViewMerger {
         pair.added = f64::NAN;
     }
 
-    /// Weighs the pairs that are stale.
+    /// Recomputes the stale pairs.
     fn weigh(&mut self) {
         for (&(a, b), pair) in &mut self.pairs {
             if pair.added.is_nan() {
-                // Sums of nothing are -0, which orders before 0: ties go by names, not by that.
+                // Sums of nothing are -0, which orders before 0: ties must go by cell number.
                 pair.both = self.graph.cost_of_both(a, b) + 0.0;
                 pair.added = added(&self.graph, &self.drawn, &self.sees, a, b) + 0.0;
             }
         }
     }
 
-    /// The pair that adds least, of each portal or as a whole; of those, the cheapest.
+    /// Returns the pair that adds least, per portal or in total; ties go to the cheapest.
     fn best(
         &mut self,
         by_portal: bool,
@@ -287,7 +287,7 @@ impl ViewMerger {
     }
 }
 
-/// What all eyes draw more when two cells become one.
+/// Returns the added cost of all views when two cells become one.
 fn added(graph: &CostGraph, drawn: &[Vec<u64>], sees: &[Vec<u64>], a: u32, b: u32) -> f64 {
     let of = |seen: u32, new: u32| -> f64 {
         let (x, y) = (&sees[seen as usize], &sees[new as usize]);
@@ -308,7 +308,7 @@ fn draw(drawn: &mut [u64], items: &[u32]) {
     }
 }
 
-/// Where bits are set, ascending.
+/// Returns the positions of set bits, ascending.
 fn bits(words: impl Iterator<Item = u64>) -> impl Iterator<Item = usize> {
     words.enumerate().flat_map(|(i, mut word)| {
         std::iter::from_fn(move || {
@@ -329,7 +329,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What a pair scores, and what its merge makes of all cells.
+    /// The key of a pair, and the cells after its merge.
     type Found = ((MergeKey, [u32; 2]), Vec<u32>);
 
     fn items(graph: &CostGraph, into: &[u32], group: u32) -> BTreeSet<u32> {
@@ -341,7 +341,7 @@ mod tests {
         items.iter().map(|&i| graph.weights[i as usize]).sum()
     }
 
-    /// What all eyes draw.
+    /// Returns the total cost of all views.
     fn drawn(graph: &CostGraph, sees: &[BTreeSet<usize>], into: &[u32]) -> f64 {
         let of_eye = |eye| {
             let groups: BTreeSet<u32> = (0..into.len())
@@ -354,7 +354,7 @@ mod tests {
         (0..128).map(of_eye).sum()
     }
 
-    /// The same by looking at every eye, cell and item anew for each pair.
+    /// Merges by recounting every eye, cell and item for each pair.
     fn by_looking(
         graph: &CostGraph,
         bounds: &Bounds,
@@ -411,14 +411,14 @@ mod tests {
             graph in graphs(), max_cost in prop_oneof![50_u32..400, Just(u32::MAX)], max_cells in 1_usize..20,
             max_portals in 0_usize..40, joins_outdoors in any::<bool>(), seeds in prop::collection::vec((any::<u64>(), any::<u64>()), 24),
         ) {
-            // Two random words at once: an eye sees a quarter of the cells.
+            // Combines two random words, so that an eye sees a quarter of the cells.
             let eyes: Vec<Vec<u64>> = (0..graph.items.len())
                 .map(|c| vec![seeds[c].0 & seeds[c].1, seeds[c].0 & seeds[23 - c].1.rotate_left(7)])
                 .collect();
             let sees: Vec<BTreeSet<usize>> = (eyes.iter())
                 .map(|e| (0..128).filter(|i| e[i / 64] >> (i % 64) & 1 == 1).collect())
                 .collect();
-            // Whole weights: sums do not depend on their order.
+            // Integer weights: sums do not depend on their order.
             let bounds = Bounds { min_cost: 0.0, max_cost: max_cost.into(), max_cells, max_portals, joins_outdoors };
             let start = ViewMerger::new(graph.clone(), eyes.clone(), (0..graph.items.len() as u32).collect());
             let mut least = f64::INFINITY;
@@ -430,7 +430,7 @@ mod tests {
                     least = least.min(drawn(&graph, &sees, &found.into));
                 }
             }
-            // The best of these, or better.
+            // At least as good as the best of these.
             let found = merge(&graph, &bounds, Eyes(eyes));
             prop_assert!(least.is_infinite() || drawn(&graph, &sees, &found) <= least);
         }

@@ -1,33 +1,32 @@
 //! Door leaves and panes: detail objects that close an opening.
 //!
-//! Detail is left out of the decomposition (Haumont et al. 2003, §6.1), but a door leaf says more
-//! about where a room ends than any measure of the opening behind it. Flat detail objects are
-//! therefore drawn into a volume of their own: the flood stops there, and an opening that such an
-//! object fills is never merged across. Whether the object is called a door does not matter, and a
-//! flat object that stands elsewhere (a shelf against a wall, a table top) fills no opening between
-//! two rooms, so it changes nothing.
+//! Detail is left out of the decomposition (Haumont et al. 2003, §6.1), but a door leaf is better
+//! evidence of a room's end than any measure of the opening behind it. So flat detail objects are
+//! drawn into a volume of their own: the flood stops there, and no merge crosses an opening that such an
+//! object fills. The object need not be named a door. A flat object elsewhere (a shelf against a wall,
+//! a table top) fills no opening between two rooms, so it changes nothing.
 
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Triangle, triangle_area_normal};
 
-/// Flat means thinner than this. [Units: wu] A door with its frame and handles is about 0.3.
+/// Largest thickness of a flat object. [Units: wu] A door with its frame and handles has about 0.3.
 pub(crate) const MAX_THICKNESS: f64 = 0.4;
-/// A closure is at least this long and this wide. [Units: wu]
+/// Least length and width of a closure. [Units: wu]
 const MIN_EXTENT: f64 = 0.35;
-/// … and at least this many times wider than thick.
+/// … and least ratio of its width to its thickness.
 const MIN_FLATNESS: f64 = 2.0;
 /// Least height of a door leaf. [Units: wu]
 const MIN_LEAF_HEIGHT: f64 = 1.6;
 /// Least share of its bounding rectangle that a door leaf fills; the bars of a railing fill less.
 const MIN_FILL: f64 = 0.5;
-/// A point of a plate's rim is held when a wall or another plate is within this distance, which bridges a frame. [Units: wu]
+/// A point of a plate's rim is held if a wall or another plate is this near, which bridges a frame. [Units: wu]
 const HELD_WITHIN: f64 = 0.2;
-/// Least share of its rim that is held when a leaf is shut: nearly three of its four sides.
+/// Least held share of the rim of a shut leaf: nearly three of its four sides.
 const MIN_HELD: f64 = 0.7;
 /// Samples along each side of a plate's rim.
 const RIM_SAMPLES: usize = 8;
 
-/// The detail objects that are flat enough to close an opening, each by its triangles.
+/// Returns the triangles of each detail object that is flat enough to close an opening.
 #[must_use]
 pub(crate) fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
     let mut out = Vec::new();
@@ -54,10 +53,11 @@ pub(crate) fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
     out
 }
 
-/// All plates but the leaves of doors that stand open: those whose rim does not run along walls or other plates nearly all
-/// around, but is held below and at the hinges alone. They shut nothing, and would cut a corridor in two.
+/// Returns all plates except door leaves that stand open. The rim of an open leaf does not run along walls or other
+/// plates nearly all around, but is held only below and at the hinges. Such leaves shut nothing, and would cut a
+/// corridor in two.
 ///
-/// Eight queries of box trees for each side of a plate.
+/// Eight box tree queries for each side of a plate.
 #[must_use]
 pub(crate) fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Vec<Vec<Triangle>> {
     let owner: Vec<usize> = (0..plates.len())
@@ -93,10 +93,10 @@ pub(crate) fn without_open_leaves(plates: Vec<Vec<Triangle>>, walls: &Bvh) -> Ve
     plates
 }
 
-/// The box around an object, along the direction in which it is thin.
+/// The box around an object, oriented along its thin direction.
 struct Plate {
     center: DVec3,
-    /// Half of the extents along the two sides of the plate.
+    /// Half extents along the two sides of the plate.
     sides: [DVec3; 2],
     thickness: f64,
 }
@@ -104,7 +104,7 @@ struct Plate {
 impl Plate {
     fn of(triangles: &[Triangle]) -> Self {
         let n = thin_direction(triangles);
-        // The two other extents along the horizontal and the vertical of the plate.
+        // The other two extents run along the horizontal and the vertical of the plate.
         let level = if n.y.abs() > 0.7 { DVec3::X } else { DVec3::Y };
         let u = (level - n * n.dot(level)).normalize();
         let range = |d: DVec3| {
@@ -133,7 +133,7 @@ impl Plate {
             && least > MIN_FLATNESS * self.thickness
     }
 
-    /// Whether it may be the leaf of a door, given its area on all sides: upright, not as low as a counter, and no railing.
+    /// Returns `true` for a possible door leaf, given its area on all sides: upright, above counter height, no railing.
     fn is_leaf(&self, area: f64) -> bool {
         let [u, v] = self.sides;
         let height = 2.0 * u.y.abs().max(v.y.abs());
@@ -141,7 +141,7 @@ impl Plate {
         height >= MIN_LEAF_HEIGHT && area >= MIN_FILL * 8.0 * u.length() * v.length()
     }
 
-    /// Points along its rim, evenly by side in number.
+    /// Returns points along its rim, the same number on each side.
     fn rim(&self) -> Vec<DVec3> {
         let [u, v] = self.sides;
         let corners = [u + v, v - u, -u - v, u - v].map(|c| self.center + c);
@@ -158,12 +158,12 @@ fn is_flat(triangles: &[Triangle]) -> bool {
     !triangles.is_empty() && Plate::of(triangles).is_flat()
 }
 
-/// Directions that surfaces are sorted by at most.
+/// Most directions that surfaces are sorted into.
 const MAX_DIRECTIONS: usize = 64;
 
-/// The direction that most of the surface faces, up to sign.
+/// Returns the direction that most of the surface faces, up to sign.
 ///
-/// The largest triangles say which directions there are: the many small ones of moldings, handles and scanned edges may
+/// The largest triangles define the directions: the many small ones of moldings, handles and scanned edges may
 /// face anywhere.
 pub(crate) fn thin_direction(triangles: &[Triangle]) -> DVec3 {
     let mut normals: Vec<DVec3> = triangles.iter().map(triangle_area_normal).collect();
@@ -211,7 +211,7 @@ mod tests {
         let walls = Bvh::build(&walls.concat());
         let shut = at(DVec3::ZERO, DVec3::new(0.9, 2.0, 0.04));
         let ajar = at(DVec3::ZERO, DVec3::new(0.04, 2.0, 0.9));
-        // As high as a railing: where it stands, it stands.
+        // As low as a railing: it counts as a plate wherever it stands.
         let low = at(DVec3::ZERO, DVec3::new(0.04, 1.0, 0.9));
         for (plate, stays) in [(shut, true), (ajar, false), (low, true)] {
             assert_eq!(
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn small_triangles_that_face_anywhere_do_not_hide_which_way_a_leaf_faces() {
-        // Moldings whose vertices a scanner has moved come first in the file, in more directions than are told apart.
+        // Moldings with vertices moved by a scanner come first in the file, in more directions than the limit.
         let mut rng = enfilade_testkit::Rng::new(7);
         let mut within = |size: DVec3| DVec3::new(rng.unit(), rng.unit(), rng.unit()) * size;
         let mut leaf: Vec<Triangle> = (0..400)

@@ -1,36 +1,36 @@
-//! Candidate portals: from where two cells meet to a plane in the real opening.
+//! Candidate portals: fits a plane in the real opening to the faces where two cells meet.
 //!
 //! Haumont et al. 2003, §4.3 place a portal from the distance map (the geodesic between the two
-//! regions) or from the silhouette of the opening seen from one side, and take the smaller. We take
-//! the smallest, too, but among planes that the scene itself suggests: the planes of the walls around
-//! the opening, the middles between two of them, and the front's own mean plane, moved and tilted.
-//! Each candidate is judged by its *free cross-section*: the part of the plane that can be reached
-//! from the front without meeting a triangle, measured on the triangles themselves, not on voxels.
+//! regions) or from the silhouette of the opening seen from one side, and take the smaller. We also take
+//! the smallest, but among planes that the scene itself suggests: the planes of the walls around
+//! the opening, midway between two of them, and the front's own mean plane, moved and tilted.
+//! Each plane is judged by its *free cross-section*: the part of the plane that can be reached
+//! from the front without crossing a triangle, measured on the triangles themselves, not on voxels.
 //!
 //! The result is a [`Candidate`]: a convex polygon that covers that cross-section and reaches a little
-//! into the walls. How much of it is really open, and between which cells, the cell complex decides.
+//! into the walls. The cell complex decides which parts of it are open, and between which cells.
 //!
-//! Cost: a few dozen sections an opening, each linear in the triangles near it. Numerically harmless:
+//! Cost: a few dozen sections per opening, each linear in the triangles near it. Numerically harmless:
 //! a section is a picture of fixed resolution; errors make a candidate a few centimeters too large.
 
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
 
 use super::picture::Picture;
 
-/// An opening between two cells, as a builder knows it.
+/// An opening between two cells, as the builder describes it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Opening {
     /// Mean plane.
     pub(crate) plane: Plane,
-    /// Mean of its points. [Units: wu]
+    /// Mean of the front's points. [Units: wu]
     pub(crate) center: DVec3,
-    /// Length of the vector area, or the projected area where it wraps around something. [Units: wu²]
+    /// Length of the vector area, or the projected area if the front wraps around something. [Units: wu²]
     pub(crate) area: f64,
-    /// Share that door leaves and panes fill.
+    /// Share filled by door leaves and panes.
     pub(crate) closed: f64,
 }
 
-/// A candidate portal: a convex polygon across an opening, a bit larger than the opening.
+/// A candidate portal: a convex polygon across an opening, slightly larger than the opening.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
     /// Its polygon.
@@ -39,13 +39,13 @@ pub(crate) struct Candidate {
     pub(crate) closed: f64,
 }
 
-/// How far around the front's extent a section may reach before it counts as unbounded. [Units: wu]
+/// Distance beyond the front's extent at which a section counts as unbounded. [Units: wu]
 const MARGIN: f64 = 0.7;
-/// How far from the front's mean plane a candidate may lie. [Units: wu]
+/// Largest distance of a candidate from the front's mean plane. [Units: wu]
 const OFFSET: f64 = 0.6;
 
-/// Fits a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, of which `bvh` is. Slits
-/// narrower than `hole` count as closed: through them a section would run on into the hollow of a wall.
+/// Fits a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, which `bvh` indexes.
+/// Slits narrower than `hole` count as closed: through them a section would extend into the hollow of a wall.
 #[must_use]
 pub(crate) fn fit_candidate(
     centers: &[DVec3],
@@ -62,7 +62,7 @@ pub(crate) fn fit_candidate(
     near.sort_unstable();
     let around: Vec<Triangle> = near.iter().map(|&t| triangles[t as usize]).collect();
     let mut best: Option<FreeSection> = None;
-    // Wall planes come first; others are asked only when no wall closes the opening.
+    // Wall planes come first; others are tried only if no wall plane closes the opening.
     for normals in candidate_normals(opening, &around) {
         for normal in normals {
             for plane in candidate_planes(opening, normal, &around, hole) {
@@ -95,7 +95,7 @@ pub(crate) fn fit_candidate(
     }
 }
 
-/// Directions worth trying, unit length, facing like the opening's own normal: those of walls, the
+/// Returns directions worth trying, unit length, facing like the opening's own normal: those of walls, the
 /// front's own, and tilted ones.
 fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] {
     let own = opening.plane.normal;
@@ -104,17 +104,17 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
         let area_normal = triangle_area_normal(t);
         let area = area_normal.length();
         let facing = area_normal * area_normal.dot(own).signum();
-        // At a door in the corner of a room the front runs askew, by up to half a right angle.
+        // At a door where two walls meet, the front runs askew, by up to 45 degrees.
         if area > 1e-9 && facing.dot(own) > 0.65 * area {
             faces.push((facing / area, area));
         }
     }
-    // The largest stand for what is about parallel to them: small triangles lean where vertices were moved.
+    // The largest surfaces represent those nearly parallel to them: small triangles tilt where vertices were moved.
     let order = |n: DVec3| n.to_array().map(f64::to_bits);
     faces.sort_by(|a, b| b.1.total_cmp(&a.1).then(order(a.0).cmp(&order(b.0))));
     let mut normals: Vec<(DVec3, f64)> = Vec::new();
     for (n, area) in faces {
-        // Large walls far off count no more than what stands right at the opening.
+        // Large walls far off count no more than surfaces right at the opening.
         let weight = area.min(opening.area);
         match normals.iter_mut().find(|(m, _)| m.dot(n) > 0.9998) {
             Some((_, w)) => *w += weight,
@@ -129,7 +129,7 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
     normals.truncate(3);
     let walls: Vec<DVec3> = normals.into_iter().map(|(n, _)| n).collect();
     let mut fronts: Vec<DVec3> = Vec::new();
-    // The front is a little ragged: upright and level planes are what it means most of the time.
+    // The front is a little ragged: its plane is usually meant to be upright or level.
     let upright = DVec3::new(own.x, 0.0, own.z).normalize_or_zero();
     for n in [upright, DVec3::Y * own.y.signum(), own] {
         if n.dot(own) > 0.94 && walls.iter().chain(&fronts).all(|m| m.dot(n) < 0.9998) {
@@ -141,14 +141,14 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
     [walls, fronts, tilted.to_vec()]
 }
 
-/// Planes with this normal worth trying: those of walls, those midway between two, and a sweep. `hole` is the smallest hole.
+/// Returns planes with this normal worth trying: those of walls, those midway between two, and a sweep.
 fn candidate_planes(
     opening: &Opening,
     normal: DVec3,
     around: &[Triangle],
     hole: f64,
 ) -> Vec<Plane> {
-    // Steps within a surface are no wider than what is closed anyway.
+    // Steps within a surface are at most as wide as gaps that are closed anyway.
     let step = 0.2 * hole;
     let middle = Plane::through(opening.center, normal);
     let mut offsets: Vec<f64> = Vec::new();
@@ -175,7 +175,7 @@ fn candidate_planes(
         .collect()
 }
 
-/// What of a plane can be reached from the front without meeting a triangle.
+/// The part of a plane that can be reached from the front without crossing a triangle.
 struct FreeSection {
     plane: Plane,
     picture: Picture,
@@ -190,12 +190,12 @@ impl FreeSection {
     /// Lower is better: the smallest closed section; near ties go to the plane nearest the front.
     fn cost(&self, opening: &Opening) -> f64 {
         let unbounded = if self.bounded { 1.0 } else { 4.0 };
-        // A tenth of a wall's thickness is no reason to prefer a plane off the middle.
+        // A tenth of a wall's thickness does not justify a plane off the middle.
         (self.area + 1e-3) * unbounded * (1.0 + 0.1 * self.offset.abs())
             + 0.02 * opening.area * self.offset.abs()
     }
 
-    /// Convex hull of the open lattice cells, grown into the walls.
+    /// Returns the convex hull of the open lattice cells, grown into the walls.
     fn winding(&self) -> Winding {
         let mut corners = Vec::new();
         let Picture {
@@ -236,7 +236,7 @@ fn free_section(
 ) -> FreeSection {
     let picture = Picture::around(plane, centers, MARGIN + spacing);
     let blocked = picture.blocked(plane, around);
-    // Half a hole from each side; less than half a cell is none.
+    // Half a hole from each side, rounded to cells.
     let reach = (0.5 * hole / picture.step).round() as usize;
     let (pieces, found) = picture.pieces(&picture.grown(&blocked, reach), centers);
     // The piece that most of the front projects onto.
@@ -244,7 +244,7 @@ fn free_section(
     let (open, area, bounded) = match main {
         Some(i) => {
             let main = &found[i];
-            // A plane that most of the front misses is no plane of this opening.
+            // A plane that most of the front misses does not belong to this opening.
             let share = main.n_hits as f64 / centers.len() as f64;
             let open: Vec<bool> = pieces.iter().map(|&p| p as usize == i + 1).collect();
             let mut open = picture.grown(&open, reach);
@@ -275,7 +275,7 @@ fn free_section(
 mod tests {
     use super::*;
 
-    /// The faces of a block, two triangles each.
+    /// Returns the faces of a block, two triangles each.
     fn block(lo: DVec3, hi: DVec3) -> Vec<Triangle> {
         Aabb::new(lo, hi).triangles()
     }
@@ -403,7 +403,7 @@ mod tests {
         let middle = Plane::through(DVec3::new(2.1, 1.0, 2.5), DVec3::X);
         let section = |hole: f64| free_section(&middle, &centers, &walls, [0.1, hole]);
         let closed = section(0.05);
-        // Two steps of the picture around a doorway of 2 m².
+        // Within two picture steps around a doorway of 2 m².
         assert!(
             closed.bounded && (closed.area - 2.0).abs() < 0.25,
             "{}",

@@ -1,24 +1,24 @@
-//! The direction that a building's walls run in, so that the voxels lie along them.
+//! The direction of a building's walls, along which the voxel grid is laid.
 //!
-//! In a grid that lies askew to the walls each wall is a staircase, and what should be one flat
-//! front between two rooms is a sloping one whose rests become portals of their own. So the grid
-//! is laid along the direction that most of the walls have. Only the voxels turn: all that they find is
-//! turned back, and the cell complex cuts the scene as it stands.
+//! In a grid askew to the walls, each wall is a staircase, and the flat front between two rooms
+//! becomes a sloping one, whose leftovers become portals of their own. So the grid follows the direction
+//! of most walls. Only the voxel grid turns: all results are turned back, and the cell complex cuts the scene
+//! as it stands.
 
 use std::borrow::Cow;
 
 use enfilade_geom::{Aabb, DVec3, Triangle, Winding, triangle_area_normal};
 
-/// A wall's normal leans less than this. [Units: sine of the angle to the level]
+/// Largest tilt of a wall's normal. [Units: sine of the angle to the level]
 const UPRIGHT: f64 = 0.1;
-/// Walls within this of a direction have it. [Units: degrees]
+/// Walls within this angle of a direction count for it. [Units: degrees]
 const SPREAD: usize = 1;
-/// A direction counts when this share of all walls has it.
+/// Least share of all walls that a direction needs.
 const MIN_SHARE: f64 = 0.2;
-/// … and it has this many times the walls that run along the axes.
+/// … and least ratio of its walls to those along the axes.
 const MIN_GAIN: f64 = 1.25;
 
-/// A turn about the vertical axis, from the scene to the grid and back.
+/// A rotation about the vertical axis, from the scene to the grid and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame {
     cos: f64,
@@ -29,13 +29,13 @@ impl Frame {
     /// The frame of the scene itself.
     pub(crate) const SCENE: Self = Self { cos: 1.0, sin: 0.0 };
 
-    /// The frame along most of the walls; the scene's own unless another is clearly better.
+    /// Returns the frame along most of the walls; the scene's own unless another is clearly better.
     ///
-    /// The order of the triangles has no say. Linear in them.
+    /// Independent of the order of the triangles. Linear in them.
     #[must_use]
     pub(crate) fn of(triangles: &[Triangle]) -> Self {
-        // For each degree of the quarter circle the sum of normals, in whole numbers: sums of those
-        // do not depend on the order.
+        // The sum of normals for each degree of the quarter circle, in integers: such sums do not
+        // depend on the order.
         let mut sums = [[0_i128; 3]; 90];
         for t in triangles {
             let n = triangle_area_normal(t);
@@ -57,7 +57,7 @@ impl Frame {
             })
         };
         let total: f64 = sums.iter().map(|s| s[0]).sum::<i128>() as f64;
-        // Half open at 90 degrees: what runs along the axes is in the first degree and the last.
+        // Half open at 90 degrees: walls along the axes are in the first and the last degree.
         let along_axes = (sums[0][0] + sums[89][0]) as f64;
         let inner = SPREAD..90 - SPREAD;
         let best = inner
@@ -77,19 +77,19 @@ impl Frame {
         }
     }
 
-    /// Whether it is the scene's own.
+    /// Returns `true` for the scene's own frame.
     #[must_use]
     pub(crate) fn is_scene(self) -> bool {
         self == Self::SCENE
     }
 
-    /// How far the grid is turned, from x toward z. [Units: degrees]
+    /// Returns the turn of the grid, from x toward z. [Units: degrees]
     #[must_use]
     pub(crate) fn degrees(self) -> f64 {
         self.sin.atan2(self.cos).to_degrees()
     }
 
-    /// A point or direction of the scene, in the grid.
+    /// Converts a point or direction from the scene to the grid.
     #[must_use]
     pub(crate) fn to_grid(self, p: DVec3) -> DVec3 {
         DVec3::new(
@@ -99,7 +99,7 @@ impl Frame {
         )
     }
 
-    /// A point or direction of the grid, in the scene.
+    /// Converts a point or direction from the grid to the scene.
     #[must_use]
     pub(crate) fn to_scene(self, p: DVec3) -> DVec3 {
         DVec3::new(
@@ -109,7 +109,7 @@ impl Frame {
         )
     }
 
-    /// Triangles of the scene, in the grid.
+    /// Converts triangles from the scene to the grid.
     #[must_use]
     pub(crate) fn triangles_to_grid<'a>(self, triangles: &'a [Triangle]) -> Cow<'a, [Triangle]> {
         if self.is_scene() {
@@ -119,7 +119,7 @@ impl Frame {
         Cow::Owned(turned.collect())
     }
 
-    /// A polygon of the grid, in the scene.
+    /// Converts a polygon from the grid to the scene.
     #[must_use]
     pub(crate) fn winding_to_scene(self, winding: &Winding) -> Winding {
         let mut out = winding.clone();
@@ -129,7 +129,7 @@ impl Frame {
         out
     }
 
-    /// The box, along the scene's axes, around a box of the grid.
+    /// Returns the axis-aligned box in the scene around a box of the grid.
     #[must_use]
     pub(crate) fn aabb_to_scene(self, bounds: &Aabb) -> Aabb {
         if self.is_scene() {
@@ -148,7 +148,7 @@ impl Frame {
     }
 }
 
-/// A direction turned by quarters into the first quadrant: x above 0, y not below.
+/// Turns a direction by quarters into the first quadrant: x above 0, y not below.
 fn folded(mut x: f64, mut y: f64) -> [f64; 2] {
     while x <= 0.0 || y < 0.0 {
         (x, y) = (y, -x);
@@ -160,7 +160,7 @@ fn folded(mut x: f64, mut y: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Walls of a box of 8 × 5 × 3, turned by `degrees`, with a floor that has no say.
+    /// Walls of a box of 8 × 5 × 3, turned by `degrees`, with a floor that must not matter.
     fn walls(degrees: f64) -> Vec<Triangle> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let turn = |x: f64, y: f64, z: f64| DVec3::new(cos * x - sin * z, y, cos * z + sin * x);

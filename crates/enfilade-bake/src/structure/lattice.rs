@@ -1,6 +1,6 @@
-//! Counting on a lattice of points in a plane: what hangs together, and what surrounds it.
+//! Counts on a lattice of points in a plane: connected points, and their surroundings.
 
-/// Share of the rim of `mask` (what lies within two steps of it) where `is_wall` holds.
+/// Returns the share of the rim of `mask` (points within two steps of it) where `is_wall` holds.
 pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
     let (mut rim, mut wall) = (0_usize, 0_usize);
     for j in 0..side[1] {
@@ -18,8 +18,8 @@ pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize)
     wall as f64 / rim.max(1) as f64
 }
 
-/// Points of `inside` (a lattice `side` wide and high) that hang together with a seed. Uses up
-/// `inside`. What lies behind a wall beside the opening is no part of the section at the opening.
+/// Returns the number of points of `inside` (a lattice of size `side`) connected to a seed. Clears those
+/// points. Points behind a wall beside the opening do not belong to the section at the opening.
 pub(crate) fn connected_count(
     inside: &mut [bool],
     side: [usize; 2],

@@ -1,31 +1,31 @@
 //! How badly the triangles of a model fit together.
 //!
-//! Exporters and scanners move vertices, and a hurried hand leaves walls a bit short: then two triangles that are meant to
-//! share an edge do not, and a slit as wide as the error lies between them. In a model that was made like that as a whole,
-//! no slit of that width means anything.
+//! Exporters and scanners move vertices, and hasty modeling leaves walls a bit short. Then two triangles that should
+//! share an edge do not, and a slit as wide as the error lies between them. If a whole model was made like that,
+//! no slit of that width carries meaning.
 //!
-//! Measured at edges that only one triangle has: how far the middle is from the next triangle. Edges in the open, far from
-//! all others, are the rims of sheets and say nothing; in a model that fits most edges are shared.
+//! Measures, at edges with a single triangle, the distance from the edge's midpoint to the nearest other triangle.
+//! Edges far from all other triangles are rims of sheets and carry no information. If a model fits, most are shared.
 //!
-//! Time: a box query for each edge of a few thousand triangles. In doubt the result is 0, and the model is baked as if it fitted.
+//! Time: a box query for each edge of a few thousand triangles. In doubt the result is 0: the model counts as fitting.
 
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, closest_point_on_triangle};
 use rayon::prelude::*;
 
-/// So many triangles are looked at, about.
+/// Approximate number of triangles sampled.
 const SAMPLES: usize = 4096;
-/// An edge that is farther than this from all other triangles is the rim of a sheet. [Units: wu]
+/// An edge farther than this from all other triangles is the rim of a sheet. [Units: wu]
 const RIM: f64 = 0.05;
-/// Edges that are nearer than this to another triangle fit: rounding. [Units: wu]
+/// An edge nearer than this to another triangle fits: rounding. [Units: wu]
 const FITS: f64 = 1e-5;
-/// Share of all edges that must not fit before the model counts as made like that.
+/// Least share of all edges that must not fit for a misfit to count.
 const MOST: f64 = 0.5;
-/// Of the edges that do not fit, this share is nearer to the next triangle than what is returned.
+/// Quantile, among the edges that do not fit, of the returned distance.
 const QUANTILE: f64 = 0.95;
 
-/// How far edges that are meant to be one lie apart, nearly all of them; 0 where most fit. [Units: wu]
+/// Returns how far apart nearly all edges lie that should coincide; 0 if most fit. [Units: wu]
 ///
-/// The order of the triangles has no say.
+/// Independent of the order of the triangles.
 pub(crate) fn misfit(triangles: &[Triangle], bvh: &Bvh, allowance: &Allowance) -> f64 {
     let sampled: Vec<usize> = sampled(triangles);
     let mut gaps: Vec<f64> = sampled
@@ -41,11 +41,11 @@ pub(crate) fn misfit(triangles: &[Triangle], bvh: &Bvh, allowance: &Allowance) -
     gaps[((gaps.len() - 1) as f64 * QUANTILE) as usize]
 }
 
-/// About [`SAMPLES`] triangles, chosen by where they are.
+/// Returns about [`SAMPLES`] triangles, chosen by position.
 fn sampled(triangles: &[Triangle]) -> Vec<usize> {
     let every = triangles.len().div_ceil(SAMPLES) as u64;
     let is_chosen = |t: &Triangle| {
-        // A sum, so that it does not matter with which vertex a file begins.
+        // A sum, so that the first vertex in the file does not matter.
         let mixed = t.iter().map(|p| mixed(*p));
         mixed.fold(0_u64, u64::wrapping_add) % every == 0
     };
@@ -54,7 +54,7 @@ fn sampled(triangles: &[Triangle]) -> Vec<usize> {
         .collect()
 }
 
-/// A point as a number without pattern (the finalizer of SplitMix64, Steele, Lea & Flood 2014).
+/// Hashes a point (the finalizer of SplitMix64, Steele, Lea & Flood 2014).
 fn mixed(p: DVec3) -> u64 {
     p.to_array().iter().fold(0, |sum: u64, x| {
         let mut z = sum
@@ -66,13 +66,13 @@ fn mixed(p: DVec3) -> u64 {
     })
 }
 
-/// Distance from the middle of the edge that begins at vertex `k` of triangle `t` to the next triangle; 0 where one has the
-/// same edge, infinite where none is near.
+/// Returns the distance from the midpoint of the edge that begins at vertex `k` of triangle `t` to the nearest other
+/// triangle; 0 if one shares the edge, infinite if none is near.
 fn gap(triangles: &[Triangle], bvh: &Bvh, t: usize, k: usize, allowance: &Allowance) -> f64 {
     let [a, b] = [triangles[t][k], triangles[t][(k + 1) % 3]];
     let middle = a.midpoint(b);
     let mut nearest = f64::INFINITY;
-    // Nothing is nearer than one that has the same edge.
+    // No distance is below that of a shared edge.
     bvh.any_in_box(&Aabb::new(middle, middle).expanded(RIM), |other| {
         if other as usize != t {
             let other = &triangles[other as usize];

@@ -1,9 +1,9 @@
-//! What is there: the structure of a scene, as all builders see it before any of them looks for rooms.
+//! The structure of a scene, as all builders see it before any of them searches for rooms.
 //!
 //! | question | file |
 //! | --- | --- |
 //! | which triangles bound rooms, which are stairs, along which axes | `of`, `stairs`, `frame` |
-//! | what closes openings: door leaves and panes | `blockers` |
+//! | surfaces that close openings: door leaves and panes | `blockers` |
 //! | where storeys end | `slabs` |
 //! | how badly triangles fit together | `misfit` |
 //! | where surfaces end, which triangles are missing | `rims` |

@@ -1,4 +1,4 @@
-//! The structural triangles of a scene, sorted by what they are.
+//! The structural triangles of a scene, sorted by purpose.
 
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Triangle, triangle_area_normal};
@@ -14,51 +14,51 @@ use crate::{BakeConfig, BakeError};
 /// Label of the space around the building.
 pub(crate) const OUTDOORS: u32 = 1;
 
-/// What it costs to sort a triangle, in units of [`Allowance`].
+/// Cost of sorting a triangle, in units of [`Allowance`].
 const WORK_A_TRIANGLE: u64 = 20;
 
-/// Whether stairs are told from walls.
+/// How stairs are treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stairs {
-    /// They stand in rooms and bound none.
+    /// Stairs stand in rooms and bound none.
     Apart,
-    /// All structure bounds rooms: brushes say by their class what is detail.
+    /// All structure bounds rooms: the class of a brush marks detail.
     AreWalls,
 }
 
 /// The structure of a scene.
 ///
-/// `walls`, `rims`, `stairs` and `bvh` are in the frame, all else is where the scene has it.
+/// `walls`, `rims`, `stairs` and `bvh` are in frame coordinates, all else in scene coordinates.
 pub(crate) struct Structure<'a> {
     pub(crate) scene: &'a Scene,
-    /// Where each triangle comes from.
+    /// Source of each triangle.
     pub(crate) sources: Vec<TriangleSource>,
     /// All structural triangles that have an area.
     pub(crate) triangles: Vec<Triangle>,
     /// The axes along which most walls run.
     pub(crate) frame: Frame,
-    /// What bounds rooms.
+    /// Triangles that bound rooms.
     pub(crate) walls: Vec<Triangle>,
-    /// Number of each wall among the triangles.
+    /// Index of each wall in `triangles`.
     pub(crate) wall_numbers: Vec<u32>,
     pub(crate) stairs: Vec<Triangle>,
-    /// Of all structural triangles.
+    /// Indexes all structural triangles.
     pub(crate) bvh: Bvh,
-    /// Where walls end.
+    /// Edges where walls end.
     pub(crate) rims: Rims,
     /// How far triangles that should meet miss each other. [Units: wu]
     pub(crate) misfit: f64,
-    /// What those who look at it spend from.
+    /// Shared budget of all that works on the structure.
     pub(crate) allowance: &'a Allowance,
 }
 
 impl<'a> Structure<'a> {
-    /// `frame` chooses the axes from the structural triangles.
+    /// Sorts the structure of a scene. `frame` chooses the axes from the structural triangles.
     ///
     /// `O(n log n)` in triangles.
     ///
     /// # Errors
-    /// When nothing is structural.
+    /// If nothing is structural.
     pub(crate) fn of(
         scene: &'a Scene,
         frame: impl FnOnce(&[Triangle]) -> Frame,
@@ -78,7 +78,7 @@ impl<'a> Structure<'a> {
             Stairs::Apart => find_stairs(&sources, &framed),
             Stairs::AreWalls => vec![false; framed.len()],
         };
-        // What is nothing but stairs has no rooms that they could stand in.
+        // If everything is stairs, there are no rooms for them to stand in.
         if is_stair.iter().all(|&s| s) {
             is_stair.fill(false);
         }
@@ -105,23 +105,23 @@ impl<'a> Structure<'a> {
         })
     }
 
-    /// The box around everything structural, in the frame.
+    /// Returns the box around everything structural, in frame coordinates.
     pub(crate) fn bounds(&self) -> Aabb {
         bounds_of(&self.walls).union(bounds_of(&self.stairs))
     }
 
-    /// The smallest hole of this model. [Units: wu]
+    /// Returns the smallest hole of this model. [Units: wu]
     pub(crate) fn hole(&self, config: &BakeConfig) -> f64 {
         config.smallest_hole.resolved(self.misfit).gap()
     }
 
-    /// Heights at which storeys end, ascending. [Units: wu]
+    /// Returns the heights at which storeys end, ascending. [Units: wu]
     pub(crate) fn slabs(&self) -> Vec<f64> {
         slab_heights(&self.walls)
     }
 
-    /// Triangles of the detail objects that may close an opening, in the frame: door leaves that are shut, panes. `surfaces`
-    /// are what holds their rims.
+    /// Returns the triangles of detail objects that may close an opening, in frame coordinates: shut door leaves,
+    /// panes. `surfaces` hold their rims.
     pub(crate) fn blockers(&self, surfaces: &Bvh) -> Vec<Triangle> {
         let plates = plates(self.scene);
         let framed = plates
@@ -130,12 +130,12 @@ impl<'a> Structure<'a> {
         without_open_leaves(framed.collect(), surfaces).concat()
     }
 
-    /// Triangles that are missing in walls, each as large as an opening of the least width. What they open is no doorway.
+    /// Returns triangles missing in walls, each as large as an opening of the least width. The hole is not a doorway.
     pub(crate) fn missing(&self, config: &BakeConfig) -> Vec<Triangle> {
         self.rims.missing_triangles(config.min_opening.powi(2))
     }
 
-    /// Forgets what is in the frame: what a builder found is put where the scene has it.
+    /// Drops the data in frame coordinates, once the builder's results are back in scene coordinates.
     pub(crate) fn into_scene(self) -> Self {
         let bvh = if self.frame.is_scene() {
             self.bvh
@@ -155,7 +155,7 @@ impl<'a> Structure<'a> {
     }
 }
 
-/// Structural triangles that have an area, with where they came from.
+/// Returns the structural triangles that have an area, with their sources.
 pub(crate) fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<Triangle>) {
     scene
         .triangle_sources(Role::Structural)
@@ -166,7 +166,7 @@ pub(crate) fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<T
         .unzip()
 }
 
-/// Box around triangles; empty for none.
+/// Returns the box around triangles; empty for none.
 pub(crate) fn bounds_of(triangles: &[Triangle]) -> Aabb {
     triangles
         .iter()
@@ -174,8 +174,8 @@ pub(crate) fn bounds_of(triangles: &[Triangle]) -> Aabb {
         .fold(Aabb::EMPTY, |b, &p| b.including(p))
 }
 
-/// The triangles in an order of their own, each from its least corner on, for builders whose result would
-/// depend on how a file lists them.
+/// Returns the triangles in a canonical order, each starting at its least vertex, for builders whose result
+/// would depend on the order in the file.
 pub(crate) fn in_own_order(triangles: &[Triangle]) -> Vec<Triangle> {
     let order = |a: &DVec3, b: &DVec3| {
         let by = |k: usize| a[k].total_cmp(&b[k]);

@@ -1,10 +1,10 @@
-//! A plane's section with triangles, as a picture: which lattice cells they block, and which open ones hang together.
+//! A plane's section with triangles, as a picture: the lattice cells that they block, and the connected open ones.
 //!
-//! Of fixed resolution, so that a section costs no more than a picture and the triangles near it.
+//! The resolution is fixed, so that a section costs no more than a picture and the triangles near it.
 
 use enfilade_geom::{DVec3, Plane, Triangle};
 
-/// Most lattice points along one side.
+/// Most lattice cells along one side.
 const MAX_SIDE: usize = 320;
 /// Finest lattice spacing. [Units: wu]
 const FINEST: f64 = 0.02;
@@ -19,9 +19,9 @@ pub(super) struct Picture {
     pub(super) side: [usize; 2],
 }
 
-/// Cells of a picture that hang together.
+/// A connected set of open cells.
 pub(super) struct OpenPatch {
-    /// Points of the opening that lie in it.
+    /// Number of the opening's points in it.
     pub(super) n_hits: usize,
     pub(super) meets_border: bool,
 }
@@ -52,7 +52,7 @@ impl Picture {
         [self.u, self.v].map(|d| d.dot(p - self.origin) / self.step)
     }
 
-    /// The cells that triangles lie in or cross.
+    /// Returns the cells that triangles lie in or cross.
     pub(super) fn blocked(&self, plane: &Plane, around: &[Triangle]) -> Vec<bool> {
         let mut blocked = vec![false; self.side[0] * self.side[1]];
         for t in around {
@@ -66,8 +66,8 @@ impl Picture {
         blocked
     }
 
-    /// The pieces of the open cells that points lie in: of each cell the number of its piece from 1 on, 0 where there is
-    /// none, and the pieces.
+    /// Returns, for each open cell, the number of its piece from 1 on (0 for none), and the pieces. Only pieces that
+    /// contain a point count.
     pub(super) fn pieces(&self, blocked: &[bool], points: &[DVec3]) -> (Vec<u32>, Vec<OpenPatch>) {
         let mut piece_of = vec![0_u32; blocked.len()];
         let mut pieces: Vec<OpenPatch> = Vec::new();
@@ -87,7 +87,7 @@ impl Picture {
         (piece_of, pieces)
     }
 
-    /// A set of cells with all that are up to `reach` cells from it, along both sides.
+    /// Returns a set of cells with all cells up to `reach` from it, along both sides.
     pub(super) fn grown(&self, cells: &[bool], reach: usize) -> Vec<bool> {
         let [nu, nv] = self.side;
         let mut out = cells.to_vec();
@@ -103,7 +103,7 @@ impl Picture {
         out
     }
 
-    /// Marks the open cells that hang together with `start`.
+    /// Marks the open cells connected to `start`.
     fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> OpenPatch {
         let side = self.side;
         let mut meets_border = false;
@@ -130,7 +130,7 @@ impl Picture {
     }
 }
 
-/// Where a triangle crosses a plane, given the distances `d` of its vertices from it.
+/// Returns the segment in which a triangle crosses a plane, given the distances `d` of its vertices.
 fn crossing(t: &Triangle, d: [f64; 3]) -> Option<[DVec3; 2]> {
     if !(d.iter().any(|&d| d <= 0.0) && d.iter().any(|&d| d >= 0.0)) {
         return None;
@@ -163,7 +163,7 @@ fn draw_segment(blocked: &mut [bool], side: [usize; 2], p: [f64; 2], q: [f64; 2]
     }
 }
 
-/// Marks the lattice cells whose centers a triangle of the plane covers.
+/// Marks the lattice cells whose centers lie in a triangle of the plane.
 fn fill_triangle(blocked: &mut [bool], side: [usize; 2], t: [[f64; 2]; 3]) {
     for i in 0..3 {
         draw_segment(blocked, side, t[i], t[(i + 1) % 3]);

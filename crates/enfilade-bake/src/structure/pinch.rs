@@ -1,39 +1,39 @@
-//! Where rooms end: at openings that are a *pinch*, narrower than what lies on either side of them.
+//! Where rooms end: at openings that are a *pinch*, narrower than the space on either side of them.
 //!
-//! One rule and one loop for all builders that merge cells into rooms. They differ in how they look an opening and the
-//! sections of space beside it up: in voxels, or in a tree.
+//! One rule and one loop for all builders that merge cells into rooms. They differ in how they look up an opening and
+//! the sections of space beside it: in voxels, or in a tree.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
-/// How merging decides. All lengths in world units, all else without one.
+/// Settings of merging. Lengths are in world units, all else is dimensionless.
 #[derive(Clone, Debug)]
 pub struct MergeSettings {
-    /// Two cells are one room when the opening between them reaches this share of what lies beside
-    /// it. [Limit: 0 to 1] Doors come out at 0.15–0.6, open plan at 0.9 and more.
+    /// Two cells are one room if the opening between them reaches this share of the space beside it.
+    /// [Limit: 0 to 1] Doors have 0.15–0.6, open plan 0.9 and more.
     pub threshold: f64,
-    /// The same where the opening lies in a wall: where, next to its rim, one cell is on one side and
-    /// the other on the other with something thin in between.
+    /// The threshold for an opening in a wall: next to its rim, one cell is on one side and the other on the
+    /// other, with something thin in between.
     pub wall_threshold: f64,
-    /// Share of the rim that must be wall for that.
+    /// Share of the rim that must be wall for `wall_threshold` to apply fully.
     pub wall_rim: f64,
-    /// Weight of the radius ratio: radii are coarser than areas, so they get the benefit.
+    /// Weight of the radius ratio: radii are coarser than areas, so they get the benefit of the doubt.
     pub radius_gain: f64,
-    /// How far from the opening's plane cross-sections are looked for. [Units: wu]
+    /// Distance from the opening's plane within which cross-sections are measured. [Units: wu]
     pub reach: f64,
-    /// How far around the opening's rim cross-sections are counted. [Units: wu]
+    /// Margin around the opening's rim within which cross-sections are counted. [Units: wu]
     pub surround: f64,
-    /// What an opening to the outdoors counts, compared with one between rooms.
+    /// Weight of an opening to the outdoors, compared with one between rooms.
     pub outdoor_gain: f64,
     /// Share of an opening that a door leaf or pane must fill to close it.
     pub closed_share: f64,
-    /// Radius of the largest ball that fits into a room at least. [Units: wu] What is narrower
-    /// everywhere is a crevice, and belongs to the room it opens to most.
+    /// Least radius of the largest ball in a room. [Units: wu] A cell narrower everywhere is a crevice, and
+    /// belongs to the room it opens to most.
     pub min_radius: f64,
-    /// A cell with this share of its sides open is a bay of what it opens to. [Limit: 0 to 1] A square of columns a fifth as
-    /// thick as they stand apart is open by 0.8, a vestibule of 1.5 m with a doorway on each side by 0.5.
+    /// A cell with this share of its sides open is a bay of its neighbor. [Limit: 0 to 1] A square of columns a fifth
+    /// as thick as their spacing is open by 0.8, a vestibule of 1.5 m with a doorway on each side by 0.5.
     pub bay_share: f64,
 }
 
@@ -55,7 +55,7 @@ impl Default for MergeSettings {
 }
 
 impl MergeSettings {
-    /// How open the way through an opening is; from 1 on, the two cells are one room. `ratio` is the opening's area ÷ the
+    /// Returns the openness of an opening; from 1 on, the two cells are one room. `ratio` is the opening's area ÷ the
     /// smaller of the sections of space beside it, `wall` the share of its rim that is wall.
     pub(crate) fn openness(&self, ratio: f64, wall: f64) -> f64 {
         let wall = (wall / self.wall_rim).min(1.0);
@@ -68,21 +68,21 @@ pub(crate) type Pair = (u32, u32);
 
 /// Cells that may be joined across the openings between them.
 pub(crate) trait Mergeable: Sync {
-    /// Whether there is work to be spent; if not, what was joined so far is all.
+    /// Returns `true` while the work budget lasts; after that, the joins so far are final.
     fn may_go_on(&self) -> bool;
-    /// All pairs of cells with an opening between them.
+    /// Returns all pairs of cells with an opening between them.
     fn pairs(&self) -> Vec<Pair>;
-    /// Whether there still is an opening between the two.
+    /// Returns `true` if there still is an opening between the two.
     fn is_pair(&self, pair: Pair) -> bool;
-    /// How open the openings between the two are: see [`MergeSettings::openness`].
+    /// Returns the openness of the openings between the two: see [`MergeSettings::openness`].
     fn openness(&self, pair: Pair) -> f64;
-    /// How often each of the two was joined with others.
+    /// Returns how often each of the two was joined with others.
     fn ages(&self, pair: Pair) -> [u32; 2];
     /// Joins the two; returns the pairs whose openings have changed.
     fn join(&mut self, pair: Pair) -> Vec<Pair>;
 }
 
-/// A pair that waits to be joined; the most open comes first, ties by number.
+/// A pair waiting to be joined; the most open comes first, ties by number.
 struct Waiting {
     openness: f64,
     pair: Pair,
@@ -109,10 +109,10 @@ impl Ord for Waiting {
     }
 }
 
-/// Joins cells across openings that are no pinch, the most open first, until only pinches are left.
+/// Joins cells across openings that are not a pinch, the most open first, until only pinches are left.
 ///
-/// Pairs whose opening a join changes are weighed again at once. The others compare with a cell that grew, which can but
-/// lower their openness: they are weighed again when their turn comes.
+/// Pairs whose opening a join changes are weighed again at once. The other pairs now compare with a larger cell, which
+/// can only lower their openness: they are weighed again when their turn comes.
 pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
     let mut queue: BinaryHeap<Waiting> = weighed(cells, &cells.pairs()).into();
     while let Some(top) = queue.pop() {
@@ -131,7 +131,7 @@ pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
     }
 }
 
-/// The pairs, of those given, whose two cells are one room.
+/// Returns those of the given pairs whose two cells are one room.
 fn weighed<M: Mergeable>(cells: &M, pairs: &[Pair]) -> Vec<Waiting> {
     let weigh = |&pair: &Pair| {
         if !cells.may_go_on() {

@@ -1,33 +1,33 @@
 //! Rims: where surfaces end, and the triangles that are missing in them.
 //!
-//! In a closed surface every edge is passed as often in one direction as in the other. Edges for which that is not so are where it
-//! ends: at the mouth of a tube, around a sheet, and where an exporter or a hole in a scan has left out a triangle. A missing
-//! triangle is told by three such edges around it. What it opens is no doorway, however large it is: half a floor may be missing, and
-//! the hollow of the slab below then joins all rooms that stand on it. So it is shut where rooms are looked for, and as it is an opening
-//! all the same, it is a candidate portal.
+//! In a closed surface, triangles traverse every edge as often in one direction as in the other. A surface ends at
+//! edges where that fails: at the mouth of a tube, around a sheet, and where an exporter or a hole in a scan left out a
+//! triangle. Three such edges around a triangle show that it is missing. The hole is not a doorway, however large: half
+//! a floor may be missing, and the hollow of the slab below then joins all rooms that stand on it. So the search for
+//! rooms treats it as shut; since it is an opening all the same, it becomes a candidate portal.
 //!
-//! Only triangles that share corners to the bit tell: where all corners have moved, all edges are rims, and no three of them meet.
+//! Needs triangles that share vertices to the bit: if all vertices have moved, all edges are rims, and no three meet.
 //!
 //! Cost: a sort of the edges, `O(n log n)` in triangles.
 
 use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
 
-/// Where more rims than these begin at one corner, sheets end there, and no triangle is missing. It bounds the search.
+/// If more rims than this begin at one vertex, sheets end there, and no triangle is missing. It bounds the search.
 const MAX_RIMS: usize = 16;
 
-/// A corner of a rim, and the far corner of the triangle at the edge that leaves it.
+/// A vertex of a rim, and the opposite vertex of the triangle at the edge that leaves it.
 pub(crate) type RimVertex = (DVec3, DVec3);
 
-/// Edges that one triangle more uses in one direction than in the other, as that triangle turns.
+/// Edges that triangles use once more in one direction than in the other, in the direction of the surplus triangle.
 #[derive(Default)]
 pub(crate) struct Rims {
     points: Vec<DVec3>,
-    /// From, to, far corner; ascending by `from`.
+    /// From, to, opposite vertex; ascending by `from`.
     edges: Vec<[u32; 3]>,
 }
 
 impl Rims {
-    /// Of triangles that share corners to the bit.
+    /// Finds the rims of triangles that share vertices to the bit.
     pub(crate) fn of(triangles: &[Triangle]) -> Self {
         let key = |p: &DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
         let mut points: Vec<DVec3> = triangles.iter().flatten().copied().collect();
@@ -55,8 +55,8 @@ impl Rims {
         }
     }
 
-    /// The triangles of at least `min_area` wu² that are missing: three rims in a ring, each an edge of another triangle. The order
-    /// of the input has no say.
+    /// Returns the missing triangles of at least `min_area` wu²: three rims in a ring, each an edge of another
+    /// triangle. Independent of the order of the input.
     pub(crate) fn missing_triangles(&self, min_area: f64) -> Vec<Triangle> {
         let from = |v: u32| {
             let at = self.edges.partition_point(|e| e[0] < v);
@@ -66,8 +66,8 @@ impl Rims {
         };
         let mut out = Vec::new();
         for &[a, b, apex] in &self.edges {
-            // Each is found once, from its least corner on. The rims of a triangle that stands alone are its own edges: there the
-            // far corner of each is the third corner.
+            // Each is found once, from its least vertex. The rims of an isolated triangle are its own edges: there the
+            // opposite vertex of each is the third vertex.
             for &[_, c, next_apex] in from(b).filter(|e| a < b && a < e[1]) {
                 let is_last = |e: &[u32; 3]| e[1] == a && e[2] != b;
                 let triangle = [a, b, c].map(|v| self.points[v as usize]);
@@ -80,7 +80,7 @@ impl Rims {
         out
     }
 
-    /// Closed loops in which every corner has one edge in and one out.
+    /// Returns closed loops in which every vertex has one edge in and one out.
     pub(crate) fn loops(&self) -> Vec<Vec<RimVertex>> {
         let next = |v: u32| -> Option<usize> {
             let at = self.edges.partition_point(|e| e[0] < v);
@@ -107,7 +107,7 @@ impl Rims {
     }
 }
 
-/// The edge without an opposite, where there is one more in one direction than in the other.
+/// Returns the unmatched edge if one direction has exactly one more.
 fn odd_one(run: &[[u32; 3]]) -> Option<[u32; 3]> {
     let (up, down): (Vec<[u32; 3]>, Vec<[u32; 3]>) = run.iter().partition(|e| e[0] < e[1]);
     match up.len() as i64 - down.len() as i64 {
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn missing_triangles_are_found_where_solids_share_edges() {
-        // Two blocks that stand corner to corner along an edge.
+        // Two blocks that touch along an edge.
         let shift = |t: Triangle, by: DVec3| t.map(|p| p + by);
         let one = block(0.0, 1.0);
         let place = [DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0)];
@@ -191,7 +191,7 @@ mod tests {
     fn what_ends_is_not_missing() {
         let alone = block(0.0, 3.0)[0];
         assert!(missing_triangles(&[alone]).is_empty());
-        // Corners of no two triangles are the same.
+        // No two triangles share a vertex.
         let apart: Vec<Triangle> = block(0.0, 3.0)
             .into_iter()
             .enumerate()

@@ -1,17 +1,17 @@
 //! Heights at which storeys end: the middles of slabs.
 //!
-//! A slab shows as two large level surfaces close above each other. Builders keep storeys apart there.
+//! A slab shows as two large level surfaces close above each other. Builders keep storeys separate there.
 //!
 //! Cost: linear in triangles.
 
 use enfilade_geom::{Triangle, triangle_area_normal};
 
-/// A level counts when its surfaces cover this share of the scene's plan.
+/// Least share of the scene's plan that the surfaces of a level cover.
 const MIN_SHARE: f64 = 0.08;
-/// The two faces of one slab lie no further apart than this. [Units: wu]
+/// Largest distance between the two faces of one slab. [Units: wu]
 const MAX_SLAB: f64 = 0.5;
 
-/// Heights (+Y) of the middles of slabs, ascending. [Units: wu]
+/// Returns the heights (+Y) of the middles of slabs, ascending. [Units: wu]
 #[must_use]
 pub(crate) fn slab_heights(triangles: &[Triangle]) -> Vec<f64> {
     let mut levels: Vec<(f64, f64)> = Vec::new(); // height, area
@@ -39,8 +39,8 @@ pub(crate) fn slab_heights(triangles: &[Triangle]) -> Vec<f64> {
         }
     }
     merged.retain(|l| l.1 >= MIN_SHARE * plan);
-    // The largest level first: it and the largest other one close by are the two faces of a slab;
-    // sills, lintels, treads and finishes next to them are not slabs of their own.
+    // The largest level first: it and the largest other one close by are the two faces of a slab.
+    // Sills, lintels, treads and finishes next to them are not slabs of their own.
     merged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
     let mut heights = Vec::new();
     while let Some(&(y, _)) = merged.first() {

@@ -1,12 +1,12 @@
 //! Stairs: structure that bounds no room.
 //!
-//! A flight of stairs stands in a room like furniture, but it is as large as a wall: treads without
-//! risers fence off the space below them, and a winding flight pinches the room it stands in. The
-//! flood therefore does not see stairs (Haumont et al. 2003, §6.1 leave furniture out for the same
-//! reason); everything exact, the cell complex above all, still does.
+//! A flight of stairs stands in a room like furniture, but is as large as a wall: treads without
+//! risers fence off the space below them, and a winding flight pinches its room. So the flood ignores
+//! stairs (Haumont et al. 2003, §6.1 leave out furniture for the same reason). Everything exact, above all
+//! the cell complex, still includes them.
 //!
-//! A group of triangles is a flight when it holds a chain of level surfaces, each a riser above the
-//! one before and a step aside. Shelves and louvers lie straight above each other and are none.
+//! A group of triangles is a flight if it contains a chain of level surfaces, each a riser above the
+//! previous one and a step aside. Shelves and louvers are not: they lie straight above each other.
 
 use std::collections::HashMap;
 
@@ -15,23 +15,23 @@ use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
 
 /// Rise from one step to the next. [Units: wu]
 const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.25;
-/// Level distance between the middles of one step and the next. [Units: wu]
+/// Horizontal distance between the middles of one step and the next. [Units: wu]
 const GOING: std::ops::RangeInclusive<f64> = 0.12..=1.2;
 /// Area of a step. [Units: wu²]
 const STEP_AREA: std::ops::RangeInclusive<f64> = 0.03..=4.0;
-/// Cosine of the most that a tread leans.
+/// Cosine of the largest tilt of a tread.
 const LEVEL: f64 = 0.99;
-/// Treads are at least this share of the area that faces up.
+/// Least share of treads in the area that faces up.
 const MIN_LEVEL_SHARE: f64 = 0.5;
-/// … and at least this share of all area: of a narrow flight that is massive down to the ground an
-/// eighth is treads, of a wall whose arched top runs in level strips a thirtieth.
+/// … and in the whole area. In a narrow flight that is massive down to the ground, an eighth is treads;
+/// in a wall whose arched top runs in level strips, a thirtieth.
 const MIN_TREAD_SHARE: f64 = 0.1;
-/// Steps in a row that make a flight.
+/// Least number of steps in a row.
 const MIN_STEPS: usize = 4;
-/// Objects with a larger plan are looked at shell by shell: a whole building may be one. [Units: wu²]
+/// Objects with a larger plan are examined shell by shell: a whole building may be one object. [Units: wu²]
 const MAX_PLAN: f64 = 40.0;
 
-/// Which triangles belong to stairs.
+/// Returns `true` for each triangle that belongs to stairs.
 #[must_use]
 pub(crate) fn find_stairs(sources: &[TriangleSource], triangles: &[Triangle]) -> Vec<bool> {
     let mut is_stair = vec![false; triangles.len()];
@@ -63,7 +63,7 @@ fn bounds(triangles: &[Triangle], members: &[usize]) -> Aabb {
     Aabb::of_points(members.iter().flat_map(|&t| &triangles[t]))
 }
 
-/// Triangles that hang together by equal corners, in order of their first triangle.
+/// Returns groups of triangles connected by equal vertices, in order of their first triangle.
 fn shells(triangles: &[Triangle], members: &[usize]) -> Vec<Vec<usize>> {
     let mut sets = Sets::new(members.len());
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
@@ -96,13 +96,13 @@ fn is_flight(triangles: &[Triangle], members: &[usize]) -> bool {
     if size.x * size.z > MAX_PLAN {
         return false;
     }
-    // Treads face up; in a model turned inside out, down.
+    // Treads face up, or down in a model turned inside out.
     [1.0, -1.0]
         .iter()
         .any(|&side| longest_flight(&levels(triangles, members, side)) >= MIN_STEPS)
 }
 
-/// A level surface: its middle and area. Triangles at one height that touch in plan are one.
+/// A level surface: its middle and area. Triangles at one height and close in plan form one.
 struct Level {
     middle: DVec3,
     area: f64,
@@ -126,7 +126,7 @@ fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
             })
         })
         .collect();
-    // Anything round has level spots at all heights; treads are most of what faces up.
+    // Anything round has level spots at all heights; of stairs, treads are most of the area that faces up.
     let level = flat.iter().map(|f| f.2).sum::<f64>();
     if level < MIN_LEVEL_SHARE * upward || level < MIN_TREAD_SHARE * total {
         return Vec::new();
@@ -134,7 +134,7 @@ fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
     flat.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<Level> = Vec::new();
     for (y, middle, area) in flat {
-        // A step is small: what lies further off at the same height is a step of another flight.
+        // A step is small: a surface further off at the same height is a step of another flight.
         let home = out
             .iter_mut()
             .rev()
@@ -155,7 +155,7 @@ fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
     out
 }
 
-/// Steps of the longest chain in which each is a rise above and a going aside from the one before.
+/// Returns the length of the longest chain in which each step is a rise above and a going aside from the previous.
 fn longest_flight(levels: &[Level]) -> usize {
     // Levels ascend, so that a chain only looks back.
     let mut longest = vec![1_usize; levels.len()];
@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_wall_whose_top_runs_in_level_strips_is_no_flight() {
-        // Half a meter thick, both faces, as an arched roof cuts it: the strips step down by 0.18 m.
+        // Half a meter thick, both faces, as cut by an arched roof: the strips step down by 0.18 m.
         let mut wall = Vec::new();
         for i in 0..8 {
             let at = DVec3::new(f64::from(i) * 0.5, 0.0, 0.0);
@@ -225,7 +225,7 @@ mod tests {
             quad(&mut wall, at + DVec3::Z * 0.5, up, DVec3::X * 0.5);
         }
         assert!(!find_stairs(&sources(48), &wall).iter().any(|&s| s));
-        // A narrow flight that is massive down to the ground has as much of a wall as a flight can.
+        // A narrow flight, massive down to the ground, has the largest share of wall that a flight can have.
         let mut massive = Vec::new();
         for i in 0..16 {
             let at = DVec3::new(f64::from(i) * 0.28, 0.0, 0.0);
@@ -241,7 +241,7 @@ mod tests {
     fn a_flight_inside_one_large_mesh_is_found_by_its_shell() {
         let mut all = Vec::new();
         for i in 0..8 {
-            // Multiples of a power of two: corners of neighbors are equal to the bit.
+            // Multiples of a power of two: vertices of neighbors are equal to the bit.
             let at = DVec3::new(f64::from(i) * 0.25, f64::from(i) * 0.1875, 0.0);
             quad(&mut all, at, DVec3::Z, DVec3::X * 0.25);
             quad(&mut all, at + DVec3::X * 0.25, DVec3::Z, DVec3::Y * 0.1875);

@@ -1,4 +1,4 @@
-//! A candidate portal in each opening between two regions.
+//! Fits a candidate portal to each opening between two regions.
 
 use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 use rayon::prelude::*;
@@ -12,15 +12,16 @@ use super::regions::Regions;
 use crate::structure::{Candidate, fit_candidate};
 use crate::voxel::{BitVolume, Grid, Labels};
 
-/// Openings smaller than this many voxel faces are left to the complex, which finds them as cracks.
+/// Smaller openings, in voxel faces, are left to the complex, which finds them as cracks.
 const MIN_FACES: usize = 4;
 
-/// What fitting a candidate costs, in units of [`Allowance`], and each face of its opening more.
+/// Cost of fitting a candidate, in units of [`Allowance`], plus that of each face of its opening.
 const WORK: u64 = 100;
 const WORK_A_FACE: u64 = 5;
 
-/// Fits a candidate to each opening, among `walls`; `closures` are the voxels that door leaves and panes fill, and
-/// `closed_share` is how much of a front that must be for a pane to be parted at its corners. Slits narrower than `hole` count as closed.
+/// Fits a candidate to each opening, among `walls`. `closures` are the voxels that door leaves and panes fill; a front
+/// with at least the share `closed_share` of them is a pane, and is split where it bends. Slits narrower than
+/// `hole` count as closed.
 pub(super) fn fit_candidates(
     grid: &Grid,
     labels: &Labels,

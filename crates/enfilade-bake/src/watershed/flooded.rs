@@ -8,30 +8,30 @@ use rayon::prelude::*;
 use crate::structure::OUTDOORS;
 use crate::voxel::{BitVolume, Grid, Labels};
 
-/// The faces through which two cells touch: voxel index × 4 + axis, the face being the one between
-/// the voxel and its next neighbor along the axis.
+/// Faces through which two cells touch: voxel index × 4 + axis, for the face between the voxel and the next one
+/// along the axis.
 pub(super) type Faces = Vec<u64>;
 
-/// A flooded volume, as merging sees it.
+/// A flooded volume, the input of merging.
 #[derive(Clone, Copy)]
 pub(crate) struct Flooded<'a> {
-    /// Place and size of the voxels.
+    /// Position and size of the voxels.
     pub(crate) grid: &'a Grid,
     /// Basin of each voxel, 0 where solid.
     pub(crate) labels: &'a Labels,
-    /// Greatest distance in each basin. [Units: vx]
+    /// Largest distance in each basin. [Units: vx]
     pub(crate) peaks: &'a [f32],
     /// Voxels that a door leaf or a pane fills.
     pub(crate) closures: Option<&'a BitVolume>,
     /// Heights at which basins were cut at slabs, ascending. [Units: wu]
     pub(crate) slabs: &'a [f64],
-    /// What those who go through it spend from.
+    /// Shared budget of all that works on the volume.
     pub(crate) allowance: &'a Allowance,
 }
 
-/// Collects the faces between differently labelled voxels, by pair, ascending.
+/// Collects the faces between voxels of different labels, by pair, ascending.
 ///
-/// Linear in voxels; within the outdoors, dozens at a time.
+/// Linear in voxels; dozens at a time within the outdoors.
 pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
     let layer = dims[0] * dims[1];
     let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..dims[2])
@@ -58,8 +58,8 @@ pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32,
     all
 }
 
-/// Adds the faces of a voxel that is not outdoors: those to the next voxels, and, as outdoor voxels are not asked, those from
-/// outdoor voxels before it.
+/// Adds the faces of a voxel that is not outdoors: those to the next voxels, and those from outdoor voxels before it,
+/// since outdoor voxels themselves are skipped.
 fn add_faces(dims: [usize; 3], labels: &Labels, i: usize, found: &mut BTreeMap<(u32, u32), Faces>) {
     let [nx, ny, nz] = dims;
     let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];

@@ -12,13 +12,13 @@ use crate::voxel::{BitVolume, Grid};
 /// A connected or coplanar group of faces between two cells.
 #[derive(Clone, Debug)]
 pub(crate) struct Front {
-    /// What they fill; its plane's normal points from the lesser to the greater label.
+    /// The opening that they fill; its plane's normal points from the lower to the greater label.
     pub(crate) opening: Opening,
     /// The faces.
     pub(crate) faces: Faces,
 }
 
-/// Center of a face. [Units: wu]
+/// Returns the center of a face. [Units: wu]
 #[must_use]
 pub(crate) fn face_center(grid: &Grid, face: u64) -> DVec3 {
     let axis = (face % 4) as usize;
@@ -28,7 +28,7 @@ pub(crate) fn face_center(grid: &Grid, face: u64) -> DVec3 {
     p
 }
 
-/// Whether one of a face's two voxels is in a set.
+/// Returns `true` if one of a face's two voxels is in a set.
 #[must_use]
 pub(crate) fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
     let [nx, ny, _] = grid.dims;
@@ -36,14 +36,14 @@ pub(crate) fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
     voxels.get_index(index) || voxels.get_index(index + [1, nx, nx * ny][axis])
 }
 
-/// What it costs to find the patch that a face is in, in units of [`Allowance`](enfilade_geom::Allowance).
+/// Cost per face of finding patches, in units of [`Allowance`](enfilade_geom::Allowance).
 pub(super) const WORK_A_FACE: u64 = 8;
 
 /// Splits the faces between two cells into fronts, one for each opening, largest first.
 ///
-/// Faces that touch (or nearly: within two voxels) belong together; groups that share a plane are
-/// one opening too, because a column in the middle of a wide opening does not make two doors of it.
-/// `is_lesser` tells whether a voxel index lies in the cell with the lesser label.
+/// Faces that touch (or nearly: within two voxels) belong together. Groups that share a plane are also
+/// one opening, because a column in the middle of a wide opening does not make two doors of it.
+/// `is_lesser` returns `true` if a voxel index lies in the cell with the lower label.
 #[must_use]
 pub(crate) fn group_faces(
     flooded: Flooded<'_>,
@@ -103,8 +103,8 @@ pub(crate) fn group_faces(
     fronts
 }
 
-/// Faces grouped by nearness: two faces are linked when their voxels are at most one step apart
-/// along each axis. Each group ascending, groups by their first face.
+/// Groups faces by nearness: two faces are linked if their voxels are at most one step apart
+/// along each axis. Each group is ascending, groups are in order of their first face.
 #[must_use]
 pub(crate) fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     let [nx, ny, _] = grid.dims;
@@ -116,7 +116,7 @@ pub(crate) fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     let mut sets = Sets::new(voxels.len());
     let (nx64, layer) = (nx as i64, (nx * ny) as i64);
     for (at, &voxel) in voxels.iter().enumerate() {
-        // Half of the 26 neighbors: the other half looks back at us.
+        // Half of the 26 neighbors: the other half finds this voxel.
         for dz in 0..=1_i64 {
             for dy in -1..=1_i64 {
                 for dx in -1..=1_i64 {
@@ -145,7 +145,7 @@ pub(crate) fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     patches.into_values().collect()
 }
 
-/// What a set of faces says about the opening they fill.
+/// Computes the opening that a set of faces fills.
 #[must_use]
 pub(crate) fn front_of(
     grid: &Grid,
@@ -165,9 +165,9 @@ pub(crate) fn front_of(
         closed += usize::from(closures.is_some_and(|bits| is_in(grid, bits, face)));
     }
     center /= faces.len() as f64;
-    // A flat front seen along the worst diagonal has √3 times its area in voxel faces; when the
-    // vector area falls short of that by far, the front wraps around something and its silhouette
-    // along the axis of most faces says more.
+    // A flat front seen along the worst diagonal has √3 times its area in voxel faces. If the vector area
+    // is far below that, the front wraps around something, and its silhouette along the axis of most
+    // faces is a better measure.
     let total = faces.len() as f64;
     let wraps = vector.length() < 0.4 * total;
     let (normal, area) = if wraps {
@@ -210,13 +210,13 @@ pub(crate) fn front_of(
     }
 }
 
-/// Share of a front's faces that must lie flat on each side of a corner.
+/// Least share of a front's faces that lie flat on each side of a bend.
 const CORNER_SHARE: f64 = 0.2;
 
-/// A front that runs around a corner as the two or three that it is, each across one axis of the grid; any other as it is.
-/// Panes on both sides of a corner post meet so.
+/// Splits a front that bends around a post into its two or three parts, each across one axis of the grid; returns any
+/// other front whole. The panes on both sides of a building's "corner" form such a front.
 ///
-/// A front askew to the grid is made of steps, and flat across no axis. `O(n log n)` in faces.
+/// A front askew to the grid consists of steps, and is flat across no axis. `O(n log n)` in faces.
 #[must_use]
 pub(crate) fn without_corners(grid: &Grid, faces: Faces) -> Vec<Faces> {
     let mut per_axis: [Faces; 3] = Default::default();
@@ -237,7 +237,7 @@ pub(crate) fn without_corners(grid: &Grid, faces: Faces) -> Vec<Faces> {
     if flat.iter().filter(|&&f| f).count() < 2 {
         return vec![faces];
     }
-    // What little there is across another axis is the steps of these.
+    // The few faces across another axis are steps of these parts.
     let parts = per_axis.iter().zip(flat).filter(|p| p.1);
     parts.flat_map(|p| connected_patches(grid, p.0)).collect()
 }
@@ -248,7 +248,7 @@ mod tests {
 
     use super::*;
 
-    /// The faces across `axis` of voxels.
+    /// The faces of voxels across `axis`.
     fn faces(grid: &Grid, axis: u64, voxels: impl Iterator<Item = [usize; 3]>) -> Faces {
         voxels
             .map(|[x, y, z]| grid.index(x, y, z) as u64 * 4 + axis)
@@ -266,12 +266,12 @@ mod tests {
                 column.flat_map(|[x, _, z]| (3..12).map(move |y| [x, y, z])),
             )
         };
-        // Two panes that meet at a corner.
+        // Two panes that meet at a right angle.
         let mut corner = panes(0, |i| [15, 0, i]);
         corner.extend(panes(2, |i| [i, 0, 15]));
         let parts = without_corners(&grid, corner);
         assert_eq!(parts.iter().map(Vec::len).collect::<Vec<_>>(), [90, 90]);
-        // One pane at half a right angle: steps along both axes.
+        // One pane at 45 degrees: steps along both axes.
         let mut askew = panes(0, |i| [i, 0, i]);
         askew.extend(panes(2, |i| [i, 0, i]));
         let n = askew.len();

@@ -1,24 +1,24 @@
-//! Which regions are rooms, and which are matter: insides of walls and of closed solids.
+//! Separates rooms from matter: the insides of walls and of closed solids.
 //!
 //! The hollow between the two faces of a wall is as empty as a room, and so is the inside of a block,
-//! a column or a piece of furniture. They are told apart by two things: nothing can get in, and the
-//! surfaces around them face away. What is connected with the outdoors through openings is always air.
+//! a column or a piece of furniture. Two properties identify matter: nothing can get in, and the
+//! surfaces around it face away. Regions connected with the outdoors through openings are always air.
 //!
-//! Which way surfaces face is asked along rays, as a winding number is (Jacobson, Kavan &
+//! The facing of surfaces is sampled along rays, as for a winding number (Jacobson, Kavan &
 //! Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers", 2013), but
 //! one ray at a time: a ray from matter leaves one solid more than it enters, wherever solids overlap
-//! or stand on a sheet of land, and a ray from a room never does, because it enters a wall first. The
-//! sum over a whole sphere of a scene's open sheets is a fraction that means nothing.
+//! or stand on a sheet of land. A ray from a room never does, because it enters a wall first. A
+//! sum over the whole sphere would be a meaningless fraction in a scene with open sheets.
 //!
-//! Not every model can be asked. What the known air (what is open to the outdoors, or else the
-//! outdoors) sees decides: fronts, and surfaces are trusted; backs, and they are turned; some of each,
-//! and only what is open to what counts: then what nothing can get into is matter if nothing but a
-//! sheet parts it from what surrounds it, and a room if walls do or fronts look at it from all sides
-//! (as in a vessel or a level, modelled from inside).
+//! Not every model allows this test. The known air (regions open to the outdoors, or else the
+//! outdoors) decides. If it sees fronts, surfaces are trusted; if it sees backs, they are turned; if it sees some of
+//! each, only connections count: a closed-off region is matter if a single sheet separates it from its
+//! surroundings, and a room if walls do, or if fronts face it from all sides
+//! (as in a vessel or a level modelled from inside).
 //!
-//! A scene that is nothing but such a shell is a building and not a boulder: kept, and said.
+//! A scene that consists only of such a shell is a building, not a boulder: kept, with a note.
 //!
-//! Cost: 14 rays from up to 32 points of each region, each through all that it meets.
+//! Cost: 14 rays from up to 32 points of each region, each through everything that it hits.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,38 +30,37 @@ use crate::voxel::{Grid, Labels};
 use super::regions::Regions;
 use crate::structure::{BACKS, OUTDOORS, is_crevice, rays_from};
 
-/// Points that ask around in each region.
+/// Sample points in each region.
 const POINTS: usize = 32;
-/// From inside matter this share of the rays leave it: all but those that slip through a crack or
+/// Least share of the rays from inside matter that leave it: all but those that slip through a crack or
 /// along an edge.
 const LEAVING: f64 = 0.9;
-/// Surfaces are trusted where known air sees at most this share of backs, and turned where it sees at
-/// most this share of fronts: half of what surfaces that face anywhere show.
+/// Surfaces are trusted if known air sees at most this share of backs, and turned if it sees at
+/// most this share of fronts: half the share seen of randomly oriented surfaces.
 const ASTRAY: f64 = 0.25;
 /// Two surfaces nearer than this are the two faces of a wall. [Units: wu]
 const WALL: f64 = 0.5;
-/// … and nearer than this are one sheet that is there twice. [Units: wu]
+/// … and nearer than this are one duplicated sheet. [Units: wu]
 const TWICE: f64 = 0.01;
-/// Surfaces nearer than this along a ray are at one place: that of rounding. [Units: wu]
+/// Surfaces nearer than this along a ray are at the same place, up to rounding. [Units: wu]
 const SAME: f64 = 1e-5;
-/// Where this share of all structure bounds closed shells, the scene is these shells.
+/// If shells bound this share of all structure, the scene consists of them.
 const ALL_THERE_IS: f64 = 0.9;
 
-/// What is no room.
+/// The regions that are not rooms.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Matter {
     /// Regions, ascending: solid matter, and closed-off spaces in which no ball of the least radius
-    /// fits (bays between rafters, gaps in the construction). What of the latter leaks into a room is
-    /// part of that room after all: the cell complex sees to it.
+    /// fits (bays between rafters, gaps in the construction). Parts of the latter that leak into a room
+    /// still become part of that room: the cell complex sees to it.
     pub(crate) regions: Vec<u32>,
-    /// What was decided in doubt, one sentence each.
+    /// Doubtful decisions, one sentence each.
     pub(crate) notes: Vec<String>,
-    /// Whether surfaces show their fronts to air and their backs to matter.
+    /// Surfaces show their fronts to air and their backs to matter.
     pub(crate) fronts_face_air: bool,
 }
 
-/// Finds the regions that are no rooms; `min_radius` is that of the largest ball that fits into a
-/// room at least.
+/// Finds the regions that are not rooms; the largest ball in a room has at least the radius `min_radius`.
 #[must_use]
 pub(crate) fn find_matter(
     grid: &Grid,
@@ -98,7 +97,7 @@ pub(crate) fn find_matter(
     let (mut narrow, mut doubtful) = (Vec::new(), Vec::new());
     let mut any_room = !indoors.is_empty();
     for group in enclosed {
-        // A voxel center next to a wall is already half a voxel away from it at least.
+        // A voxel center next to a wall is at least half a voxel away from it.
         let widest = group
             .iter()
             .map(|r| f64::from(radius[r]) - 0.5)
@@ -123,8 +122,8 @@ pub(crate) fn find_matter(
     if n == 0 {
         return matter;
     }
-    // What tells that surfaces face inward must hold more than what would be lost by it: beside a cave it may be a crevice
-    // of the outside.
+    // The evidence that surfaces face inward must hold more voxels than would be lost by it: beside a cave it may be a
+    // crevice of the outside.
     let lost: Vec<u32> = doubtful.iter().flatten().copied().collect();
     let is_outvoted = facing == Facing::Inward
         && n_voxels(labels, regions, &lost) > n_voxels(labels, regions, &indoors);
@@ -132,16 +131,20 @@ pub(crate) fn find_matter(
         || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance)
     {
         matter.notes.push(format!(
-            "{n} closed shell{} without any opening {} all there is: taken for rooms and not for solids",
+            "{n} closed shell{} without openings {} the whole scene: treated as rooms, not as solids",
             if n == 1 { "" } else { "s" },
             if n == 1 { "is" } else { "are" },
         ));
     } else {
         matter.notes.push(format!(
-            "the inside{} of {n} closed solid{} {} no room{}",
+            "the inside{} of {n} closed solid{} {}{}",
             if n == 1 { "" } else { "s" },
             if n == 1 { "" } else { "s" },
-            if n == 1 { "is" } else { "are" },
+            if n == 1 {
+                "is not a room"
+            } else {
+                "are not rooms"
+            },
             facing.reason(),
         ));
         matter.regions.extend(doubtful.into_iter().flatten());
@@ -150,7 +153,7 @@ pub(crate) fn find_matter(
     matter
 }
 
-/// Voxels of some regions.
+/// Returns the number of voxels of some regions.
 fn n_voxels(labels: &Labels, regions: &Regions, of: &[u32]) -> usize {
     let of: BTreeSet<u32> = of.iter().copied().collect();
     let mut n = 0;
@@ -162,19 +165,19 @@ fn n_voxels(labels: &Labels, regions: &Regions, of: &[u32]) -> usize {
     n
 }
 
-/// Which way the surfaces of a scene face.
+/// The facing of the surfaces of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Facing {
     /// Away from matter.
     Outward,
     /// Into matter.
     Inward,
-    /// Any way.
+    /// Inconsistent.
     Anyhow,
 }
 
 impl Facing {
-    /// By what indoor air that is open to the outdoors sees, where there is any: sheets modelled from
+    /// Decides by the view of indoor air that is open to the outdoors, if there is any: sheets modelled from
     /// inside show the outdoors nothing but backs.
     fn of(indoors: &Seen, outdoors: &Seen) -> Self {
         if indoors.all > 0.0 {
@@ -190,7 +193,7 @@ impl Facing {
         }
     }
 
-    /// Whether what nothing can get into, and from which one sees this, is matter.
+    /// Returns `true` if a closed-off region with this view is matter.
     fn is_matter(self, seen: &Seen) -> bool {
         match self {
             Self::Outward => {
@@ -207,33 +210,33 @@ impl Facing {
     fn reason(self) -> &'static str {
         match self {
             Self::Outward => "",
-            Self::Inward => " (surfaces of this model face into what they bound)",
+            Self::Inward => " (the surfaces of this model face into solid matter)",
             Self::Anyhow => {
-                " (surfaces of this model face either way; nothing opens to these, and only a sheet \
-                 bounds them)"
+                " (the surfaces of this model face either way; these have no openings, and only a single \
+                 sheet bounds them)"
             }
         }
     }
 }
 
-/// What a ray costs, in units of [`Allowance`], and each hit one more.
+/// Cost of a ray, in units of [`Allowance`]; each hit costs one more.
 const WORK_A_RAY: u64 = 10;
 
-/// What rays from inside a region meet.
+/// The hits of rays from inside a region.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// Rays that meet anything.
+    /// Rays that hit anything.
     all: f64,
     /// … a back first.
     back: f64,
     /// … and a second surface right behind the first.
     walled: f64,
-    /// Rays that meet anything and do not go down: what stands on a sheet of land, or is sunk into
+    /// Rays that hit anything and do not go down: an object that stands on a sheet of land, or is sunk into
     /// it, has a floor like a room's.
     aside: f64,
     /// … a back first.
     back_aside: f64,
-    /// … and leave one solid more than they enter: with surfaces that face outward, and inward.
+    /// … and leave one solid more than they enter, if surfaces face outward, and if inward.
     leaving: [f64; 2],
 }
 
@@ -247,15 +250,15 @@ impl Seen {
             if !allowance.spend(WORK_A_RAY + hits.len() as u64) {
                 break;
             }
-            // At one place a back counts as first: where two solids touch, one is left before the
-            // other is entered.
+            // At one place a back counts as first: where two solids touch, the ray leaves one before it
+            // enters the other.
             hits.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             seen.add(&hits, ray.direction.y > -0.5);
         }
         seen
     }
 
-    /// Adds a ray. It goes about 1 wu along one axis or all in a unit of its parameter, which therefore
+    /// Adds a ray. One unit of its parameter is about 1 wu along one axis or along all, so the parameter
     /// is the distance across walls along the grid.
     fn add(&mut self, hits: &[(f64, bool)], goes_aside: bool) {
         let Some(&(at, is_front)) = hits.first() else {
@@ -291,14 +294,14 @@ impl Seen {
         self
     }
 
-    /// Share of backs among what is seen.
+    /// Returns the share of backs among the hits.
     fn backs(&self) -> f64 {
         self.back / self.all.max(1.0)
     }
 }
 
-/// Whether closed shells are the whole scene: next to all structure bounds them, and where surfaces
-/// face outward they hang together (a group of blocks is no building).
+/// Returns `true` if closed shells are the whole scene: they bound nearly all structure, and if surfaces
+/// face outward, the shells are connected (a group of blocks is not a building).
 fn are_all_there_is(
     grid: &Grid,
     labels: &Labels,
@@ -358,7 +361,7 @@ fn are_all_there_is(
     (1..boxes.len() as u32).all(|i| sets.find(i) == sets.find(0))
 }
 
-/// Groups of regions that open to each other, over any number of openings; that of the outdoors
+/// Returns groups of regions connected by openings, over any number of openings; the group of the outdoors
 /// begins with it.
 fn groups(regions: &Regions) -> Vec<Vec<u32>> {
     let n = regions.region_of_basin.len();
@@ -376,7 +379,7 @@ fn groups(regions: &Regions) -> Vec<Vec<u32>> {
     groups.into_values().collect()
 }
 
-/// Up to [`POINTS`] voxel centers of each wanted region, evenly picked in scan order.
+/// Returns up to [`POINTS`] voxel centers of each wanted region, evenly picked in scan order.
 fn sample_points(
     grid: &Grid,
     labels: &Labels,
@@ -401,7 +404,7 @@ fn sample_points(
         if !is_wanted[region as usize] {
             return;
         }
-        // Every so many of the region's voxels, from the middle of the first so many.
+        // Every `step`-th of the region's voxels, from the middle of the first `step`.
         let step = count[&region].div_ceil(POINTS);
         let k = seen.entry(region).or_default();
         let first = (step / 2 + step - *k % step) % step;

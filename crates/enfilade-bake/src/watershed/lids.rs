@@ -1,16 +1,16 @@
-//! Lids and floors: what closes a building that has no roof, or no floor.
+//! Lids and floors: surfaces that close a building without a roof, or without a floor.
 //!
-//! Worlds for robots, doll's houses and half-finished models have walls and no ceiling. Seen as a
-//! volume such a room is a bay of the outdoors: the farther up, the wider. Yet anyone who looks at it
+//! Worlds for robots, doll's houses and half-finished models have walls and no ceiling. As a volume,
+//! such a room is a bay of the outdoors: the farther up, the wider. Yet any viewer
 //! sees rooms. So where walls end at one height all around, and there is nothing above but sky, a
-//! lid is laid just below the tops of the walls; the flood treats it like a door leaf (see
+//! lid is laid just below the tops of the walls. The flood treats it like a door leaf (see
 //! `closures`), and it becomes an open portal between the room and the outdoors.
 //!
-//! Walls alone, as floor plans pulled up have them, end at the foot as they do at the top: a floor is
-//! laid there by the same rule, upside down, and becomes an open portal, too.
+//! Bare walls, as in extruded floor plans, end at the foot as they do at the top: a floor is
+//! laid there by the same rule, upside down, and also becomes an open portal.
 //!
-//! Courtyards, roof terraces and gardens stay outdoors: a lid is laid only on a group of walls that
-//! encloses next to nothing with a roof.
+//! Courtyards, roof terraces and gardens stay outdoors: a group of walls gets a lid only if next to
+//! nothing that it encloses has a roof.
 //!
 //! The walls must stand upright along +Y. Cost: linear in voxels for the heights of columns, then
 //! linear in the plan's columns for each height at which walls end.
@@ -21,22 +21,22 @@ use crate::voxel::{BitVolume, Grid};
 
 use crate::structure::Candidate;
 
-/// A column is a wall when this much of it is filled below its top. [Units: wu]
+/// A column is a wall if it is filled for this height below its top. [Units: wu]
 const MIN_WALL: f64 = 1.8;
-/// Walls must end at one height over this length to count. [Units: wu]
+/// Least length of walls that end at one height. [Units: wu]
 const MIN_LENGTH: f64 = 4.0;
 /// Gaps between walls up to twice this do not let the outdoors in. [Units: wu]
 const MAX_GAP: f64 = 0.6;
-/// A group of walls with more than this share of what it encloses under a roof has no lid.
+/// A group of walls gets no lid if a larger share of its enclosed area is under a roof,
 const MAX_ROOFED: f64 = 0.05;
-/// … or with more than this share higher than [`MIN_WALL`] below the lid (a terrace, a flat roof).
+/// … or if a larger share is filled to less than [`MIN_WALL`] below the lid (a terrace, a flat roof).
 const MAX_SHALLOW: f64 = 0.25;
-/// Columns this near to a wall may be the hollow of a wall of two sheets: no roof. [Units: wu]
+/// Columns this near to a wall may be the hollow of a wall of two sheets, not a roof. [Units: wu]
 const MAX_HOLLOW: f64 = 0.25;
-/// Lids smaller than this are left out. [Units: wu²]
+/// Least area of a lid. [Units: wu²]
 const MIN_AREA: f64 = 1.0;
 
-/// What is laid where walls just end. One voxel thick, each at its height; `None` when there is none.
+/// Lids and floors, one voxel thick, each at its height; `None` if there are none.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lids {
     /// Below the tops of walls.
@@ -46,11 +46,11 @@ pub(crate) struct Lids {
 }
 
 impl Lids {
-    /// The candidate portal for an opening that lies in a lid or floor for the most part: level, around its faces.
+    /// Returns the candidate portal of an opening that lies mostly in a lid or floor: level, around its faces.
     #[must_use]
     pub(crate) fn candidate_of(&self, grid: &Grid, faces: &[u64]) -> Option<Candidate> {
-        // A third into the voxel from without: under all the tops that end in the row above, over all
-        // the feet that end in the row below.
+        // A third into the voxel from outside: below all tops that end in the row above, above all
+        // feet that end in the row below.
         let sheets = [(&self.lids, 1.0), (&self.floors, -1.0)];
         sheets.into_iter().find_map(|(voxels, side)| {
             let row = row_of(voxels.as_ref()?, grid, faces)?;
@@ -59,13 +59,13 @@ impl Lids {
         })
     }
 
-    /// What was laid, in words.
+    /// Describes the lids and floors.
     #[must_use]
     pub(crate) fn notes(&self, grid: &Grid) -> Vec<String> {
         let note = |what: &str, ends: &str, voxels: &BitVolume| {
             let area = voxels.count() as f64 * grid.voxel * grid.voxel;
             format!(
-                "{what} of {area:.0} m² supplied where walls end at {ends} and nothing is {}: open portals",
+                "{what} of {area:.0} m² added as open portals, where walls end at {ends} with nothing {}",
                 if ends == "the top" { "above" } else { "below" }
             )
         };
@@ -75,7 +75,7 @@ impl Lids {
     }
 }
 
-/// The row of the lid or floor that most of the faces lie in, if nearly all do.
+/// Returns the row of the lid or floor that contains nearly all of the faces, if any.
 fn row_of(voxels: &BitVolume, grid: &Grid, faces: &[u64]) -> Option<usize> {
     let mut rows: Vec<usize> = Vec::new();
     for &face in faces {
@@ -173,7 +173,7 @@ impl Columns {
                         if top[column] == 0 {
                             top[column] = y as u32 + 1;
                         }
-                        // Counts on only while nothing is missing.
+                        // Counts on only while the column is filled without a gap.
                         if run[column] + y as u32 + 1 == top[column] {
                             run[column] += 1;
                         }
@@ -188,7 +188,7 @@ impl Columns {
         }
     }
 
-    /// Rows in which walls end along [`MIN_LENGTH`] or more, the highest first.
+    /// Returns the rows in which walls end along [`MIN_LENGTH`] or more, the highest first.
     fn wall_ends(&self, grid: &Grid) -> Vec<usize> {
         let mut count = vec![0_usize; grid.dims[1] + 2];
         for (&top, _) in self.top.iter().zip(&self.is_wall).filter(|c| *c.1) {
@@ -208,7 +208,7 @@ impl Columns {
         rows
     }
 
-    /// The columns to be lidded at the height of `row`.
+    /// Returns the columns that need a lid at the height of `row`.
     fn enclosed(&self, grid: &Grid, occupied: &BitVolume, row: usize) -> Vec<usize> {
         let [nx, ny, nz] = grid.dims;
         let n = nx * nz;
@@ -222,7 +222,7 @@ impl Columns {
         debug_assert!(row < ny);
         let (is_inside, steps) = inside(grid, &is_free);
         let clear = (MAX_HOLLOW / grid.voxel).ceil() as u32;
-        // Walls and what they enclose, group by group.
+        // Walls and the area they enclose, group by group.
         let mut seen = vec![false; n];
         let mut out = Vec::new();
         let enough = (MIN_AREA / (grid.voxel * grid.voxel)) as usize;
@@ -256,9 +256,9 @@ impl Columns {
     }
 }
 
-/// Which free columns lie inside: those that the border does not reach through gaps wider than
-/// twice [`MAX_GAP`]; gaps themselves go half to either side. Also every column's steps to the
-/// nearest wall, `u32::MAX` where farther than [`MAX_GAP`].
+/// Returns which free columns lie inside: those that the border does not reach through gaps wider than
+/// twice [`MAX_GAP`]; each side gets half of a gap. Also returns every column's steps to the
+/// nearest wall, `u32::MAX` if farther than [`MAX_GAP`].
 fn inside(grid: &Grid, is_free: &[bool]) -> (Vec<bool>, Vec<u32>) {
     const NONE: u32 = u32::MAX;
     let [nx, _, nz] = grid.dims;
@@ -286,7 +286,7 @@ fn inside(grid: &Grid, is_free: &[bool]) -> (Vec<bool>, Vec<u32>) {
             spread(nx, nz, start, &mut is_outside, |c| steps[c] == NONE);
         }
     }
-    // Both sides grow into what is left at the same pace.
+    // Both sides grow into the remaining columns at the same pace.
     let mut side: Vec<u8> = (0..n)
         .map(|c| match (steps[c] == NONE, is_outside[c]) {
             (true, true) => 1,
@@ -307,11 +307,11 @@ fn inside(grid: &Grid, is_free: &[bool]) -> (Vec<bool>, Vec<u32>) {
         }
         front = next;
     }
-    // What nothing reached is enclosed by walls and narrow.
+    // Columns that nothing reached are narrow and enclosed by walls.
     ((0..n).map(|c| is_free[c] && side[c] != 1).collect(), steps)
 }
 
-/// All columns that four-neighbors connect to `start` where `may` holds; marks them as seen.
+/// Returns all columns connected to `start` by shared sides where `may` holds; marks them as seen.
 fn spread(
     nx: usize,
     nz: usize,
@@ -417,7 +417,7 @@ mod tests {
         let (lids, floors) = (both.lids.unwrap(), both.floors.unwrap());
         assert_eq!((lids.count(), floors.count()), (94 * 76, 94 * 76));
         assert!(floors.iter_set().all(|i| grid().coords(i)[1] == 11));
-        // A floor 1.2 m above the feet of the walls: what lies below is the land's.
+        // A floor 1.2 m above the feet of the walls: the space below belongs to the land.
         fill(&mut walls, [10, 22, 10], [110, 23, 90]);
         assert!(
             find_lids(&grid(), &walls, &Allowance::default())

@@ -1,20 +1,20 @@
 //! Limbs: corridors that open to rooms without a frame.
 //!
-//! At the mouth of a corridor as high as the room nothing is narrower than the corridor itself, so no
-//! ratio of an opening to what lies beside it tells where the room ends, and the flood meets in the
-//! dead middle. What tells is the local thickness in plan: a limb is what no disc of twice its own
-//! width fits into, and it is a room when it is at least two of its widths long. An alcove is shorter;
-//! a bend or a crossing of corridors of equal width has no room for the larger disc, so that corridors
-//! that meet are one limb.
+//! At the mouth of a corridor as high as the room, nothing is narrower than the corridor itself. So no
+//! ratio of an opening to the space beside it shows where the room ends, and the floods meet in the
+//! middle of the corridor. The local thickness in plan does show it: a limb is an area that fits no disc of
+//! twice its own width, and it is a room if it is at least two of its widths long. An alcove is
+//! shorter. A bend or a crossing of corridors of equal width has no space for the larger disc, so
+//! corridors that meet are one limb.
 //!
-//! What two floods share in the dead middle of a corridor is joined again. Doors are not: they are
+//! Floods that meet in the middle of a corridor are joined again. Doors are not: they are
 //! narrower than the corridor.
 //!
-//! What begins and ends in the same room (beside a column, a counter or a partition that stands free)
+//! A limb that begins and ends in the same room (beside a column, a counter or a free-standing partition)
 //! is part of that room.
 //!
-//! The plan of a region is its largest layer of voxels, and a limb takes all that is above and below.
-//! Cost: a distance transform of the plan for each width that is tried.
+//! The plan of a region is its largest layer of voxels; a limb includes everything above and below.
+//! Cost: a distance transform of the plan for each width tried.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -29,15 +29,15 @@ use super::regions::Regions;
 use super::sections::section_ratio;
 use crate::structure::{MergeSettings, OUTDOORS};
 
-/// A limb opens to what is at least this many times as thick: its section is at most half of that.
+/// A limb opens to areas at least this many times as thick: its section is at most half of theirs.
 const THICKER: f64 = 2.0;
 /// … and is at least this many of its widths long.
 const LONG: f64 = 2.0;
-/// From one width that is tried to the next.
+/// Factor from one width tried to the next.
 const STEP: f64 = 1.15;
 
-/// Makes rooms of the limbs of rooms, of what `flooded` was before it is cut. Half-widths from
-/// `settings.min_radius` on count; `shut` is what door leaves and panes fill.
+/// Splits limbs off their rooms, in the labels of a flooded volume. Half-widths count from
+/// `settings.min_radius` on; `shut` are the voxels that door leaves and panes fill.
 pub(crate) fn split_limbs(
     grid: &Grid,
     labels: &mut Labels,
@@ -49,7 +49,7 @@ pub(crate) fn split_limbs(
 ) {
     let least = settings.min_radius / grid.voxel;
     let mut limbs: Vec<(u32, usize, Vec<[usize; 2]>)> = Vec::new();
-    // Greatest half-width of each region, in plan. [Units: vx]
+    // Largest half-width of each region, in plan. [Units: vx]
     let mut thickness: BTreeMap<u32, f64> = BTreeMap::new();
     let n = regions.region_of_basin.len();
     for (region, plan) in plans(grid, labels, regions) {
@@ -68,7 +68,7 @@ pub(crate) fn split_limbs(
     labels.make_room_for(n + limbs.len());
     for (k, (region, row, columns)) in limbs.into_iter().enumerate() {
         let of = |labels: &Labels, i: usize| {
-            // Basins from `n` on are limbs that were cut off before.
+            // Basins from `n` on are limbs that were split off before.
             let basin = labels.get(i) as usize;
             basin < n && regions.region_of_basin[basin] == region
         };
@@ -101,7 +101,7 @@ pub(crate) fn split_limbs(
 
 type Contacts = BTreeMap<(u32, u32), Vec<u64>>;
 
-/// The faces between regions, given those between basins.
+/// Returns the faces between regions, given those between basins.
 fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
     let mut contacts = Contacts::new();
     for (&(a, b), faces) in by_basin {
@@ -115,9 +115,9 @@ fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
     contacts
 }
 
-/// Joins limbs (from label `first` on) with what they open to over their whole width and what is not
-/// so much thicker as to be a room for them: the halves of a corridor in whose dead middle two floods
-/// met, the arms of a crossing. Returns whether there was any.
+/// Joins limbs (from label `first` on) with neighbors that they open to over their whole width and that are not
+/// thick enough to be a room beside them: the halves of a corridor in whose middle two floods
+/// met, the arms of a crossing. Returns `true` if there were any.
 fn join_limbs(
     flooded: Flooded<'_>,
     regions: &mut Regions,
@@ -159,7 +159,7 @@ struct Plan {
     row: usize,
     /// Column of the first cell.
     first: [usize; 2],
-    /// Cells along x and z, with a rim of cells that are not the region's.
+    /// Number of cells along x and z, with a rim of cells outside the region.
     side: [usize; 2],
     is_free: Vec<bool>,
 }
@@ -171,11 +171,11 @@ struct Limb {
     half_width: f64,
 }
 
-/// Where one layer of a region lies.
+/// Position of one layer of a region.
 #[derive(Clone, Copy)]
 struct Layer {
     n_voxels: usize,
-    /// Least and greatest column.
+    /// Lowest and highest column.
     columns: [[usize; 2]; 2],
 }
 
@@ -185,7 +185,7 @@ impl Layer {
         columns: [[usize::MAX; 2], [0; 2]],
     };
 
-    /// With the voxels `along` x of the row at `z`.
+    /// Includes the voxels `along` x of the row at `z`.
     fn add(&mut self, along: Range<usize>, z: usize) {
         let [least, greatest] = &mut self.columns;
         *least = [least[0].min(along.start), least[1].min(z)];
@@ -194,7 +194,7 @@ impl Layer {
     }
 }
 
-/// The plan of each region but the outdoors.
+/// Returns the plan of each region except the outdoors.
 fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
     let [nx, ny, _] = grid.dims;
     let mut layers: BTreeMap<u32, Vec<Layer>> = BTreeMap::new();
@@ -222,7 +222,7 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
 }
 
 impl Plan {
-    /// Of the columns from the least to the greatest, those that are free.
+    /// Makes the plan of the free columns from the lowest to the highest.
     fn of(
         row: usize,
         [least, greatest]: [[usize; 2]; 2],
@@ -248,7 +248,7 @@ impl Plan {
         [x + self.first[0] - 1, z + self.first[1] - 1]
     }
 
-    /// The greatest half-width, and the limbs whose half-width is at least `least`, narrow ones first.
+    /// Returns the largest half-width, and the limbs whose half-width is at least `least`, narrow ones first.
     /// [Units: vx]
     fn limbs(&self, least: f64, allowance: &Allowance) -> (f64, Vec<Limb>) {
         let to_wall = self.distance_to(|c| !self.is_free[c]);
@@ -258,7 +258,7 @@ impl Plan {
         let mut rest = self.is_free.clone();
         let mut out = Vec::new();
         let mut half_width = least;
-        // Each width asks all cells for distances and parts.
+        // Each width computes distances and components over all cells.
         let work = 1 + self.is_free.len() as u64;
         while THICKER * half_width <= thickest && allowance.spend(work) {
             let reach = THICKER * half_width;
@@ -290,7 +290,7 @@ impl Plan {
         (thickest, out)
     }
 
-    /// Length of what the thicker parts `core` leave over: from mouth to mouth, or to its end. 0 where
+    /// Returns the length of an area between the thicker parts `core`: from mouth to mouth, or to its end. 0 if
     /// it has no mouth, or more than one to the same part.
     fn length(&self, cells: &[usize], core: &[u32]) -> f64 {
         let mut steps: BTreeMap<usize, u32> = cells.iter().map(|&c| (c, u32::MAX)).collect();
@@ -305,15 +305,15 @@ impl Plan {
         }
         let mut is_mouth = vec![false; self.is_free.len()];
         front.iter().for_each(|&c| is_mouth[c] = true);
-        // Mouths are wider than a step: corners that touch by an edge are one mouth.
+        // Mouths are wider than a step: diagonal and edge neighbors form one mouth.
         let n_mouths = self.count_patches(&front, &is_mouth);
         opens_to.sort_unstable();
         opens_to.dedup();
         if n_mouths == 0 || n_mouths > opens_to.len() {
             return 0.0;
         }
-        // By edges and by edges or corners in turn: right along the axes, short by a tenth at most
-        // elsewhere, and never too long, so that the corner of a room is no limb whatever its angle.
+        // Alternates steps by edges only and steps with diagonals: exact along the axes, short by a tenth at most
+        // elsewhere, and never too long, so that an acute end of a room is never a limb.
         let mut far = 0;
         while !front.is_empty() {
             let mut next = Vec::new();
@@ -331,11 +331,11 @@ impl Plan {
             far += u32::from(!next.is_empty());
             front = next;
         }
-        // Between mouths the farthest cell is half way.
+        // Between two mouths the farthest cell is half way.
         f64::from(far + 1) * if n_mouths > 1 { 2.0 } else { 1.0 }
     }
 
-    /// How many patches cells make that touch by edges or corners.
+    /// Returns the number of patches of cells, connected by edges or diagonals.
     fn count_patches(&self, cells: &[usize], is_in: &[bool]) -> usize {
         let mut left = is_in.to_vec();
         let mut n = 0;
@@ -356,7 +356,7 @@ impl Plan {
         n
     }
 
-    /// The neighbors of a cell that is not on the rim: four by edges, then four by corners.
+    /// Returns the neighbors of a cell that is not on the rim: four by edges, then four diagonal.
     fn neighbors(&self, c: usize) -> [usize; 8] {
         let (up, down) = (c + self.side[0], c - self.side[0]);
         let beside = [c - 1, c + 1, down, up];
@@ -367,12 +367,12 @@ impl Plan {
         out
     }
 
-    /// The four neighbors by edges of a cell that is not on the rim.
+    /// Returns the four neighbors by edges of a cell that is not on the rim.
     fn around(&self, c: usize) -> impl Iterator<Item = usize> + use<> {
         self.neighbors(c).into_iter().take(4)
     }
 
-    /// Parts that hang together by edges: the number of each cell's part from 1 on, and their cells.
+    /// Returns the components connected by edges: the number of each cell's component from 1 on, and their cells.
     fn components(&self, is_in: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<Vec<usize>>) {
         let mut part = vec![0_u32; self.is_free.len()];
         let mut parts = Vec::new();
@@ -398,7 +398,7 @@ impl Plan {
         (part, parts)
     }
 
-    /// Distance of each cell to the nearest for which `is_there` holds. [Units: vx]
+    /// Returns the distance of each cell to the nearest for which `is_there` holds. [Units: vx]
     fn distance_to(&self, is_there: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
         let [nx, nz] = self.side;
         distance(&BitVolume::from_fn([nx, 1, nz], is_there))
@@ -409,7 +409,7 @@ impl Plan {
 mod tests {
     use super::*;
 
-    /// A plan of boxes, low and one past the high corner; 10 cells to the meter.
+    /// Makes a plan of boxes, given as minimum and maximum (exclusive); 10 cells to the meter.
     fn plan(boxes: &[[usize; 4]]) -> Plan {
         let side = [400, 200];
         let mut is_free = vec![false; side[0] * side[1]];
@@ -426,7 +426,7 @@ mod tests {
         }
     }
 
-    /// Least and greatest x of each limb.
+    /// Lowest and highest x of each limb.
     fn spans(plan: &Plan) -> Vec<[usize; 2]> {
         let (_, limbs) = plan.limbs(3.0, &Allowance::default());
         let span = |l: &Limb| {

@@ -1,8 +1,8 @@
 //! The watershed builder: rooms and openings found in a voxel volume.
 //!
-//! Haumont, Debeir & Sillion, "Volumetric Cell-and-Portal Generation" (2003), with three
-//! departures: distances are exact instead of chamfered, over-segmentation is cured by merging
-//! (`regions`), and what comes out are not portals but candidates in the real opening, which the cell
+//! After Haumont, Debeir & Sillion, "Volumetric Cell-and-Portal Generation" (2003), with three
+//! departures: distances are exact instead of chamfered, merging cures over-segmentation
+//! (`regions`), and the results are not portals but candidates in the real opening, which the cell
 //! complex then realizes exactly.
 //!
 //! Read `propose.rs` first: it calls the steps in order.

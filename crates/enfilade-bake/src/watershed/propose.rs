@@ -1,4 +1,4 @@
-//! The flow of the watershed builder: structure → voxels → basins → rooms → candidate portals and votes.
+//! The stages of the watershed builder: structure → voxels → basins → rooms → candidate portals and votes.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,7 @@ use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 /// Time is linear in voxels and about linear in triangles; memory about 3 bytes a voxel plus the scene.
 ///
 /// # Errors
-/// When a setting is out of limits, the scene is too large for the budget of voxels, or the caller cancels.
+/// If a setting is invalid, the scene is too large for the voxel budget, or the caller cancels.
 pub(crate) fn propose(
     structure: &Structure<'_>,
     config: &BakeConfig,
@@ -106,7 +106,7 @@ pub(crate) fn propose(
         voids = shallow_voids(&structure.walls, &structure.bvh, &region_at, allowance);
     }
     drop(labels);
-    // From here on all is where the scene has it.
+    // From here on, everything is in scene coordinates.
     let frame = &structure.frame;
     for candidate in &mut candidates {
         candidate.winding = frame.winding_to_scene(&candidate.winding);
@@ -129,7 +129,7 @@ pub(crate) fn propose(
     })
 }
 
-/// Counts for the file: of the grid, and of what was found in it.
+/// Returns counts for the file: of the grid, and of its contents.
 fn counts_of(
     grid: &Grid,
     frame: &Frame,
@@ -152,20 +152,20 @@ fn resolution_of(grid: &Grid) -> Resolution {
     }
 }
 
-/// The region of a point, 0 where there is none.
+/// Returns the region of a point, 0 if there is none.
 fn region_at(grid: &Grid, labels: &Labels, regions: &Regions, p: DVec3) -> u32 {
     grid.voxel_at(p).map_or(0, |[x, y, z]| {
         regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
     })
 }
 
-/// Voxels that are no air, or closed for the flood.
+/// Voxels that are not air, or are closed to the flood.
 struct Solid {
     occupied: BitVolume,
-    /// Those that door leaves and panes fill.
+    /// Voxels that door leaves and panes fill.
     closures: BitVolume,
     lids: Lids,
-    /// Closures, lids, caps of open tubes, and walls that are missing.
+    /// Closures, lids, caps of open tubes, and missing wall triangles.
     shut: BitVolume,
 }
 
@@ -174,7 +174,7 @@ impl Solid {
         let allowance = structure.allowance;
         let occupied = voxelize(grid, &structure.walls, allowance);
         let closures = voxelize(grid, &structure.blockers(&structure.bvh), allowance);
-        // Where a building has no roof or floor or a tube just ends, a lid or a cap takes its place.
+        // Lids and caps replace missing roofs, floors and ends of tubes.
         let lids = find_lids(grid, &occupied, allowance);
         let mut caps = rim_caps(&structure.rims, config.min_opening.powi(2));
         caps.extend(structure.missing(config));
@@ -191,8 +191,8 @@ impl Solid {
         }
     }
 
-    /// How far voxels of air are from a surface, squared, and those that are outdoors and so far that it does not matter.
-    /// Door leaves count as surfaces here.
+    /// Returns the squared distance of air voxels to the nearest surface, and the outdoor voxels so far away that
+    /// theirs do not matter. Door leaves count as surfaces here.
     fn distances(&self, allowance: &Allowance) -> (Vec<u16>, BitVolume) {
         let mut blocked = self.occupied.clone();
         blocked.union_with(&self.shut);
@@ -201,17 +201,17 @@ impl Solid {
     }
 }
 
-/// What the flood found.
+/// The basins of the flood.
 struct Basins {
     labels: Labels,
-    /// Greatest distance in each basin, by label. [Units: vx]
+    /// Largest distance in each basin, by label. [Units: vx]
     peaks: Vec<f32>,
     saddles: BTreeMap<(u32, u32), f32>,
     n_basins: usize,
 }
 
 impl Basins {
-    /// Air that is `far` from everything is known to be outdoors.
+    /// Floods the air. Air that is `far` from everything is known to be outdoors.
     fn flood(
         grid: &Grid,
         distances: Vec<u16>,
@@ -219,7 +219,7 @@ impl Basins {
         config: &BakeConfig,
         allowance: &Allowance,
     ) -> Self {
-        let mut outdoors = border(grid.dims); // which the padding keeps empty
+        let mut outdoors = border(grid.dims); // the padding keeps it empty
         outdoors.union_with(far);
         let options = WatershedOptions {
             h: config.noise / grid.voxel,
@@ -236,7 +236,7 @@ impl Basins {
         }
     }
 
-    /// Gives the air that closures fill to the basins beside it.
+    /// Gives the air inside closures to the basins beside it.
     fn refill(&mut self, grid: &Grid, occupied: &BitVolume) {
         flood_closures(grid.dims, &mut self.labels, occupied);
     }

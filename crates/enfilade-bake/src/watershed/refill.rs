@@ -1,8 +1,8 @@
-//! Voxels that only door leaves and panes fill: walls to the flood, but air.
+//! Labels voxels that only door leaves and panes fill: walls to the flood, but air.
 
 use crate::voxel::{BitVolume, Labels};
 
-/// Labels the voxels that only closures fill: they were walls to the flood but are air. The basins
+/// Labels the voxels that only closures fill: walls to the flood, but air. The basins
 /// on both sides grow into them at the same pace and meet in the middle of the leaf or pane.
 pub(crate) fn flood_closures(dims: [usize; 3], labels: &mut Labels, occupied: &BitVolume) {
     match labels {

@@ -1,24 +1,24 @@
-//! From basins to rooms: over-segmentation cured by merging across openings that are no pinch.
+//! From basins to rooms: merging across openings that are not a pinch cures over-segmentation.
 //!
 //! The flood (Haumont et al. 2003, §4.2) cuts a scene into far more basins than it has rooms (§6).
-//! Two basins belong to one room when the opening between them is hardly narrower than what lies on
-//! either side of it. That is measured as the smaller of two ratios, neither of which has a scale:
+//! Two basins belong to one room if the opening between them is hardly narrower than the space on
+//! either side of it. The measure is the smaller of two ratios, both scale-free:
 //!
 //! * *section ratio*: area of the opening ÷ the smaller of the two cells' largest cross-sections
-//!   parallel to it, looked for close to the opening (a room that is large elsewhere must not make
-//!   its own alcove look like another room, nor swallow its neighbors one by one);
+//!   parallel to it, measured close to the opening (a room that is large elsewhere must neither turn
+//!   its own alcove into another room, nor swallow its neighbors one by one);
 //! * *radius ratio*: saddle radius ÷ the smaller of the two peak radii.
 //!
-//! Pairs are merged least pinched first, and weighed again as cells grow. An opening that a door
-//! leaf or a pane fills is never merged across, whatever its shape: that is what tells a closet as
-//! deep as its door is wide from an alcove.
+//! Pairs are merged least pinched first, and weighed again as cells grow. No merge crosses an opening
+//! that a door leaf or a pane fills, whatever its shape: this separates a closet as deep as its door is
+//! wide from an alcove.
 //!
 //! The opening's area is the length of the *vector area* of the faces between the two cells. It
-//! depends on the rim alone, not on how the flood's front bulges or on how the building is turned
+//! depends on the rim alone, not on bulges of the flood's front or on the building's rotation
 //! in the grid.
 //!
-//! Cost: one evaluation looks at a few ten thousand lattice points around an opening; their number
-//! grows with the basins, that is with the building. Errs towards too many cells.
+//! Cost: one evaluation visits a few tens of thousands of lattice points around an opening; the number of evaluations
+//! grows with the basins, and so with the building. Errs towards too many cells.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,12 +35,12 @@ use crate::structure::{MergeSettings, Mergeable, OUTDOORS, Opening, Pair, join_r
 pub(crate) struct Regions {
     /// Room label of each basin label (index 0: solid). [`OUTDOORS`] stays itself.
     pub(crate) region_of_basin: Vec<u32>,
-    /// Faces between each pair of regions (lesser label first).
+    /// Faces between each pair of regions (lower label first).
     pub(crate) contacts: BTreeMap<(u32, u32), Faces>,
 }
 
 /// Merges the basins of `flooded` into rooms. `saddles` holds the saddle distance of each pair of
-/// touching basins, lesser label first. [Units: vx]
+/// touching basins, lower label first. [Units: vx]
 #[must_use]
 pub(crate) fn merge_basins(
     flooded: Flooded<'_>,
@@ -65,8 +65,8 @@ pub(crate) fn merge_basins(
         merger.neighbors[a as usize].insert(b);
         merger.neighbors[b as usize].insert(a);
     }
-    // What lies under a wide hole in a slab is a room only together with what surrounds it: each
-    // storey is put together first, and only then are openings between storeys weighed.
+    // Space under a wide hole in a slab is a room only together with its surroundings: so each
+    // storey is merged first, and only then are openings between storeys weighed.
     for storeys_apart in [true, false] {
         merger.storeys_apart = storeys_apart;
         join_rooms(&mut merger);
@@ -76,24 +76,24 @@ pub(crate) fn merge_basins(
     merger.finish()
 }
 
-/// What weighing an opening costs, in units of [`Allowance`](enfilade_geom::Allowance), besides its faces and the sections
+/// Cost of weighing an opening, in units of [`Allowance`](enfilade_geom::Allowance), besides its faces and the sections
 /// beside it.
 const WORK: u64 = 100;
 
 struct BasinMerger<'a> {
     flooded: Flooded<'a>,
     settings: &'a MergeSettings,
-    /// The cell of each basin: one of its basins.
+    /// The cell of each basin, named by one of its basins.
     cell: Vec<u32>,
-    /// The basins of each cell, at that one.
+    /// The basins of each cell, at the index of the basin that names it.
     basins: Vec<Vec<u32>>,
     peak: Vec<f32>,
-    /// Grows when a cell does, so that a stale candidate is known by its age.
+    /// Grows with the cell, so that stale queue entries are recognized by their age.
     version: Vec<u32>,
     neighbors: Vec<BTreeSet<u32>>,
     contacts: BTreeMap<(u32, u32), Faces>,
     saddles: BTreeMap<(u32, u32), f32>,
-    /// Whether openings that lie in a slab count as shut for now.
+    /// Treats openings that lie in a slab as shut for now.
     storeys_apart: bool,
 }
 
@@ -107,7 +107,7 @@ impl BasinMerger<'_> {
                 .any(|h| (h - opening.center.y).abs() < 0.2)
     }
 
-    /// Joins cells too narrow to be a room to the neighbor they share the largest open front with.
+    /// Joins cells too narrow to be a room to the neighbor with which they share the largest open front.
     fn absorb_crevices(&mut self) {
         // A voxel center next to a wall is already one voxel away from it.
         let limit = self.settings.min_radius / self.flooded.grid.voxel + 0.5;
@@ -124,7 +124,7 @@ impl BasinMerger<'_> {
             if self.cell[c as usize] != c || !self.flooded.allowance.spend(1 + n_neighbors) {
                 continue;
             }
-            // What only closures shut off (the space under a table top) is no room either.
+            // Space that only closures shut off (under a table top) is not a room either.
             let open_faces = |n: u32| {
                 let faces = &self.contacts[&(c.min(n), c.max(n))];
                 (self.open_faces(faces).count(), faces.len())
@@ -139,10 +139,10 @@ impl BasinMerger<'_> {
         }
     }
 
-    /// Joins cells whose sides are hardly walled to the neighbor that they open to most, least walled first: bays between
-    /// the columns of a hall.
+    /// Joins cells whose sides are hardly walled to the neighbor that they open to most, least walled first: bays
+    /// between the columns of a hall.
     ///
-    /// One look at all voxels, and one at all pairs for each cell so joined.
+    /// One pass over all voxels, and one over all pairs for each cell so joined.
     fn absorb_bays(&mut self) {
         let mut sides = self.side_faces();
         let is_upright = |f: &&u64| **f % 4 != 1;
@@ -154,7 +154,7 @@ impl BasinMerger<'_> {
         for &pair in self.contacts.keys() {
             open.insert(pair, n_open(self, pair));
         }
-        // Each round asks all pairs from both sides.
+        // Each round visits all pairs from both sides.
         while self.flooded.allowance.spend(2 * self.contacts.len() as u64) {
             let bays = (OUTDOORS + 1..self.cell.len() as u32).filter_map(|c| {
                 let neighbors = self.neighbors[c as usize].iter();
@@ -173,7 +173,7 @@ impl BasinMerger<'_> {
             };
             let pair = (bay.min(home), bay.max(home));
             let shared = self.contacts[&pair].iter().filter(is_upright).count();
-            // The sides of the outdoors are not counted, nor asked for.
+            // The sides of the outdoors are not counted, and not needed.
             let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared);
             self.join(pair);
             let whole = self.cell[bay as usize];
@@ -185,7 +185,7 @@ impl BasinMerger<'_> {
         }
     }
 
-    /// The faces that no door leaf or pane fills.
+    /// Returns the faces that no door leaf or pane fills.
     fn open_faces<'a>(&'a self, faces: &'a [u64]) -> impl Iterator<Item = &'a u64> {
         let Flooded {
             grid,
@@ -199,7 +199,7 @@ impl BasinMerger<'_> {
             .filter(move |&&f| !closures.is_some_and(|bits| is_in(grid, bits, f)))
     }
 
-    /// Number of upright faces around each cell.
+    /// Returns the number of upright faces around each cell.
     fn side_faces(&self) -> Vec<usize> {
         let [nx, ny, nz] = self.flooded.grid.dims;
         let labels = self.flooded.labels;
@@ -273,7 +273,7 @@ impl Mergeable for BasinMerger<'_> {
             return 0.0;
         };
         let smaller_peak = self.peak[a as usize].min(self.peak[b as usize]);
-        // Pairs made by a cut have no saddle: their radii say nothing, the sections decide.
+        // Pairs made by a cut have no saddle: the radius ratio is unknown, so the sections decide.
         let saddle = self.saddles.get(&(a, b)).copied().unwrap_or(f32::INFINITY);
         let radius = self.settings.radius_gain * f64::from(saddle / smaller_peak.max(1e-6));
         let low = radius
@@ -309,7 +309,7 @@ impl Mergeable for BasinMerger<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// The one with more neighbors survives, except that outdoors always does.
+    /// The cell with more neighbors survives, except that outdoors always does.
     fn join(&mut self, (a, b): Pair) -> Vec<Pair> {
         let pair = (a.min(b), a.max(b));
         let n = |c: u32| self.neighbors[c as usize].len();

@@ -1,8 +1,8 @@
-//! Caps: what closes a tube, a cave or a shell that ends in an open rim.
+//! Caps: surfaces that close a tube, a cave or a shell that ends in an open rim.
 //!
 //! A scanned cave, a vessel or a room without its ceiling is one sheet of triangles that just ends. No
-//! pinch tells the flood where: inside and outdoors flow together through a mouth as wide as the tube.
-//! But the rim itself tells: a closed loop of edges that only one triangle uses, about planar, with
+//! pinch shows the flood where: inside and outdoors flow together through a mouth as wide as the tube.
+//! But the rim itself does: a closed loop of edges with a single triangle, about planar, with
 //! the surface leaving its plane to one side all around. Such a mouth is capped for the flood (see
 //! `closures`), and becomes an open portal. The rim of a flat sheet, a hill or a window in a thin wall
 //! lies *in* the surface and gets no cap.
@@ -13,16 +13,16 @@ use enfilade_geom::{DVec3, Triangle};
 
 use crate::structure::{RimVertex, Rims};
 
-/// A rim strays from its plane by at most this share of the square root of its area.
+/// Largest distance of a rim from its plane, as a share of the square root of its area.
 const MAX_STRAY: f64 = 0.15;
-/// Perimeter² ÷ area of the longest slit that counts; a circle has 4π, a square 16.
+/// Largest perimeter² ÷ area of a slit; a circle has 4π, a square 16.
 const MAX_SLIT: f64 = 40.0;
-/// The surface leaves the rim's plane at more than about 30 degrees …
+/// Least sine of the angle between the surface and the rim's plane, about 30 degrees,
 const MIN_SLOPE: f64 = 0.5;
 /// … to the same side, along this share of the rim.
 const MIN_SHARE: f64 = 0.8;
 
-/// Triangles that cap the open rims of at least `min_area` wu². The order of the input has no say.
+/// Returns triangles that cap the open rims of at least `min_area` wu². Independent of the order of the input.
 #[must_use]
 pub(crate) fn rim_caps(rims: &Rims, min_area: f64) -> Vec<Triangle> {
     let mut caps = Vec::new();
@@ -35,7 +35,7 @@ pub(crate) fn rim_caps(rims: &Rims, min_area: f64) -> Vec<Triangle> {
     caps
 }
 
-/// The middle of a rim that is the mouth of something.
+/// Returns the middle of a rim that is a mouth.
 fn mouth_of(rim: &[RimVertex], min_area: f64) -> Option<DVec3> {
     let n = rim.len();
     let center = rim.iter().map(|c| c.0).sum::<DVec3>() / n as f64;
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use enfilade_geom::Aabb;
 
-    /// A tube of `n` sides along z, from 0 to `length`, cone-shaped with these two radii.
+    /// A tube of `n` sides along z, from 0 to `length`, conical with these two radii.
     fn tube(n: usize, length: f64, radii: [f64; 2]) -> Vec<Triangle> {
         let p = |i: usize, k: usize| {
             let a = std::f64::consts::TAU * (i % n) as f64 / n as f64;

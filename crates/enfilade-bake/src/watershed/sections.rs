@@ -1,4 +1,4 @@
-//! Cross-sections beside an opening: how much of what lies on either side of it an opening leaves
+//! Cross-sections beside an opening: the share of the space on either side that an opening leaves
 //! open.
 
 use enfilade_geom::DVec3;
@@ -8,19 +8,19 @@ use super::fronts::{Front, face_center};
 use crate::structure::{MergeSettings, OUTDOORS, Opening, connected_count, rim_share};
 use crate::voxel::{Grid, Labels};
 
-/// Share of a front that leaves must hold for it to stand between them.
+/// Least share of a front that leaves hold if it stands between them.
 const LEAVES: f64 = 0.2;
-/// An opening lies elsewhere than the front of the flood where it is narrower by this.
+/// An opening lies away from the flood's front if it is narrower there by this factor.
 const PINCHED: f64 = 0.9;
 
-/// Steps of the lattice around an opening's rim within which most pinches show: a look at all that is counted costs ten
+/// Lattice steps around an opening's rim within which most pinches show: a pass over the full surround costs ten
 /// times as much around a small opening.
 const CLOSE: f64 = 3.0;
 
-/// Area of the opening of `front`, between the cells of `pair`, ÷ the smaller of their largest cross-sections
-/// beside it; and the share of its rim that is wall. `cell_of` tells the cell of a basin.
+/// Returns the area of the opening of `front`, between the cells of `pair`, ÷ the smaller of their largest
+/// cross-sections beside it; and the share of its rim that is wall. `cell_of` returns the cell of a basin.
 ///
-/// Below the threshold of `settings` the ratio is that of the first sections found to be large enough for that.
+/// Below the threshold of `settings`, the ratio uses the first sections found to be large enough.
 pub(super) fn section_ratio(
     flooded: Flooded<'_>,
     settings: &MergeSettings,
@@ -29,7 +29,7 @@ pub(super) fn section_ratio(
     cell_of: &(impl Fn(u32) -> u32 + Sync),
 ) -> (f64, f64) {
     let step = lattice_step(flooded.grid);
-    // Of the same lattice: a section that is large enough there is no smaller in all of it.
+    // The same lattice: a section that is large enough there is no smaller in the full surround.
     let rest = ((settings.surround / step).floor() - CLOSE).max(0.0);
     if rest > 0.0 && front.opening.closed < LEAVES {
         let close = settings.surround - rest * step;
@@ -45,9 +45,9 @@ pub(super) fn section_ratio(
     }
 }
 
-/// How large the sections beside an opening are.
+/// Sizes of the sections beside an opening.
 enum Sections {
-    /// So large that the opening is a pinch, whatever more there is: its area ÷ the section.
+    /// So large that the opening is a pinch in any case: its area ÷ the section.
     Pinch(f64),
     /// Its area ÷ the smaller of the largest, and the share of its rim that is wall.
     All { ratio: f64, wall: f64 },
@@ -62,8 +62,8 @@ fn sections(
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
 
-    // The front of a flood may stand past the doorway, between the leaves of an open door, say: the
-    // opening is where what both have is narrowest.
+    // The flood's front may stand beyond the doorway, between the leaves of an open door, say: the
+    // opening is where the two cells together are narrowest.
     let (mut n_open, mut at) = (opening.area / unit, 0);
     if opening.closed >= LEAVES {
         let (mut inside, mut stack) = (vec![false; slices.seeds.len()], Vec::new());
@@ -76,7 +76,7 @@ fn sections(
         }
     }
 
-    // Once both are this large, the opening is a pinch whatever else there is.
+    // Once both are this large, the opening is a pinch in any case.
     let enough = n_open / settings.threshold;
     let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
     // From the opening outward, as far sections are the large ones.
@@ -106,19 +106,19 @@ fn sections(
 /// Slices with fewer points than this are visited on one thread.
 const ALONE: usize = 500;
 
-/// The smaller of the largest sections of two cells, the first of them `a`. The outdoors has no end.
+/// Returns the smaller of the largest sections of two cells, the first of them `a`. The outdoors is unlimited.
 fn smaller([before, after]: &[Side; 2], a: u32) -> usize {
     let [of_a, of_b] = [0, 1].map(|c| before.largest[c].max(after.largest[c]));
     if a == OUTDOORS { of_b } else { of_a.min(of_b) }
 }
 
-/// What is found on one side of an opening.
+/// The sections on one side of an opening.
 struct Side {
-    /// Points of the largest section of either cell.
+    /// Number of points of the largest section of either cell.
     largest: [usize; 2],
-    /// Points that the section of the cell on this side has in any slice.
+    /// Points that the section of the cell on this side contains in any slice.
     beside: Vec<bool>,
-    /// Room for one slice.
+    /// Buffers for one slice.
     inside: [Vec<bool>; 2],
     stack: Vec<usize>,
 }
@@ -134,7 +134,7 @@ impl Side {
         }
     }
 
-    /// Looks at the slice `s` steps along the normal; the cell `own` of the two is the one on this side.
+    /// Measures the slice `s` steps along the normal; the cell `own` of the two is the one on this side.
     fn look(
         &mut self,
         slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>,
@@ -155,7 +155,7 @@ impl Side {
     }
 }
 
-/// Between points of a lattice, and between slices. [Units: wu]
+/// Returns the distance between lattice points, and between slices. [Units: wu]
 fn lattice_step(grid: &Grid) -> f64 {
     grid.voxel.max(0.1)
 }
@@ -164,13 +164,13 @@ fn lattice_step(grid: &Grid) -> f64 {
 struct Slices<'a, F> {
     flooded: Flooded<'a>,
     cell_of: &'a F,
-    /// Between points, and between slices. [Units: wu]
+    /// Distance between points, and between slices. [Units: wu]
     step: f64,
-    /// First point of the slice in the opening, then to the next along the rows, the columns, and to
+    /// First point of the slice in the opening, then the steps along the rows, the columns, and to
     /// the next slice. [Units: vx]
     base: DVec3,
     along: [DVec3; 3],
-    /// Points along both sides.
+    /// Number of points along both sides.
     side: [usize; 2],
     /// Points that lie in the opening.
     seeds: Vec<bool>,
@@ -215,7 +215,7 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
 
     /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
     ///
-    /// Once the allowance is over, none.
+    /// Visits none once the allowance is used up.
     fn visit(&self, s: i64, point: impl FnMut(usize, u32)) {
         if !self
             .flooded
@@ -243,13 +243,13 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             labels[grid.index(x, y, z)].into()
         };
         let [du, dv, dn] = self.along;
-        // In voxels, so that a lattice point costs an addition and a look-up.
+        // In voxel coordinates, so that a lattice point costs an addition and a look-up.
         let base = self.base + dn * s as f64;
         let mut last = (0, 0);
         for j in 0..self.side[1] {
             let row = base + dv * j as f64;
             let at = |i: usize| row + du * i as f64;
-            // What lies between two points of a box lies in it.
+            // A segment between two points of a box lies in it.
             let all_in = is_in(at(0)) && is_in(at(self.side[0] - 1));
             for i in 0..self.side[0] {
                 let p = at(i);

@@ -1,9 +1,9 @@
 //! Cuts at slabs: where a storey ends although the distance field shows no pinch.
 //!
-//! A stair hole, and more so the open side of a gallery, is as wide as the rooms are high: one basin
+//! A stair hole, and even more the open side of a gallery, is as wide as the rooms are high: one basin
 //! forms across the slab, and no merging can undo that. But an opening lies *in a wall* (or a slab):
 //! Lefebvre & Hornus 2003 find their separators by extending the model's own planes. So basins are
-//! cut, before merging, along the planes of large level surfaces. Merging is the judge: where a cut
+//! cut, before merging, along the planes of large level surfaces. Merging is the judge: if a cut
 //! goes through the middle of a tall room, the opening is as large as the room, and both halves
 //! become one again.
 //!
@@ -14,11 +14,11 @@ use rayon::prelude::*;
 use crate::structure::OUTDOORS;
 use crate::voxel::{Grid, Labels};
 
-/// A part of a basin smaller than this is not worth a cut. [Units: wu³]
+/// Least volume of a part of a basin that is worth a cut. [Units: wu³]
 const MIN_VOLUME: f64 = 0.3;
 
 /// Gives the parts of each basin above and below the `heights` labels of their own. Returns the
-/// basin that each new label was cut from; new labels follow the `n_labels` that there are.
+/// basin that each new label was cut from; new labels follow the existing `n_labels`.
 pub(crate) fn cut_at_slabs(
     grid: &Grid,
     labels: &mut Labels,
@@ -74,7 +74,7 @@ pub(crate) fn cut_at_slabs(
     parents
 }
 
-/// Voxels of each basin in each storey, `[basin][storey]`; outdoors is left out.
+/// Counts the voxels of each basin in each storey, `[basin][storey]`, without the outdoors.
 fn count_by_storey<T: Copy + Into<u32> + Sync>(
     dims: [usize; 3],
     labels: &[T],
@@ -96,7 +96,7 @@ fn count_by_storey<T: Copy + Into<u32> + Sync>(
     count
 }
 
-/// Replaces every label but solid and outdoors, given the label and the row (y).
+/// Replaces every label except solid and outdoors, given the label and the row (y).
 fn relabel<T: Copy + Into<u32> + Send>(
     dims: [usize; 3],
     labels: &mut [T],

@@ -1,8 +1,8 @@
 //! Shallow voids: the air above a hung ceiling, below a raised floor.
 //!
 //! Nothing can get into them and no ball of a room's size fits, yet they are air between two front
-//! faces, not the inside of anything. They are part of the room whose ceiling they lie on. Voxels are
-//! too coarse for them, so they are found by rays: straight up from every surface that faces up, a
+//! faces, not the inside of anything. They belong to the room whose ceiling they lie on. Voxels are
+//! too coarse for them, so rays find them: straight up from every surface that faces up, a
 //! surface that faces down, close above.
 //!
 //! Cost: a ray for each 0.5 m² of level surface, and a walk down a few voxels.
@@ -12,20 +12,20 @@ use rayon::prelude::*;
 
 use crate::structure::count_backs;
 
-/// Voids are lower than this. [Units: wu] From there on they are rooms of their own.
+/// Voids are lower than this. [Units: wu] Higher ones are rooms of their own.
 const MAX_HEIGHT: f64 = 0.5;
-/// What lies between a void and its room is thinner than this. [Units: wu]
+/// Largest thickness between a void and its room. [Units: wu]
 const MAX_CEILING: f64 = 0.4;
-/// One sample for each piece of surface of this area. [Units: wu²]
+/// Surface area per sample. [Units: wu²]
 const SAMPLE_AREA: f64 = 0.5;
 /// Most samples on one triangle.
 const MAX_SAMPLES: usize = 64;
-/// What a sample costs, in units of [`Allowance`].
+/// Cost of a sample, in units of [`Allowance`].
 const WORK_A_SAMPLE: u64 = 10;
 
-/// Points in shallow voids, each with the region below its floor, in order of the triangles.
+/// Returns points in shallow voids, each with the region below its floor, in order of the triangles.
 ///
-/// `region_at` tells the region of a point, 0 where there is none.
+/// `region_at` returns the region of a point, 0 if there is none.
 #[must_use]
 pub(crate) fn shallow_voids(
     triangles: &[Triangle],
@@ -54,10 +54,10 @@ pub(crate) fn shallow_voids(
                 };
                 let hit = bvh.closest_hit(&ray, |_| false)?;
                 if !hit.front {
-                    return None; // the back of a face: we are inside something
+                    return None; // the back of a face: inside something
                 }
                 let middle = p + DVec3::Y * (hit.t * 0.5);
-                // Where solids overlap, one sees fronts up and down and backs to the sides.
+                // Where solids overlap, rays hit fronts up and down and backs to the sides.
                 if count_backs(bvh, &[middle], allowance).0 > 0.0 {
                     return None;
                 }
@@ -75,7 +75,7 @@ pub(crate) fn shallow_voids(
         .collect()
 }
 
-/// The `k`-th of `n` points spread over a triangle by the R2 sequence (Roberts 2018), folded.
+/// Returns the `k`-th of `n` points spread over a triangle by the R2 sequence (Roberts 2018), folded.
 fn sample(t: &Triangle, k: usize, n: usize) -> DVec3 {
     if n == 1 {
         return (t[0] + t[1] + t[2]) / 3.0;

@@ -1,4 +1,4 @@
-//! Votes: voxels that say which region a point belongs to.
+//! Votes: voxels that assign a region to a point.
 
 use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle};
 use rayon::prelude::*;
@@ -8,15 +8,15 @@ use crate::complex::Vote;
 use crate::structure::{Frame, bounds_of};
 use crate::voxel::{BitVolume, Grid, Labels, voxelize};
 
-/// At most about this many voxels vote.
+/// Approximate upper limit on the number of votes.
 const MAX_VOTES: usize = 1_000_000;
 /// Voxels this close to where two regions meet do not vote: a candidate may lie on either
 /// side of them. [Units: wu]
 const UNSURE: f64 = 0.35;
-/// What a ray costs, in units of [`Allowance`].
+/// Cost of a ray, in units of [`Allowance`].
 const WORK_A_RAY: u64 = 10;
 
-/// Votes as they are cast: as small as can be, for they are many, and the labels are still there.
+/// Compact votes: there are many, and the labels are still in memory.
 pub(super) struct Ballots {
     /// Voxels along each edge of a block.
     block: usize,
@@ -24,12 +24,12 @@ pub(super) struct Ballots {
     dims: [usize; 3],
     /// Region that each block votes for; 0 is none.
     region: Vec<u32>,
-    /// Which voxel of the block it is that votes: 17³ of them at most, with 2³² voxels in all.
+    /// Index within the block of the voxel that votes: 17³ of them at most, with 2³² voxels in all.
     voter: Vec<u16>,
 }
 
 impl Ballots {
-    /// One voxel of each block of `block`³ speaks for its region.
+    /// Casts votes: one voxel of each block of `block`³ votes for its region.
     pub(super) fn cast(
         grid: &Grid,
         labels: &Labels,
@@ -105,7 +105,7 @@ impl Ballots {
     pub(super) fn count(self, grid: &Grid, frame: &Frame) -> Vec<Vote> {
         let weight = (grid.voxel * self.block as f64).powi(3) as f32;
         let [nx, ny, _] = self.dims;
-        // One after the other into a list of the right size: in parallel they would be there twice.
+        // Sequential, into a list of the right size: a parallel version would hold them twice.
         let n = self.region.iter().filter(|&&region| region != 0).count();
         let mut votes = Vec::with_capacity(n);
         for (b, (label, k)) in self.region.into_iter().zip(self.voter).enumerate() {
@@ -124,13 +124,13 @@ impl Ballots {
     }
 }
 
-/// Voxel number `k` of a block, along x first.
+/// Returns the coordinates of voxel number `k` of a block, along x first.
 fn voter_at(of: [usize; 3], block: usize, k: usize) -> [usize; 3] {
     let within = [k % block, k / block % block, k / (block * block)];
     [0, 1, 2].map(|axis| of[axis] * block + within[axis])
 }
 
-/// Voxels that stairs fill: those that they touch, and those between where rays up and down meet back
+/// Returns the voxels that stairs fill: those that they touch, and those between where rays up and down hit back
 /// faces.
 pub(super) fn inside_of(
     stairs: &[Triangle],
