@@ -11,7 +11,6 @@ const STILL: &[&str] = &[
     "crates/enfilade-bake/",
     "crates/enfilade-bench/",
     "crates/enfilade-cli/",
-    "crates/enfilade-cpg/",
     "crates/enfilade-geom/src/allowance.rs",
     "crates/enfilade-import/",
     "crates/enfilade-render/",
